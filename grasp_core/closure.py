@@ -1,0 +1,182 @@
+"""Equilibrium and force closure with exact circular friction cones, proved either way.
+
+Solved: whether contact forces f_i in the friction cones C_i can balance every wrench.
+
+Contacts are in force closure iff the contact wrenches have rank 6 and some forces in the
+interior of the cones balance each other: a neighbourhood of such forces maps onto a
+neighbourhood of the zero wrench, and scaling does the rest. The margin program
+
+    maximise t  subject to  sum f_i = 0,  sum x_i x f_i = 0,  sum n_i.f_i = 1,
+                            |f_i - (n_i.f_i) n_i| + t <= mu_i n_i.f_i
+
+is therefore positive for force closure. Its dual is a twist y = (a, b): with the contact
+velocities v_i = a + b x x_i, the support of cone i in direction y is
+s_i(y) = n_i.v_i + mu_i |tangential part of v_i|, and t = max_i s_i(y) for the best y. If no
+s_i(y) is positive, then no contact wrench has a positive product with y, and no external
+wrench w with y.w < 0 can be resisted.
+
+Both answers are certificates: `verify` uses sums, norms and one singular value.
+
+Source: Sudsang & Ponce 1995, Definition 1 and Proposition 1, with the condition on the rank
+made explicit; the cone program is standard.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, frozen
+from grasp_core.closure_margin import ROUNDING, decide, proves_closure, supports
+from grasp_core.errors import InputError, UndecidedError
+from grasp_core.values import Grasp, contact_arrays
+from grasp_core.wrenches import normal_and_tangential
+
+LARGEST_FRICTION = 1e3
+"""Coefficients above this are reported as infinite; no material comes near it."""
+FRICTION_ACCURACY = 1e-8
+"""Relative width of the final bracket of a critical friction; absolute below 1e-2."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClosureCertificate:
+    """A verdict on force closure with what proves it."""
+
+    closed: bool
+    margin: float
+    """Optimum t of the margin program: dimensionless, unchanged by moving and scaling."""
+    positions: Array
+    """(k, 3) [m]"""
+    normals: Array
+    """(k, 3)"""
+    friction: Array
+    """Coulomb coefficient of each contact, (k,)."""
+    forces: Array | None
+    """If closed: balancing forces strictly inside the cones, (k, 3), normal parts summing to 1."""
+    separating_wrench: Array | None
+    """If not: y = (a, b), (6,), about the frame's origin, with y.w <= 0 for every wrench w that
+    the contacts can apply; an external wrench w with y.w < 0 is not resisted."""
+
+    def verify(self) -> bool:
+        """Re-check the verdict in plain arithmetic, without any solver."""
+        if self.closed:
+            arms, _, _ = _unit_size(self.positions)
+            return self.forces is not None and proves_closure(
+                self.forces, arms, self.normals, self.friction
+            )
+        return self.separating_wrench is not None and self._separates(self.separating_wrench)
+
+    def _separates(self, wrench: Array) -> bool:
+        arms, center, size = _unit_size(self.positions)
+        twist = np.concatenate(
+            [wrench[:3] + np.cross(wrench[3:], center), wrench[3:] * size]
+        )  # about the contacts' centre, at unit size
+        length = float(np.linalg.norm(twist))
+        worst = float(supports(twist, arms, self.normals, self.friction).max())
+        return length > 0.0 and worst <= ROUNDING * length
+
+
+def force_closure(
+    positions: ArrayLike | Grasp,
+    normals: ArrayLike | None = None,
+    friction: ArrayLike = 0.5,
+) -> ClosureCertificate:
+    """Decide force closure of hard-finger contacts under Coulomb friction.
+
+    Args:
+        positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
+        normals: Unit vectors into the object, (k, 3).
+        friction: Coulomb coefficient, one for all contacts or one each, (k,).
+
+    Raises:
+        InputError: Shapes, lengths or signs are wrong.
+        UndecidedError: The contacts are within rounding of the boundary of closure.
+    """
+    points, units = contact_arrays(positions, normals)
+    mu = _frictions(friction, len(points))
+    arms, center, size = _unit_size(points)
+    answer = decide(arms, units, mu)
+    if answer.forces is not None:
+        return ClosureCertificate(True, answer.margin, points, units, mu, answer.forces, None)
+    if answer.twist is not None:
+        wrench = _about_origin(answer.twist, center, size)
+        verdict = ClosureCertificate(False, answer.margin, points, units, mu, None, wrench)
+        if verdict.verify():
+            return verdict
+    raise UndecidedError(
+        f"the closure margin is {answer.margin:.2g}, too close to zero to decide; change the "
+        "friction or the contacts slightly"
+    )
+
+
+def critical_friction(positions: ArrayLike | Grasp, normals: ArrayLike | None = None) -> float:
+    """Smallest common Coulomb coefficient above which the contacts are in force closure.
+
+    A bracket is narrowed from both sides by certificates: balancing forces in all cones
+    bound it from above by their own steepest angle, a separating twist from below.
+
+    Args:
+        positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
+        normals: Unit vectors into the object, (k, 3).
+
+    Returns:
+        The coefficient, to `FRICTION_ACCURACY`; 0.0 when the normals alone balance;
+        `math.inf` when `LARGEST_FRICTION` does not suffice.
+    """
+    points, units = contact_arrays(positions, normals)
+    arms, _, _ = _unit_size(points)
+    lower, upper, trial = 0.0, math.inf, 0.5
+    while upper == math.inf or upper - lower > FRICTION_ACCURACY * max(upper, 1e-2):
+        answer = decide(arms, units, np.full(len(points), trial))
+        if answer.forces is not None:
+            upper = min(trial, _steepest(answer.forces, units))
+        elif answer.twist is not None:
+            lower = max(trial, _least_friction_not_separated(answer.twist, arms, units))
+        else:
+            return trial  # neither side has a proof left: the boundary itself
+        if upper == math.inf and lower >= LARGEST_FRICTION:
+            return math.inf
+        trial = _between(lower, upper)
+        if not lower < trial < upper:
+            break
+    return 0.0 if upper <= FRICTION_ACCURACY else upper
+
+
+def _between(lower: float, upper: float) -> float:
+    """Halve the bracket of cone angles: it treats small and large friction alike."""
+    return math.tan(0.5 * (math.atan(lower) + math.atan(min(upper, 4.0 * LARGEST_FRICTION))))
+
+
+def _steepest(forces: Array, normals: Array) -> float:
+    along, across = normal_and_tangential(forces, normals)
+    return float((across / along).max())
+
+
+def _least_friction_not_separated(twist: Array, arms: Array, normals: Array) -> float:
+    """Up to which common friction a twist keeps separating."""
+    velocities = twist[:3] + np.cross(twist[3:], arms)
+    along, across = normal_and_tangential(velocities, normals)
+    return float(np.min(-along / np.maximum(across, 1e-300)))
+
+
+def _unit_size(points: Array) -> tuple[Array, Array, float]:
+    """Arms from the mean contact over the longest one, with that centre and length."""
+    center = points.mean(axis=0)
+    arms = points - center
+    size = float(np.linalg.norm(arms, axis=1).max())
+    size = size if size > 0.0 else 1.0
+    return arms / size, center, size
+
+
+def _about_origin(twist: Array, center: Array, size: float) -> Array:
+    turning = twist[3:] / size
+    return np.concatenate([twist[:3] - np.cross(turning, center), turning])
+
+
+def _frictions(friction: ArrayLike, count: int) -> Array:
+    values = np.asarray(friction, dtype=np.float64)
+    mu = frozen(np.full(count, values) if values.ndim == 0 else values, (count,), "friction")
+    if (mu < 0.0).any():
+        raise InputError(f"friction must not be negative, got {float(mu.min()):.6g}")
+    return mu

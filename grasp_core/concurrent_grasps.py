@@ -1,0 +1,165 @@
+"""Concurrent grasps: four lines of force that meet in one focus point.
+
+Solved: for four convex faces and a force cone at each, the focus point x0 and four discs of
+the largest common radius r, one inside each face, such that x0 lies in the force cone of
+every point of every disc. When the four force cones positively span R^3 whatever direction
+each contributes (P3), any four contacts in the discs are then in equilibrium.
+
+Derivation. On face i the points are c_i + T_i y. Let g run over the inward unit normals of
+the facets of a pyramid inscribed in force cone i. A contact at y can aim at x0 iff
+g.(x0 - c_i - T_i y) >= 0 for all g. Over a disc of radius r around y_i the worst case is
+g.(x0 - c_i - T_i y_i) - r |T_i'g|, and the disc lies inside the face iff e.y_i + r <= b for
+its edges. All of it is linear in (x0, y_1..y_4, r):
+
+    maximise r  subject to  g.x0 - (T_i'g).y_i - r |T_i'g| >= g.c_i    for all i, g
+                            e.y_i + r <= b                             for all i, edges
+
+The disc centres stay variables: eliminating them by shrinking the face over-estimates r as
+soon as an edge of the shrunk face vanishes. The radius is free in sign, so that the program
+is always feasible and the sign of its optimum, with the multipliers that prove it, decides.
+
+A second program keeps the smallest radius and maximises the sum of the four radii, so that
+contacts whose discs have room do not end up against an arbitrary edge.
+
+With axis = normal and half-angle = theta this is section 3.1 of the paper.
+
+Source: Sudsang & Ponce 1995, section 3.1 and Proposition 5.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.face_pieces import FacePiece
+from grasp_core.lp import LinearProgram, Optimum, maximize
+from grasp_core.polygons import clip, plane_frame
+from grasp_core.values import FINGERS, ForceCone
+
+PYRAMID_SIDES = 16
+"""An inscribed 16-sided pyramid loses 1.9 % of the cone's tangent, on the safe side."""
+KEPT = 1e-9
+"""Share of the smallest radius that the second program may give up: the accuracy
+asked of the first."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConcurrentPlacement:
+    """Focus point and discs of one quadruple of faces, in the pieces' units."""
+
+    focus: Array
+    """(3,)"""
+    positions: Array
+    """Disc centres, (4, 3)."""
+    radii: Array
+    """Radius of each disc, (4,); contacts anywhere in the four discs are in equilibrium."""
+    radius: float
+    """The smallest of them."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NoConcurrentPlacement:
+    """No focus point serves these faces and cones with discs of positive radius.
+
+    `bound` is the largest radius that the program's multipliers allow.
+    """
+
+    bound: float
+
+
+def place_concurrent(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], *, least_radius: float
+) -> ConcurrentPlacement | NoConcurrentPlacement:
+    """Place a focus point and four discs of the largest common radius.
+
+    Args:
+        pieces: Four convex pieces, in finger order, in units where the object has size one.
+        cones: The force cones, in the same order; together they must satisfy the
+            generalised P3 for the result to mean equilibrium.
+        least_radius: Smaller discs count as none.
+
+    Raises:
+        SolverError: A program's answer failed its check.
+    """
+    A, b = _rows(pieces, cones)
+    first = maximize(LinearProgram(_unit(A.shape[1], 15), A, b))
+    if not isinstance(first, Optimum) or first.value < least_radius:
+        return NoConcurrentPlacement(first.value if isinstance(first, Optimum) else 0.0)
+    keep = -_unit(A.shape[1], 15)
+    even = LinearProgram(
+        _unit(A.shape[1], 11, 12, 13, 14),
+        np.vstack([A, keep]),
+        np.append(b, -first.value * (1.0 - KEPT)),
+    )
+    second = maximize(even)
+    x = second.x if isinstance(second, Optimum) else first.x
+    y, radii = x[3:11].reshape(FINGERS, 2), x[11:15]
+    positions = np.array([piece.point(at) for piece, at in zip(pieces, y, strict=True)])
+    return ConcurrentPlacement(x[:3], positions, radii, float(radii.min()))
+
+
+def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array) -> Array:
+    """Where on a piece a contact can aim at the focus within its force cone, (k, 3).
+
+    The inverted cone of section 3.1, inscribed by the same pyramid as in the program.
+    """
+    G = inscribed_facets(cone)
+    flat = clip(piece.corners, G @ piece.frame, G @ (focus - piece.origin))
+    return piece.origin + flat @ piece.frame.T
+
+
+def inscribed_facets(cone: ForceCone, sides: int = PYRAMID_SIDES) -> Array:
+    """Inward unit normals g of a pyramid inscribed in a circular cone, (sides, 3).
+
+    The pyramid's edges lie on the cone, so {v : g.v >= 0 for all g} is inside the cone. Its
+    facets touch a cone of half-angle psi with tan(psi) = tan(half_angle) cos(pi / sides).
+    """
+    turns = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
+    across = np.column_stack([np.cos(turns), np.sin(turns)]) @ plane_frame(cone.axis).T
+    psi = np.arctan(np.tan(cone.half_angle) * np.cos(np.pi / sides))
+    return np.sin(psi) * cone.axis - np.cos(psi) * across
+
+
+def radius_bounds(normals: Array, offsets: Array, half_angles: Array) -> Array:
+    """Upper bounds on the discs of many quadruples whose force cones surround the normals.
+
+    A disc needs r <= d_i tan(half_angle) with d_i = n_i.x0 - h_i. With the positive weights
+    of sum lam_i n_i = 0, sum lam_i d_i = -sum lam_i h_i wherever the focus is, so the least
+    d_i is at most that sum over sum lam_i.
+
+    Args:
+        normals: Positively spanning unit vectors, (q, 4, 3).
+        offsets: h_i = n_i.x on each face's plane, (q, 4).
+        half_angles: (q,) [rad].
+    """
+    weights = np.abs(
+        [np.linalg.det(np.delete(normals, left_out, axis=1)) for left_out in range(FINGERS)]
+    ).T
+    depth = -np.einsum("qi,qi->q", weights, offsets) / weights.sum(axis=1)
+    return depth * np.tan(half_angles)
+
+
+def _rows(pieces: Sequence[FacePiece], cones: Sequence[ForceCone]) -> tuple[Array, Array]:
+    """Rows over (x0 (3), y (4 x 2), radii (4), smallest radius)."""
+    rows: list[Array] = []
+    limits: list[Array] = []
+    for i, (piece, cone) in enumerate(zip(pieces, cones, strict=True)):
+        G = inscribed_facets(cone)
+        flat = G @ piece.frame
+        aim = np.zeros((len(G), 16))
+        aim[:, :3], aim[:, 3 + 2 * i : 5 + 2 * i] = -G, flat
+        aim[:, 11 + i] = np.linalg.norm(flat, axis=1)
+        inside = np.zeros((len(piece.E), 16))
+        inside[:, 3 + 2 * i : 5 + 2 * i], inside[:, 11 + i] = piece.E, 1.0
+        smallest = np.zeros((1, 16))
+        smallest[0, 15], smallest[0, 11 + i] = 1.0, -1.0
+        rows += [aim, inside, smallest]
+        limits += [-G @ piece.origin, piece.b, np.zeros(1)]
+    return np.vstack(rows), np.concatenate(limits)
+
+
+def _unit(length: int, *places: int) -> Array:
+    vector = np.zeros(length)
+    vector[list(places)] = 1.0
+    return vector

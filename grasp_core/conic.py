@@ -1,0 +1,118 @@
+"""Conic program -> re-checked primal and dual solution; the door to Clarabel.
+
+    minimise q.x  subject to  b - A x in K,
+
+with K a product of zero, non-negative and second-order cones. The dual variable z lies in
+the dual cone and satisfies A'z + q = 0; at the optimum q.x = -b.z.
+"""
+
+import importlib
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.errors import SolverError
+
+RESIDUAL = 1e-7
+"""Largest accepted violation, relative to the solution's size. Callers turn what passes into
+a certificate of their own, so this only catches answers that are wrong outright."""
+REQUESTED = 1e-11
+"""Tolerance asked of the solver."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConicProgram:
+    """Rows in the order zero, non-negative, then second-order cones (bound first)."""
+
+    q: Array
+    """(n,)"""
+    A: Array
+    """(rows, n)"""
+    b: Array
+    """(rows,)"""
+    zeros: int
+    """How many rows must vanish."""
+    nonnegatives: int
+    """How many rows must not be negative."""
+    cones: tuple[int, ...] = ()
+    """Length of each second-order cone: (s0, s1, ...) with s0 >= |(s1, ...)|."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConicSolution:
+    """Primal and dual solution, each checked against the data."""
+
+    x: Array
+    z: Array
+    """Dual variable, (rows,)."""
+    value: float
+
+
+def minimize(program: ConicProgram) -> ConicSolution:
+    """Solve a feasible and bounded conic program.
+
+    Raises:
+        SolverError: The answer failed our check; an infeasible program ends here too.
+    """
+    clarabel, sparse = _modules()
+    kinds: list[Any] = []
+    if program.zeros:
+        kinds.append(clarabel.ZeroConeT(program.zeros))
+    if program.nonnegatives:
+        kinds.append(clarabel.NonnegativeConeT(program.nonnegatives))
+    kinds += [clarabel.SecondOrderConeT(length) for length in program.cones]
+    n = len(program.q)
+    solver = clarabel.DefaultSolver(
+        sparse.csc_matrix((n, n)), program.q, sparse.csc_matrix(program.A), program.b, kinds,
+        _settings(),
+    )  # fmt: skip
+    answer = solver.solve()
+    solution = ConicSolution(np.array(answer.x), np.array(answer.z), 0.0)
+    _check(program, solution, str(answer.status))
+    return ConicSolution(solution.x, solution.z, float(program.q @ solution.x))
+
+
+def _check(program: ConicProgram, solution: ConicSolution, status: str) -> None:
+    x, z = solution.x, solution.z
+    if not (np.isfinite(x).all() and np.isfinite(z).all()):
+        raise SolverError(f"the conic solver returned no numbers ({status})")
+    slack = program.b - program.A @ x
+    allowed = RESIDUAL * (1.0 + float(np.abs(x).max()) + float(np.abs(z).max()))
+    failures = {
+        "a primal row is violated": _outside(program, slack, dual=False),
+        "a multiplier leaves the dual cone": _outside(program, z, dual=True),
+        "the multipliers do not give the objective": np.abs(program.A.T @ z + program.q).max(),
+        "primal and dual values differ": abs(program.q @ x + program.b @ z),
+    }
+    for failure, size in failures.items():
+        if size > allowed:
+            raise SolverError(f"{failure} by {size:.3g}, allowed {allowed:.3g} ({status})")
+
+
+def _outside(program: ConicProgram, rows: Array, *, dual: bool) -> float:
+    """How far a vector lies outside K (or its dual, where the zero rows are free)."""
+    start = program.zeros
+    worst = 0.0 if dual else float(np.abs(rows[:start]).max(initial=0.0))
+    worst = max(worst, -float(rows[start : start + program.nonnegatives].min(initial=0.0)))
+    start += program.nonnegatives
+    for length in program.cones:
+        worst = max(worst, float(np.linalg.norm(rows[start + 1 : start + length]) - rows[start]))
+        start += length
+    return worst
+
+
+@cache
+def _modules() -> tuple[Any, Any]:
+    return importlib.import_module("clarabel"), importlib.import_module("scipy.sparse")
+
+
+@cache
+def _settings() -> Any:
+    settings = _modules()[0].DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = REQUESTED
+    settings.max_threads = 1
+    return settings

@@ -1,0 +1,48 @@
+"""Everything the three packages raise on purpose, one class per cause."""
+
+from enum import StrEnum
+
+
+class GraspError(Exception):
+    """Base of every error that graspproof raises on purpose."""
+
+
+class InputError(GraspError):
+    """A value handed in breaks the contract; the message says which and how to mend it."""
+
+
+class UndecidedError(GraspError):
+    """The question lies closer to its boundary than the arithmetic can tell."""
+
+
+class SolverError(GraspError):
+    """A solver's answer failed our own check of it, so there is no answer."""
+
+
+class MeshRefusal(StrEnum):
+    """Why a mesh is not accepted; the value is the stable code shown to users."""
+
+    UNREADABLE = "GP-MESH-UNREADABLE"
+    FORMAT = "GP-MESH-FORMAT"
+    EMPTY = "GP-MESH-EMPTY"
+    NON_FINITE = "GP-MESH-NON-FINITE"
+    INDEX = "GP-MESH-INDEX"
+    SIZE = "GP-MESH-SIZE"
+    TOO_MANY = "GP-MESH-TOO-MANY"
+    OPEN = "GP-MESH-OPEN"
+    NON_MANIFOLD = "GP-MESH-NON-MANIFOLD"
+    WINDING = "GP-MESH-WINDING"
+    ZERO_VOLUME = "GP-MESH-ZERO-VOLUME"
+    OVERLAP = "GP-MESH-OVERLAP"
+
+
+class MeshError(InputError):
+    """A mesh cannot be taken as a solid polyhedron.
+
+    Attributes:
+        reason: The stable code of the refusal.
+    """
+
+    def __init__(self, reason: MeshRefusal, message: str) -> None:
+        super().__init__(f"{reason.value}: {message}")
+        self.reason = reason

@@ -1,0 +1,81 @@
+"""Convex pieces of an object's faces, moved and scaled so that the object has size one.
+
+The programs work on these: their tolerances then mean the same for every object.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.lp import LinearProgram, Optimum, maximize
+from grasp_core.polygons import edge_rows, plane_frame
+from grasp_core.values import Face, Polyhedron
+
+THINNEST = 1e-6
+"""Pieces without room for a disc of this radius (object size one) hold no contact."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FacePiece:
+    """One convex piece: the points origin + frame @ y with E y <= b."""
+
+    face: int
+    """Index of its face in the polyhedron."""
+    normal: Array
+    """Unit vector into the object, (3,)."""
+    origin: Array
+    """A point of the plane, (3,)."""
+    frame: Array
+    """Orthonormal columns spanning the plane, (3, 2)."""
+    corners: Array
+    """(k, 2), counter-clockwise about the normal."""
+    E: Array
+    """Unit outward edge normals, (k, 2)."""
+    b: Array
+    """(k,)"""
+    inradius: float
+    """Radius of the largest disc inside."""
+
+    def point(self, y: Array) -> Array:
+        """The point in space of plane coordinates, (3,)."""
+        return self.origin + self.frame @ y
+
+
+def unit_pieces(body: Polyhedron) -> tuple[FacePiece, ...]:
+    """All convex pieces with room for a contact, about the centre of mass over the radius."""
+    pieces = [
+        _piece(index, face, (polygon - body.center_of_mass) / body.radius)
+        for index, face in enumerate(body.faces)
+        for polygon in face.pieces
+    ]
+    return tuple(piece for piece in pieces if piece.inradius > THINNEST)
+
+
+def _piece(index: int, face: Face, polygon: Array) -> FacePiece:
+    frame = plane_frame(face.normal)
+    origin = polygon.mean(axis=0)
+    corners = (polygon - origin) @ frame
+    E, b = edge_rows(corners)
+    return FacePiece(
+        face=index,
+        normal=face.normal,
+        origin=origin,
+        frame=frame,
+        corners=corners,
+        E=E,
+        b=b,
+        inradius=_inscribed_radius(E, b),
+    )
+
+
+def inscribed_disc_radius(polygon: Array, piece: FacePiece) -> float:
+    """Radius of the largest disc in a convex polygon (k, 3) that lies on a piece."""
+    return _inscribed_radius(*edge_rows((polygon - piece.origin) @ piece.frame))
+
+
+def _inscribed_radius(E: Array, b: Array) -> float:
+    """Radius of the largest disc in {y : E y <= b}."""
+    rows = np.column_stack([E, np.ones(len(E))])
+    best = maximize(LinearProgram(np.array([0.0, 0.0, 1.0]), rows, b))
+    return best.value if isinstance(best, Optimum) else 0.0

@@ -1,0 +1,157 @@
+"""Triangles become planar faces: grouping by explicit angle and distance, then outlines.
+
+A group grows across shared edges from a seed triangle and is measured against the seed's
+own plane, never from neighbour to neighbour, so that the facets of a fine sphere cannot
+creep into one "face".
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.polygons import (
+    area_and_centroid,
+    is_convex,
+    merge_into_convex_pieces,
+    plane_frame,
+    signed_area,
+    without_straight_corners,
+)
+from grasp_core.values import Face
+
+Triangulate: TypeAlias = Callable[[list[Array]], Indices]
+"""Corners of an outer border and holes, in order, to counter-clockwise triangles."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlatnessLimits:
+    """How far triangles may deviate and still be one planar face."""
+
+    angle: float = 1e-3
+    """[rad]; about a thousand times the normal error of a millimetre-high triangle in single
+    precision, and far below any friction angle of interest."""
+    distance: float = 1e-6
+    """Relative to the object's largest extent; some ten single-precision steps."""
+
+
+def planar_faces(
+    vertices: Array, triangles: Indices, limits: FlatnessLimits, triangulate: Triangulate
+) -> tuple[Face, ...]:
+    """All planar faces of a closed, outward-wound mesh, in the order of their first triangle."""
+    groups = coplanar_groups(vertices, triangles, limits)
+    slack = limits.distance * float(np.ptp(vertices, axis=0).max())
+    return tuple(_face(vertices, triangles[group], slack, triangulate) for group in groups)
+
+
+def coplanar_groups(vertices: Array, triangles: Indices, limits: FlatnessLimits) -> list[Indices]:
+    """Edge-connected groups of triangles that lie in one plane within the limits.
+
+    The largest triangles seed first: their planes are the least affected by rounding. A
+    triangle thinner than the distance limit has no meaningful normal, so only its
+    distance counts.
+    """
+    corners = vertices[triangles]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    double_area = np.linalg.norm(cross, axis=1)
+    normals = cross / np.where(double_area > 0.0, double_area, 1.0)[:, None]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    distance = limits.distance * float(np.ptp(vertices, axis=0).max())
+    sliver = double_area <= distance * longest
+    neighbours = triangle_neighbours(triangles)
+    group_of = np.full(len(triangles), -1)
+    for seed in np.argsort(-double_area, kind="stable"):
+        if group_of[seed] >= 0:
+            continue
+        normal, origin = normals[seed], corners[seed, 0]
+        stack, group_of[seed] = [int(seed)], seed
+        while stack:
+            for other in neighbours[stack.pop()]:
+                if group_of[other] >= 0:
+                    continue
+                tilt = 0.0 if sliver[other] else np.linalg.norm(normals[other] - normal)
+                if tilt <= limits.angle and _off(corners[other], origin, normal) <= distance:
+                    group_of[other] = seed
+                    stack.append(int(other))
+    _, first, member = np.unique(group_of, return_index=True, return_inverse=True)
+    return [np.flatnonzero(member == group) for group in np.argsort(first, kind="stable")]
+
+
+def _off(points: Array, origin: Array, normal: Array) -> float:
+    return float(np.abs((points - origin) @ normal).max())
+
+
+def triangle_neighbours(triangles: Indices) -> Indices:
+    """The triangle across each edge (k, k+1) of each triangle, (t, 3), for a closed mesh."""
+    count = len(triangles)
+    tail, head = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    side = np.lexsort((np.where(tail < head, tail, head), np.where(tail < head, head, tail)))
+    pairs = side.reshape(-1, 2)
+    across = np.empty(3 * count, dtype=np.int64)
+    across[pairs[:, 0]], across[pairs[:, 1]] = pairs[:, 1] // 3, pairs[:, 0] // 3
+    return across.reshape(-1, 3)
+
+
+def _face(vertices: Array, triangles: Indices, slack: float, triangulate: Triangulate) -> Face:
+    corners = vertices[triangles]
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
+    normal = -outward / np.linalg.norm(outward)
+    weights = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    origin = (weights[:, None] * corners.mean(axis=1)).sum(axis=0) / weights.sum()
+    frame = plane_frame(normal)
+
+    def flat(loop: list[int]) -> Array:
+        return without_straight_corners((vertices[loop[::-1]] - origin) @ frame, slack)
+
+    def lift(loop: Array) -> Array:
+        return origin + loop @ frame.T
+
+    loops = sorted((flat(loop) for loop in border_loops(triangles)), key=signed_area)[::-1]
+    outer, holes = loops[0], loops[1:]
+    if not holes and is_convex(outer):
+        pieces = [outer]
+    else:
+        pieces = merge_into_convex_pieces(np.vstack(loops), triangulate(loops))
+        pieces = [without_straight_corners(piece, slack) for piece in pieces]
+    area, centroid = area_and_centroid(loops)
+    return Face(
+        normal=normal,
+        centroid=origin + frame @ centroid,
+        area=area,
+        polygon=lift(outer),
+        holes=tuple(lift(hole) for hole in holes),
+        pieces=tuple(lift(piece) for piece in pieces),
+    )
+
+
+def border_loops(triangles: Indices) -> list[list[int]]:
+    """Vertex loops around a group of triangles, wound as the triangles are.
+
+    Where two parts of the border touch in one vertex, the walk turns through the group's
+    own triangles, so that each loop stays simple.
+    """
+    inside = {
+        (int(t[k]), int(t[(k + 1) % 3])): int(t[(k + 2) % 3]) for t in triangles for k in range(3)
+    }
+    border = [edge for edge in inside if edge[::-1] not in inside]
+    unseen, loops = dict.fromkeys(border), list[list[int]]()
+    while unseen:
+        edge = next(iter(unseen))
+        loop: list[int] = []
+        while edge in unseen:
+            del unseen[edge]
+            loop.append(edge[0])
+            edge = _next_on_border(inside, edge)
+        loops.append(loop)
+    return loops
+
+
+def _next_on_border(inside: dict[tuple[int, int], int], edge: tuple[int, int]) -> tuple[int, int]:
+    pivot, apex = edge[1], inside[edge]
+    while (apex, pivot) in inside:
+        apex = inside[apex, pivot]
+    return pivot, apex

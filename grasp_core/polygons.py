@@ -1,0 +1,139 @@
+"""Figures in a plane: frames, edges, clipping, and convex pieces of a polygon with holes.
+
+A polygon is an (k, 2) array of corners, counter-clockwise unless it is a hole. A convex
+polygon is also the set {y : E y <= b}, with the rows of E unit outward edge normals.
+"""
+
+import math
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+
+CONVEX_SLACK = 1e-9
+"""How far a corner may turn inwards and still count as straight, relative to the two edge
+lengths' product: well above the rounding of coordinates, well below a visible notch."""
+
+
+def plane_frame(normal: Array) -> Array:
+    """Two orthonormal columns spanning the plane with this normal, (3, 2).
+
+    (column 0, column 1, normal) is right-handed. The choice is deterministic and
+    depends on the normal only, so that all figures on one face share it.
+    """
+    x, y, z = (float(part) for part in normal)
+    smallest = min(abs(x), abs(y), abs(z))
+    if abs(x) == smallest:
+        u, v, w = 0.0, -z, y
+    elif abs(y) == smallest:
+        u, v, w = z, 0.0, -x
+    else:
+        u, v, w = -y, x, 0.0
+    length = math.sqrt(u * u + v * v + w * w)
+    u, v, w = u / length, v / length, w / length
+    return np.array([[u, y * w - z * v], [v, z * u - x * w], [w, x * v - y * u]])
+
+
+def signed_area(polygon: Array) -> float:
+    """Area of a polygon, positive when counter-clockwise."""
+    x, y = polygon.T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def area_and_centroid(loops: list[Array]) -> tuple[float, Array]:
+    """Area and centre of area (2,) of an outer border with holes (holes clockwise)."""
+    area, moment = 0.0, np.zeros(2)
+    for loop in loops:
+        following = np.roll(loop, -1, axis=0)
+        cross = loop[:, 0] * following[:, 1] - loop[:, 1] * following[:, 0]
+        area += 0.5 * float(cross.sum())
+        moment += ((loop + following) * cross[:, None]).sum(axis=0) / 6.0
+    return area, moment / area
+
+
+def edge_rows(polygon: Array) -> tuple[Array, Array]:
+    """Half-planes (E, b) of a convex counter-clockwise polygon: inside is E y <= b."""
+    along = np.roll(polygon, -1, axis=0) - polygon
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    E = np.column_stack([along[:, 1], -along[:, 0]])
+    return E, np.einsum("kj,kj->k", E, polygon)
+
+
+def clip(polygon: Array, rows: Array, limits: Array) -> Array:
+    """The part of a convex polygon where rows @ y <= limits; (0, 2) when nothing is left."""
+    for row, limit in zip(rows, limits, strict=True):
+        height = polygon @ row - limit
+        kept: list[Array] = []
+        for here in range(len(polygon)):
+            after = (here + 1) % len(polygon)
+            if height[here] <= 0.0:
+                kept.append(polygon[here])
+            if height[here] * height[after] < 0.0:
+                share = height[here] / (height[here] - height[after])
+                kept.append(polygon[here] + share * (polygon[after] - polygon[here]))
+        polygon = np.array(kept).reshape(-1, 2)
+    return polygon
+
+
+def without_straight_corners(polygon: Array, slack: float) -> Array:
+    """Drop corners that lie within `slack` of the line through their two neighbours."""
+    kept = polygon
+    while len(kept) > 3:  # noqa: PLR2004 - a triangle has no corner to spare
+        before, after = np.roll(kept, 1, axis=0), np.roll(kept, -1, axis=0)
+        chord = after - before
+        cross = chord[:, 0] * (kept - before)[:, 1] - chord[:, 1] * (kept - before)[:, 0]
+        height = np.abs(cross) / np.maximum(np.linalg.norm(chord, axis=1), slack)
+        straightest = int(np.argmin(height))
+        if height[straightest] > slack:
+            break
+        kept = np.delete(kept, straightest, axis=0)
+    return kept
+
+
+def is_convex(polygon: Array) -> bool:
+    """Whether a counter-clockwise polygon turns left (or goes straight) at every corner."""
+    edge = np.roll(polygon, -1, axis=0) - polygon
+    following = np.roll(edge, -1, axis=0)
+    turn = edge[:, 0] * following[:, 1] - edge[:, 1] * following[:, 0]
+    lengths = np.linalg.norm(edge, axis=1) * np.linalg.norm(following, axis=1)
+    return bool((turn >= -CONVEX_SLACK * lengths).all())
+
+
+def merge_into_convex_pieces(points: Array, triangles: Indices) -> list[Array]:
+    """Join the triangles of a polygon into few convex pieces.
+
+    Diagonals are removed one by one as long as the two pieces beside them form a convex
+    piece; the result has at most four times the least possible number of pieces.
+
+    Args:
+        points: Corners, (n, 2).
+        triangles: A triangulation without further points, (t, 3), counter-clockwise.
+
+    Source:
+        Hertel & Mehlhorn, "Fast triangulation of the plane with respect to simple
+        polygons", Information and Control 64, 1985.
+    """
+    pieces = {index: [int(v) for v in triangle] for index, triangle in enumerate(triangles)}
+    owner = {edge: key for key, loop in pieces.items() for edge in _edges(loop)}
+    for tail, head in sorted(edge for edge in owner if edge[0] < edge[1] and edge[::-1] in owner):
+        one, two = owner[tail, head], owner[head, tail]
+        if one == two:
+            continue
+        joined = _join(pieces[one], pieces[two], tail, head)
+        if len(set(joined)) == len(joined) and is_convex(points[joined]):
+            pieces[one] = joined
+            del pieces[two]
+            owner.update(dict.fromkeys(_edges(joined), one))
+    return [points[loop] for _, loop in sorted(pieces.items())]
+
+
+def _edges(loop: list[int]) -> list[tuple[int, int]]:
+    return list(zip(loop, loop[1:] + loop[:1], strict=True))
+
+
+def _join(one: list[int], two: list[int], tail: int, head: int) -> list[int]:
+    """Walk `one` from head round to tail, then `two` from tail round to head."""
+    start, other = one.index(head), two.index(tail)
+    first = one[start:] + one[:start]
+    second = two[other:] + two[:other]
+    return first + second[1:-1]

@@ -1,0 +1,93 @@
+"""Solids as triangle meshes: hulls, extrusions and booleans; the only door to manifold3d."""
+
+import importlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solid:
+    """A closed triangle mesh, wound counter-clockwise seen from outside."""
+
+    vertices: Array
+    """(n, 3) [m]"""
+    triangles: Indices
+    """(t, 3)"""
+
+    def __add__(self, other: "Solid") -> "Solid":
+        """The union of two solids."""
+        return _solid(_manifold(self) + _manifold(other))
+
+    def __sub__(self, other: "Solid") -> "Solid":
+        """What remains of this solid when the other is cut away."""
+        return _solid(_manifold(self) - _manifold(other))
+
+    @property
+    def volume(self) -> float:
+        """[m^3]; negative when the mesh is inside out."""
+        corners = self.vertices[self.triangles] - self.vertices.mean(axis=0)
+        return float(np.linalg.det(corners).sum()) / 6.0
+
+    def moved(self, offset: ArrayLike) -> "Solid":
+        """The same solid somewhere else."""
+        return Solid(self.vertices + np.asarray(offset, dtype=np.float64), self.triangles)
+
+
+def hull(points: ArrayLike) -> Solid:
+    """Convex hull of points, (n, 3)."""
+    return _solid(_kernel().Manifold.hull_points(np.asarray(points, dtype=np.float64)))
+
+
+def extrusion(outline: ArrayLike, height: float, holes: Sequence[ArrayLike] = ()) -> Solid:
+    """A plane figure (k, 2) in z = 0 drawn out to z = height, with straight holes."""
+    loops = [np.asarray(loop, dtype=np.float64) for loop in (outline, *holes)]
+    kernel = _kernel()
+    figure = kernel.CrossSection(loops, kernel.FillRule.EvenOdd)
+    return _solid(kernel.Manifold.extrude(figure, height))
+
+
+def triangulate(loops: Sequence[Array]) -> Indices:
+    """Triangles between an outer border and its holes, as indices into all corners in order."""
+    return np.asarray(_kernel().triangulate([*loops]), dtype=np.int64)
+
+
+def intersection_volume(one: Solid, two: Solid) -> float:
+    """Volume that two solids share [m^3]."""
+    return float((_manifold(one) ^ _manifold(two)).volume())
+
+
+def union_volume(solids: Sequence[Solid]) -> float:
+    """Volume of the union of solids [m^3]."""
+    kernel = _kernel()
+    parts = [_manifold(solid) for solid in solids]
+    return float(kernel.Manifold.batch_boolean(parts, kernel.OpType.Add).volume())
+
+
+def _kernel() -> Any:
+    return importlib.import_module("manifold3d")
+
+
+def _manifold(solid: Solid) -> Any:
+    kernel = _kernel()
+    mesh = kernel.Mesh64(
+        np.ascontiguousarray(solid.vertices), np.ascontiguousarray(solid.triangles, dtype=np.uint64)
+    )
+    body = kernel.Manifold(mesh)
+    if body.status() != kernel.Error.NoError:
+        raise InputError(f"not a closed, orientable mesh: {body.status().name}")
+    return body
+
+
+def _solid(body: Any) -> Solid:
+    mesh = body.to_mesh64()
+    return Solid(
+        np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3],
+        np.asarray(mesh.tri_verts, dtype=np.int64),
+    )

@@ -1,0 +1,145 @@
+"""When four cones of directions positively span space whatever directions they contribute (P3).
+
+Solved: Definition 3 of the paper in closed form, and all face quadruples that satisfy it.
+
+Four vectors theta-positively span R^3 when every choice of one vector from each cone of
+half-angle theta around them positively spans R^3. Let A have the unit axes of three of the
+four cones as rows. If the axes themselves positively span, then by continuity the property
+first fails when some triple of cones admits linearly dependent picks, that is, when a plane
+through the origin with unit normal g meets all three: |A g| <= sin(psi) row by row. With
+y = A g such a g exists iff some y in that box has |A^-1 y| >= 1, and a convex function is
+largest at a corner of the box. So, for equal half-angles,
+
+    sin(theta*) = min over the 4 triples, over signs s in {+-1}^3, of 1 / |A^-1 s|,
+
+and the property holds exactly for theta < theta*. The columns of A^-1 are cross products of
+the axes over det A, which is how the code evaluates it. theta* never exceeds asin(1/3): the
+ball of radius sin(theta*) lies in a tetrahedron inscribed in the unit sphere.
+
+Source: Sudsang & Ponce 1995, Definition 3 and Proposition 4; the closed form is this project's.
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, Indices, frozen_units
+
+SIGNS = np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=np.float64)
+LARGEST_SPAN_ANGLE = math.asin(1.0 / 3.0)
+"""Reached by the regular tetrahedron only [rad]."""
+DEPENDENT = 1e-12
+"""Triples of unit vectors with a smaller determinant are coplanar: a few rounding errors."""
+
+
+def span_angle(normals: ArrayLike) -> float:
+    """Largest half-angle below which four cones around unit vectors always positively span.
+
+    Args:
+        normals: Unit vectors, (4, 3).
+
+    Returns:
+        theta* [rad]; 0.0 when the vectors themselves do not positively span R^3.
+    """
+    units = frozen_units(normals, (4, 3), "normals")
+    if not positively_span(units):
+        return 0.0
+    triples = [units[list(triple)] for triple in combinations(range(4), 3)]
+    return math.asin(min(abs(triple_sine(*triple)) for triple in triples))
+
+
+def cones_positively_span(axes: ArrayLike, half_angles: ArrayLike) -> bool:
+    """Whether four circular cones positively span R^3 whatever vector each contributes.
+
+    The generalised P3: cones of different half-angles around any axes.
+
+    Args:
+        axes: Unit vectors, (4, 3).
+        half_angles: (4,) [rad].
+    """
+    units = frozen_units(axes, (4, 3), "axes")
+    sines = np.sin(np.asarray(half_angles, dtype=np.float64))
+    if not positively_span(units):
+        return False
+    for triple in combinations(range(4), 3):
+        corners = np.linalg.solve(units[list(triple)], (SIGNS * sines[list(triple)]).T)
+        if np.linalg.norm(corners, axis=0).max() >= 1.0:
+            return False
+    return True
+
+
+def positively_span(vectors: Array) -> bool:
+    """Whether some positive combination of four vectors, (4, 3), vanishes and they span R^3."""
+    signed = [
+        (-1) ** left_out * float(np.linalg.det(np.delete(vectors, left_out, axis=0)))
+        for left_out in range(4)
+    ]
+    return min(signed) > DEPENDENT or max(signed) < -DEPENDENT
+
+
+def triple_sine(one: Array, two: Array, three: Array) -> Array:
+    """Sine of the half-angle at which three cones first touch one plane, signed by det.
+
+    Args:
+        one: Unit vectors, (..., 3).
+        two: Likewise.
+        three: Likewise.
+
+    Returns:
+        (...): zero where the three are coplanar.
+    """
+    one, two, three = np.broadcast_arrays(one, two, three)
+    crosses = np.stack([np.cross(two, three), np.cross(three, one), np.cross(one, two)], axis=-2)
+    determinant = np.einsum("...i,...i->...", one, crosses[..., 0, :])
+    longest = np.linalg.norm(SIGNS @ crosses, axis=-1).max(axis=-1)
+    safe = np.where(np.abs(determinant) > DEPENDENT, longest, np.inf)
+    return determinant / safe
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpanningQuadruples:
+    """Face quadruples whose normals positively span at some least angle."""
+
+    indices: Indices
+    """(q, 4), ascending in each row, rows in lexicographic order."""
+    span_angles: Array
+    """theta* of each, (q,) [rad]."""
+
+
+def spanning_quadruples(normals: Array, least_angle: float) -> SpanningQuadruples:
+    """All quadruples of directions whose span angle exceeds `least_angle`.
+
+    A table of signed triple sines decides each quadruple. With i < j fixed, the faces fall
+    into those to the left of the plane (i, j) and those to its right; a positively spanning
+    quadruple takes one of each, so only those pairs are tested, as one array operation.
+
+    Args:
+        normals: Unit vectors, (n, 3).
+        least_angle: [rad]
+    """
+    count, least = len(normals), math.sin(least_angle)
+    table = np.array([triple_sine(normal, normals[:, None], normals[None]) for normal in normals])
+    found: list[Indices] = []
+    sines: list[Array] = []
+    for i, j in combinations(range(count), 2):
+        left = j + 1 + np.flatnonzero(table[i, j, j + 1 :] > least)
+        right = j + 1 + np.flatnonzero(table[i, j, j + 1 :] < -least)
+        if not (left.size and right.size):
+            continue
+        a, b = left[:, None], right[None, :]
+        sine = np.minimum(
+            np.minimum(table[i, a, b], table[j, b, a]),
+            np.minimum(table[i, j, a], table[j, i, b]),
+        )
+        rows, columns = np.nonzero(sine > least)
+        pair = np.sort(np.column_stack([left[rows], right[columns]]), axis=1)
+        found.append(np.column_stack([np.full((len(pair), 2), (i, j)), pair]))
+        sines.append(sine[rows, columns])
+    if not found:
+        return SpanningQuadruples(np.empty((0, 4), dtype=np.int64), np.empty(0))
+    indices, sine = np.concatenate(found), np.concatenate(sines)
+    order = np.lexsort(indices.T[::-1])
+    return SpanningQuadruples(indices[order], np.arcsin(sine[order]))

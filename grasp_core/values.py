@@ -1,0 +1,265 @@
+"""The nouns of the project: faces, polyhedra, contacts, grasps and plans, all frozen.
+
+Every vector is in the object's frame and in SI units. Normals are unit vectors that
+point into the object. Arrays are copied, checked and made read-only on construction.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, Self, TypeAlias, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, Indices, frozen, frozen_indices, frozen_units
+from grasp_core.errors import InputError
+
+Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
+
+Item = TypeVar("Item")
+
+FINGERS = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Face:
+    """A planar face: one outer border, perhaps holes, and a split into convex pieces."""
+
+    normal: Array
+    """Unit vector into the object, (3,)."""
+    centroid: Array
+    """Centre of area, on the plane, (3,) [m]."""
+    area: float
+    """[m^2]"""
+    polygon: Array
+    """Outer border, (k, 3) [m], counter-clockwise when `normal` points at the viewer."""
+    holes: tuple[Array, ...]
+    """Borders of the holes, each (k, 3) [m], clockwise in the same view."""
+    pieces: tuple[Array, ...]
+    """Convex polygons that tile the face, each (k, 3) [m], wound as `polygon`."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "normal", frozen_units(self.normal, (3,), "normal"))
+        object.__setattr__(self, "centroid", frozen(self.centroid, (3,), "centroid"))
+        object.__setattr__(self, "polygon", frozen(self.polygon, (None, 3), "polygon"))
+        for name in ("holes", "pieces"):
+            loops = tuple(frozen(loop, (None, 3), name) for loop in getattr(self, name))
+            object.__setattr__(self, name, loops)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Polyhedron:
+    """A solid bounded by planar faces, with the mass properties of uniform density 1."""
+
+    name: str
+    vertices: Array
+    """Welded vertices, (n, 3) [m]."""
+    triangles: Indices
+    """Vertex indices, (t, 3), counter-clockwise seen from outside."""
+    faces: tuple[Face, ...]
+    volume: float
+    """[m^3]"""
+    center_of_mass: Array
+    """(3,) [m]"""
+    inertia: Array
+    """About the centre of mass at density 1 kg/m^3, (3, 3) [kg m^2]."""
+    content_sha256: str
+    """Hash of the canonical mesh: the same for any file name, vertex or triangle order."""
+    source_sha256: str
+    """Hash of the file's bytes; `content_sha256` when there was no file."""
+    notes: tuple[str, ...] = ()
+    """What was mended on the way in, for people to read."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vertices", frozen(self.vertices, (None, 3), "vertices"))
+        triangles = frozen_indices(self.triangles, (None, 3), "triangles")
+        object.__setattr__(self, "triangles", triangles)
+        center = frozen(self.center_of_mass, (3,), "center_of_mass")
+        object.__setattr__(self, "center_of_mass", center)
+        object.__setattr__(self, "inertia", frozen(self.inertia, (3, 3), "inertia"))
+
+    @classmethod
+    def from_mesh(cls, vertices: ArrayLike, triangles: ArrayLike, *, name: str = "object") -> Self:
+        """Build from a triangle mesh, with the checks and refusals of a mesh file.
+
+        Args:
+            vertices: (n, 3) [m].
+            triangles: Vertex indices, (t, 3).
+            name: What to call the object.
+
+        Raises:
+            MeshError: The mesh is not a solid; its `reason` says why.
+        """
+        from grasp_core.mesh import polyhedron_from_mesh
+
+        return polyhedron_from_mesh(vertices, triangles, name=name, kind=cls)
+
+    @property
+    def radius(self) -> float:
+        """Largest distance of a vertex from the centre of mass [m]."""
+        return float(np.linalg.norm(self.vertices - self.center_of_mass, axis=1).max())
+
+    @property
+    def normals(self) -> Array:
+        """The faces' normals, (faces, 3)."""
+        return np.array([face.normal for face in self.faces]).reshape(-1, 3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceCone:
+    """A circular cone of force directions inside a friction cone.
+
+    The paper's case has the normal as axis and the friction angle as half-angle.
+    """
+
+    axis: Array
+    """Unit vector, (3,)."""
+    half_angle: float
+    """[rad]"""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", frozen_units(self.axis, (3,), "axis"))
+        if not 0.0 <= self.half_angle < np.pi / 2:
+            raise InputError(f"half_angle must be in [0, pi/2), got {self.half_angle:.6g}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contact:
+    """Where one fingertip touches, and which way it can push."""
+
+    position: Array
+    """Point on the surface, (3,) [m]."""
+    normal: Array
+    """Unit vector into the object, (3,)."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position", frozen(self.position, (3,), "position"))
+        object.__setattr__(self, "normal", frozen_units(self.normal, (3,), "normal"))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactRegion:
+    """Where one finger may stand while the others stay anywhere in their own regions."""
+
+    kind: Literal["cone"]
+    """What certifies it: `cone` is the inverted force cone of a focus point cut with the face."""
+    polygon: Array
+    """Convex polygon on the face, (k, 3) [m]."""
+    inscribed_radius: float
+    """Radius of the largest disc inside the polygon [m]."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "polygon", frozen(self.polygon, (None, 3), "polygon"))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grasp:
+    """Four contacts in finger order, with the witness of why they hold."""
+
+    id: str
+    family: Family
+    faces: tuple[int, int, int, int]
+    contacts: tuple[Contact, Contact, Contact, Contact]
+    focus_points: Array
+    """Where the witness lines of force meet, (k, 3) [m]: one point for a concurrent grasp."""
+    force_cones: tuple[ForceCone, ForceCone, ForceCone, ForceCone]
+    """The cones the construction used; each lies inside its contact's friction cone."""
+    regions: tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
+    radius: float
+    """Radius of the smallest of the four independent discs [m]."""
+    span_angle: float
+    """Largest half-angle at which the four normals positively span, theta* [rad]."""
+    critical_friction: float
+    """Smallest Coulomb coefficient at which the contacts can be in equilibrium."""
+    closure_margin: float
+    """Margin of the exact closure test at the planned friction (see `force_closure`)."""
+
+    def __post_init__(self) -> None:
+        for name in ("faces", "contacts", "force_cones", "regions"):
+            if len(getattr(self, name)) != FINGERS:
+                count = len(getattr(self, name))
+                raise InputError(f"a grasp has {FINGERS} {name}, got {count}")
+        object.__setattr__(self, "focus_points", frozen(self.focus_points, (None, 3), "focus"))
+
+    @property
+    def positions(self) -> Array:
+        """Contact points in finger order, (4, 3) [m]."""
+        return np.array([contact.position for contact in self.contacts])
+
+    @property
+    def normals(self) -> Array:
+        """Inward normals in finger order, (4, 3)."""
+        return np.array([contact.normal for contact in self.contacts])
+
+
+@dataclass(frozen=True, slots=True)
+class FamilyCounts:
+    """What happened to the face quadruples of one family."""
+
+    tried: int = 0
+    """Quadruples whose programs were set up."""
+    pruned: int = 0
+    """Quadruples skipped because a bound showed they cannot enter the best `limit`."""
+    solved: int = 0
+    """Linear programs solved."""
+    infeasible: int = 0
+    """Quadruples proved to hold no grasp of this family at the planned angle."""
+    found: int = 0
+    """Grasps certified by the exact closure test."""
+    rejected: int = 0
+    """Grasps of the construction that the exact closure test did not certify: a bug if not 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanCounts:
+    """What the planner tried on one object."""
+
+    faces: int
+    quadruples: int
+    """All sets of four faces."""
+    spanning: int
+    """Those whose normals positively span at the least planned angle (P3)."""
+    families: Mapping[str, FamilyCounts] = field(default_factory=dict[str, FamilyCounts])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """The grasps found on one object, best radius first, and what was tried."""
+
+    grasps: tuple[Grasp, ...]
+    friction: float
+    theta: float
+    """Half-angle of the friction cones planned with, before each quadruple's own limit [rad]."""
+    seed: int
+    counts: PlanCounts
+    absence: str | None = None
+    """Why there is no grasp, as a sentence; None when there is one."""
+
+
+def four(items: Iterable[Item]) -> tuple[Item, Item, Item, Item]:
+    """Exactly four things, one per finger.
+
+    Raises:
+        InputError: There are more or fewer.
+    """
+    listed = tuple(items)
+    if len(listed) != FINGERS:
+        raise InputError(f"expected {FINGERS}, one per finger, got {len(listed)}")
+    return listed
+
+
+def contact_arrays(positions: ArrayLike | Grasp, normals: ArrayLike | None) -> tuple[Array, Array]:
+    """Positions and inward normals, each (k, 3), from a grasp or from two arrays.
+
+    Raises:
+        InputError: Shapes differ, a normal is not a unit vector, or fewer than two contacts.
+    """
+    if isinstance(positions, Grasp):
+        return positions.positions, positions.normals
+    if normals is None:
+        raise InputError("normals are missing: pass positions and normals, or a Grasp")
+    points = frozen(positions, (None, 3), "positions")
+    units = frozen_units(normals, (len(points), 3), "normals")
+    if len(points) < 2:  # noqa: PLR2004 - one contact alone can balance nothing
+        raise InputError(f"at least two contacts are needed, got {len(points)}")
+    return points, units
