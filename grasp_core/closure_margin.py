@@ -170,5 +170,6 @@ def _margin_program(balance: Array, normals: Array, friction: Array) -> tuple[fl
     )
     forces = solution.x[:-1]
     if not rows["zero"]:
-        forces -= np.linalg.lstsq(balance, balance @ forces, rcond=None)[0]
-    return float(solution.x[-1]), forces.reshape(k, 3), -solution.z[:m]
+        forces = forces - np.linalg.lstsq(balance, balance @ forces, rcond=None)[0]
+    balanced = np.asarray(forces, dtype=np.float64).reshape(k, 3)
+    return float(solution.x[-1]), balanced, -solution.z[:m]

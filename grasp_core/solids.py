@@ -77,7 +77,7 @@ def _kernel() -> Any:
 def _manifold(solid: Solid) -> Any:
     kernel = _kernel()
     mesh = kernel.Mesh64(
-        np.ascontiguousarray(solid.vertices), np.ascontiguousarray(solid.triangles, dtype=np.uint64)
+        np.array(solid.vertices, order="C"), np.array(solid.triangles, dtype=np.uint64, order="C")
     )
     body = kernel.Manifold(mesh)
     if body.status() != kernel.Error.NoError:

@@ -1,0 +1,119 @@
+"""Contacts on an object -> where everything stands in the scene, as plain numbers.
+
+The world frame is the object's frame moved to its centre of mass: T_world_object is the
+translation by minus the centre of mass. Lengths and forces are true to the object and the
+user. Masses are not: a quasi-static test asks whether forces balance, and similar objects
+should behave alike, so object and fingers get the mass that the largest normal force moves
+by the object's radius in a fixed time.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.errors import InputError
+from grasp_core.values import Contact, Grasp, Polyhedron
+from grasp_core.wrenches import contact_frames
+
+RESPONSE_TIME_S = 0.07
+"""Time in which the largest normal force moves the object by its radius, from rest and
+without the factor 1/2: 1 kg for 10 N and 5 cm, where the settings were measured."""
+STIFFNESS = 5.0
+"""Servo stiffness in largest normal forces per object radius: below 1 the grasp is unstable,
+above 50 the servo fights the planned forces."""
+TIP_RADIUS = 0.1
+PAD_HALF_WIDTH = 0.2
+PAD_DEPTH = 0.1
+RETREAT = 0.5
+"""Fingertip radius, pad size and distance of approach, in object radii."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FingerDrive:
+    """How a fingertip is built and driven."""
+
+    radius_m: float
+    mass_kg: float
+    stiffness_n_per_m: float
+    damping_n_s_per_m: float
+    max_normal_force_n: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layout:
+    """Everything that stands in a scene, in the world frame."""
+
+    name: str
+    vertices: Array
+    """Object mesh about its centre of mass, (n, 3) [m]."""
+    triangles: Array
+    """(t, 3)"""
+    radius_m: float
+    """Largest distance of the object's surface from its centre of mass."""
+    mass_kg: float
+    inertia_kg_m2: float
+    """The same about every axis."""
+    contacts: Array
+    """(k, 3) [m]"""
+    frames: Array
+    """Columns (inward normal, tangent, tangent) of each contact, (k, 3, 3)."""
+    friction: float
+    drive: FingerDrive
+
+    @property
+    def tip_centers(self) -> Array:
+        """Centres of the fingertips touching the object, (k, 3) [m]."""
+        return self.contacts - self.drive.radius_m * self.frames[:, :, 0]
+
+
+def arrange(
+    body: Polyhedron,
+    grasp: Grasp | Sequence[Contact],
+    friction: float,
+    *,
+    max_normal_force: float = 10.0,
+    fingertip_radius: float | None = None,
+) -> Layout:
+    """Place object, fingertips and drives for a grasp.
+
+    Args:
+        body: The object.
+        grasp: A grasp, or contacts from elsewhere.
+        friction: Coulomb coefficient at every contact.
+        max_normal_force: Limit of each finger's push [N].
+        fingertip_radius: [m]; a tenth of the object's radius when None.
+
+    Raises:
+        InputError: A number is not positive.
+    """
+    contacts = grasp.contacts if isinstance(grasp, Grasp) else tuple(grasp)
+    radius = body.radius
+    tip = TIP_RADIUS * radius if fingertip_radius is None else fingertip_radius
+    positive = {"friction": friction, "max_normal_force": max_normal_force, "fingertip_radius": tip}
+    for name, value in positive.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise InputError(f"{name} must be a positive number, got {value}")
+    mass = max_normal_force * RESPONSE_TIME_S**2 / radius
+    stiffness = STIFFNESS * max_normal_force / radius
+    normals = np.array([contact.normal for contact in contacts])
+    positions = np.array([contact.position for contact in contacts])
+    return Layout(
+        name=body.name,
+        vertices=body.vertices - body.center_of_mass,
+        triangles=body.triangles,
+        radius_m=radius,
+        mass_kg=mass,
+        inertia_kg_m2=mass * (radius / 2.0) ** 2,
+        contacts=positions - body.center_of_mass,
+        frames=contact_frames(normals),
+        friction=friction,
+        drive=FingerDrive(
+            radius_m=tip,
+            mass_kg=mass,
+            stiffness_n_per_m=stiffness,
+            damping_n_s_per_m=2.0 * float(np.sqrt(stiffness * mass)),
+            max_normal_force_n=max_normal_force,
+        ),
+    )

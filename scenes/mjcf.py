@@ -1,0 +1,237 @@
+"""Layout -> MJCF text: self-contained, every setting written out, every number in full.
+
+The text is written here rather than by MuJoCo's own writer, which leaves out what equals a
+default (defaults move between releases) and rounds numbers. The object's mesh is for the
+eye. Contact happens between each fingertip and its own pad: a box on the object whose top
+is flush with the face at the contact, visible to that one finger only, so that normals are
+exact on any object, convex or not.
+
+Fingers are spheres on three slides along (normal, tangent, tangent), each with a position
+servo: `ctrl = f / kp` makes it push with force f at its zero position, and the servo on the
+normal is limited to the largest normal force.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.values import Contact, Grasp, Polyhedron
+from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, RETREAT, Layout, arrange
+from scenes.physics import PhysicsSettings, flags
+
+AXES = ("normal", "tangent1", "tangent2")
+SQUEEZE = 0.4
+"""Mean normal force of the `grasp` keyframe, in largest normal forces."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """A grasp as a MuJoCo model in text, with the numbers it was made from."""
+
+    xml: str
+    layout: Layout
+    physics: PhysicsSettings
+
+
+def build_scene(
+    body: Polyhedron,
+    grasp: Grasp | Iterable[Contact],
+    friction: float = 0.5,
+    *,
+    max_normal_force: float = 10.0,
+    fingertip_radius: float | None = None,
+    physics: PhysicsSettings | None = None,
+) -> Scene:
+    """Turn a grasp into a MuJoCo scene.
+
+    Args:
+        body: The object.
+        grasp: A grasp, or contacts from elsewhere.
+        friction: Coulomb coefficient at every contact.
+        max_normal_force: Limit of each finger's push [N].
+        fingertip_radius: [m]; a tenth of the object's radius when None.
+        physics: Simulation settings.
+
+    Raises:
+        InputError: A number is out of range.
+    """
+    contacts = grasp if isinstance(grasp, Grasp) else tuple(grasp)
+    layout = arrange(
+        body, contacts, friction,
+        max_normal_force=max_normal_force, fingertip_radius=fingertip_radius,
+    )  # fmt: skip
+    physics = physics or PhysicsSettings()
+    return Scene(to_text(layout, physics), layout, physics)
+
+
+def write_scene(scene: Scene, path: str | Path) -> Path:
+    """Write the scene's text to a file and return its path."""
+    path = Path(path)
+    path.write_text(scene.xml, encoding="utf-8")
+    return path
+
+
+def to_text(layout: Layout, physics: PhysicsSettings) -> str:
+    """The MJCF text of a layout: the same text for the same layout."""
+    root = ElementTree.Element("mujoco", model=_plain(layout.name))
+    _add(root, "compiler", {"angle": "radian", "autolimits": "false", "inertiafromgeom": "false"})
+    option = _add(root, "option", physics.options())
+    _add(option, "flag", flags())
+    _add(root, "statistic", {"extent": 3.0 * layout.radius_m, "center": (0.0, 0.0, 0.0)})
+    assets = _add(root, "asset", {})
+    mesh = {"name": "object", "inertia": "shell"}
+    _add(
+        assets, "mesh", mesh | {"vertex": layout.vertices.ravel(), "face": layout.triangles.ravel()}
+    )
+    world = _add(root, "worldbody", {})
+    light = {"pos": (0.0, 0.0, 8.0 * layout.radius_m), "dir": (0.0, 0.0, -1.0)}
+    _add(world, "light", light | {"type": "directional"})
+    _object(world, layout, physics)
+    for finger in range(len(layout.contacts)):
+        _finger(world, layout, physics, finger)
+    actuators = _add(root, "actuator", {})
+    for finger in range(len(layout.contacts)):
+        _servos(actuators, layout, finger)
+    _keyframes(root, layout)
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _object(world: ElementTree.Element, layout: Layout, physics: PhysicsSettings) -> None:
+    body = _add(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)})
+    _add(body, "freejoint", {"name": "object"})
+    inertia = (layout.inertia_kg_m2,) * 3
+    _add(
+        body,
+        "inertial",
+        {"pos": (0.0, 0.0, 0.0), "mass": layout.mass_kg, "diaginertia": inertia},
+    )
+    _add(
+        body,
+        "geom",
+        {"name": "object", "type": "mesh", "mesh": "object", "contype": 0, "conaffinity": 0,
+         "group": 1, "rgba": (0.55, 0.62, 0.70, 0.6), "mass": 0.0},
+    )  # fmt: skip
+    width, depth = PAD_HALF_WIDTH * layout.radius_m, PAD_DEPTH * layout.radius_m
+    for finger, (point, frame) in enumerate(zip(layout.contacts, layout.frames, strict=True)):
+        outward = np.column_stack([frame[:, 2], frame[:, 1], -frame[:, 0]])
+        pad = {
+            "name": f"pad{finger}",
+            "type": "box",
+            "size": (width, width, 0.5 * depth),
+            "pos": point + 0.5 * depth * frame[:, 0],
+            "quat": quaternion(outward),
+            "contype": 1 << finger,
+            "conaffinity": 0,
+            "friction": (layout.friction, 0.0, 0.0),
+            "mass": 0.0,
+            "group": 3,
+            "rgba": (0.9, 0.6, 0.2, 0.3),
+        }
+        _add(body, "geom", pad | physics.contact())
+
+
+def _finger(
+    world: ElementTree.Element, layout: Layout, physics: PhysicsSettings, finger: int
+) -> None:
+    drive = layout.drive
+    pose = {"pos": layout.tip_centers[finger], "quat": quaternion(layout.frames[finger])}
+    body = _add(world, "body", {"name": f"finger{finger}", "gravcomp": 1.0} | pose)
+    for axis, direction in zip(AXES, np.eye(3), strict=True):
+        _add(
+            body,
+            "joint",
+            {"name": f"finger{finger}_{axis}", "type": "slide", "axis": direction,
+             "pos": (0.0, 0.0, 0.0), "limited": "false", "damping": 0.0, "stiffness": 0.0,
+             "armature": 0.0, "frictionloss": 0.0},
+        )  # fmt: skip
+    _add(
+        body,
+        "inertial",
+        {"pos": (0.0, 0.0, 0.0), "mass": drive.mass_kg,
+         "diaginertia": (0.4 * drive.mass_kg * drive.radius_m**2,) * 3},
+    )  # fmt: skip
+    tip = {
+        "name": f"finger{finger}",
+        "type": "sphere",
+        "size": drive.radius_m,
+        "contype": 0,
+        "conaffinity": 1 << finger,
+        "friction": (layout.friction, 0.0, 0.0),
+        "mass": 0.0,
+        "group": 0,
+        "rgba": (0.8, 0.25, 0.2, 1.0),
+    }
+    _add(body, "geom", tip | physics.contact())
+
+
+def _servos(actuators: ElementTree.Element, layout: Layout, finger: int) -> None:
+    drive = layout.drive
+    for axis in AXES:
+        name = f"finger{finger}_{axis}"
+        servo = {
+            "name": name,
+            "joint": name,
+            "kp": drive.stiffness_n_per_m,
+            "kv": drive.damping_n_s_per_m,
+            "ctrllimited": "false",
+            "forcelimited": "false",
+        }
+        if axis == "normal":
+            servo |= {"forcelimited": "true", "forcerange": (0.0, drive.max_normal_force_n)}
+        _add(actuators, "position", servo)
+
+
+def _keyframes(root: ElementTree.Element, layout: Layout) -> None:
+    """`approach`: fingers away from the object; `grasp`: touching. Both servos push gently in."""
+    fingers = len(layout.contacts)
+    home = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], np.zeros(3 * fingers)])
+    away = home.copy()
+    away[7::3] = -RETREAT * layout.radius_m
+    drive = layout.drive
+    push = np.zeros((fingers, 3))
+    push[:, 0] = SQUEEZE * drive.max_normal_force_n / drive.stiffness_n_per_m
+    keys = _add(root, "keyframe", {})
+    _add(keys, "key", {"name": "approach", "qpos": away, "ctrl": push.ravel()})
+    _add(keys, "key", {"name": "grasp", "qpos": home, "ctrl": push.ravel()})
+
+
+def quaternion(rotation: Array) -> Array:
+    """Unit quaternion (w, x, y, z) of a rotation matrix, (4,), with its largest part positive.
+
+    The symmetric matrix below has the quaternion as its eigenvector of largest eigenvalue.
+    """
+    R = rotation
+    K = np.array(
+        [
+            [np.trace(R), R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
+            [0.0, R[0, 0] - R[1, 1] - R[2, 2], R[0, 1] + R[1, 0], R[0, 2] + R[2, 0]],
+            [0.0, 0.0, R[1, 1] - R[0, 0] - R[2, 2], R[1, 2] + R[2, 1]],
+            [0.0, 0.0, 0.0, R[2, 2] - R[0, 0] - R[1, 1]],
+        ]
+    )
+    vector = np.linalg.eigh(K, UPLO="U")[1][:, -1]
+    return vector * np.sign(vector[int(np.argmax(np.abs(vector)))])
+
+
+def _add(
+    parent: ElementTree.Element, tag: str, attributes: Mapping[str, object]
+) -> ElementTree.Element:
+    text = {name: _text(value) for name, value in attributes.items()}
+    return ElementTree.SubElement(parent, tag, text)
+
+
+def _text(value: object) -> str:
+    """A number in full precision, a sequence with blanks between."""
+    if isinstance(value, str):
+        return value
+    return " ".join(repr(number) for number in np.asarray(value).ravel().tolist())
+
+
+def _plain(name: str) -> str:
+    """A model name of printable characters only."""
+    return "".join(c if c.isprintable() else "_" for c in name) or "object"
