@@ -138,7 +138,8 @@ def _margin_program(balance: Array, normals: Array, friction: Array) -> tuple[fl
     """
     k, m = len(normals), len(balance)
     n = 3 * k + 1
-    receding = np.linalg.lstsq(balance.T, -normals.ravel(), rcond=None)[0]
+    departing = np.linalg.lstsq(balance.T, -normals.ravel(), rcond=None)[0]
+    receding = np.asarray(departing, dtype=np.float64)
     if np.abs(balance.T @ receding + normals.ravel()).max() <= ROUNDING:
         return -math.inf, np.zeros((k, 3)), receding  # every contact leaves along its normal
     rows = {kind: list[Array]() for kind in ("zero", "nonnegative", "cone")}
@@ -170,6 +171,6 @@ def _margin_program(balance: Array, normals: Array, friction: Array) -> tuple[fl
     )
     forces = solution.x[:-1]
     if not rows["zero"]:
-        forces = forces - np.linalg.lstsq(balance, balance @ forces, rcond=None)[0]
-    balanced = np.asarray(forces, dtype=np.float64).reshape(k, 3)
-    return float(solution.x[-1]), balanced, -solution.z[:m]
+        correction = np.linalg.lstsq(balance, balance @ forces, rcond=None)[0]
+        forces = forces - np.asarray(correction, dtype=np.float64)
+    return float(solution.x[-1]), forces.reshape(k, 3), -solution.z[:m]

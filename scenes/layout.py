@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array
-from grasp_core.errors import InputError
+from grasp_core.arrays import Array, Indices
+from grasp_core.closure import force_closure
+from grasp_core.errors import InputError, UndecidedError
 from grasp_core.values import Contact, Grasp, Polyhedron
 from grasp_core.wrenches import contact_frames
 
@@ -23,6 +24,8 @@ without the factor 1/2: 1 kg for 10 N and 5 cm, where the settings were measured
 STIFFNESS = 5.0
 """Servo stiffness in largest normal forces per object radius: below 1 the grasp is unstable,
 above 50 the servo fights the planned forces."""
+SQUEEZE = 0.6
+"""Largest normal force of the gentle grasp, in largest normal forces."""
 TIP_RADIUS = 0.1
 PAD_HALF_WIDTH = 0.2
 PAD_DEPTH = 0.1
@@ -48,7 +51,7 @@ class Layout:
     name: str
     vertices: Array
     """Object mesh about its centre of mass, (n, 3) [m]."""
-    triangles: Array
+    triangles: Indices
     """(t, 3)"""
     radius_m: float
     """Largest distance of the object's surface from its centre of mass."""
@@ -61,6 +64,8 @@ class Layout:
     """Columns (inward normal, tangent, tangent) of each contact, (k, 3, 3)."""
     friction: float
     drive: FingerDrive
+    squeeze: Array
+    """Forces of a gentle grasp, balanced where possible, in the contact frames, (k, 3) [N]."""
 
     @property
     def tip_centers(self) -> Array:
@@ -116,4 +121,18 @@ def arrange(
             damping_n_s_per_m=2.0 * float(np.sqrt(stiffness * mass)),
             max_normal_force_n=max_normal_force,
         ),
+        squeeze=SQUEEZE * max_normal_force * _pushes(positions, normals, friction),
     )
+
+
+def _pushes(positions: Array, normals: Array, friction: float) -> Array:
+    """Forces in the contact frames, (k, 3), that hold the object still if any do.
+
+    The largest normal part is one. Contacts that are not in force closure just push.
+    """
+    try:
+        forces = force_closure(positions, normals, friction).forces
+    except UndecidedError:
+        forces = None
+    local = np.einsum("kij,ki->kj", contact_frames(normals), normals if forces is None else forces)
+    return local / local[:, 0].max()

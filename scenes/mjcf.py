@@ -24,8 +24,6 @@ from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, RETREAT, Layout, arrange
 from scenes.physics import PhysicsSettings, flags
 
 AXES = ("normal", "tangent1", "tangent2")
-SQUEEZE = 0.4
-"""Mean normal force of the `grasp` keyframe, in largest normal forces."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -187,14 +185,12 @@ def _servos(actuators: ElementTree.Element, layout: Layout, finger: int) -> None
 
 
 def _keyframes(root: ElementTree.Element, layout: Layout) -> None:
-    """`approach`: fingers away from the object; `grasp`: touching. Both servos push gently in."""
+    """`approach`: fingers away from the object; `grasp`: touching. Both squeeze gently."""
     fingers = len(layout.contacts)
     home = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], np.zeros(3 * fingers)])
     away = home.copy()
     away[7::3] = -RETREAT * layout.radius_m
-    drive = layout.drive
-    push = np.zeros((fingers, 3))
-    push[:, 0] = SQUEEZE * drive.max_normal_force_n / drive.stiffness_n_per_m
+    push = layout.squeeze / layout.drive.stiffness_n_per_m
     keys = _add(root, "keyframe", {})
     _add(keys, "key", {"name": "approach", "qpos": away, "ctrl": push.ravel()})
     _add(keys, "key", {"name": "grasp", "qpos": home, "ctrl": push.ravel()})

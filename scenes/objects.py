@@ -147,8 +147,9 @@ def _screwdriver() -> Solid:
         np.vstack([_ring(0.014, 8, -0.09), _ring(0.017, 8, -0.06), _ring(0.013, 8, -0.005)])
     )
     shaft = hull(np.vstack([_ring(0.006, 6, -0.02), _ring(0.006, 6, 0.07)]))
-    blade = hull([[x, y, z] for x, y, z in product((-0.007, 0.007), (-0.004, 0.004), (0.06, 0.07))]
-                 + [[x, y, 0.095] for x, y in product((-0.006, 0.006), (-0.001, 0.001))])  # fmt: skip
+    thick = product((-0.007, 0.007), (-0.004, 0.004), (0.06, 0.07))
+    edge = product((-0.006, 0.006), (-0.001, 0.001), (0.095,))
+    blade = hull([*thick, *edge])
     return handle + shaft + blade
 
 
@@ -194,9 +195,9 @@ def _facet_signs(solid: Solid) -> Array:
 
 def _polar_corners(solid: Solid) -> Array:
     """Corner of the polar body for each triangle: the point p with p.v = 1 at its vertices."""
-    return np.linalg.solve(solid.vertices[solid.triangles], np.ones((len(solid.triangles), 3, 1)))[
-        ..., 0
-    ]
+    ones = np.ones((len(solid.triangles), 3, 1))
+    corners = np.linalg.solve(solid.vertices[solid.triangles], ones)[..., 0]
+    return np.asarray(corners, dtype=np.float64)
 
 
 OBJECTS: dict[str, Callable[[], Solid]] = {

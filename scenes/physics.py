@@ -76,5 +76,9 @@ UNUSED_FLAGS = (
 
 def flags() -> dict[str, str]:
     """All flags of MJCF's `flag` element, so that no default matters."""
-    on = dict.fromkeys(ENABLED_FLAGS, "enable")
-    return on | dict.fromkeys((*DISABLED_FLAGS, *UNUSED_FLAGS), "disable")
+    states = dict[str, str]()
+    for name in ENABLED_FLAGS:
+        states[name] = "enable"
+    for name in (*DISABLED_FLAGS, *UNUSED_FLAGS):
+        states[name] = "disable"
+    return states
