@@ -94,7 +94,7 @@ def force_closure(
         UndecidedError: The contacts are within rounding of the boundary of closure.
     """
     points, units = contact_arrays(positions, normals)
-    mu = _frictions(friction, len(points))
+    mu = contact_frictions(friction, len(points))
     arms, center, size = _unit_size(points)
     answer = decide(arms, units, mu)
     if answer.forces is not None:
@@ -174,7 +174,8 @@ def _about_origin(twist: Array, center: Array, size: float) -> Array:
     return np.concatenate([twist[:3] - np.cross(turning, center), turning])
 
 
-def _frictions(friction: ArrayLike, count: int) -> Array:
+def contact_frictions(friction: ArrayLike, count: int) -> Array:
+    """One checked Coulomb coefficient per contact, (count,), from one for all or one each."""
     values = np.asarray(friction, dtype=np.float64)
     mu = frozen(np.full(count, values) if values.ndim == 0 else values, (count,), "friction")
     if (mu < 0.0).any():

@@ -1,0 +1,219 @@
+"""Contact forces that balance a wrench, by strictly convex programs; the door to ProxQP.
+
+Forces are sought in pyramids inscribed in the friction cones, so that every answer lies in
+the true cones. Two objectives for balanced forces: the least norm, and the least friction,
+that is, the smallest coefficient max_i |tangential part| / normal part. The latter is found
+by Dinkelbach's iteration: with r the current coefficient, forces that minimise the largest
+tangential part minus r times the normal part have a smaller one, until they do not. Where
+nothing balances, `closest_forces` leaves the least imbalance.
+
+Forces are scaled by the largest normal force and lengths by the longest arm inside. ProxQP
+calls some of these feasible programs infeasible, so it is asked for the closest feasible
+point, and its status is not read: an answer counts when its own residuals are small.
+"""
+
+import importlib
+import math
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, frozen
+from grasp_core.errors import GraspError, InputError, SolverError
+from grasp_core.values import Grasp, contact_arrays
+from grasp_core.wrenches import contact_frames, grasp_map
+
+PYRAMID_SIDES = 16
+"""An inscribed 16-sided pyramid gives away 1.9 % of the friction coefficient."""
+RESIDUAL = 1e-6
+"""Largest imbalance and cone violation accepted, in units of the largest normal force: a
+hundred times the accuracy asked of the solver."""
+REQUESTED = 1e-8
+REGULAR = 1e-3
+"""Weight of the forces' own size that keeps the least-friction programs strictly convex."""
+IMPROVEMENT = 1e-2
+"""Iteration ends when the coefficient falls by less than this share."""
+MAX_ROUNDS = 20
+LEAST_CHARGE = 1e-3
+"""Weight of the forces' own size against the imbalance in `closest_forces`."""
+
+
+class NoForcesError(GraspError):
+    """No forces within the limits balance the wrench."""
+
+
+def contact_forces(  # noqa: PLR0913 - the contract's arguments
+    positions: ArrayLike | Grasp,
+    normals: ArrayLike | None,
+    friction: float,
+    wrench: ArrayLike,
+    *,
+    objective: Literal["least_norm", "least_friction"] = "least_norm",
+    normal_force: tuple[float, float] = (0.0, math.inf),
+    center: ArrayLike = (0.0, 0.0, 0.0),
+) -> Array:
+    """Forces at the contacts that balance an external wrench.
+
+    Args:
+        positions: Contact points, (k, 3) [m]; or a Grasp, with `normals` None.
+        normals: Unit vectors into the object, (k, 3).
+        friction: Coulomb coefficient that the forces must respect.
+        wrench: External (force, torque), (6,) [N, N m], torque about `center`.
+        objective: What to make least.
+        normal_force: Least and largest normal force of each contact [N].
+        center: (3,) [m]
+
+    Returns:
+        Forces on the object, (k, 3) [N], in the frame of `positions`.
+
+    Raises:
+        InputError: Shapes or limits are wrong.
+        NoForcesError: No forces found that meet the limits and the friction.
+    """
+    problem = _Problem.of(positions, normals, wrench, normal_force, center)
+    least_norm = objective == "least_norm"
+    local = problem.least_norm(friction) if least_norm else problem.least_friction(friction)
+    if local is None or problem.required_friction(local) > friction * (1.0 + RESIDUAL):
+        raise NoForcesError(
+            f"no forces found with friction {friction:.6g} and normal forces in "
+            f"{normal_force} N that balance this wrench; lower the load or raise the limits"
+        )
+    return problem.in_space(local)
+
+
+def least_friction_forces(
+    positions: Array, normals: Array, friction: float, wrench: Array, *,
+    normal_force: tuple[float, float], center: Array,
+) -> tuple[Array, float] | None:  # fmt: skip
+    """Balancing forces (k, 3) of least friction, with that coefficient, whatever it is.
+
+    `friction` is where the search starts; forces are found above it if they must be.
+
+    None when the limits on the normal forces leave no balance.
+    """
+    problem = _Problem.of(positions, normals, wrench, normal_force, center)
+    local = problem.least_friction(friction)
+    return None if local is None else (problem.in_space(local), problem.required_friction(local))
+
+
+def closest_forces(
+    positions: Array, normals: Array, friction: float, wrench: Array, *,
+    normal_force: tuple[float, float], center: Array,
+) -> Array:  # fmt: skip
+    """Forces in the friction cones that leave the least imbalance, (k, 3)."""
+    problem = _Problem.of(positions, normals, wrench, normal_force, center)
+    return problem.in_space(problem.closest(friction))
+
+
+class _Problem:
+    """One wrench on one set of contacts, scaled; forces are (normal, tangent, tangent)."""
+
+    def __init__(
+        self, arms: Array, normals: Array, wrench: Array, normal_force: tuple[float, float]
+    ) -> None:
+        least, largest = normal_force
+        scale = largest if math.isfinite(largest) else float(np.linalg.norm(wrench))
+        self.scale = scale if scale > 0.0 else 1.0
+        self.frames = contact_frames(normals)
+        size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
+        rows = grasp_map(arms / size)
+        self.G = np.hstack([rows[:, 3 * i : 3 * i + 3] @ R for i, R in enumerate(self.frames)])
+        self.w = wrench / self.scale
+        self.w[3:] /= size
+        self.count = len(arms)
+        self.lower = np.tile([least / self.scale, -np.inf, -np.inf], self.count)
+        self.upper = np.tile([largest / self.scale, np.inf, np.inf], self.count)
+
+    @classmethod
+    def of(
+        cls, positions: ArrayLike | Grasp, normals: ArrayLike | None, wrench: ArrayLike,
+        normal_force: tuple[float, float], center: ArrayLike,
+    ) -> "_Problem":  # fmt: skip
+        points, units = contact_arrays(positions, normals)
+        if not 0.0 <= normal_force[0] < normal_force[1]:
+            raise InputError(f"normal_force must be (least, largest), got {normal_force}")
+        about = frozen(center, (3,), "center")
+        return cls(points - about, units, np.array(frozen(wrench, (6,), "wrench")), normal_force)
+
+    def in_space(self, local: Array) -> Array:
+        """Scaled local forces as forces in the object's frame, (k, 3) [N]."""
+        forces = np.einsum("kij,kj->ki", self.frames, local.reshape(-1, 3))
+        return self.scale * np.asarray(forces, dtype=np.float64)
+
+    def required_friction(self, local: Array) -> float:
+        """The coefficient that these forces need."""
+        along, across = local[0::3], np.hypot(local[1::3], local[2::3])
+        return float((across / np.maximum(along, np.finfo(np.float64).tiny)).max())
+
+    def pyramid(self, friction: float) -> Array:
+        """Rows R with R f <= 0 inside pyramids inscribed in the cones, (16 k, 3 k)."""
+        turns = 2.0 * np.pi * (np.arange(PYRAMID_SIDES) + 0.5) / PYRAMID_SIDES
+        slope = -friction * math.cos(np.pi / PYRAMID_SIDES)
+        side = np.column_stack([np.full(PYRAMID_SIDES, slope), np.cos(turns), np.sin(turns)])
+        return np.asarray(np.kron(np.eye(self.count), side), dtype=np.float64)
+
+    def least_norm(self, friction: float) -> Array | None:
+        """Balanced forces of least norm."""
+        rows = self.pyramid(friction)
+        P = np.eye(self.G.shape[1])
+        return self._balanced(_solve(P, 0.0 * P[0], rows, self, balanced=True))
+
+    def least_friction(self, start: float) -> Array | None:
+        """Balanced forces of least friction, iterating from a coefficient on the way there."""
+        best, friction = None, start
+        for _ in range(MAX_ROUNDS):
+            better = self._toward_less_friction(friction)
+            if better is None:
+                break
+            needed = self.required_friction(better)
+            if best is not None and needed > friction * (1.0 - IMPROVEMENT):
+                break
+            best, friction = better, needed
+        return best
+
+    def _toward_less_friction(self, friction: float) -> Array | None:
+        """Balanced forces whose largest excess over `friction`, a further variable, is least."""
+        rows = self.pyramid(friction)
+        n = self.G.shape[1]
+        P, q = np.diag([REGULAR] * n + [1.0]), np.array([0.0] * n + [1.0])
+        excess = np.hstack([rows, -np.ones((len(rows), 1))])
+        x = _solve(P, q, excess, self, balanced=True)
+        return None if x is None else self._balanced(x[:n])
+
+    def closest(self, friction: float) -> Array:
+        """Forces in the cones with the least imbalance."""
+        rows = self.pyramid(friction)
+        P = self.G.T @ self.G + LEAST_CHARGE * np.eye(self.G.shape[1])
+        x = _solve(P, self.G.T @ self.w, rows, self, balanced=False)
+        if x is None or (rows @ x).max() > RESIDUAL:
+            raise SolverError("no forces in the cones were found, though a pure push is one")
+        return x
+
+    def _balanced(self, local: Array | None) -> Array | None:
+        """The forces if they balance the wrench within the limits, corrected to rounding."""
+        if local is None:
+            return None
+        correction = np.linalg.lstsq(self.G, self.G @ local + self.w, rcond=None)[0]
+        exact = local - np.asarray(correction, dtype=np.float64)
+        imbalance = float(np.abs(self.G @ exact + self.w).max())
+        outside = max((self.lower - exact).max(), (exact - self.upper).max())
+        return exact if max(imbalance, float(outside)) <= RESIDUAL else None
+
+
+def _solve(P: Array, q: Array, rows: Array, problem: _Problem, *, balanced: bool) -> Array | None:
+    """Minimise x'Px/2 + q'x with rows @ x <= 0; a last variable beyond the forces is free."""
+    solver: Any = importlib.import_module("qpsolvers")
+    extra = len(q) - problem.G.shape[1]
+    balance = (
+        (np.hstack([problem.G, np.zeros((6, extra))]), -problem.w) if balanced else (None,) * 2
+    )
+    program = solver.Problem(
+        P, q, rows, np.zeros(len(rows)), *balance,
+        lb=np.append(problem.lower, [-np.inf] * extra),
+        ub=np.append(problem.upper, [np.inf] * extra),
+    )  # fmt: skip
+    answer = solver.solve_problem(
+        program, solver="proxqp", eps_abs=REQUESTED, primal_infeasibility_solving=balanced
+    )
+    return None if answer.x is None else np.asarray(answer.x, dtype=np.float64)

@@ -1,0 +1,91 @@
+"""Negative controls: contact sets made from a grasp that are proved not to be force-closed.
+
+A validator that cannot say no proves nothing. Each control carries the certificate of its
+failure, and its separating wrench is the first thing it is tested with: no contact force
+within the cones can oppose that wrench, whatever the fingers do.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure import ClosureCertificate, force_closure
+from grasp_core.errors import UndecidedError
+from grasp_core.values import Contact, Grasp, Polyhedron
+
+FRICTION_SHARE = 0.9
+"""Share of the critical friction that the low-friction control gets."""
+LEAST_FRICTION = 1e-4
+"""Simulated friction cannot be lower than 1e-5."""
+SEARCH = 64
+"""How many random displacements of the contacts are tried."""
+TOWARD_CORNER = 0.95
+"""How far towards a corner of its face a moved contact goes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Control:
+    """Contacts that must not hold, and the proof."""
+
+    name: str
+    contacts: tuple[Contact, ...]
+    friction: float
+    certificate: ClosureCertificate
+
+
+def negative_controls(
+    body: Polyhedron, grasp: Grasp, friction: float, seed: int
+) -> tuple[Control, ...]:
+    """The controls that exist for a grasp: low friction, a finger removed, contacts moved."""
+    rng = np.random.default_rng(seed)
+    candidates = (
+        _low_friction(grasp),
+        _finger_removed(grasp, friction),
+        _contacts_moved(body, grasp, friction, rng),
+    )
+    return tuple(found for tries in candidates if (found := next(tries, None)) is not None)
+
+
+def _low_friction(grasp: Grasp) -> Iterator[Control]:
+    friction = FRICTION_SHARE * grasp.critical_friction
+    if friction >= LEAST_FRICTION:
+        yield from _refuted("low_friction", grasp.contacts, friction)
+
+
+def _finger_removed(grasp: Grasp, friction: float) -> Iterator[Control]:
+    for finger in range(len(grasp.contacts)):
+        rest = grasp.contacts[:finger] + grasp.contacts[finger + 1 :]
+        yield from _refuted("finger_removed", rest, friction)
+
+
+def _contacts_moved(
+    body: Polyhedron, grasp: Grasp, friction: float, rng: np.random.Generator
+) -> Iterator[Control]:
+    pieces = [body.faces[face].pieces for face in grasp.faces]
+    for _ in range(SEARCH):
+        moved = [
+            Contact(_near_corner(choice, rng), contact.normal)
+            for choice, contact in zip(pieces, grasp.contacts, strict=True)
+        ]
+        yield from _refuted("contacts_moved", moved, friction)
+
+
+def _near_corner(pieces: Sequence[Array], rng: np.random.Generator) -> Array:
+    """A point of a face next to one of its corners."""
+    piece = pieces[int(rng.integers(len(pieces)))]
+    corner, middle = piece[int(rng.integers(len(piece)))], piece.mean(axis=0)
+    return middle + TOWARD_CORNER * (corner - middle)
+
+
+def _refuted(name: str, contacts: Sequence[Contact], friction: float) -> Iterator[Control]:
+    """The control, if the analysis proves that it is not in force closure."""
+    positions = np.array([contact.position for contact in contacts])
+    normals = np.array([contact.normal for contact in contacts])
+    try:
+        certificate = force_closure(positions, normals, friction)
+    except UndecidedError:
+        return
+    if not certificate.closed:
+        yield Control(name, tuple(contacts), friction, certificate)

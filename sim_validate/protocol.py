@@ -1,0 +1,39 @@
+"""What is done to a grasp in simulation, and what counts as holding: numbers only.
+
+Wrench hold. The fingers squeeze with planned forces while friction is raised, so that the
+transients of loading cannot slip a contact that would hold at rest. Then the wrench and the
+forces planned for it are applied together, things settle, friction is lowered to the value
+under test, and the object must stay where it is.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class HoldProtocol:
+    """Durations, loads and thresholds of a wrench hold.
+
+    Thresholds are relative to the object's radius: 2e-4 is 10 um for an object of 10 cm. A
+    servo hides an unbalanced force of stiffness times displacement, here a thousandth of
+    the largest normal force, so looser thresholds would certify the wrong thing.
+    """
+
+    squeeze_s: float = 0.16
+    load_s: float = 0.16
+    settle_s: float = 0.10
+    hold_s: float = 0.40
+    settling_friction: float = 3.0
+    """Friction while loading, relative to the larger of what is tested and what the planned
+    forces need."""
+    load_share: float = 0.8
+    """Applied wrench relative to the largest one the analysis says is resisted."""
+    control_load: float = 0.2
+    """Wrench applied to a contact set that resists none, in largest normal forces."""
+    least_normal_share: float = 0.005
+    """Least planned normal force, in largest normal forces: keeps idle fingers in touch."""
+    hold_threshold: float = 2e-4
+    """Largest displacement while holding, in object radii."""
+    total_threshold: float = 2e-2
+    """Largest displacement from the planned pose, in object radii."""
+    gap_threshold: float = 2e-4
+    """A fingertip farther than this from its face has lost contact, in object radii."""

@@ -1,0 +1,207 @@
+"""A grasp and its negative controls, from analysis through simulation to a verdict.
+
+For each test wrench the analysis predicts the largest multiple that is resisted; a share of
+it is applied in simulation, with forces planned to need the least friction. The grasp is
+confirmed when all wrenches hold, and the run can be trusted when no control does.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure import contact_frictions
+from grasp_core.errors import InputError
+from grasp_core.forces import closest_forces, least_friction_forces
+from grasp_core.quality import WrenchBody, axis_wrenches
+from grasp_core.values import Contact, Grasp, Polyhedron
+from scenes.mjcf import Scene, build_scene
+from scenes.physics import PhysicsSettings
+from sim_validate.controls import Control, negative_controls
+from sim_validate.protocol import HoldProtocol
+from sim_validate.simulate import Bench, Load
+from sim_validate.verdict import HoldVerdict, Outcome, judge
+
+AXIS_NAMES = tuple(
+    f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"
+)
+WEAKEST = "weakest"
+SEPARATING = "separating"
+"""The wrench that a control's certificate says is not resisted."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WrenchVerdict:
+    """One wrench hold, predicted and simulated."""
+
+    name: str
+    wrench: Array
+    """Applied external wrench, (6,) [N, N m], torque about the centre of mass."""
+    predicted_limit: float
+    """Largest multiple of the applied wrench that the analysis says is resisted."""
+    required_friction: float | None
+    """What the planned forces need; None where no forces balance the wrench."""
+    hold: HoldVerdict
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ControlVerdict:
+    """A contact set proved not to be force-closed, and what the simulator made of it."""
+
+    control: Control
+    tried: tuple[WrenchVerdict, ...]
+    """Wrenches up to and including the first that did not hold."""
+
+    @property
+    def held(self) -> bool:
+        """Whether every wrench held: it must not."""
+        return all(trial.hold.outcome is Outcome.HELD for trial in self.tried)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdict:
+    """What simulation says about a grasp."""
+
+    id: str
+    predicted_critical_friction: float
+    wrenches: tuple[WrenchVerdict, ...]
+    controls: tuple[ControlVerdict, ...]
+    scene: Scene
+    protocol: HoldProtocol
+
+    @property
+    def outcome(self) -> Outcome:
+        """`held`, or how the first wrench that did not hold ended."""
+        ends = (trial.hold.outcome for trial in self.wrenches)
+        return next((end for end in ends if end is not Outcome.HELD), Outcome.HELD)
+
+    @property
+    def held(self) -> bool:
+        """Whether every wrench held."""
+        return self.outcome is Outcome.HELD
+
+    @property
+    def controls_failed(self) -> bool:
+        """Whether the simulator told every control from a grasp."""
+        return not any(control.held for control in self.controls)
+
+
+def validate(  # noqa: PLR0913 - the circumstances of a trial
+    body: Polyhedron,
+    grasp: Grasp,
+    friction: float = 0.5,
+    *,
+    max_normal_force: float = 10.0,
+    protocol: HoldProtocol | None = None,
+    physics: PhysicsSettings | None = None,
+    seed: int = 0,
+) -> Verdict:
+    """Test a grasp and its negative controls in simulation.
+
+    Args:
+        body: The object.
+        grasp: A grasp in force closure at this friction.
+        friction: Coulomb coefficient at every contact.
+        max_normal_force: Limit of each finger's push [N].
+        protocol: Durations, loads and thresholds.
+        physics: Simulation settings.
+        seed: Chooses how contacts are moved for a negative control.
+
+    Raises:
+        InputError: The friction does not exceed the grasp's critical friction.
+    """
+    if not friction > grasp.critical_friction:
+        raise InputError(
+            f"grasp {grasp.id} needs friction above {grasp.critical_friction:.6g}, got {friction}"
+        )
+    protocol = protocol or HoldProtocol()
+    physics = physics or PhysicsSettings()
+    rig = _Rig(body, grasp.contacts, friction, max_normal_force, protocol, physics)
+    wrenches = tuple(rig.hold(*test) for test in rig.loads())
+    controls = tuple(
+        _control(body, control, max_normal_force, protocol, physics)
+        for control in negative_controls(body, grasp, friction, seed)
+    )
+    return Verdict(grasp.id, grasp.critical_friction, wrenches, controls, rig.scene, protocol)
+
+
+def _control(
+    body: Polyhedron, control: Control, max_normal_force: float, protocol: HoldProtocol,
+    physics: PhysicsSettings,
+) -> ControlVerdict:  # fmt: skip
+    rig = _Rig(body, control.contacts, control.friction, max_normal_force, protocol, physics)
+    tried: list[WrenchVerdict] = []
+    for test in rig.hopeless_loads(control):
+        tried.append(rig.hold(*test))
+        if tried[-1].hold.outcome is not Outcome.HELD:
+            break
+    return ControlVerdict(control, tuple(tried))
+
+
+class _Rig:
+    """Contacts on an object, in analysis and on the simulated bench."""
+
+    def __init__(
+        self, body: Polyhedron, contacts: tuple[Contact, ...], friction: float,
+        max_normal_force: float, protocol: HoldProtocol, physics: PhysicsSettings,
+    ) -> None:  # fmt: skip
+        self.body, self.friction, self.protocol = body, friction, protocol
+        self.positions = np.array([contact.position for contact in contacts])
+        self.normals = np.array([contact.normal for contact in contacts])
+        self.max_normal_force = max_normal_force
+        self.resisted = WrenchBody(
+            self.positions - body.center_of_mass,
+            self.normals,
+            contact_frictions(friction, len(contacts)),
+            max_normal_force,
+        )
+        self.scene = build_scene(
+            body, contacts, friction, max_normal_force=max_normal_force, physics=physics
+        )
+        self.bench = Bench(self.scene, protocol)
+        forces, needed = self._planned(np.zeros(6))
+        self.bench.squeeze(forces, self._settling(needed))
+
+    def loads(self) -> Iterator[tuple[str, Array, float]]:
+        """The twelve axis wrenches and the weakest one, at their share of the limit."""
+        axes = axis_wrenches(self.body.radius)
+        weakest = self.resisted.weakest(axes, self.body.radius).wrench
+        for name, wrench in zip((*AXIS_NAMES, WEAKEST), (*axes, weakest), strict=True):
+            limit = self.resisted.limit(wrench).limit
+            share = self.protocol.load_share
+            yield name, share * limit * wrench, 1.0 / share
+
+    def hopeless_loads(self, control: Control) -> Iterator[tuple[str, Array, float]]:
+        """The separating wrench, then the axis wrenches, all of the same size."""
+        twist = control.certificate.separating_wrench
+        assert twist is not None  # noqa: S101 - controls are refuted by construction
+        center, radius = self.body.center_of_mass, self.body.radius
+        about_center = np.concatenate([twist[:3] + np.cross(twist[3:], center), twist[3:]])
+        scale = np.array([1.0] * 3 + [radius] * 3)
+        facing = -about_center * scale**2
+        size = self.protocol.control_load * self.max_normal_force
+        axes = axis_wrenches(radius)
+        for name, wrench in zip((SEPARATING, *AXIS_NAMES), (facing, *axes), strict=True):
+            applied = size * wrench / float(np.linalg.norm(wrench / scale))
+            yield name, applied, self.resisted.limit(applied).limit
+
+    def hold(self, name: str, wrench: Array, predicted_limit: float) -> WrenchVerdict:
+        """Apply one wrench in simulation and judge what happens."""
+        forces, needed = self._planned(wrench)
+        trace = self.bench.hold(Load(wrench, forces), self._settling(needed), self.friction)
+        verdict = judge(trace, self.body.radius, self.protocol)
+        return WrenchVerdict(name, wrench, predicted_limit, needed, verdict)
+
+    def _planned(self, wrench: Array) -> tuple[Array, float | None]:
+        """Forces of least friction that balance a wrench, or the closest ones."""
+        least = self.protocol.least_normal_share * self.max_normal_force
+        contacts = self.positions, self.normals, self.friction
+        limits, center = (least, self.max_normal_force), self.body.center_of_mass
+        balanced = least_friction_forces(*contacts, wrench, normal_force=limits, center=center)
+        if balanced is not None:
+            return balanced
+        return closest_forces(*contacts, wrench, normal_force=limits, center=center), None
+
+    def _settling(self, needed: float | None) -> float:
+        return self.protocol.settling_friction * max(self.friction, needed or 0.0)
