@@ -2,11 +2,14 @@
 
 The world frame is the object's frame moved to its centre of mass: T_world_object is the
 translation by minus the centre of mass. Lengths and forces are true to the object and the
-user. Masses are not: a quasi-static test asks whether forces balance, and similar objects
-should behave alike, so object and fingers get the mass that the largest normal force moves
-by the object's radius in a fixed time.
+user. Masses are not: a quasi-static test asks whether forces balance, and similar grasps
+should behave alike, so all of the dynamics is scaled by the size of the grasp, which is the
+lever of the contacts about the axis they are closest to. Object and fingers get the mass
+that the largest normal force moves by that lever in a fixed time, centred between the
+contacts, and the servos the stiffness that keeps such a lever stable.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,11 +22,13 @@ from grasp_core.values import Contact, Grasp, Polyhedron
 from grasp_core.wrenches import contact_frames
 
 RESPONSE_TIME_S = 0.07
-"""Time in which the largest normal force moves the object by its radius, from rest and
-without the factor 1/2: 1 kg for 10 N and 5 cm, where the settings were measured."""
+"""Square root of mass x grasp size / largest normal force: 1 kg for 10 N and 5 cm, where the
+settings were measured."""
 STIFFNESS = 5.0
-"""Servo stiffness in largest normal forces per object radius: below 1 the grasp is unstable,
-above 50 the servo fights the planned forces."""
+"""Servo stiffness in largest normal forces per grasp size: below 1 a force-controlled grasp
+is unstable, above 50 the servo fights the planned forces."""
+LEAST_SIZE = 0.01
+"""Smallest grasp size in object radii, for contacts that are nearly on one line."""
 SQUEEZE = 0.6
 """Largest normal force of the gentle grasp, in largest normal forces."""
 TIP_RADIUS = 0.1
@@ -55,6 +60,10 @@ class Layout:
     """(t, 3)"""
     radius_m: float
     """Largest distance of the object's surface from its centre of mass."""
+    center: Array
+    """Mean of the contacts, where the simulated mass is, (3,) [m]."""
+    grasp_size_m: float
+    """Lever of the contacts about the axis through `center` that they are closest to."""
     mass_kg: float
     inertia_kg_m2: float
     """The same about every axis."""
@@ -100,17 +109,20 @@ def arrange(
     for name, value in positive.items():
         if not (np.isfinite(value) and value > 0.0):
             raise InputError(f"{name} must be a positive number, got {value}")
-    mass = max_normal_force * RESPONSE_TIME_S**2 / radius
-    stiffness = STIFFNESS * max_normal_force / radius
     normals = np.array([contact.normal for contact in contacts])
     positions = np.array([contact.position for contact in contacts])
+    size = max(grasp_size(positions), LEAST_SIZE * radius)
+    mass = max_normal_force * RESPONSE_TIME_S**2 / size
+    stiffness = STIFFNESS * max_normal_force / size
     return Layout(
         name=body.name,
         vertices=body.vertices - body.center_of_mass,
         triangles=body.triangles,
         radius_m=radius,
+        center=positions.mean(axis=0) - body.center_of_mass,
+        grasp_size_m=size,
         mass_kg=mass,
-        inertia_kg_m2=mass * (radius / 2.0) ** 2,
+        inertia_kg_m2=mass * (size / 2.0) ** 2,
         contacts=positions - body.center_of_mass,
         frames=contact_frames(normals),
         friction=friction,
@@ -123,6 +135,16 @@ def arrange(
         ),
         squeeze=SQUEEZE * max_normal_force * _pushes(positions, normals, friction),
     )
+
+
+def grasp_size(positions: Array) -> float:
+    """Root mean square distance of contacts from the axis they are closest to [m].
+
+    Args:
+        positions: (k, 3) [m].
+    """
+    spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
+    return float(np.linalg.norm(spread[1:])) / math.sqrt(len(positions))
 
 
 def _pushes(positions: Array, normals: Array, friction: float) -> Array:

@@ -106,7 +106,7 @@ def _object(world: ElementTree.Element, layout: Layout, physics: PhysicsSettings
     _add(
         body,
         "inertial",
-        {"pos": (0.0, 0.0, 0.0), "mass": layout.mass_kg, "diaginertia": inertia},
+        {"pos": layout.center, "mass": layout.mass_kg, "diaginertia": inertia},
     )
     _add(
         body,

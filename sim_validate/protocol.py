@@ -13,9 +13,10 @@ from dataclasses import dataclass
 class HoldProtocol:
     """Durations, loads and thresholds of a wrench hold.
 
-    Thresholds are relative to the object's radius: 2e-4 is 10 um for an object of 10 cm. A
-    servo hides an unbalanced force of stiffness times displacement, here a thousandth of
-    the largest normal force, so looser thresholds would certify the wrong thing.
+    Thresholds are relative to the size of the grasp, the lever of its contacts about the
+    axis they are closest to: 2e-4 is 10 um for contacts that span a decimetre. A servo
+    hides an unbalanced force of stiffness times displacement, here a thousandth of the
+    largest normal force, so looser thresholds would certify the wrong thing.
     """
 
     squeeze_s: float = 0.16
@@ -32,8 +33,8 @@ class HoldProtocol:
     least_normal_share: float = 0.005
     """Least planned normal force, in largest normal forces: keeps idle fingers in touch."""
     hold_threshold: float = 2e-4
-    """Largest displacement while holding, in object radii."""
+    """Largest displacement while holding, in grasp sizes."""
     total_threshold: float = 2e-2
-    """Largest displacement from the planned pose, in object radii."""
+    """Largest displacement from the planned pose, in grasp sizes."""
     gap_threshold: float = 2e-4
-    """A fingertip farther than this from its face has lost contact, in object radii."""
+    """A fingertip farther than this from its face has lost contact, in grasp sizes."""

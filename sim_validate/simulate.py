@@ -20,7 +20,7 @@ from sim_validate.protocol import HoldProtocol
 CHUNK = 5
 """Steps between changes of load and samples of motion."""
 LOST = 1.0
-"""Stop when the object has moved by this many radii: it is gone."""
+"""Stop when the object has moved by this many grasp sizes: it is gone."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +40,7 @@ class HoldTrace:
     times_s: Array
     """(n,)"""
     displacements_m: Array
-    """Translation plus object radius times rotation, (n,)."""
+    """Motion of the point between the contacts plus grasp size times rotation, (n,)."""
     rotations_rad: Array
     """(n,)"""
     slips_m: Array
@@ -123,24 +123,26 @@ class Bench:
     def _apply(self, forces: Array, wrench: Array) -> None:
         local = np.einsum("kij,ki->kj", self.layout.frames, forces)
         self.data.ctrl[:] = local.ravel() / self.layout.drive.stiffness_n_per_m
-        self.data.xfrc_applied[self.body] = wrench
+        torque = wrench[3:] - np.cross(self.layout.center, wrench[:3])
+        self.data.xfrc_applied[self.body] = np.concatenate([wrench[:3], torque])
 
     def _step(self) -> None:
         mujoco.mj_step(self.model, self.data, nstep=CHUNK)
         self.stepped += CHUNK
 
     def _pose(self) -> tuple[Array, Array]:
-        """Position and rotation matrix of the object as of the last completed step."""
+        """Where the point between the contacts is (3,), and the object's rotation (3, 3)."""
         mujoco.mj_kinematics(self.model, self.data)
         rotation = self.data.xmat[self.body].reshape(3, 3).copy()
-        return self.data.xpos[self.body].copy(), rotation
+        return self.data.xpos[self.body] + rotation @ self.layout.center, rotation
 
     def _tips(self, position: Array, rotation: Array) -> Array:
-        """Fingertip centres in the object's axes, (k, 3)."""
-        return (self.data.xpos[self.tip_bodies] - position) @ rotation
+        """Fingertip centres in the object's frame, (k, 3)."""
+        return (self.data.xpos[self.tip_bodies] - position) @ rotation + self.layout.center
 
     def _watch(self, duration_s: float) -> HoldTrace:
         layout, normals = self.layout, self.layout.frames[:, :, 0]
+        size = layout.grasp_size_m
         position0, rotation0 = self._pose()
         tips0 = self._tips(position0, rotation0)
         begun = self.stepped
@@ -150,15 +152,15 @@ class Bench:
             position, rotation = self._pose()
             tips = self._tips(position, rotation)
             turn = rotation_angle(rotation @ rotation0.T)
-            moved = float(np.linalg.norm(position - position0)) + layout.radius_m * turn
+            moved = float(np.linalg.norm(position - position0)) + size * turn
             _, slip = normal_and_tangential(tips - tips0, normals)
             height = np.einsum("ki,ki->k", layout.contacts - tips, normals)
             time = (self.stepped - begun) * self.model.opt.timestep
             rows.append((time, moved, turn, slip, height - layout.drive.radius_m))
-            if not moved < LOST * layout.radius_m:
+            if not moved < LOST * size:
                 break
         times, moves, turns, slips, gaps = (np.array(column) for column in zip(*rows, strict=True))
-        start = float(np.linalg.norm(position0)) + layout.radius_m * rotation_angle(rotation0)
+        start = float(np.linalg.norm(position0 - layout.center)) + size * rotation_angle(rotation0)
         state = np.concatenate([self.data.qpos, self.data.qvel, self.data.qacc])
         return HoldTrace(
             times_s=times,

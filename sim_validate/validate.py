@@ -190,7 +190,7 @@ class _Rig:
         """Apply one wrench in simulation and judge what happens."""
         forces, needed = self._planned(wrench)
         trace = self.bench.hold(Load(wrench, forces), self._settling(needed), self.friction)
-        verdict = judge(trace, self.body.radius, self.protocol)
+        verdict = judge(trace, self.scene.layout.grasp_size_m, self.protocol)
         return WrenchVerdict(name, wrench, predicted_limit, needed, verdict)
 
     def _planned(self, wrench: Array) -> tuple[Array, float | None]:

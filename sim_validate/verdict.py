@@ -31,7 +31,7 @@ class HoldVerdict:
 
     outcome: Outcome
     displacement_m: float
-    """Largest while holding: translation plus object radius times rotation."""
+    """Largest while holding: motion between the contacts plus grasp size times rotation."""
     rotation_rad: float
     slip_m: Array
     """Largest tangential motion of each fingertip over its face, (k,)."""
@@ -39,19 +39,19 @@ class HoldVerdict:
     """When a threshold was first crossed."""
 
 
-def judge(trace: HoldTrace, radius_m: float, protocol: HoldProtocol) -> HoldVerdict:
+def judge(trace: HoldTrace, grasp_size_m: float, protocol: HoldProtocol) -> HoldVerdict:
     """Apply the thresholds of a protocol to a trace.
 
     Args:
         trace: Motion from the moment friction was lowered.
-        radius_m: The object's radius; thresholds are relative to it.
+        grasp_size_m: The lever of the contacts; thresholds are relative to it.
         protocol: Where the thresholds come from.
     """
     sound = trace.finite and trace.warnings == 0 and abs(trace.clock_error_s) < CLOCK_SLACK_S
     total = trace.start_m + trace.displacements_m
-    moved = trace.displacements_m >= protocol.hold_threshold * radius_m
-    strayed = total >= protocol.total_threshold * radius_m
-    apart = trace.gaps_m.max(axis=1) > protocol.gap_threshold * radius_m
+    moved = trace.displacements_m >= protocol.hold_threshold * grasp_size_m
+    strayed = total >= protocol.total_threshold * grasp_size_m
+    apart = trace.gaps_m.max(axis=1) > protocol.gap_threshold * grasp_size_m
     failing = np.flatnonzero(moved | strayed | apart)
     first = int(failing[0]) if failing.size else None
     if not sound:
