@@ -268,7 +268,7 @@ def _grasp(body: Polyhedron, found: _Found) -> Grasp:
         disc = body.radius * inscribed_disc_radius(polygon, piece)
         regions.append(ContactRegion("cone", _at(body, polygon), disc))
     return Grasp(
-        id="concurrent-" + "-".join(str(face) for face in quadruple.faces),
+        id="c-" + "-".join(str(face) for face in quadruple.faces),
         family="concurrent",
         faces=quadruple.faces,
         contacts=four(Contact(p, n) for p, n in zip(positions, normals, strict=True)),

@@ -1,6 +1,30 @@
-"""Simulate, judge, and compare with what the analysis predicts."""
+"""Simulate, judge, and compare with what the analysis predicts.
 
-from sim_validate.protocol import HoldProtocol as HoldProtocol
-from sim_validate.validate import Verdict as Verdict
-from sim_validate.validate import validate as validate
-from sim_validate.verdict import Outcome as Outcome
+Names are imported on first use: the command line's help must not wait for a simulator.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sim_validate.protocol import HoldProtocol as HoldProtocol
+    from sim_validate.validate import Verdict as Verdict
+    from sim_validate.validate import validate as validate
+    from sim_validate.verdict import Outcome as Outcome
+
+_HOMES = {
+    "HoldProtocol": "protocol",
+    "Verdict": "validate",
+    "validate": "validate",
+    "Outcome": "verdict",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"sim_validate.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(_HOMES)

@@ -7,6 +7,7 @@ within the cones can oppose that wrench, whatever the fingers do.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -38,11 +39,11 @@ class Control:
 def negative_controls(
     body: Polyhedron, grasp: Grasp, friction: float, seed: int
 ) -> tuple[Control, ...]:
-    """The controls that exist for a grasp: low friction, a finger removed, contacts moved."""
+    """The controls that exist for a grasp: low friction, fingers removed, contacts moved."""
     rng = np.random.default_rng(seed)
     candidates = (
         _low_friction(grasp),
-        _finger_removed(grasp, friction),
+        _fingers_removed(grasp, friction),
         _contacts_moved(body, grasp, friction, rng),
     )
     return tuple(found for tries in candidates if (found := next(tries, None)) is not None)
@@ -54,10 +55,11 @@ def _low_friction(grasp: Grasp) -> Iterator[Control]:
         yield from _refuted("low_friction", grasp.contacts, friction)
 
 
-def _finger_removed(grasp: Grasp, friction: float) -> Iterator[Control]:
-    for finger in range(len(grasp.contacts)):
-        rest = grasp.contacts[:finger] + grasp.contacts[finger + 1 :]
-        yield from _refuted("finger_removed", rest, friction)
+def _fingers_removed(grasp: Grasp, friction: float) -> Iterator[Control]:
+    """Three contacts that lose closure, or else two, which can always be turned about a line."""
+    for count in (3, 2):
+        for rest in combinations(grasp.contacts, count):
+            yield from _refuted("fingers_removed", rest, friction)
 
 
 def _contacts_moved(

@@ -1,0 +1,228 @@
+"""Grasps <-> JSON text, with units in the keys; what is read is checked field by field.
+
+The file holds the object's mesh, so that grasps can be validated from it alone.
+"""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from grasp_core.errors import InputError
+from grasp_core.mesh import polyhedron_from_mesh
+from grasp_core.values import Contact, ContactRegion, ForceCone, Grasp, Plan, Polyhedron, four
+from grasp_core.versions import versions
+
+SCHEMA = 1
+ON_FACE = 1e-6
+"""How far a contact read from a file may be off its face, in object radii."""
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Triple = tuple[Finite, Finite, Finite]
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
+
+
+class MeshRecord(_Record):
+    """Triangles of the object."""
+
+    vertices_m: list[Triple]
+    triangles: list[tuple[int, int, int]]
+
+
+class ObjectRecord(_Record):
+    """The object that was planned on."""
+
+    name: str
+    source_sha256: str
+    content_sha256: str
+    mesh: MeshRecord
+    center_of_mass_m: Triple
+
+
+class ContactRecord(_Record):
+    """Where a fingertip touches."""
+
+    position_m: Triple
+    normal: Triple
+
+
+class ConeRecord(_Record):
+    """A force cone of the construction."""
+
+    axis: Triple
+    half_angle_deg: Finite
+
+
+class RegionRecord(_Record):
+    """Where a finger may stand."""
+
+    kind: Literal["cone"]
+    polygon_m: list[Triple]
+    inscribed_radius_m: Finite
+
+
+class GraspRecord(_Record):
+    """One grasp."""
+
+    id: str
+    family: Literal["concurrent", "pencil", "regulus"]
+    faces: tuple[int, int, int, int]
+    contacts: tuple[ContactRecord, ContactRecord, ContactRecord, ContactRecord]
+    focus_points_m: list[Triple]
+    force_cones: tuple[ConeRecord, ConeRecord, ConeRecord, ConeRecord]
+    radius_m: Finite
+    regions: tuple[RegionRecord, RegionRecord, RegionRecord, RegionRecord]
+    span_angle_deg: Finite
+    critical_friction: Finite
+    closure_margin: Finite
+    ferrari_canny: tuple[Finite, Finite] | None
+
+
+class GraspsRecord(_Record):
+    """A whole `grasps.json`."""
+
+    schema_version: Literal[1] = Field(alias="schema")
+    object: ObjectRecord
+    friction: Finite
+    theta_deg: Finite
+    seed: int
+    versions: dict[str, str]
+    counts: dict[str, Any]
+    absence: str | None
+    grasps: list[GraspRecord]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SavedGrasps:
+    """What a `grasps.json` says, as values."""
+
+    body: Polyhedron
+    friction: float
+    seed: int
+    grasps: tuple[Grasp, ...]
+
+
+def plan_to_json(body: Polyhedron, plan: Plan) -> str:
+    """The text of `grasps.json`: the same for the same plan."""
+    document: dict[str, object] = {
+        "schema": SCHEMA,
+        "object": {
+            "name": body.name,
+            "source_sha256": body.source_sha256,
+            "content_sha256": body.content_sha256,
+            "mesh": {
+                "vertices_m": body.vertices.tolist(),
+                "triangles": body.triangles.tolist(),
+            },
+            "center_of_mass_m": body.center_of_mass.tolist(),
+        },
+        "friction": plan.friction,
+        "theta_deg": math.degrees(plan.theta),
+        "seed": plan.seed,
+        "versions": versions(),
+        "counts": asdict(plan.counts),
+        "absence": plan.absence,
+        "grasps": [_grasp_to_record(grasp) for grasp in plan.grasps],
+    }
+    return json.dumps(document, allow_nan=False, indent=1) + "\n"
+
+
+def _grasp_to_record(grasp: Grasp) -> Mapping[str, object]:
+    return {
+        "id": grasp.id,
+        "family": grasp.family,
+        "faces": list(grasp.faces),
+        "contacts": [
+            {"position_m": contact.position.tolist(), "normal": contact.normal.tolist()}
+            for contact in grasp.contacts
+        ],
+        "focus_points_m": grasp.focus_points.tolist(),
+        "force_cones": [
+            {"axis": cone.axis.tolist(), "half_angle_deg": math.degrees(cone.half_angle)}
+            for cone in grasp.force_cones
+        ],
+        "radius_m": grasp.radius,
+        "regions": [
+            {
+                "kind": region.kind,
+                "polygon_m": region.polygon.tolist(),
+                "inscribed_radius_m": region.inscribed_radius,
+            }
+            for region in grasp.regions
+        ],
+        "span_angle_deg": math.degrees(grasp.span_angle),
+        "critical_friction": grasp.critical_friction,
+        "closure_margin": grasp.closure_margin,
+        "ferrari_canny": None,
+    }
+
+
+def grasps_from_json(text: str) -> SavedGrasps:
+    """Read the text of a `grasps.json`.
+
+    Raises:
+        InputError: The text is not such a file; the message names the field.
+        MeshError: Its mesh is not a solid.
+    """
+    try:
+        record = GraspsRecord.model_validate_json(text)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "the document"
+        raise InputError(f"grasps file: {where}: {first['msg']}") from error
+    mesh = record.object.mesh
+    body = polyhedron_from_mesh(
+        mesh.vertices_m,
+        mesh.triangles,
+        name=record.object.name,
+        source_sha256=record.object.source_sha256,
+    )
+    if body.content_sha256 != record.object.content_sha256:
+        raise InputError("grasps file: object.content_sha256 does not match its mesh")
+    grasps = tuple(_grasp_from_record(body, grasp) for grasp in record.grasps)
+    return SavedGrasps(body, record.friction, record.seed, grasps)
+
+
+def _grasp_from_record(body: Polyhedron, record: GraspRecord) -> Grasp:
+    grasp = Grasp(
+        id=record.id,
+        family=record.family,
+        faces=record.faces,
+        contacts=four(
+            Contact(np.array(contact.position_m), np.array(contact.normal))
+            for contact in record.contacts
+        ),
+        focus_points=np.array(record.focus_points_m).reshape(-1, 3),
+        force_cones=four(
+            ForceCone(np.array(cone.axis), math.radians(cone.half_angle_deg))
+            for cone in record.force_cones
+        ),
+        regions=four(
+            ContactRegion(region.kind, np.array(region.polygon_m), region.inscribed_radius_m)
+            for region in record.regions
+        ),
+        radius=record.radius_m,
+        span_angle=math.radians(record.span_angle_deg),
+        critical_friction=record.critical_friction,
+        closure_margin=record.closure_margin,
+    )
+    _check_on_faces(body, grasp)
+    return grasp
+
+
+def _check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
+    for finger, (face, contact) in enumerate(zip(grasp.faces, grasp.contacts, strict=True)):
+        where = f"grasps file: {grasp.id}: contact {finger}"
+        if not 0 <= face < len(body.faces):
+            raise InputError(f"{where} names face {face}; there are 0..{len(body.faces) - 1}")
+        normal, centroid = body.faces[face].normal, body.faces[face].centroid
+        off = abs(float(normal @ (contact.position - centroid))) / body.radius
+        if max(off, float(np.abs(contact.normal - normal).max())) > ON_FACE:
+            raise InputError(f"{where} does not lie on face {face} with that face's normal")

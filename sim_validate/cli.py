@@ -1,0 +1,248 @@
+"""The command line: flags, exit codes, and which command they lead to.
+
+Nothing heavy is imported here, so that help and usage errors answer at once.
+"""
+
+import sys
+import tomllib
+from collections.abc import Sequence
+from dataclasses import field
+from enum import IntEnum
+from pathlib import Path
+from typing import Annotated, Any, Literal, cast
+
+import tyro
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, UseAppendAction, arg
+
+from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError
+from sim_validate.engines import available_cores
+
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Count = Annotated[int, Field(ge=1)]
+Seed = Annotated[int, Field(ge=0, lt=2**64)]
+RUN_LIMIT = 100
+"""How many grasps `run` tests unless told otherwise: some ten seconds."""
+
+
+class Exit(IntEnum):
+    """Exit codes of the command."""
+
+    GOOD = 0
+    NEGATIVE = 1
+    """It ran, and a verdict is negative."""
+    USAGE = 2
+    INTERNAL = 3
+    INPUT = 4
+    """An input was refused."""
+    NONE = 5
+    """No grasp exists."""
+    PARTIAL = 6
+    INTERRUPTED = 130
+
+
+@dataclass(frozen=True)
+class Speech:
+    """How much to say, and in which form."""
+
+    json: bool = False
+    """Print one JSON document on standard output, everything else on standard error."""
+    quiet: Annotated[bool, arg(aliases=["-q"])] = False
+    """Say nothing but errors."""
+    verbose: Annotated[bool, arg(aliases=["-v"])] = False
+    """Say more."""
+
+
+@dataclass(frozen=True)
+class Planning:
+    """What to plan."""
+
+    friction: Positive = 0.5
+    """Coulomb coefficient at every contact."""
+    theta_deg: Positive | None = None
+    """Half-angle of the friction cones to plan with [deg]; the friction angle if not given."""
+    family: UseAppendAction[tuple[Literal["concurrent"], ...]] = ()
+    """Construction to try; all if not given, may be repeated."""
+    limit: Count | None = None
+    """Keep at most this many grasps, those with the largest independent discs; None for all."""
+    seed: Seed = 0
+    """For everything random."""
+    unit: Literal["m", "cm", "mm", "in"] = "m"
+    """What one unit in a mesh file is."""
+
+
+@dataclass(frozen=True)
+class Testing:
+    """How to simulate."""
+
+    max_normal_force: Positive = 10.0
+    """Limit of each finger's push [N]."""
+    jobs: Count = field(default_factory=available_cores)
+    """Largest number of processes; results do not depend on it."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """Plan grasps, test each with its negative controls in MuJoCo, and write everything."""
+
+    object: Positional[str]
+    """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
+    planning: OmitArgPrefixes[Planning] = Planning(limit=RUN_LIMIT)
+    testing: OmitArgPrefixes[Testing] = field(default_factory=Testing)
+    speech: OmitArgPrefixes[Speech] = Speech()
+    out: Path | None = None
+    """Folder for the results; graspproof-out/OBJECT if not given."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Find force-closure grasps, each with its certificate checked."""
+
+    object: Positional[str]
+    """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
+    planning: OmitArgPrefixes[Planning] = Planning()
+    speech: OmitArgPrefixes[Speech] = Speech()
+    out: Path | None = None
+    """Folder for grasps.json; nothing is written if not given."""
+
+
+@dataclass(frozen=True)
+class Validate:
+    """Test the grasps of a file, with negative controls, in MuJoCo."""
+
+    grasps: Positional[Path]
+    """A grasps.json."""
+    friction: Positive | None = None
+    """Coulomb coefficient to test at; the one planned for if not given."""
+    limit: Count | None = None
+    """Test only the first so many."""
+    seed: Seed | None = None
+    """For moving contacts in controls; the plan's if not given."""
+    testing: OmitArgPrefixes[Testing] = field(default_factory=Testing)
+    speech: OmitArgPrefixes[Speech] = Speech()
+    out: Path | None = None
+    """Folder for verdicts.json; nothing is written if not given."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Write grasps as MuJoCo scenes that open in its own viewer."""
+
+    grasps: Positional[Path]
+    """A grasps.json."""
+    grasp: str | None = None
+    """Id of one grasp; all of them if not given."""
+    friction: Positive | None = None
+    """Coulomb coefficient; the one planned for if not given."""
+    max_normal_force: Positive = 10.0
+    """Limit of each finger's push [N]."""
+    speech: OmitArgPrefixes[Speech] = Speech()
+    out: Path | None = None
+    """Folder for the scenes; a single scene is printed if not given."""
+
+
+@dataclass(frozen=True)
+class Inspect:
+    """Show what a mesh is as a polyhedron: faces, mass properties, spanning quadruples."""
+
+    object: Positional[str]
+    """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
+    unit: Literal["m", "cm", "mm", "in"] = "m"
+    """What one unit in the file is."""
+    speech: OmitArgPrefixes[Speech] = Speech()
+
+
+@dataclass(frozen=True)
+class Objects:
+    """List the built-in objects."""
+
+    speech: OmitArgPrefixes[Speech] = Speech()
+
+
+@dataclass(frozen=True)
+class Doctor:
+    """Check this installation: versions, solvers, simulator."""
+
+    speech: OmitArgPrefixes[Speech] = Speech()
+
+
+Command = Run | Plan | Validate | Scene | Inspect | Objects | Doctor
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Args:
+        argv: Arguments without the program's name; those of the process when None.
+
+    Returns:
+        An exit code, see `Exit`.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    try:
+        command: Command = tyro.cli(
+            FlagCreatePairsOff[Command],  # type: ignore[valid-type]
+            prog="graspproof",
+            description="Four-finger force-closure grasps, proved and simulated.",
+            args=_with_config(arguments),
+        )
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else Exit.USAGE
+    except InputError as error:
+        return _complain(str(error), Exit.USAGE)
+    return _dispatch(command)
+
+
+def _dispatch(command: Command) -> int:
+    from sim_validate import commands
+
+    try:
+        return commands.execute(command)
+    except InputError as error:
+        return _complain(str(error), Exit.INPUT)
+    except (SolverError, UndecidedError) as error:
+        return _complain(f"{type(error).__name__}: {error}", Exit.INTERNAL)
+    except GraspError as error:
+        return _complain(str(error), Exit.NEGATIVE)
+    except OSError as error:
+        return _complain(f"{error.filename or 'output'}: {error.strerror}", Exit.INPUT)
+    except KeyboardInterrupt:
+        return _complain("interrupted", Exit.INTERRUPTED)
+
+
+def _complain(message: str, code: Exit) -> int:
+    from sim_validate.console import printable
+
+    sys.stderr.write(f"graspproof: {printable(message)}\n")
+    return int(code)
+
+
+def _with_config(arguments: list[str]) -> list[str]:
+    """Put the settings of `--config FILE.toml` before the flags, which then override them."""
+    if "--config" not in arguments:
+        return arguments
+    place = arguments.index("--config")
+    if place + 1 >= len(arguments):
+        raise InputError("--config needs the name of a TOML file")
+    path = Path(arguments[place + 1])
+    rest = arguments[:place] + arguments[place + 2 :]
+    try:
+        settings = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"--config {path}: {error}") from error
+    flags = [word for name, value in settings.items() for word in _as_flags(name, value)]
+    return [*rest[:1], *flags, *rest[1:]]
+
+
+def _as_flags(name: str, value: Any) -> list[str]:
+    flag = "--" + name.replace("_", "-")
+    if isinstance(value, bool):
+        return [flag] if value else []
+    items = cast("list[Any]", value) if isinstance(value, list) else [value]
+    return [word for item in items for word in (flag, str(item))]
+
+
+def run_and_exit() -> None:
+    """Entry point of the `graspproof` command."""
+    sys.exit(main())
