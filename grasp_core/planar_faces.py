@@ -131,8 +131,8 @@ def _face(vertices: Array, triangles: Indices, slack: float, triangulate: Triang
 def border_loops(triangles: Indices) -> list[list[int]]:
     """Vertex loops around a group of triangles, wound as the triangles are.
 
-    Where two parts of the border touch in one vertex, the walk turns through the group's
-    own triangles, so that each loop stays simple.
+    Where the border touches itself in one vertex, the walk turns through the group's own
+    triangles, and is then cut there, so that each loop passes a vertex once.
     """
     inside = {
         (int(t[k]), int(t[(k + 1) % 3])): int(t[(k + 2) % 3]) for t in triangles for k in range(3)
@@ -146,8 +146,20 @@ def border_loops(triangles: Indices) -> list[list[int]]:
             del unseen[edge]
             loop.append(edge[0])
             edge = _next_on_border(inside, edge)
-        loops.append(loop)
+        loops += _cut_at_repeats(loop)
     return loops
+
+
+def _cut_at_repeats(walk: list[int]) -> list[list[int]]:
+    loops: list[list[int]] = []
+    current: list[int] = []
+    for vertex in walk:
+        if vertex in current:
+            start = current.index(vertex)
+            loops.append(current[start:])
+            current = current[:start]
+        current.append(vertex)
+    return [*loops, current]
 
 
 def _next_on_border(inside: dict[tuple[int, int], int], edge: tuple[int, int]) -> tuple[int, int]:

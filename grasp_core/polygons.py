@@ -10,6 +10,8 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 
+MERGE_ORDERS = 16
+"""How many orders of removing diagonals are tried."""
 CONVEX_SLACK = 1e-9
 """How far a corner may turn inwards and still count as straight, relative to the two edge
 lengths' product: well above the rounding of coordinates, well below a visible notch."""
@@ -103,7 +105,8 @@ def merge_into_convex_pieces(points: Array, triangles: Indices) -> list[Array]:
     """Join the triangles of a polygon into few convex pieces.
 
     Diagonals are removed one by one as long as the two pieces beside them form a convex
-    piece; the result has at most four times the least possible number of pieces.
+    piece; the result has at most four times the least possible number of pieces. The order
+    matters, so a few are tried and the one with the fewest pieces is kept.
 
     Args:
         points: Corners, (n, 2).
@@ -113,9 +116,17 @@ def merge_into_convex_pieces(points: Array, triangles: Indices) -> list[Array]:
         Hertel & Mehlhorn, "Fast triangulation of the plane with respect to simple
         polygons", Information and Control 64, 1985.
     """
+    edges = {edge for triangle in triangles.tolist() for edge in _edges(triangle)}
+    diagonals = sorted(edge for edge in edges if edge[0] < edge[1] and edge[::-1] in edges)
+    starts = range(0, len(diagonals), 1 + len(diagonals) // MERGE_ORDERS)
+    orders = [diagonals[start:] + diagonals[:start] for start in starts] or [diagonals]
+    return min((_merged(points, triangles, order) for order in orders), key=len)
+
+
+def _merged(points: Array, triangles: Indices, diagonals: list[tuple[int, int]]) -> list[Array]:
     pieces = {index: [int(v) for v in triangle] for index, triangle in enumerate(triangles)}
     owner = {edge: key for key, loop in pieces.items() for edge in _edges(loop)}
-    for tail, head in sorted(edge for edge in owner if edge[0] < edge[1] and edge[::-1] in owner):
+    for tail, head in diagonals:
         one, two = owner[tail, head], owner[head, tail]
         if one == two:
             continue

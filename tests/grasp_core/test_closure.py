@@ -1,0 +1,276 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from tests.judges import (
+    TETRA_CENTERS,
+    TETRA_NORMALS,
+    TETRAHEDRON,
+    pyramid_margin,
+    random_contacts,
+    random_rotation,
+)
+
+AROUND_Z = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, -1]])
+"""(x, y, z) -> (-y, x, -z): a quarter turn with a reflection."""
+
+
+def turned(point, normal):
+    images = [np.linalg.matrix_power(AROUND_Z, k) for k in range(4)]
+    return np.array([R @ point for R in images]), np.array([R @ normal for R in images])
+
+
+def test_face_centres_of_a_tetrahedron_are_closed_at_any_friction():
+    for friction in (1e-3, 0.1, 0.5, 2.0):
+        certificate = gc.force_closure(TETRA_CENTERS, TETRA_NORMALS, friction)
+        assert certificate.closed
+        assert certificate.verify()
+        assert certificate.margin == pytest.approx(friction / 4, rel=1e-6)
+    assert gc.critical_friction(TETRA_CENTERS, TETRA_NORMALS) == 0.0
+
+
+@pytest.mark.parametrize(("s", "h"), [(0.2, 0.3), (0.4, 0.0), (0.4, 0.7), (0.05, -0.5)])
+def test_four_sides_of_a_box(s, h):
+    """Contacts (rho, s, h) and their images need |s| / rho."""
+    positions, normals = turned(np.array([1.0, s, h]), np.array([-1.0, 0, 0]))
+    assert gc.critical_friction(positions, normals) == pytest.approx(s, rel=1e-7)
+
+
+@pytest.mark.parametrize("beta_deg", [10.0, 20.0, 30.0])
+def test_four_sides_of_a_frustum(beta_deg):
+    beta = math.radians(beta_deg)
+    spin = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    normal = np.array([-math.cos(beta), 0, -math.sin(beta)])
+    images = [np.linalg.matrix_power(spin, k) for k in range(4)]
+    positions = np.array([R @ [1.0, 0, 0] for R in images])
+    normals = np.array([R @ normal for R in images])
+    assert gc.critical_friction(positions, normals) == pytest.approx(math.tan(beta), rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("a", "h", "w", "expected"), [(0.2, 1, 2, 0.3), (0.5, 0.8, 2, 0.0), (0.1, 0.5, 1, 0.3)]
+)
+def test_parallel_faces(a, h, w, expected):
+    """Two and two opposite contacts in one plane; a third pair of axes closes nothing."""
+    positions = np.array([[-w / 2, a, 0], [-w / 2, -a, 0], [w / 2, h + a, 0], [w / 2, h - a, 0]])
+    normals = np.array([[1.0, 0, 0], [1, 0, 0], [-1, 0, 0], [-1, 0, 0]])
+    assert gc.critical_friction(positions, normals) == pytest.approx(expected, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("length", "l", "m", "s", "expected"),
+    [
+        (3, 0.3, -0.3, 0.5, 0.390567), (3, 0.2, -0.2, 0.5, 0.272166), (1, 0.3, -0.3, 0.4, 0.468521),
+        (3, 0.5, 0.0, 0.5, 0.287093), (3, 0.4, 0.1, 0.5, 0.173077), (3, 0.6, -0.1, 0.5, 0.396322),
+        (3, 0.3, 0.3, 0.5, 0.0),
+    ],
+)  # fmt: skip
+def test_ends_of_a_double_wedge_bar(length, l, m, s, expected):  # noqa: E741 - the oracle's letters
+    x = length + 1 - s
+    positions = np.array([[-x, s, l], [-x, -s, -l], [x, m, s], [x, -m, -s]])
+    normals = np.array([[1.0, -1, 0], [1, 1, 0], [-1, 0, -1], [-1, 0, 1]]) / math.sqrt(2.0)
+    assert gc.critical_friction(positions, normals) == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("rho", "z1", "z2", "expected"), [(1.0, 0.0, 0.3, 0.2), (0.8, 0.2, -0.1, 0.166636)]
+)
+def test_sides_and_top_of_a_prism(rho, z1, z2, expected):
+    angles = np.radians([90.0, 210.0, 330.0])
+    out = np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
+    positions = np.vstack(
+        [rho * out + np.array([[0, 0, z1], [0, 0, z2], [0, 0, z2]]), [[0, 0, 1.0]]]
+    )
+    normals = np.vstack([-out, [[0, 0, -1.0]]])
+    assert gc.critical_friction(positions, normals) == pytest.approx(expected, abs=1e-6)
+    assert gc.critical_friction(positions[:3], normals[:3]) == pytest.approx(
+        abs(z2 - z1) / (1.5 * rho)
+    )
+
+
+T1, T2 = np.array([1.0, -1, 0]) / math.sqrt(2), np.array([1.0, 1, -2]) / math.sqrt(6)
+
+
+@pytest.mark.parametrize(
+    ("shift", "expected"),
+    [
+        (0.1 * T2, 0.053369), (-0.1 * T2, 0.056495), (0.1 * T1, 0.057699), (0.2 * T2, 0.103758),
+        (-0.2 * T2, 0.116320), (0.2 * T1, 0.115179), (0.4 * T2, 0.195994), (-0.4 * T2, 0.247306),
+        (0.4 * T1, 0.228570),
+    ],
+)  # fmt: skip
+def test_one_contact_of_a_tetrahedron_displaced(shift, expected):
+    positions = TETRA_CENTERS.copy()
+    positions[0] += shift
+    assert gc.critical_friction(positions, TETRA_NORMALS) == pytest.approx(expected, abs=1e-6)
+
+
+def test_equal_displacements_of_all_contacts_cancel():
+    """The group V4 maps the contacts onto each other; forces along the normals balance."""
+    group = [np.diag(d) for d in ([1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1])]
+    start = TETRA_CENTERS[0] + 0.3 * T1 + 0.2 * T2
+    positions = np.array([R @ start for R in group])
+    normals = np.array([R @ TETRA_NORMALS[0] for R in group])
+    assert gc.critical_friction(positions, normals) == 0.0
+
+
+def test_a_frictionless_equilibrium_of_a_paraboloid_is_not_closed_without_friction():
+    a = np.arange(4.0)
+    positions = np.array([[0.0, 0, 0], [1, 1, 1], [2, 0, 0], [3, 1, 3]])
+    directions = np.column_stack([0 * a, np.ones(4), a]) * np.array([1, -1, 1, -1])[:, None]
+    normals = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    assert not gc.force_closure(positions, normals, 0.0).closed
+    assert gc.force_closure(positions, normals, 0.5).closed
+
+
+def test_contacts_on_one_line_are_never_closed():
+    positions = np.array([[0.0, 0, z] for z in (-2, -1, 1, 2)])
+    normals = np.array([[0.0, 0, 1], [0, 0, 1], [0, 0, -1], [0, 0, -1]])
+    certificate = gc.force_closure(positions, normals, 0.9)
+    assert not certificate.closed
+    assert certificate.verify()
+    assert gc.critical_friction(positions, normals) == math.inf
+
+
+def test_normals_that_all_point_one_way_need_infinite_friction():
+    positions = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    normals = np.tile([0.0, 0, 1], (4, 1))
+    assert gc.critical_friction(positions, normals) == math.inf
+    certificate = gc.force_closure(positions, normals, 5.0)
+    assert not certificate.closed
+    assert certificate.verify()
+
+
+def test_friction_may_differ_between_contacts():
+    """A cube held at three places: closed with friction everywhere, not without at the first."""
+    positions = np.array([[-1.0, 0, 0], [0, 0, -1], [0, 0, 1]])
+    assert gc.force_closure(positions, -positions, [1.0, 1.0, 1.0]).closed
+    certificate = gc.force_closure(positions, -positions, [0.0, 1.0, 1.0])
+    assert not certificate.closed
+    assert certificate.verify()
+
+
+def test_a_balanced_pair_beside_idle_contacts_is_decided():
+    """Two opposite contacts balance; the others turn the object about their line one way only."""
+    positions = np.array([[-1.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]])
+    normals = np.array([[1.0, 0, 0], [-1, 0, 0], [0, -0.6, 0.8], [0, 0.6, -0.8]])
+    certificate = gc.force_closure(positions, normals, 0.3)
+    assert not certificate.closed
+    assert certificate.margin == 0.0
+    assert certificate.verify()
+
+
+def test_the_boundary_itself_is_left_undecided():
+    """Exactly critical: forces exist only on the cones."""
+    positions, normals = turned(np.array([1.0, 0.25, 0.5]), np.array([-1.0, 0, 0]))
+    with pytest.raises(gc.UndecidedError, match="too close to zero"):
+        gc.force_closure(positions, normals, 0.25)
+
+
+def test_verdicts_carry_certificates_that_verify_and_pyramids_agree():
+    """Random contacts: closed ones pass an outer, others fail an inner 64-sided pyramid."""
+    rng = np.random.default_rng(11)
+    seen = {True: 0, False: 0}
+    for _ in range(400):
+        positions, normals = random_contacts(rng)
+        certificate = gc.force_closure(positions, normals, 0.5)
+        assert certificate.verify()
+        margin = pyramid_margin(positions, normals, 0.5, 64, outer=certificate.closed)
+        assert (margin > -1e-9) if certificate.closed else (margin < 1e-9)
+        seen[certificate.closed] += 1
+    assert min(seen.values()) >= 100
+
+
+def test_closure_holds_exactly_above_the_critical_friction():
+    rng = np.random.default_rng(12)
+    tested = 0
+    for _ in range(150):
+        positions, normals = random_contacts(rng)
+        critical = gc.critical_friction(positions, normals)
+        if 1e-3 < critical < 10.0:
+            assert gc.force_closure(positions, normals, critical * (1 + 1e-5)).closed
+            assert not gc.force_closure(positions, normals, critical * (1 - 1e-5)).closed
+            tested += 1
+    assert tested >= 100
+
+
+def test_certificates_do_not_survive_tampering():
+    rng = np.random.default_rng(13)
+    tested = 0
+    for _ in range(60):
+        positions, normals = random_contacts(rng)
+        certificate = gc.force_closure(positions, normals, 0.5)
+        if certificate.closed:
+            spoiled = certificate.forces.copy()
+            spoiled[0] += 0.05 * normals[1]
+            assert not replace(certificate, forces=spoiled).verify()
+            assert not replace(certificate, forces=-certificate.forces).verify()
+            assert not replace(certificate, closed=False).verify()
+        else:
+            assert not replace(
+                certificate, separating_wrench=-certificate.separating_wrench
+            ).verify()
+            assert not replace(certificate, separating_wrench=np.zeros(6)).verify()
+            assert not replace(certificate, closed=True).verify()
+        tested += 1
+    assert tested == 60
+
+
+def test_no_contact_force_works_along_the_separating_wrench():
+    """Sampled forces in the cones, with their wrenches about the origin."""
+    rng = np.random.default_rng(14)
+    tested = 0
+    for _ in range(60):
+        positions, normals = random_contacts(rng)
+        certificate = gc.force_closure(positions + 3.0, normals, 0.2)
+        if certificate.closed:
+            continue
+        y = certificate.separating_wrench
+        for point, normal in zip(positions + 3.0, normals, strict=True):
+            across = np.cross(normal, rng.normal(size=(20, 3)))
+            across *= (
+                0.2 * rng.uniform(size=(20, 1)) / np.linalg.norm(across, axis=1, keepdims=True)
+            )
+            forces = normal + across
+            work = forces @ y[:3] + np.cross(point, forces) @ y[3:]
+            assert work.max() <= 1e-9 * np.abs(y).max()
+            tested += len(forces)
+    assert tested >= 2000
+
+
+def test_moving_scaling_and_reordering_change_nothing():
+    rng = np.random.default_rng(15)
+    tested = 0
+    for _ in range(40):
+        positions, normals = random_contacts(rng)
+        here = gc.force_closure(positions, normals, 0.5)
+        R, scale, order = random_rotation(rng), 10.0 ** rng.uniform(-3, 3), rng.permutation(4)
+        there = gc.force_closure(
+            (scale * positions @ R.T + 5.0 * scale)[order], (normals @ R.T)[order], 0.5
+        )
+        assert there.closed == here.closed
+        assert there.margin == pytest.approx(here.margin, abs=1e-8)
+        assert there.verify()
+        tested += 1
+    assert tested == 40
+
+
+@pytest.mark.parametrize(
+    ("positions", "normals", "friction", "message"),
+    [
+        (TETRAHEDRON, 2 * TETRA_NORMALS, 0.5, "length 1"),
+        (TETRAHEDRON, TETRA_NORMALS[:3], 0.5, "shape"),
+        (TETRAHEDRON[:1], TETRA_NORMALS[:1], 0.5, "at least two"),
+        (TETRAHEDRON, None, 0.5, "normals are missing"),
+        (TETRAHEDRON, TETRA_NORMALS, -0.1, "must not be negative"),
+        (TETRAHEDRON, TETRA_NORMALS, math.nan, "finite"),
+        (TETRAHEDRON * math.inf, TETRA_NORMALS, 0.5, "finite"),
+        (TETRAHEDRON, TETRA_NORMALS, [0.5, 0.5], "shape"),
+    ],
+)
+def test_bad_arguments_are_refused(positions, normals, friction, message):
+    with pytest.raises(gc.InputError, match=message):
+        gc.force_closure(positions, normals, friction)

@@ -1,0 +1,160 @@
+import math
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.concurrent_grasps import (
+    ConcurrentPlacement,
+    NoConcurrentPlacement,
+    cone_footprint,
+    inscribed_facets,
+    place_concurrent,
+    radius_bounds,
+)
+from grasp_core.face_pieces import unit_pieces
+from grasp_core.spanning import spanning_quadruples
+from grasp_core.values import ForceCone
+from scenes.objects import example_object
+
+TOLERANCE = 1e-7
+"""Ten times the residual at which a program's answer is accepted, in object radii."""
+
+
+def placements(name, theta, limit):
+    """Placements on the spanning quadruples of a convex object, at most `limit`."""
+    body = example_object(name)
+    pieces = unit_pieces(body)
+    found = spanning_quadruples(body.normals, theta)
+    for faces in found.indices[:limit]:
+        quad = [pieces[face] for face in faces]
+        cones = [ForceCone(piece.normal, theta) for piece in quad]
+        yield quad, cones, place_concurrent(quad, cones, least_radius=1e-4)
+
+
+@pytest.mark.parametrize("theta_deg", [5.0, 10.0, 15.0])
+def test_the_tetrahedron_has_four_equal_discs_about_its_centres(theta_deg):
+    """r = rho0 tan(theta) cos(pi / 16), with rho0 = 1/3 of the radius."""
+    theta = math.radians(theta_deg)
+    (quad, _, placed), = placements("tetrahedron", theta, 1)  # fmt: skip
+    expected = math.tan(theta) * math.cos(math.pi / 16) / 3.0
+    assert isinstance(placed, ConcurrentPlacement)
+    np.testing.assert_allclose(placed.radii, expected, atol=TOLERANCE)
+    np.testing.assert_allclose(placed.focus, 0.0, atol=TOLERANCE)
+    centers = [-piece.normal / 3.0 for piece in quad]
+    np.testing.assert_allclose(placed.positions, centers, atol=TOLERANCE)
+
+
+def test_discs_lie_in_their_faces_and_see_the_focus_within_the_cone():
+    tested = 0
+    for name in ("random-20-7", "icosahedron", "random-12-1"):
+        for quad, cones, placed in placements(name, math.radians(8.0), 150):
+            if isinstance(placed, NoConcurrentPlacement):
+                continue
+            for piece, cone, center, radius in zip(
+                quad, cones, placed.positions, placed.radii, strict=True
+            ):
+                turns = np.linspace(0, 2 * np.pi, 40)
+                ring = np.column_stack([np.cos(turns), np.sin(turns)]) @ piece.frame.T
+                points = center + radius * ring
+                flat = (points - piece.origin) @ piece.frame
+                assert (flat @ piece.E.T <= piece.b + TOLERANCE).all()
+                lines = placed.focus - points
+                angles = np.arccos(lines @ cone.axis / np.linalg.norm(lines, axis=1))
+                assert angles.max() <= cone.half_angle + 1e-6
+            tested += 1
+    assert tested >= 100
+
+
+def test_contacts_anywhere_in_the_discs_are_in_force_closure():
+    """The independent regions of section 3.1, by the exact circular cones at a slightly larger
+    friction, since contacts on the borders may use the very edge of the force cones.
+    """
+    rng = np.random.default_rng(0)
+    theta, tested = math.radians(9.0), 0
+    for name in ("random-20-7", "icosahedron", "random-30-2"):
+        for quad, _, placed in placements(name, theta, 60):
+            if isinstance(placed, NoConcurrentPlacement):
+                continue
+            for _ in range(4):
+                turns = rng.uniform(0, 2 * np.pi, 4)
+                reach = placed.radii * np.array(rng.choice([1.0, 1.0, 0.5], 4))
+                points = [
+                    center + length * piece.frame @ [math.cos(turn), math.sin(turn)]
+                    for piece, center, length, turn in zip(
+                        quad, placed.positions, reach, turns, strict=True
+                    )
+                ]
+                normals = [piece.normal for piece in quad]
+                assert gc.force_closure(points, normals, math.tan(theta) + 1e-5).closed
+                tested += 1
+    assert tested >= 200
+
+
+def test_contacts_at_the_corners_of_the_footprints_are_in_force_closure():
+    theta, tested = math.radians(9.0), 0
+    for quad, cones, placed in placements("random-20-7", theta, 40):
+        if isinstance(placed, NoConcurrentPlacement):
+            continue
+        regions = [cone_footprint(p, c, placed.focus) for p, c in zip(quad, cones, strict=True)]
+        for k in range(6):
+            points = [region[k % len(region)] for region in regions]
+            normals = [piece.normal for piece in quad]
+            assert gc.force_closure(points, normals, math.tan(theta) + 1e-5).closed
+            tested += 1
+    assert tested >= 60
+
+
+def test_no_placement_is_larger_than_its_bound_and_refusals_are_bounded():
+    tested = 0
+    for quad, cones, placed in placements("random-20-7", math.radians(6.0), 200):
+        if isinstance(placed, NoConcurrentPlacement):
+            assert placed.bound < 1e-4
+            continue
+        normals = np.array([[piece.normal for piece in quad]])
+        offsets = np.array([[piece.normal @ piece.origin for piece in quad]])
+        bound = radius_bounds(normals, offsets, np.array([cones[0].half_angle]))
+        assert placed.radius <= bound[0] + TOLERANCE
+        assert placed.radius <= min(piece.inradius for piece in quad) + TOLERANCE
+        tested += 1
+    assert tested >= 50
+
+
+def test_tilted_cones_hold_a_box_by_its_four_sides():
+    """Known optimum for half-size 1, friction 0.5: tilt 14.036, half-angle 12.529 degrees give
+    discs of 0.2284 with 32-sided pyramids; 16 sides give a little less.
+    """
+    box = gc.Polyhedron.from_mesh(*cube_mesh())
+    pieces = [p for p in unit_pieces(box) if abs(p.normal[2]) < 0.5]
+    tilt, half_angle = math.radians(14.036), math.radians(12.529)
+    cones = []
+    for piece in pieces:
+        sign = 1.0 if abs(piece.normal[0]) > 0.5 else -1.0
+        axis = math.cos(tilt) * piece.normal + sign * math.sin(tilt) * np.array([0.0, 0, 1.0])
+        cones.append(ForceCone(axis / np.linalg.norm(axis), half_angle))
+    assert gc.cones_positively_span([c.axis for c in cones], [half_angle - 1e-4] * 4)
+    placed = place_concurrent(pieces, cones, least_radius=1e-4)
+    assert isinstance(placed, ConcurrentPlacement)
+    assert 0.98 * 0.2284 < placed.radius * box.radius < 0.2290
+    for _ in range(20):
+        points = box.radius * placed.positions
+        assert gc.force_closure(points, [p.normal for p in pieces], 0.5).closed
+
+
+def test_facets_lie_inside_the_circular_cone():
+    cone = ForceCone(np.array([0.0, 0.6, 0.8]), math.radians(20.0))
+    G = inscribed_facets(cone)
+    assert (G @ cone.axis > 0).all()
+    for one, two in zip(G, np.roll(G, -1, axis=0), strict=True):
+        edge = np.cross(one, two)
+        edge *= np.sign(edge @ cone.axis) / np.linalg.norm(edge)
+        assert math.acos(edge @ cone.axis) == pytest.approx(cone.half_angle, abs=1e-12)
+        assert (G @ edge >= -1e-12).all()
+
+
+def cube_mesh():
+    corners = np.array([[x, y, z] for x in (-1.0, 1) for y in (-1.0, 1) for z in (-1.0, 1)])
+    from grasp_core.solids import hull
+
+    solid = hull(corners)
+    return solid.vertices, solid.triangles
