@@ -34,7 +34,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.face_pieces import FacePiece
 from grasp_core.lp import LinearProgram, Optimum, maximize
-from grasp_core.polygons import clip, plane_frame
+from grasp_core.polygons import clip
 from grasp_core.values import FINGERS, ForceCone
 
 PYRAMID_SIDES = 16
@@ -104,19 +104,27 @@ def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array) -> Array:
 
     The inverted cone of section 3.1, inscribed by the same pyramid as in the program.
     """
-    G = inscribed_facets(cone)
+    G = inscribed_facets(cone, piece.frame[:, 0])
     flat = clip(piece.corners, G @ piece.frame, G @ (focus - piece.origin))
     return piece.origin + flat @ piece.frame.T
 
 
-def inscribed_facets(cone: ForceCone, sides: int = PYRAMID_SIDES) -> Array:
+def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES) -> Array:
     """Inward unit normals g of a pyramid inscribed in a circular cone, (sides, 3).
 
     The pyramid's edges lie on the cone, so {v : g.v >= 0 for all g} is inside the cone. Its
     facets touch a cone of half-angle psi with tan(psi) = tan(half_angle) cos(pi / sides).
+
+    Args:
+        cone: The circular cone.
+        toward: Across the axis, the direction in which the pyramid's first edge leans, (3,).
+        sides: Number of facets.
     """
     turns = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
-    across = np.column_stack([np.cos(turns), np.sin(turns)]) @ plane_frame(cone.axis).T
+    first = toward - (toward @ cone.axis) * cone.axis
+    first = first / np.linalg.norm(first)
+    frame = np.vstack([first, np.cross(cone.axis, first)])
+    across = np.column_stack([np.cos(turns), np.sin(turns)]) @ frame
     psi = np.arctan(np.tan(cone.half_angle) * np.cos(np.pi / sides))
     return np.sin(psi) * cone.axis - np.cos(psi) * across
 
@@ -145,7 +153,7 @@ def _rows(pieces: Sequence[FacePiece], cones: Sequence[ForceCone]) -> tuple[Arra
     rows: list[Array] = []
     limits: list[Array] = []
     for i, (piece, cone) in enumerate(zip(pieces, cones, strict=True)):
-        G = inscribed_facets(cone)
+        G = inscribed_facets(cone, piece.frame[:, 0])
         flat = G @ piece.frame
         aim = np.zeros((len(G), 16))
         aim[:, :3], aim[:, 3 + 2 * i : 5 + 2 * i] = -G, flat

@@ -9,7 +9,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.lp import LinearProgram, Optimum, maximize
-from grasp_core.polygons import edge_rows, plane_frame
+from grasp_core.polygons import edge_rows
 from grasp_core.values import Face, Polyhedron
 
 THINNEST = 1e-6
@@ -27,7 +27,10 @@ class FacePiece:
     origin: Array
     """A point of the plane, (3,)."""
     frame: Array
-    """Orthonormal columns spanning the plane, (3, 2)."""
+    """Orthonormal columns spanning the plane, the first along an edge, (3, 2).
+
+    Tied to the object, so that turning it turns the pyramids inscribed in force cones too.
+    """
     corners: Array
     """(k, 2), counter-clockwise about the normal."""
     E: Array
@@ -53,7 +56,9 @@ def unit_pieces(body: Polyhedron) -> tuple[FacePiece, ...]:
 
 
 def _piece(index: int, face: Face, polygon: Array) -> FacePiece:
-    frame = plane_frame(face.normal)
+    edge = polygon[1] - polygon[0]
+    along = np.asarray(edge / np.linalg.norm(edge), dtype=np.float64)
+    frame = np.column_stack([along, np.cross(face.normal, along)])
     origin = polygon.mean(axis=0)
     corners = (polygon - origin) @ frame
     E, b = edge_rows(corners)

@@ -30,6 +30,8 @@ RESIDUAL = 1e-6
 """Largest imbalance and cone violation accepted, in units of the largest normal force: a
 hundred times the accuracy asked of the solver."""
 REQUESTED = 1e-8
+MAX_ITERATIONS = 300
+"""Feasible programs of this size take about twenty; infeasible ones would go on for minutes."""
 REGULAR = 1e-3
 """Weight of the forces' own size that keeps the least-friction programs strictly convex."""
 IMPROVEMENT = 1e-2
@@ -142,9 +144,10 @@ class _Problem:
         return self.scale * np.asarray(forces, dtype=np.float64)
 
     def required_friction(self, local: Array) -> float:
-        """The coefficient that these forces need."""
+        """The coefficient that these forces need, not counting contacts without force."""
         along, across = local[0::3], np.hypot(local[1::3], local[2::3])
-        return float((across / np.maximum(along, np.finfo(np.float64).tiny)).max())
+        ratios = across / np.maximum(along, np.finfo(np.float64).tiny)
+        return float(np.where(across > RESIDUAL, ratios, 0.0).max())
 
     def pyramid(self, friction: float) -> Array:
         """Rows R with R f <= 0 inside pyramids inscribed in the cones, (16 k, 3 k)."""
@@ -186,9 +189,16 @@ class _Problem:
         rows = self.pyramid(friction)
         P = self.G.T @ self.G + LEAST_CHARGE * np.eye(self.G.shape[1])
         x = _solve(P, self.G.T @ self.w, rows, self, balanced=False)
-        if x is None or (rows @ x).max() > RESIDUAL:
+        if x is None or not np.isfinite(x).all():
             raise SolverError("no forces in the cones were found, though a pure push is one")
-        return x
+        return self._into_cones(x, friction)
+
+    def _into_cones(self, local: Array, friction: float) -> Array:
+        """Forces near these that meet the limits and the cones exactly."""
+        along = np.clip(local[0::3], self.lower[0::3], self.upper[0::3])
+        across = np.hypot(local[1::3], local[2::3])
+        shrink = np.minimum(1.0, friction * along / np.maximum(across, np.finfo(np.float64).tiny))
+        return np.column_stack([along, shrink * local[1::3], shrink * local[2::3]]).ravel()
 
     def _balanced(self, local: Array | None) -> Array | None:
         """The forces if they balance the wrench within the limits, corrected to rounding."""
@@ -214,6 +224,7 @@ def _solve(P: Array, q: Array, rows: Array, problem: _Problem, *, balanced: bool
         ub=np.append(problem.upper, [np.inf] * extra),
     )  # fmt: skip
     answer = solver.solve_problem(
-        program, solver="proxqp", eps_abs=REQUESTED, primal_infeasibility_solving=balanced
-    )
+        program, solver="proxqp", eps_abs=REQUESTED, max_iter=MAX_ITERATIONS,
+        primal_infeasibility_solving=balanced,
+    )  # fmt: skip
     return None if answer.x is None else np.asarray(answer.x, dtype=np.float64)

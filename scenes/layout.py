@@ -34,8 +34,9 @@ SQUEEZE = 0.6
 TIP_RADIUS = 0.1
 PAD_HALF_WIDTH = 0.2
 PAD_DEPTH = 0.1
+"""Fingertip radius and pad size, in object radii."""
 RETREAT = 0.5
-"""Fingertip radius, pad size and distance of approach, in object radii."""
+"""Distance of approach, in grasp sizes: from much farther the fingers would arrive too fast."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -189,7 +189,7 @@ def _keyframes(root: ElementTree.Element, layout: Layout) -> None:
     fingers = len(layout.contacts)
     home = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], np.zeros(3 * fingers)])
     away = home.copy()
-    away[7::3] = -RETREAT * layout.radius_m
+    away[7::3] = -RETREAT * layout.grasp_size_m
     push = layout.squeeze / layout.drive.stiffness_n_per_m
     keys = _add(root, "keyframe", {})
     _add(keys, "key", {"name": "approach", "qpos": away, "ctrl": push.ravel()})

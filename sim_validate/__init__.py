@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sim_validate.protocol import HoldProtocol as HoldProtocol
-    from sim_validate.validate import Verdict as Verdict
-    from sim_validate.validate import validate as validate
+    from sim_validate.validation import Verdict as Verdict
+    from sim_validate.validation import validate as validate
     from sim_validate.verdict import Outcome as Outcome
 
 _HOMES = {
     "HoldProtocol": "protocol",
-    "Verdict": "validate",
-    "validate": "validate",
+    "Verdict": "validation",
+    "validate": "validation",
     "Outcome": "verdict",
 }
 

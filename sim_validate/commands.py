@@ -20,7 +20,7 @@ from sim_validate import cli
 from sim_validate.console import Reporter
 from sim_validate.engines import each
 from sim_validate.files import read_text, write_text
-from sim_validate.validate import Verdict, validate
+from sim_validate.validation import Verdict, validate
 from sim_validate.verdict_records import summary, verdicts_to_json
 
 TABLE_ROWS = 20

@@ -7,6 +7,8 @@ experiment. Displacements are measured on the object's pose, not on contact coun
 # pyright: basic, reportAttributeAccessIssue=false
 # MuJoCo ships no types for its core; plain arrays and numbers leave this module.
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import mujoco  # noqa: TID251 - this is the door
@@ -127,7 +129,8 @@ class Bench:
         self.data.xfrc_applied[self.body] = np.concatenate([wrench[:3], torque])
 
     def _step(self) -> None:
-        mujoco.mj_step(self.model, self.data, nstep=CHUNK)
+        with _unlogged():
+            mujoco.mj_step(self.model, self.data, nstep=CHUNK)
         self.stepped += CHUNK
 
     def _pose(self) -> tuple[Array, Array]:
@@ -173,6 +176,21 @@ class Bench:
             warnings=int(sum(w.number for w in self.data.warning)),
             clock_error_s=float(self.data.time - self.stepped * self.model.opt.timestep),
         )
+
+
+@contextmanager
+def _unlogged() -> Iterator[None]:
+    """Keep the simulator from writing warnings to a file in the working directory.
+
+    They are counted in its data, and `HoldTrace.warnings` reports them.
+    """
+    before, quiet = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
+    quiet.logto_file = quiet.logto_console = False
+    mujoco.MjLogConfig.set(quiet)
+    try:
+        yield
+    finally:
+        mujoco.MjLogConfig.set(before)
 
 
 def rotation_angle(rotation: Array) -> float:

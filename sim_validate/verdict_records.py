@@ -7,7 +7,7 @@ from dataclasses import asdict
 from grasp_core.values import Polyhedron
 from grasp_core.versions import versions
 from scenes.physics import flags
-from sim_validate.validate import ControlVerdict, Verdict, WrenchVerdict
+from sim_validate.validation import ControlVerdict, Verdict, WrenchVerdict
 
 SCHEMA = 1
 

@@ -143,7 +143,7 @@ def test_tilted_cones_hold_a_box_by_its_four_sides():
 
 def test_facets_lie_inside_the_circular_cone():
     cone = ForceCone(np.array([0.0, 0.6, 0.8]), math.radians(20.0))
-    G = inscribed_facets(cone)
+    G = inscribed_facets(cone, np.array([1.0, 0.2, 0.1]))
     assert (G @ cone.axis > 0).all()
     for one, two in zip(G, np.roll(G, -1, axis=0), strict=True):
         edge = np.cross(one, two)

@@ -5,6 +5,7 @@ it is applied in simulation, with forces planned to need the least friction. The
 confirmed when all wrenches hold, and the run can be trusted when no control does.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -27,6 +28,9 @@ AXIS_NAMES = tuple(
     f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"
 )
 WEAKEST = "weakest"
+DIGITS = 9
+"""Digits kept of planned forces and wrenches: their rounding is a millionth of what a servo
+hides."""
 SEPARATING = "separating"
 """The wrench that a control's certificate says is not resisted."""
 
@@ -170,7 +174,7 @@ class _Rig:
         for name, wrench in zip((*AXIS_NAMES, WEAKEST), (*axes, weakest), strict=True):
             limit = self.resisted.limit(wrench).limit
             share = self.protocol.load_share
-            yield name, share * limit * wrench, 1.0 / share
+            yield name, _rounded(share * limit * wrench), 1.0 / share
 
     def hopeless_loads(self, control: Control) -> Iterator[tuple[str, Array, float]]:
         """The separating wrench, then the axis wrenches, all of the same size."""
@@ -183,7 +187,7 @@ class _Rig:
         size = self.protocol.control_load * self.max_normal_force
         axes = axis_wrenches(radius)
         for name, wrench in zip((SEPARATING, *AXIS_NAMES), (facing, *axes), strict=True):
-            applied = size * wrench / float(np.linalg.norm(wrench / scale))
+            applied = _rounded(size * wrench / float(np.linalg.norm(wrench / scale)))
             yield name, applied, self.resisted.limit(applied).limit
 
     def hold(self, name: str, wrench: Array, predicted_limit: float) -> WrenchVerdict:
@@ -200,8 +204,20 @@ class _Rig:
         limits, center = (least, self.max_normal_force), self.body.center_of_mass
         balanced = least_friction_forces(*contacts, wrench, normal_force=limits, center=center)
         if balanced is not None:
-            return balanced
-        return closest_forces(*contacts, wrench, normal_force=limits, center=center), None
+            return _rounded(balanced[0]), float(f"{balanced[1]:.{DIGITS}g}")
+        forces = closest_forces(*contacts, wrench, normal_force=limits, center=center)
+        return _rounded(forces), None
 
     def _settling(self, needed: float | None) -> float:
         return self.protocol.settling_friction * max(self.friction, needed or 0.0)
+
+
+def _rounded(values: Array) -> Array:
+    """Values to `DIGITS` digits of the largest of them.
+
+    Solvers' last bits depend on where their numbers lie in memory; what is simulated does not.
+    """
+    largest = float(np.abs(values).max())
+    if largest == 0.0:
+        return values
+    return np.round(values, DIGITS - 1 - math.floor(math.log10(largest)))

@@ -1,0 +1,194 @@
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.planner import LEAST_RADIUS
+from scenes.objects import example_object
+from tests.judges import pyramid_margin, random_rotation
+
+TEN_DEGREES = math.tan(math.radians(10.0))
+RADIUS_ACCURACY = 1e-6
+"""Radii are optima good to 1e-8 in object radii; two may differ by twice that."""
+
+
+def remade(body, move, name="moved"):
+    return gc.Polyhedron.from_mesh(move(body.vertices), body.triangles, name=name)
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("tetrahedron", 1), ("octahedron", 2), ("dodecahedron", 30), ("icosahedron", 90)],
+)
+def test_platonic_solids_have_the_known_number_of_quadruples_at_ten_degrees(name, count):
+    """Quadruples with theta* above ten degrees; all of them carry a concurrent grasp."""
+    found = gc.plan(example_object(name), TEN_DEGREES)
+    wide = [grasp for grasp in found.grasps if grasp.span_angle > math.radians(10.0)]
+    assert len(wide) == count
+    assert found.counts.families["concurrent"].rejected == 0
+
+
+def test_the_tetrahedron_is_held_at_its_face_centres():
+    body = example_object("tetrahedron")
+    found = gc.plan(body, TEN_DEGREES)
+    (grasp,) = found.grasps
+    assert grasp.family == "concurrent"
+    assert grasp.critical_friction == 0.0
+    discs = [region.inscribed_radius for region in grasp.regions]
+    np.testing.assert_allclose(discs, grasp.radius, rtol=1e-5)
+    np.testing.assert_allclose(grasp.focus_points, [[0.0, 0, 0]], atol=1e-7 * body.radius)
+    centers = [body.faces[face].centroid for face in grasp.faces]
+    np.testing.assert_allclose(grasp.positions, centers, atol=1e-7 * body.radius)
+
+
+@pytest.mark.parametrize("name", ["box", "prism", "l-bracket", "cross", "hex-nut"])
+def test_objects_without_spanning_quadruples_say_why(name):
+    found = gc.plan(example_object(name), 0.5)
+    assert not found.grasps
+    assert found.counts.spanning == 0
+    assert "positively spanning" in found.absence
+
+
+def test_a_bar_whose_ends_are_far_apart_has_no_concurrent_grasp_at_ten_degrees():
+    """Nine quadruples span at ten degrees or more, and no focus serves any of them."""
+    found = gc.plan(example_object("double-wedge-bar"), TEN_DEGREES)
+    assert found.counts.spanning == 9
+    assert found.counts.families["concurrent"].infeasible == 9
+    assert "no point" in found.absence or "none of them a point" in found.absence
+
+
+OBJECTS = ["wedge", "icosahedron", "random-20-7", "random-12-1", "random-30-2", "screwdriver"]
+
+
+def test_no_returned_grasp_fails_an_independent_pyramid_of_64_sides():
+    """Inner pyramids accept each grasp, so outer ones must as well; critical friction agrees."""
+    tested = 0
+    for name in OBJECTS:
+        for grasp in gc.plan(example_object(name), 0.5, limit=40).grasps:
+            for outer in (False, True):
+                assert pyramid_margin(grasp.positions, grasp.normals, 0.5, 64, outer=outer) > 1e-9
+            below = 0.99 * grasp.critical_friction
+            if below > 1e-3:
+                assert pyramid_margin(grasp.positions, grasp.normals, below, 64, outer=False) < 1e-9
+            tested += 1
+    assert tested >= 150
+
+
+def test_every_grasp_lies_on_its_faces_inside_its_regions():
+    tested = 0
+    for name in OBJECTS:
+        body = example_object(name)
+        for grasp in gc.plan(body, 0.4, limit=20).grasps:
+            for face, contact, region in zip(
+                grasp.faces, grasp.contacts, grasp.regions, strict=True
+            ):
+                plane = body.faces[face]
+                off = (region.polygon - plane.centroid) @ plane.normal
+                np.testing.assert_allclose(off, 0.0, atol=1e-9)
+                assert region.inscribed_radius >= grasp.radius * (1 - RADIUS_ACCURACY)
+                assert contact.normal @ plane.normal == pytest.approx(1.0)
+                assert _inside(contact.position, region.polygon, plane.normal)
+            tested += 1
+    assert tested >= 90
+
+
+def test_moving_turning_and_scaling_the_object_moves_its_grasps():
+    rng = np.random.default_rng(1)
+    tested = 0
+    for name in ("wedge", "random-12-1", "chamfered-box"):
+        body = example_object(name)
+        here = gc.plan(body, 0.3)
+        R, scale = random_rotation(rng), float(rng.uniform(0.1, 3.0))
+        there = gc.plan(remade(body, lambda v, R=R, s=scale: s * v @ R.T + 0.4), 0.3)
+        assert {g.faces for g in here.grasps} == {g.faces for g in there.grasps}
+        radii = {g.faces: g.radius for g in there.grasps}
+        for grasp in here.grasps:
+            expected = pytest.approx(radii[grasp.faces] / scale, rel=RADIUS_ACCURACY)
+            assert grasp.radius == expected
+            tested += 1
+    assert tested >= 60
+
+
+def test_more_friction_never_loses_a_grasp():
+    tested = 0
+    for name in ("wedge", "random-10-1", "random-12-1"):
+        body = example_object(name)
+        plans = [gc.plan(body, friction) for friction in (0.05, 0.1, 0.2, 0.35, 0.7)]
+        for less, more in pairwise(plans):
+            radii = {grasp.faces: grasp.radius for grasp in more.grasps}
+            for grasp in less.grasps:
+                assert radii[grasp.faces] >= grasp.radius * (1 - RADIUS_ACCURACY)
+                tested += 1
+    assert tested >= 200
+
+
+def test_a_smaller_theta_is_allowed_and_gives_smaller_discs():
+    body = example_object("icosahedron")
+    wide, narrow = gc.plan(body, 0.5, limit=5), gc.plan(body, 0.5, theta_deg=5.0, limit=5)
+    assert narrow.grasps[0].radius < wide.grasps[0].radius
+    assert narrow.grasps[0].force_cones[0].half_angle <= math.radians(5.0)
+
+
+def test_a_limit_returns_the_best_of_all_grasps():
+    body = example_object("random-14-1")
+    everything, few = gc.plan(body, 0.5), gc.plan(body, 0.5, limit=7)
+    assert len(few.grasps) == 7
+    assert [g.id for g in few.grasps] == [g.id for g in everything.grasps[:7]]
+    assert few.counts.families["concurrent"].pruned > 0
+
+
+def test_plans_are_the_same_every_time():
+    one, two = (gc.plan(example_object("wedge"), 0.4) for _ in range(2))
+    assert [g.id for g in one.grasps] == [g.id for g in two.grasps]
+    assert len({g.id for g in one.grasps}) == len(one.grasps)
+    for a, b in zip(one.grasps, two.grasps, strict=True):
+        np.testing.assert_array_equal(a.positions, b.positions)
+
+
+def test_progress_is_reported_for_each_quadruple():
+    seen = []
+    gc.plan(example_object("wedge"), progress=lambda *numbers: seen.append(numbers))
+    assert [done for done, _, _ in seen] == list(range(1, len(seen) + 1))
+    assert seen[-1][1] == len(seen) == 13
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"friction": 0.0}, "friction must be a positive number"),
+        ({"friction": math.nan}, "friction must be a positive number"),
+        ({"theta_deg": 30.0}, "theta_deg must be in"),
+        ({"theta_deg": -1.0}, "theta_deg must be in"),
+        ({"limit": 0}, "limit must be at least 1"),
+        ({"families": ["spiral"]}, "families must be among"),
+        ({"families": []}, "families must be among"),
+    ],
+)
+def test_bad_requests_are_refused(arguments, message):
+    with pytest.raises(gc.InputError, match=message):
+        gc.plan(example_object("tetrahedron"), **arguments)
+
+
+def test_an_object_with_too_many_faces_is_refused_at_once():
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
+    with pytest.raises(gc.InputError, match="over the limit of 400"):
+        gc.plan(gc.Polyhedron.from_mesh(ball.vertices, ball.faces))
+
+
+def test_regions_are_larger_than_discs_but_smaller_than_faces():
+    tested = 0
+    for grasp in gc.plan(example_object("icosahedron"), 0.2, limit=20).grasps:
+        assert grasp.radius > LEAST_RADIUS * 0.06
+        for region in grasp.regions:
+            assert len(region.polygon) >= 3
+            tested += 1
+    assert tested >= 80
+
+
+def _inside(point, polygon, normal):
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    return (np.cross(edges, point - polygon) @ normal >= -1e-12).all()

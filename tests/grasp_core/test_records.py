@@ -1,0 +1,80 @@
+import json
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.records import grasps_from_json, plan_to_json
+from scenes.objects import example_object
+
+
+@pytest.fixture(scope="module")
+def text():
+    body = example_object("wedge")
+    return plan_to_json(body, gc.plan(body, 0.5, limit=3))
+
+
+def test_a_plan_survives_the_file_to_the_last_bit(text):
+    body = example_object("wedge")
+    plan = gc.plan(body, 0.5, limit=3)
+    saved = grasps_from_json(text)
+    assert saved.body.content_sha256 == body.content_sha256
+    assert saved.friction == 0.5
+    assert [g.id for g in saved.grasps] == [g.id for g in plan.grasps]
+    for one, two in zip(saved.grasps, plan.grasps, strict=True):
+        np.testing.assert_array_equal(one.positions, two.positions)
+        np.testing.assert_array_equal(one.normals, two.normals)
+        assert one.critical_friction == two.critical_friction
+        for a, b in zip(one.regions, two.regions, strict=True):
+            np.testing.assert_array_equal(a.polygon, b.polygon)
+
+
+def test_the_file_has_the_fields_that_users_rely_on(text):
+    document = json.loads(text)
+    assert set(document) == {
+        "schema", "object", "friction", "theta_deg", "seed", "versions", "counts", "absence",
+        "grasps",
+    }  # fmt: skip
+    assert {"name", "source_sha256", "mesh", "center_of_mass_m"} <= set(document["object"])
+    grasp = document["grasps"][0]
+    assert {
+        "id", "family", "faces", "contacts", "focus_points_m", "force_cones", "radius_m", "regions",
+        "critical_friction", "closure_margin", "ferrari_canny",
+    } <= set(grasp)  # fmt: skip
+    assert set(grasp["contacts"][0]) == {"position_m", "normal"}
+
+
+CHANGES = {
+    "not JSON": (lambda _: "{", "the document"),
+    "schema from the future": (lambda d: d | {"schema": 2}, "schema"),
+    "unknown key": (lambda d: d | {"extra": 1}, "extra"),
+    "missing key": (lambda d: {k: v for k, v in d.items() if k != "seed"}, "seed"),
+    "text for a number": (lambda d: d | {"friction": "much"}, "friction"),
+    "NaN": (lambda d: d | {"friction": float("nan")}, "friction"),
+    "mesh of another object": (
+        lambda d: _set(d, ["object", "mesh", "vertices_m", 0, 0], 0.07),
+        "content",
+    ),
+    "three contacts": (lambda d: _set(d, ["grasps", 0, "contacts", 3], None), "contacts"),
+    "contact off its face": (
+        lambda d: _set(d, ["grasps", 0, "contacts", 0, "position_m", 0], 0.5),
+        "face",
+    ),
+    "no such face": (lambda d: _set(d, ["grasps", 0, "faces", 0], 99), "names face 99"),
+}
+
+
+@pytest.mark.parametrize("case", CHANGES)
+def test_changed_files_are_refused_by_field(text, case):
+    change, where = CHANGES[case]
+    changed = change(json.loads(text))
+    with pytest.raises(gc.InputError, match=where):
+        grasps_from_json(changed if isinstance(changed, str) else json.dumps(changed))
+
+
+def _set(document, path, value):
+    place = document
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    return document

@@ -1,0 +1,170 @@
+from dataclasses import asdict
+
+import mujoco
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+from scenes.layout import arrange, grasp_size
+from scenes.mjcf import quaternion
+from scenes.physics import DISABLED_FLAGS, ENABLED_FLAGS, UNUSED_FLAGS
+from tests.judges import random_rotation
+
+OBJECTS = ("wedge", "icosahedron", "screwdriver")
+
+
+@pytest.fixture(params=OBJECTS, scope="module")
+def held(request):
+    body = scenes.example_object(request.param)
+    grasp = gc.plan(body, 0.5, limit=1).grasps[0]
+    scene = scenes.build_scene(body, grasp, 0.5)
+    return body, grasp, scene, mujoco.MjModel.from_xml_string(scene.xml)
+
+
+def test_every_setting_reaches_the_compiled_model(held):
+    _, _, scene, model = held
+    names = {
+        "Newton": mujoco.mjtSolver.mjSOL_NEWTON,
+        "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC,
+        "dense": mujoco.mjtJacobian.mjJAC_DENSE,
+        "discrete": mujoco.mjtIntegrator.mjINT_DISCRETE,
+    }
+    options = scene.physics.options()
+    mujocos = {
+        name for name in dir(model.opt) if not name.startswith(("_", "o_", "disable", "enable"))
+    }
+    assert set(options) == mujocos
+    for name, value in options.items():
+        expected = int(names[value]) if isinstance(value, str) else value
+        np.testing.assert_array_equal(getattr(model.opt, name), expected, err_msg=name)
+        assert f'{name}="' in scene.xml
+    touching = [i for i in range(model.ngeom) if model.geom_contype[i] or model.geom_conaffinity[i]]
+    assert len(touching) == 8
+    for geom in touching:
+        np.testing.assert_array_equal(model.geom_solref[geom], scene.physics.solref)
+        np.testing.assert_array_equal(model.geom_solimp[geom], scene.physics.solimp)
+        assert model.geom_condim[geom] == 3
+        assert model.geom_margin[geom] == model.geom_gap[geom] == 0.0
+        assert model.geom_friction[geom, 0] == 0.5
+
+
+def test_all_flags_are_written_and_only_autoreset_is_off(held):
+    _, _, scene, model = held
+    for name in (*ENABLED_FLAGS, *DISABLED_FLAGS, *UNUSED_FLAGS):
+        assert f'{name}="' in scene.xml
+    assert model.opt.disableflags == int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    assert model.opt.enableflags == 0
+
+
+def test_the_flags_are_all_that_mujoco_has():
+    bits = [
+        name for kind in (mujoco.mjtDisableBit, mujoco.mjtEnableBit) for name in kind.__members__
+    ]
+    ours = {name.upper() for name in (*ENABLED_FLAGS, *DISABLED_FLAGS, *UNUSED_FLAGS)}
+    theirs = {name.split("_")[1] for name in bits if not name.startswith("mjN")}
+    assert ours == theirs
+
+
+def test_fingertips_touch_their_pads_exactly_where_the_grasp_says(held):
+    body, grasp, scene, model = held
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("grasp").id)
+    mujoco.mj_kinematics(model, data)
+    for finger, contact in enumerate(grasp.contacts):
+        tip = data.geom(f"finger{finger}")
+        touch = tip.xpos + scene.layout.drive.radius_m * contact.normal
+        np.testing.assert_allclose(touch, contact.position - body.center_of_mass, atol=1e-15)
+        pad = data.geom(f"pad{finger}")
+        outward = pad.xmat.reshape(3, 3)[:, 2]
+        np.testing.assert_allclose(outward, -contact.normal, atol=1e-14)
+        top = pad.xpos + outward * model.geom(f"pad{finger}").size[2]
+        assert abs((touch - top) @ contact.normal) < 1e-15
+
+
+def test_each_finger_meets_its_own_pad_only(held):
+    _, _, _, model = held
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("grasp").id)
+    data.qpos[7::3] += 1e-5
+    mujoco.mj_forward(model, data)
+    pairs = {
+        tuple(sorted(model.geom(int(g)).name for g in (c.geom1, c.geom2))) for c in data.contact
+    }
+    assert pairs == {(f"finger{i}", f"pad{i}") for i in range(4)}
+    assert all(c.dist == pytest.approx(-1e-5, rel=1e-6) for c in data.contact)
+
+
+def test_approach_starts_clear_and_ends_in_a_grasp(held):
+    _, _, scene, model = held
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("approach").id)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 0
+    mujoco.mj_step(model, data, nstep=1500)
+    assert data.ncon == 4
+    assert np.linalg.norm(data.qpos[:3]) < 0.02 * scene.layout.radius_m
+    assert np.abs(data.qvel).max() < 1e-3
+
+
+def test_numbers_are_written_in_full(held):
+    body, grasp, scene, model = held
+    for finger, contact in enumerate(grasp.contacts):
+        expected = (
+            contact.position - body.center_of_mass - scene.layout.drive.radius_m * contact.normal
+        )
+        np.testing.assert_array_equal(model.body(f"finger{finger}").pos, expected)
+
+
+def test_the_text_is_the_same_for_the_same_grasp_and_can_be_written(held, tmp_path):
+    body, grasp, scene, _ = held
+    assert scenes.build_scene(body, grasp, 0.5).xml == scene.xml
+    path = scenes.write_scene(scene, tmp_path / "scene.xml")
+    assert mujoco.MjModel.from_xml_path(str(path)).nv == 18
+
+
+def test_an_odd_object_name_still_makes_a_scene():
+    base = scenes.example_object("tetrahedron")
+    body = gc.Polyhedron.from_mesh(base.vertices, base.triangles, name='<b>"&\n\x1b[0m')
+    grasp = gc.plan(body).grasps[0]
+    mujoco.MjModel.from_xml_string(scenes.build_scene(body, grasp).xml)
+
+
+def test_similar_grasps_are_driven_alike():
+    """Lengths scale, forces stay: mass and stiffness scale inversely, damping inversely too."""
+    base = scenes.example_object("wedge")
+    large = gc.Polyhedron.from_mesh(3.0 * base.vertices, base.triangles)
+    drives = []
+    for body in (base, large):
+        layout = arrange(body, gc.plan(body, limit=1).grasps[0], 0.5)
+        drives.append((layout.grasp_size_m, layout.mass_kg, asdict(layout.drive)))
+    (size, mass, drive), (size3, mass3, drive3) = drives
+    assert size3 == pytest.approx(3 * size, rel=1e-6)
+    assert mass3 == pytest.approx(mass / 3, rel=1e-6)
+    assert drive3["stiffness_n_per_m"] == pytest.approx(drive["stiffness_n_per_m"] / 3, rel=1e-6)
+    assert drive3["max_normal_force_n"] == drive["max_normal_force_n"]
+
+
+def test_grasp_size_is_the_lever_about_the_nearest_axis():
+    bar = np.array([[-5.0, 1, 0], [-5, -1, 0], [5, 0, 1], [5, 0, -1]])
+    assert grasp_size(bar) == pytest.approx(1.0)
+    assert grasp_size(bar + 7.0) == pytest.approx(1.0)
+
+
+def test_quaternions_turn_like_their_matrices():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        R = random_rotation(rng)
+        w, *v = quaternion(R)
+        x = rng.normal(size=3)
+        turned = x + 2 * np.cross(v, np.cross(v, x) + w * x)
+        np.testing.assert_allclose(turned, R @ x, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    "bad", [{"friction": 0.0}, {"max_normal_force": -1.0}, {"fingertip_radius": float("nan")}]
+)
+def test_bad_numbers_are_refused(bad):
+    body = scenes.example_object("tetrahedron")
+    with pytest.raises(gc.InputError, match=f"{next(iter(bad))} must be a positive number"):
+        scenes.build_scene(body, gc.plan(body).grasps[0], **bad)

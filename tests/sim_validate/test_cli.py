@@ -1,0 +1,212 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import scenes
+from sim_validate.cli import Exit, main
+
+ROOT = Path(__file__).parent.parent.parent
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_run_writes_grasps_verdicts_and_scenes_and_tells(here, capsys):
+    assert main(["run", "tetrahedron", "--out", "results"]) == Exit.GOOD
+    assert sorted(p.name for p in here.iterdir()) == ["results"]
+    names = sorted(p.name for p in (here / "results").rglob("*") if p.is_file())
+    assert names == ["c-0-1-2-3.xml", "grasps.json", "verdicts.json"]
+    shown = capsys.readouterr().out
+    for word in ("concurrent", "radius mm", "mu*", "held", "moved um", "results"):
+        assert word in shown
+    verdicts = json.loads((here / "results" / "verdicts.json").read_text())
+    assert verdicts["complete"] is True
+    assert verdicts["summary"]["grasps_held"] == verdicts["summary"]["grasps"] == 1
+    assert verdicts["summary"]["controls"] > 0
+    assert verdicts["summary"]["controls_held"] == 0
+
+
+def test_a_verdict_has_the_fields_that_users_rely_on(here, capsys):
+    assert main(["run", "wedge", "--limit", "1", "--json"]) == Exit.GOOD
+    document = json.loads(capsys.readouterr().out)
+    (verdict,) = document["verdicts"]
+    assert {
+        "id", "outcome", "held", "critical_friction", "wrenches", "controls", "settings",
+        "versions",
+    } == set(verdict)  # fmt: skip
+    assert set(verdict["critical_friction"]) == {"predicted", "simulated"}
+    assert {"wrench", "predicted_limit", "simulated_limit", "outcome"} <= set(
+        verdict["wrenches"][0]
+    )
+    assert len(verdict["wrenches"]) == 13
+    physics = verdict["settings"]["physics"]
+    assert physics["cone"] == "elliptic"
+    assert physics["flags"]["autoreset"] == "disable"
+    for control in verdict["controls"].values():
+        assert control["held"] is False
+        assert control["separating_wrench"] is not None
+    assert (here / "graspproof-out" / "wedge" / "verdicts.json").exists()
+
+
+def test_plan_validate_and_scene_work_on_the_same_file(here, capsys):
+    assert main(["plan", "wedge", "--limit", "3", "--out", "p"]) == Exit.GOOD
+    assert main(["validate", "p/grasps.json", "--limit", "2", "--out", "v"]) == Exit.GOOD
+    assert main(["scene", "p/grasps.json", "--out", "s"]) == Exit.GOOD
+    assert len(list((here / "s").iterdir())) == 3
+    capsys.readouterr()
+    name = json.loads((here / "p" / "grasps.json").read_text())["grasps"][0]["id"]
+    assert main(["scene", "p/grasps.json", "--grasp", name]) == Exit.GOOD
+    assert capsys.readouterr().out == (here / "s" / f"{name}.xml").read_text()
+
+
+def test_one_and_two_processes_give_the_same_verdicts(here):
+    assert main(["plan", "icosahedron", "--limit", "16", "--out", "p", "-q"]) == Exit.GOOD
+    for jobs in ("1", "2"):
+        command = ["validate", "p/grasps.json", "--jobs", jobs, "--out", jobs, "-q"]
+        assert main(command) == Exit.GOOD
+    one, two = ((here / jobs / "verdicts.json").read_bytes() for jobs in ("1", "2"))
+    assert one == two
+
+
+@pytest.mark.usefixtures("here")
+def test_json_output_is_one_document_and_the_rest_goes_elsewhere(capsys):
+    for command in (
+        ["plan", "wedge", "--json"], ["inspect", "box", "--json"], ["objects", "--json"],
+        ["run", "tetrahedron", "--json"], ["doctor", "--json"], ["run", "box", "--json"],
+    ):  # fmt: skip
+        main(command)
+        json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("name", ["box", "prism"])
+@pytest.mark.parametrize("command", ["run", "plan"])
+@pytest.mark.usefixtures("here")
+def test_an_object_without_grasps_says_so_in_one_sentence(capsys, command, name):
+    assert main([command, name]) == Exit.NONE
+    sentences = [
+        line for line in capsys.readouterr().out.splitlines() if "positively spanning" in line
+    ]
+    assert len(sentences) == 1
+
+
+def test_a_mesh_file_and_its_unit(here, capsys):
+    import trimesh
+
+    body = scenes.example_object("wedge")
+    trimesh.Trimesh(1e3 * body.vertices, body.triangles).export(here / "part.stl")
+    assert main(["inspect", "part.stl"]) == Exit.INPUT
+    assert "--unit mm" in capsys.readouterr().err
+    assert main(["plan", "part.stl", "--unit", "mm", "--out", "p"]) == Exit.GOOD
+    assert json.loads((here / "p" / "grasps.json").read_text())["object"]["name"] == "part"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["plan", "tetrahedon"], Exit.INPUT, "did you mean tetrahedron"),
+        (["plan", "none.stl"], Exit.INPUT, "none.stl"),
+        (["plan", "part.xyz"], Exit.INPUT, "part.xyz"),
+        (["validate", "none.json"], Exit.INPUT, "none.json"),
+        (["plan", "wedge", "--theta-deg", "40"], Exit.INPUT, "theta_deg must be in"),
+        (["plan", "wedge", "--friction", "0"], Exit.USAGE, "friction"),
+        (["plan", "wedge", "--friction", "nan"], Exit.USAGE, "friction"),
+        (["plan", "wedge", "--limit", "0"], Exit.USAGE, "limit"),
+        (["run", "wedge", "--jobs", "0"], Exit.USAGE, "jobs"),
+        (["plan", "wedge", "--family", "spiral"], Exit.USAGE, "concurrent"),
+        (["plan", "wedge", "--fricton", "0.3"], Exit.USAGE, "--friction"),
+        (["plan"], Exit.USAGE, "Required options"),
+        (["bake"], Exit.USAGE, "inspect"),
+        (["plan", "wedge", "--config"], Exit.USAGE, "--config"),
+        (["plan", "wedge", "--config", "none.toml"], Exit.USAGE, "none.toml"),
+    ],
+)  # fmt: skip
+def test_errors_have_their_exit_code_and_name_the_cause(here, capsys, arguments, code, words):
+    assert main(arguments) == code
+    complaint = capsys.readouterr()
+    assert words in complaint.err + complaint.out
+    assert "Traceback" not in complaint.err
+    assert not list(here.iterdir())
+
+
+def test_a_config_file_sets_flags_and_flags_override_it(here, capsys):
+    (here / "c.toml").write_text(
+        'friction = 0.3\nlimit = 2\nfamily = ["concurrent"]\njson = true\n'
+    )
+    assert main(["plan", "wedge", "--config", "c.toml"]) == Exit.GOOD
+    plan = json.loads(capsys.readouterr().out)
+    assert (plan["friction"], len(plan["grasps"])) == (0.3, 2)
+    assert main(["plan", "wedge", "--config", "c.toml", "--limit", "1"]) == Exit.GOOD
+    assert len(json.loads(capsys.readouterr().out)["grasps"]) == 1
+    (here / "bad.toml").write_text("frction = 0.3\n")
+    assert main(["plan", "wedge", "--config", "bad.toml"]) == Exit.USAGE
+
+
+@pytest.mark.usefixtures("here")
+def test_a_control_that_holds_makes_the_run_fail(monkeypatch, capsys):
+    monkeypatch.setattr("sim_validate.validation.judge", _always_held)
+    assert main(["run", "wedge", "--limit", "1", "--jobs", "1"]) == Exit.NEGATIVE
+    assert "3 of 3 negative controls held" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("here")
+def test_a_run_without_controls_says_so(monkeypatch, capsys):
+    monkeypatch.setattr("sim_validate.validation.negative_controls", lambda *_: ())
+    assert main(["run", "tetrahedron", "--jobs", "1"]) == Exit.GOOD
+    assert "no negative controls" in capsys.readouterr().err
+
+
+def test_control_characters_in_a_name_do_not_reach_the_terminal(here, capsys):
+    import trimesh
+
+    body = scenes.example_object("box")
+    trimesh.Trimesh(body.vertices, body.triangles).export(here / "a\x1b[31mb.stl")
+    assert main(["inspect", "a\x1b[31mb.stl"]) == Exit.GOOD
+    shown = capsys.readouterr()
+    assert "\x1b[31m" not in shown.out + shown.err
+
+
+def test_an_interrupted_run_keeps_what_is_done(here):
+    """SIGINT while simulating: exit code 130, a whole grasps.json, verdicts marked incomplete."""
+    code = "from sim_validate.cli import run_and_exit; run_and_exit()"
+    command = [sys.executable, "-c", code, "run", "icosahedron", "--limit", "None", "--jobs", "1"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+    folder = here / "graspproof-out" / "icosahedron"
+    deadline = time.monotonic() + 120
+    while not (folder / "scenes").exists() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    time.sleep(4.0)
+    process.send_signal(signal.SIGINT)
+    _, complaint = process.communicate(timeout=60)
+    assert process.returncode == Exit.INTERRUPTED, complaint
+    assert len(json.loads((folder / "grasps.json").read_text())["grasps"]) == 420
+    verdicts = json.loads((folder / "verdicts.json").read_text())
+    assert verdicts["complete"] is False
+    assert 0 < len(verdicts["verdicts"]) < 420
+
+
+def test_help_answers_without_loading_a_simulator():
+    code = (
+        "import sys; from sim_validate.cli import main; main(['--help']); "
+        "print('HEAVY', [m for m in ('mujoco', 'trimesh', 'scipy') if m in sys.modules])"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert "HEAVY []" in answer.stdout
+    assert "validate" in answer.stdout
+
+
+def _always_held(trace, *_):
+    from sim_validate.verdict import HoldVerdict, Outcome
+
+    return HoldVerdict(Outcome.HELD, 0.0, 0.0, trace.slips_m.max(axis=0), None)
