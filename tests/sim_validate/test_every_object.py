@@ -1,0 +1,51 @@
+"""Slow: every built-in object and, where present, real meshes, planned and simulated."""
+
+from pathlib import Path
+
+import pytest
+
+import grasp_core as gc
+import scenes
+import sim_validate as sv
+
+PIECES = Path(__file__).parents[3] / "shared" / "objects" / "ycb" / "pieces"
+NAMES = [n for n in scenes.example_names() if "FACES" not in n] + [
+    f"random-{faces}-{seed}" for faces, seed in ((8, 3), (16, 1), (24, 2), (40, 1))
+]
+
+
+def hold_all(body, friction, limit):
+    """Counts of grasps and controls, after checking that the former hold and the latter do not."""
+    plan = gc.plan(body, friction, limit=limit)
+    assert all(counts.rejected == 0 for counts in plan.counts.families.values())
+    controls = 0
+    for grasp in plan.grasps:
+        verdict = sv.validate(body, grasp, friction)
+        assert verdict.held, (body.name, grasp.id, verdict.outcome)
+        assert verdict.controls_failed, (body.name, grasp.id)
+        controls += len(verdict.controls)
+    return len(plan.grasps), controls
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("friction", [0.2, 0.5, 0.8])
+def test_all_planned_grasps_of_built_in_objects_hold_and_controls_do_not(friction):
+    grasps = controls = 0
+    for name in NAMES:
+        held, refuted = hold_all(scenes.example_object(name), friction, 10)
+        grasps, controls = grasps + held, controls + refuted
+    assert grasps >= 90
+    assert controls >= 2 * grasps
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.skipif(not PIECES.exists(), reason="the real meshes are not part of the repository")
+def test_all_planned_grasps_of_real_pieces_hold_and_controls_do_not():
+    grasps = controls = 0
+    for path in sorted(PIECES.glob("*.obj")):
+        held, refuted = hold_all(gc.load_polyhedron(path), 0.5, 10)
+        grasps, controls = grasps + held, controls + refuted
+    assert grasps >= 100
+    assert controls >= 2 * grasps

@@ -1,0 +1,32 @@
+"""The README's example prints what the README says it prints."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text()
+
+
+def test_the_example_prints_what_it_says():
+    code = re.search(r"```python\n(.*?)```", README, re.DOTALL)[1]
+    said = re.search(r"```text\n(.*?)```", README, re.DOTALL)[1]
+    answer = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert answer.stdout == said
+
+
+def test_every_command_is_described():
+    from sim_validate.cli import Doctor, Inspect, Objects, Plan, Run, Scene, Validate
+
+    for command in (Run, Plan, Validate, Scene, Inspect, Objects, Doctor):
+        assert f"`graspproof {command.__name__.lower()}" in README
+
+
+def test_the_two_commands_are_one_line_each():
+    lines = [line for line in README.splitlines() if line.startswith("(python3 -m venv")]
+    assert len(lines) == 2
+    assert lines[0].endswith("graspproof run dodecahedron")
+    assert "pytest" in lines[1]
