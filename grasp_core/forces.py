@@ -37,6 +37,8 @@ REGULAR = 1e-3
 IMPROVEMENT = 1e-2
 """Iteration ends when the coefficient falls by less than this share."""
 MAX_ROUNDS = 20
+ACTIVE = (1e-6, 1e-5, 1e-7, 1e-8)
+"""Slacks below which a constraint may count as active, tried in turn."""
 LEAST_CHARGE = 1e-3
 """Weight of the forces' own size against the imbalance in `closest_forces`."""
 
@@ -189,7 +191,7 @@ class _Problem:
         rows = self.pyramid(friction)
         P = self.G.T @ self.G + LEAST_CHARGE * np.eye(self.G.shape[1])
         x = _solve(P, self.G.T @ self.w, rows, self, balanced=False)
-        if x is None or not np.isfinite(x).all():
+        if x is None:
             raise SolverError("no forces in the cones were found, though a pure push is one")
         return self._into_cones(x, friction)
 
@@ -227,4 +229,40 @@ def _solve(P: Array, q: Array, rows: Array, problem: _Problem, *, balanced: bool
         program, solver="proxqp", eps_abs=REQUESTED, max_iter=MAX_ITERATIONS,
         primal_infeasibility_solving=balanced,
     )  # fmt: skip
-    return None if answer.x is None else np.asarray(answer.x, dtype=np.float64)
+    if answer.x is None or not np.isfinite(answer.x).all():
+        return None
+    return _polished(program, np.asarray(answer.x, dtype=np.float64))
+
+
+def _polished(program: Any, x: Array) -> Array:
+    """The exact optimum on the constraints that are active at x, if it is feasible and as good.
+
+    The solver stops anywhere within its tolerance, at a point that depends on where its numbers
+    lie in memory. The conditions of optimality on the active constraints are linear equations
+    with one answer.
+    """
+    P, q, C, d, A, b = _as_rows(program)
+    for slack in ACTIVE:
+        active = d - C @ x < slack
+        E, e = np.vstack([A, C[active]]), np.concatenate([b, d[active]])
+        conditions = np.block([[P, E.T], [E, np.zeros((len(e), len(e)))]])
+        targets = np.concatenate([-q, e])
+        solved = np.linalg.lstsq(conditions, targets, rcond=None)[0]
+        exact = np.asarray(solved, dtype=np.float64)[: len(q)]
+        unmet = float(np.abs(conditions @ solved - targets).max())
+        outside = float((C @ exact - d).max())
+        worse = float(0.5 * (exact @ P @ exact - x @ P @ x) + q @ (exact - x))
+        if max(unmet, outside, worse) < RESIDUAL:
+            return exact
+    return x
+
+
+def _as_rows(program: Any) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """P, q, then C x <= d with the bounds among the rows, then A x = b."""
+    n = len(program.q)
+    above, below = np.isfinite(program.ub), np.isfinite(program.lb)
+    C = np.vstack([program.G, np.eye(n)[above], -np.eye(n)[below]])
+    d = np.concatenate([program.h, program.ub[above], -program.lb[below]])
+    none = program.A is None
+    A, b = (np.empty((0, n)), np.empty(0)) if none else (program.A, program.b)
+    return program.P, program.q, C, d, A, b

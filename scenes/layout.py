@@ -141,11 +141,14 @@ def arrange(
 def grasp_size(positions: Array) -> float:
     """Root mean square distance of contacts from the axis they are closest to [m].
 
+    To nine digits: the last bits of a singular value depend on where numbers lie in memory,
+    and the same grasp must give the same scene.
+
     Args:
         positions: (k, 3) [m].
     """
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
-    return float(np.linalg.norm(spread[1:])) / math.sqrt(len(positions))
+    return float(f"{float(np.linalg.norm(spread[1:])) / math.sqrt(len(positions)):.9g}")
 
 
 def _pushes(positions: Array, normals: Array, friction: float) -> Array:

@@ -83,11 +83,14 @@ def test_least_norm_forces_are_no_larger_than_others():
 
 
 def test_a_push_on_a_tetrahedron_is_shared_by_symmetry():
-    """A force along an inward normal adds to the opposite three contacts equally."""
+    """A force along an inward normal is taken by the other three contacts, equally up to the
+    1.9 % that the pyramids' sixteen sides give away.
+    """
     wrench = np.append(3.0 * TETRA_NORMALS[0], np.zeros(3))
     forces = contact_forces(TETRA_CENTERS, TETRA_NORMALS, 0.5, wrench)
     along, _ = normal_and_tangential(forces, TETRA_NORMALS)
-    np.testing.assert_allclose(along[1:], along[1], atol=1e-6)
+    np.testing.assert_allclose(along[1:], along[1], rtol=0.02)
+    assert along[0] == pytest.approx(0.0, abs=1e-5)
     np.testing.assert_allclose(forces.sum(axis=0), -wrench[:3], atol=1e-6)
 
 
