@@ -215,7 +215,7 @@ class _Problem:
 
 def _solve(P: Array, q: Array, rows: Array, problem: _Problem, *, balanced: bool) -> Array | None:
     """Minimise x'Px/2 + q'x with rows @ x <= 0; a last variable beyond the forces is free."""
-    solver: Any = importlib.import_module("qpsolvers")
+    solver = _qpsolvers()
     extra = len(q) - problem.G.shape[1]
     balance = (
         (np.hstack([problem.G, np.zeros((6, extra))]), -problem.w) if balanced else (None,) * 2
@@ -232,6 +232,16 @@ def _solve(P: Array, q: Array, rows: Array, problem: _Problem, *, balanced: bool
     if answer.x is None or not np.isfinite(answer.x).all():
         return None
     return _polished(program, np.asarray(answer.x, dtype=np.float64))
+
+
+def _qpsolvers() -> Any:
+    module: Any = importlib.import_module("qpsolvers")
+    if "proxqp" not in module.available_solvers:
+        raise SolverError(
+            "ProxQP cannot be loaded; it needs the package proxsuite and the system library "
+            "libgomp (on Debian: apt-get install libgomp1)"
+        )
+    return module
 
 
 def _polished(program: Any, x: Array) -> Array:

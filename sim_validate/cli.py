@@ -209,6 +209,10 @@ def _dispatch(command: Command) -> int:
         return _complain(f"{error.filename or 'output'}: {error.strerror}", Exit.INPUT)
     except KeyboardInterrupt:
         return _complain("interrupted", Exit.INTERRUPTED)
+    except Exception as error:
+        if command.speech.verbose:
+            raise
+        return _complain(f"internal error: {error!r}; -v shows where", Exit.INTERNAL)
 
 
 def _complain(message: str, code: Exit) -> int:

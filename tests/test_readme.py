@@ -26,7 +26,7 @@ def test_every_command_is_described():
 
 
 def test_the_two_commands_are_one_line_each():
-    lines = [line for line in README.splitlines() if line.startswith("(python3 -m venv")]
+    lines = [line for line in README.splitlines() if line.startswith("{ { python3 -m venv")]
     assert len(lines) == 2
     assert lines[0].endswith("graspproof run dodecahedron")
     assert "pytest" in lines[1]
