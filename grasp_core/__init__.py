@@ -7,10 +7,13 @@ from grasp_core.errors import GraspError as GraspError
 from grasp_core.errors import InputError as InputError
 from grasp_core.errors import MeshError as MeshError
 from grasp_core.errors import MeshRefusal as MeshRefusal
+from grasp_core.errors import NoForcesError as NoForcesError
 from grasp_core.errors import SolverError as SolverError
 from grasp_core.errors import UndecidedError as UndecidedError
+from grasp_core.forces import contact_forces as contact_forces
 from grasp_core.mesh import load_polyhedron as load_polyhedron
 from grasp_core.planner import plan as plan
+from grasp_core.quality import max_resisted_wrench as max_resisted_wrench
 from grasp_core.spanning import cones_positively_span as cones_positively_span
 from grasp_core.spanning import span_angle as span_angle
 from grasp_core.values import Contact as Contact

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
-from grasp_core.closure_margin import ROUNDING, decide, proves_closure, supports
+from grasp_core.closure_margin import decide, proves_closure, refutes_closure
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.values import Grasp, contact_arrays
 from grasp_core.wrenches import normal_and_tangential
@@ -36,7 +36,12 @@ from grasp_core.wrenches import normal_and_tangential
 LARGEST_FRICTION = 1e3
 """Coefficients above this are reported as infinite; no material comes near it."""
 FRICTION_ACCURACY = 1e-8
-"""Relative width of the final bracket of a critical friction; absolute below 1e-2."""
+"""Relative width of the final bracket of a critical friction."""
+FRICTIONLESS = 1e-6
+"""Critical frictions below this are reported as zero: a contact in a file with six digits is
+not placed better."""
+UNPROVED = 1e-6
+"""Relative width of a bracket that may be left when neither side has a proof any more."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,6 +63,14 @@ class ClosureCertificate:
     """If not: y = (a, b), (6,), about the frame's origin, with y.w <= 0 for every wrench w that
     the contacts can apply; an external wrench w with y.w < 0 is not resisted."""
 
+    def __post_init__(self) -> None:
+        for name in ("positions", "normals", "friction", "forces", "separating_wrench"):
+            array = getattr(self, name)
+            if array is not None:
+                kept = np.array(array, dtype=np.float64)
+                kept.setflags(write=False)
+                object.__setattr__(self, name, kept)
+
     def verify(self) -> bool:
         """Re-check the verdict in plain arithmetic, without any solver."""
         if self.closed:
@@ -72,9 +85,7 @@ class ClosureCertificate:
         twist = np.concatenate(
             [wrench[:3] + np.cross(wrench[3:], center), wrench[3:] * size]
         )  # about the contacts' centre, at unit size
-        length = float(np.linalg.norm(twist))
-        worst = float(supports(twist, arms, self.normals, self.friction).max())
-        return length > 0.0 and worst <= ROUNDING * length
+        return refutes_closure(twist, arms, self.normals, self.friction)
 
 
 def force_closure(
@@ -92,6 +103,7 @@ def force_closure(
     Raises:
         InputError: Shapes, lengths or signs are wrong.
         UndecidedError: The contacts are within rounding of the boundary of closure.
+        SolverError: The program's answer failed its check.
     """
     points, units = contact_arrays(positions, normals)
     mu = contact_frictions(friction, len(points))
@@ -121,26 +133,34 @@ def critical_friction(positions: ArrayLike | Grasp, normals: ArrayLike | None = 
         normals: Unit vectors into the object, (k, 3).
 
     Returns:
-        The coefficient, to `FRICTION_ACCURACY`; 0.0 when the normals alone balance;
+        The upper end of the bracket, to `FRICTION_ACCURACY`; 0.0 below `FRICTIONLESS`;
         `math.inf` when `LARGEST_FRICTION` does not suffice.
+
+    Raises:
+        InputError: Shapes or lengths are wrong.
+        UndecidedError: The contacts are so close to degenerate that no bracket can be proved.
+        SolverError: A program's answer failed its check.
     """
     points, units = contact_arrays(positions, normals)
     arms, _, _ = _unit_size(points)
     lower, upper, trial = 0.0, math.inf, 0.5
-    while upper == math.inf or upper - lower > FRICTION_ACCURACY * max(upper, 1e-2):
+    while upper > FRICTIONLESS and upper > lower * (1.0 + FRICTION_ACCURACY):
         answer = decide(arms, units, np.full(len(points), trial))
         if answer.forces is not None:
             upper = min(trial, _steepest(answer.forces, units))
         elif answer.twist is not None:
             lower = max(trial, _least_friction_not_separated(answer.twist, arms, units))
+        elif upper <= lower * (1.0 + UNPROVED):
+            break
         else:
-            return trial  # neither side has a proof left: the boundary itself
-        if upper == math.inf and lower >= LARGEST_FRICTION:
+            raise UndecidedError(
+                f"the critical friction lies in [{lower:.6g}, {upper:.6g}] and neither closure "
+                f"nor its opposite can be proved at {trial:.6g}; move the contacts slightly"
+            )
+        if lower >= LARGEST_FRICTION:
             return math.inf
         trial = _between(lower, upper)
-        if not lower < trial < upper:
-            break
-    return 0.0 if upper <= FRICTION_ACCURACY else upper
+    return 0.0 if upper <= FRICTIONLESS else upper
 
 
 def _between(lower: float, upper: float) -> float:
@@ -157,7 +177,7 @@ def _least_friction_not_separated(twist: Array, arms: Array, normals: Array) -> 
     """Up to which common friction a twist keeps separating."""
     velocities = twist[:3] + np.cross(twist[3:], arms)
     along, across = normal_and_tangential(velocities, normals)
-    return float(np.min(-along / np.maximum(across, 1e-300)))
+    return float(np.min(-along / np.maximum(across, np.finfo(np.float64).tiny)))
 
 
 def _unit_size(points: Array) -> tuple[Array, Array, float]:

@@ -58,10 +58,19 @@ def decide(arms: Array, normals: Array, friction: Array) -> Answer:
     margin, forces, twist = _margin_program(grasp_map(arms), normals, friction)
     if proves_closure(forces, arms, normals, friction):
         return Answer(margin, forces=forces)
-    if margin < -DECIDED:
+    if margin < 0.0 and refutes_closure(twist, arms, normals, friction):
         return Answer(margin, twist=twist)
-    twist = _twist_sparing_interior_forces(arms, normals, friction, forces)
-    return Answer(0.0 if twist is not None else margin, twist=twist)
+    sparing = _twist_sparing_interior_forces(arms, normals, friction, forces)
+    if sparing is not None and refutes_closure(sparing, arms, normals, friction):
+        return Answer(0.0, twist=sparing)
+    return Answer(margin)
+
+
+def refutes_closure(twist: Array, arms: Array, normals: Array, friction: Array) -> bool:
+    """Whether no contact force within its cone works along a twist."""
+    length = float(np.linalg.norm(twist))
+    worst = float(supports(twist, arms, normals, friction).max())
+    return length > 0.0 and worst <= ROUNDING * length
 
 
 def proves_closure(forces: Array, arms: Array, normals: Array, friction: Array) -> bool:
@@ -131,46 +140,56 @@ def _null_space(rows: Array, basis: Array) -> Array:
 def _margin_program(balance: Array, normals: Array, friction: Array) -> tuple[float, Array, Array]:
     """Margin t, balancing forces (k, 3), and the dual twist in the rows of `balance`.
 
+    The unknowns of a contact are its normal force and its tangential force over mu, so that
+    small coefficients are solved as well as large ones; without friction only the former.
+
     Args:
         balance: What must vanish as a matrix on the stacked forces, (m, 3k).
         normals: (k, 3)
         friction: (k,)
     """
     k, m = len(normals), len(balance)
-    n = 3 * k + 1
-    departing = np.linalg.lstsq(balance.T, -normals.ravel(), rcond=None)[0]
-    receding = np.asarray(departing, dtype=np.float64)
-    if np.abs(balance.T @ receding + normals.ravel()).max() <= ROUNDING:
-        return -math.inf, np.zeros((k, 3)), receding  # every contact leaves along its normal
-    rows = {kind: list[Array]() for kind in ("zero", "nonnegative", "cone")}
-    for i, (normal, mu) in enumerate(zip(normals, friction, strict=True)):
-        cone = np.zeros((3, n))
-        cone[0, 3 * i : 3 * i + 3] = -(mu if mu > 0.0 else 1.0) * normal
-        cone[0, -1] = 1.0
-        cone[1:, 3 * i : 3 * i + 3] = -plane_frame(normal).T
-        if mu > 0.0:
-            rows["cone"].append(cone)
-        else:
-            rows["zero"].append(cone[1:])
-            rows["nonnegative"].append(cone[:1])
-    equalities = np.vstack(
-        [np.hstack([balance, np.zeros((m, 1))]), np.append(normals.ravel(), 0.0)]
-    )
-    A = np.vstack([equalities, *rows["zero"], *rows["nonnegative"], *rows["cone"]])
+    bases = [
+        np.column_stack([normal, mu * plane_frame(normal)]) if mu > 0.0 else normal[:, None]
+        for normal, mu in zip(normals, friction, strict=True)
+    ]
+    starts = np.cumsum([0, *(basis.shape[1] for basis in bases)])
+    n = int(starts[-1]) + 1
+    rows = np.hstack([balance[:, 3 * i : 3 * i + 3] @ basis for i, basis in enumerate(bases)])
+    share = np.zeros(n)
+    share[starts[:-1]] = 1.0
+    departing = _departing_twist(rows, share[:-1])
+    if departing is not None:
+        return -math.inf, np.zeros((k, 3)), departing
+    largest = float(friction.max()) or 1.0
+    pushes = np.zeros((k, n))
+    pushes[np.arange(k), starts[:-1]] = -1.0
+    pushes[:, -1] = np.where(friction > 0.0, largest / np.maximum(friction, _TINY), largest)
+    round_cones = [i for i in range(k) if friction[i] > 0.0]
+    slides = [np.eye(n)[starts[i] + 1 : starts[i] + 3] for i in round_cones]
+    cones = [np.vstack([pushes[i], -slide]) for i, slide in zip(round_cones, slides, strict=True)]
+    A = np.vstack([np.hstack([rows, np.zeros((m, 1))]), share, pushes[friction == 0.0], *cones])
     b, q = np.zeros(len(A)), np.zeros(n)
     b[m], q[-1] = 1.0, -1.0
-    solution = minimize(
-        ConicProgram(
-            q,
-            A,
-            b,
-            m + 1 + 2 * len(rows["zero"]),
-            len(rows["nonnegative"]),
-            (3,) * len(rows["cone"]),
-        )
-    )
-    forces = solution.x[:-1]
-    if not rows["zero"]:
-        correction = np.linalg.lstsq(balance, balance @ forces, rcond=None)[0]
-        forces = forces - np.asarray(correction, dtype=np.float64)
-    return float(solution.x[-1]), forces.reshape(k, 3), -solution.z[:m]
+    flat = k - len(round_cones)
+    solution = minimize(ConicProgram(q, A, b, m + 1, flat, (3,) * len(round_cones)))
+    local = solution.x[:-1]
+    local = local - np.asarray(np.linalg.lstsq(rows, rows @ local, rcond=None)[0], dtype=np.float64)
+    forces = [basis @ local[starts[i] : starts[i + 1]] for i, basis in enumerate(bases)]
+    return largest * float(solution.x[-1]), np.array(forces), -solution.z[:m]
+
+
+_TINY = float(np.finfo(np.float64).tiny)
+
+
+def _departing_twist(rows: Array, share: Array) -> Array | None:
+    """A twist with which every contact leaves along its normal: then no forces balance."""
+    sizes = np.maximum(np.linalg.norm(rows, axis=0), _TINY)
+    scaled: Array = (rows / sizes).T
+    twist = -np.asarray(np.linalg.pinv(scaled) @ (share / sizes), dtype=np.float64)
+    missed = np.abs(rows.T @ twist + share) / np.maximum(sizes, 1.0)
+    if not np.isfinite(missed).all() or missed.max() > ROUNDING * (
+        1.0 + float(np.abs(twist).max())
+    ):
+        return None
+    return twist

@@ -32,6 +32,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece
 from grasp_core.lp import LinearProgram, Optimum, maximize
 from grasp_core.polygons import clip
@@ -84,8 +85,10 @@ def place_concurrent(
     """
     A, b = _rows(pieces, cones)
     first = maximize(LinearProgram(_unit(A.shape[1], 15), A, b))
-    if not isinstance(first, Optimum) or first.value < least_radius:
-        return NoConcurrentPlacement(first.value if isinstance(first, Optimum) else 0.0)
+    if not isinstance(first, Optimum):
+        raise SolverError("a program that is feasible for small enough radii was called infeasible")
+    if first.value < least_radius:
+        return NoConcurrentPlacement(first.value)
     keep = -_unit(A.shape[1], 15)
     even = LinearProgram(
         _unit(A.shape[1], 11, 12, 13, 14),
@@ -132,9 +135,9 @@ def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES)
 def radius_bounds(normals: Array, offsets: Array, half_angles: Array) -> Array:
     """Upper bounds on the discs of many quadruples whose force cones surround the normals.
 
-    A disc needs r <= d_i tan(half_angle) with d_i = n_i.x0 - h_i. With the positive weights
-    of sum lam_i n_i = 0, sum lam_i d_i = -sum lam_i h_i wherever the focus is, so the least
-    d_i is at most that sum over sum lam_i.
+    A disc needs r <= d_i tan(half_angle) cos(pi / sides) with d_i = n_i.x0 - h_i. With the
+    positive weights of sum lam_i n_i = 0, sum lam_i d_i = -sum lam_i h_i wherever the focus
+    is, so the least d_i is at most that sum over sum lam_i.
 
     Args:
         normals: Positively spanning unit vectors, (q, 4, 3).
@@ -145,7 +148,7 @@ def radius_bounds(normals: Array, offsets: Array, half_angles: Array) -> Array:
         [np.linalg.det(np.delete(normals, left_out, axis=1)) for left_out in range(FINGERS)]
     ).T
     depth = -np.einsum("qi,qi->q", weights, offsets) / weights.sum(axis=1)
-    return depth * np.tan(half_angles)
+    return depth * np.tan(half_angles) * np.cos(np.pi / PYRAMID_SIDES)
 
 
 def _rows(pieces: Sequence[FacePiece], cones: Sequence[ForceCone]) -> tuple[Array, Array]:

@@ -19,6 +19,10 @@ class SolverError(GraspError):
     """A solver's answer failed our own check of it, so there is no answer."""
 
 
+class NoForcesError(GraspError):
+    """No forces within the limits and the friction balance the wrench."""
+
+
 class MeshRefusal(StrEnum):
     """Why a mesh is not accepted; the value is the stable code shown to users."""
 

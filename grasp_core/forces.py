@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
-from grasp_core.errors import GraspError, InputError, SolverError
+from grasp_core.errors import InputError, NoForcesError, SolverError
 from grasp_core.values import Grasp, contact_arrays
 from grasp_core.wrenches import contact_frames, grasp_map
 
@@ -41,10 +41,6 @@ ACTIVE = (1e-6, 1e-5, 1e-7, 1e-8)
 """Slacks below which a constraint may count as active, tried in turn."""
 LEAST_CHARGE = 1e-3
 """Weight of the forces' own size against the imbalance in `closest_forces`."""
-
-
-class NoForcesError(GraspError):
-    """No forces within the limits balance the wrench."""
 
 
 def contact_forces(  # noqa: PLR0913 - the contract's arguments

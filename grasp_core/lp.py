@@ -21,6 +21,8 @@ from grasp_core.errors import SolverError
 RESIDUAL = 1e-8
 """Largest accepted violation, for programs whose data are of order one (the planner scales
 objects to unit size): ten times the tolerance the solver is asked for."""
+FARTHEST = 1e4
+"""A proof of infeasibility excludes all points with |x|_1 up to this, at unit size."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +59,7 @@ class Optimum:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Infeasible:
-    """There is no feasible point, proved by a combination of the rows (Farkas)."""
+    """No point with |x|_1 <= `FARTHEST` is feasible, by a combination of the rows (Farkas)."""
 
     multipliers: Array
     """(rows + equalities,)"""
@@ -106,7 +108,10 @@ def _checked_ray(program: LinearProgram, ray: Array) -> Infeasible:
     for multipliers in (unit, -unit):
         combined = np.abs(G.T @ multipliers).max(initial=0.0)
         gap = -float(h @ multipliers)
-        if multipliers[:rows].min(initial=0.0) >= -RESIDUAL and gap > combined + RESIDUAL:
+        if (
+            multipliers[:rows].min(initial=0.0) >= -RESIDUAL
+            and gap > FARTHEST * combined + RESIDUAL
+        ):
             return Infeasible(multipliers)
     raise SolverError("called infeasible, but the proof does not check")
 

@@ -125,7 +125,7 @@ def _read(path: Path) -> tuple[Array, Indices, bytes]:
         raise MeshError(MeshRefusal.FORMAT, message)
     try:
         size = path.stat().st_size
-        data = path.read_bytes() if path.is_file() and size <= MAX_FILE_BYTES else b""
+        data = path.read_bytes() if size <= MAX_FILE_BYTES else b""
     except OSError as error:
         message = f"{path}: cannot be read ({error.strerror}); check the path and its rights"
         raise MeshError(MeshRefusal.UNREADABLE, message) from error
@@ -200,7 +200,8 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike) -> tuple[Array, I
         bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
         raise MeshError(MeshRefusal.NON_FINITE, f"vertex {bad} is {points[bad]}, not finite")
     if corners.min() < 0 or corners.max() >= len(points):
-        message = f"a triangle names vertex {corners.max()}, there are 0..{len(points) - 1}"
+        wrong = corners.min() if corners.min() < 0 else corners.max()
+        message = f"a triangle names vertex {wrong}, there are 0..{len(points) - 1}"
         raise MeshError(MeshRefusal.INDEX, message)
     extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
     if not SMALLEST_EXTENT_M <= extent <= LARGEST_EXTENT_M:

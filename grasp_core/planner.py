@@ -1,13 +1,12 @@
 """Tries the constructions over face quadruples, certifies what they find, and keeps counts.
 
-Each quadruple is planned at theta_plan = min(theta, just below its span angle theta*): the
-smaller cones lie inside the real ones, so what holds there holds at the friction asked for.
 Quadruples are taken in the order of an upper bound on their radius; with a `limit`, the
 search ends when the bound falls below the worst radius kept, so the grasps returned are the
 best ones and not merely some.
 """
 
 import math
+from bisect import insort
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -22,11 +21,18 @@ from grasp_core.concurrent_grasps import (
     ConcurrentPlacement,
     cone_footprint,
     place_concurrent,
-    radius_bounds,
 )
 from grasp_core.errors import InputError, UndecidedError
-from grasp_core.face_pieces import FacePiece, inscribed_disc_radius, unit_pieces
-from grasp_core.spanning import spanning_quadruples
+from grasp_core.face_pieces import FacePiece, inscribed_disc_radius
+from grasp_core.ranking import (
+    LEAST_RADIUS,
+    PiecesByFace,
+    Quadruple,
+    Ranking,
+    pieces_by_face,
+    rank_quadruples,
+)
+from grasp_core.spanning import cones_positively_span
 from grasp_core.values import (
     FINGERS,
     Contact,
@@ -43,18 +49,8 @@ from grasp_core.values import (
 
 FAMILIES: tuple[Family, ...] = ("concurrent",)
 """The families that can be planned."""
-MAX_FACES = 400
-"""The table of face triples grows with the cube: 64 million numbers here."""
-LEAST_SPAN_ANGLE = math.radians(1.0)
-"""Quadruples that only span with narrower cones are not planned: their discs would be
-smaller than a fiftieth of the object's size."""
-BELOW_SPAN_ANGLE = 0.999
-"""Share of theta* to plan with: P3 is strict."""
-INSIDE_FRICTION = 1e-6
-"""How far inside the friction cone to plan, so that equilibrium is not marginal [rad]."""
-LEAST_RADIUS = 1e-3
-"""Smaller discs, relative to the object's size, do not count as a region to stand in."""
-
+MAX_FACES = 200
+"""65 million quadruples, some 6 million of which span: half a gigabyte."""
 Progress: TypeAlias = Callable[[int, int, int], None]
 """Called with quadruples done, quadruples in all, and grasps found so far."""
 
@@ -90,8 +86,9 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     """
     theta = _planned_half_angle(friction, theta_deg)
     _check_request(body, families, limit)
-    quadruples = _rank(body, theta)
-    grasps, counts = _search_concurrent(body, friction, quadruples, limit, progress)
+    pieces = pieces_by_face(body)
+    quadruples = rank_quadruples(body, pieces, theta)
+    grasps, counts = _search_concurrent(body, pieces, friction, quadruples, limit, progress)
     faces = len(body.faces)
     return Plan(
         grasps=grasps,
@@ -140,43 +137,16 @@ def _absence(name: str, spanning: int) -> str:
             "offers no grasp"
         )
     return (
-        f"{name} has {spanning} face quadruples that span (P3), but for none of them a point "
-        "that four contacts can aim at within their force cones, so no concurrent grasp"
+        f"{name}: {spanning} face quadruples span (P3), but none has a point that four discs of "
+        f"at least {LEAST_RADIUS:g} object radii can aim at, so there is no concurrent grasp"
     )
-
-
-@dataclass(frozen=True, slots=True)
-class _Quadruple:
-    """Four faces to try, with the half-angle to plan them at."""
-
-    faces: tuple[int, int, int, int]
-    span_angle: float
-    half_angle: float
-    bound: float
-    """No disc can be larger, relative to the object's radius."""
-
-
-def _rank(body: Polyhedron, theta: float) -> list[_Quadruple]:
-    """The spanning quadruples, largest radius bound first."""
-    normals = body.normals
-    found = spanning_quadruples(normals, LEAST_SPAN_ANGLE)
-    angles = np.minimum(theta, BELOW_SPAN_ANGLE * found.span_angles) - INSIDE_FRICTION
-    centroids = np.array([face.centroid for face in body.faces])
-    heights = np.einsum("fi,fi->f", normals, centroids - body.center_of_mass) / body.radius
-    bounds = radius_bounds(normals[found.indices], heights[found.indices], angles)
-    rows = zip(found.indices, found.span_angles, angles, bounds, strict=True)
-    quadruples = [
-        _Quadruple(four(int(face) for face in faces), float(span), float(angle), float(bound))
-        for faces, span, angle, bound in rows
-    ]
-    return sorted(quadruples, key=lambda quadruple: -quadruple.bound)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
     """A certified placement, before it is written out as a grasp."""
 
-    quadruple: _Quadruple
+    quadruple: Quadruple
     pieces: tuple[FacePiece, ...]
     placement: ConcurrentPlacement
     margin: float
@@ -184,15 +154,13 @@ class _Found:
 
 def _search_concurrent(
     body: Polyhedron,
+    pieces: PiecesByFace,
     friction: float,
-    quadruples: list[_Quadruple],
+    quadruples: Ranking,
     limit: int | None,
     progress: Progress | None,
 ) -> tuple[tuple[Grasp, ...], FamilyCounts]:
     """The best grasps: the search ends when no bound reaches the worst one kept."""
-    by_face: dict[int, list[FacePiece]] = {face: [] for face in range(len(body.faces))}
-    for piece in unit_pieces(body):
-        by_face[piece.face].append(piece)
     best: list[_Found] = []
     counts: Counter[str] = Counter()
     for done, quadruple in enumerate(quadruples):
@@ -200,13 +168,14 @@ def _search_concurrent(
         if full and quadruple.bound < best[-1].placement.radius * (1.0 - UNIT_SLACK):
             counts["pruned"] = len(quadruples) - done
             break
-        candidates = list(product(*(by_face[face] for face in quadruple.faces)))
+        candidates = list(product(*(pieces[face] for face in quadruple.faces)))
         placed = _largest_placement(quadruple, candidates)
         found = placed and _certified(body, friction, quadruple, *placed)
         outcome = "found" if found else "rejected" if placed else "infeasible"
         counts.update({"tried": 1, "solved": len(candidates), outcome: 1})
         if found:
-            best = sorted([*best, found], key=_by_radius)[:limit]
+            insort(best, found, key=_by_radius)
+            best = best[:limit]
         if progress is not None:
             progress(done + 1, len(quadruples), counts["found"])
     return tuple(_grasp(body, found) for found in best), FamilyCounts(**counts)
@@ -217,17 +186,19 @@ def _by_radius(found: _Found) -> tuple[float, tuple[int, ...]]:
     return -float(f"{found.placement.radius:.9g}"), found.quadruple.faces
 
 
-def _cones(quadruple: _Quadruple, pieces: Sequence[FacePiece]) -> list[ForceCone]:
+def _cones(quadruple: Quadruple, pieces: Sequence[FacePiece]) -> list[ForceCone]:
     return [ForceCone(piece.normal, quadruple.half_angle) for piece in pieces]
 
 
 def _largest_placement(
-    quadruple: _Quadruple, candidates: Sequence[tuple[FacePiece, ...]]
+    quadruple: Quadruple, candidates: Sequence[tuple[FacePiece, ...]]
 ) -> tuple[tuple[FacePiece, ...], ConcurrentPlacement] | None:
     """The best over all choices of one convex piece per face."""
     best = None
     for pieces in candidates:
         floor = best[1].radius if best else LEAST_RADIUS
+        if min(piece.inradius for piece in pieces) < floor:
+            continue
         placement = place_concurrent(pieces, _cones(quadruple, pieces), least_radius=floor)
         if isinstance(placement, ConcurrentPlacement):
             best = pieces, placement
@@ -237,12 +208,14 @@ def _largest_placement(
 def _certified(
     body: Polyhedron,
     friction: float,
-    quadruple: _Quadruple,
+    quadruple: Quadruple,
     pieces: tuple[FacePiece, ...],
     placement: ConcurrentPlacement,
 ) -> _Found | None:
-    """The placement with its margin, if the exact closure test agrees."""
+    """The placement with its margin, if its cones span (P3) and the exact closure test agrees."""
     normals = np.array([piece.normal for piece in pieces])
+    if not cones_positively_span(normals, [quadruple.half_angle] * FINGERS):
+        return None
     try:
         certificate = force_closure(_at(body, placement.positions), normals, friction)
     except UndecidedError:

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.mesh import polyhedron_from_mesh
 from grasp_core.values import Contact, ContactRegion, ForceCone, Grasp, Plan, Polyhedron, four
@@ -71,7 +72,8 @@ class RegionRecord(_Record):
 class GraspRecord(_Record):
     """One grasp."""
 
-    id: str
+    id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,99}$")
+    """Also the name of the grasp's scene file, hence no dots or slashes."""
     family: Literal["concurrent", "pencil", "regulus"]
     faces: tuple[int, int, int, int]
     contacts: tuple[ContactRecord, ContactRecord, ContactRecord, ContactRecord]
@@ -187,6 +189,8 @@ def grasps_from_json(text: str) -> SavedGrasps:
     if body.content_sha256 != record.object.content_sha256:
         raise InputError("grasps file: object.content_sha256 does not match its mesh")
     grasps = tuple(_grasp_from_record(body, grasp) for grasp in record.grasps)
+    if len({grasp.id for grasp in grasps}) < len(grasps):
+        raise InputError("grasps file: two grasps have the same id")
     return SavedGrasps(body, record.friction, record.seed, grasps)
 
 
@@ -222,7 +226,15 @@ def _check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
         where = f"grasps file: {grasp.id}: contact {finger}"
         if not 0 <= face < len(body.faces):
             raise InputError(f"{where} names face {face}; there are 0..{len(body.faces) - 1}")
-        normal, centroid = body.faces[face].normal, body.faces[face].centroid
-        off = abs(float(normal @ (contact.position - centroid))) / body.radius
-        if max(off, float(np.abs(contact.normal - normal).max())) > ON_FACE:
+        plane, slack = body.faces[face], ON_FACE * body.radius
+        off = abs(float(plane.normal @ (contact.position - plane.centroid)))
+        if off > slack or float(np.abs(contact.normal - plane.normal).max()) > ON_FACE:
             raise InputError(f"{where} does not lie on face {face} with that face's normal")
+        if not any(_inside(contact.position, piece, plane.normal, slack) for piece in plane.pieces):
+            raise InputError(f"{where} lies outside the border of face {face}")
+
+
+def _inside(point: Array, polygon: Array, normal: Array, slack: float) -> bool:
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    inward = np.cross(normal, edges) / np.linalg.norm(edges, axis=1, keepdims=True)
+    return bool((np.einsum("ki,ki->k", inward, point - polygon) >= -slack).all())

@@ -26,7 +26,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices, frozen_units
+from grasp_core.arrays import Array, Indices, frozen, frozen_units
+from grasp_core.errors import InputError
 
 SIGNS = np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=np.float64)
 LARGEST_SPAN_ANGLE = math.asin(1.0 / 3.0)
@@ -59,9 +60,15 @@ def cones_positively_span(axes: ArrayLike, half_angles: ArrayLike) -> bool:
     Args:
         axes: Unit vectors, (4, 3).
         half_angles: (4,) [rad].
+
+    Raises:
+        InputError: Shapes, lengths or angles are wrong.
     """
     units = frozen_units(axes, (4, 3), "axes")
-    sines = np.sin(np.asarray(half_angles, dtype=np.float64))
+    angles = frozen(half_angles, (4,), "half_angles")
+    if (angles < 0.0).any() or (angles >= np.pi / 2).any():
+        raise InputError(f"half_angles must be in [0, pi/2), got {angles.tolist()}")
+    sines = np.sin(angles)
     if not positively_span(units):
         return False
     for triple in combinations(range(4), 3):

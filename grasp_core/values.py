@@ -170,7 +170,7 @@ class Grasp:
     span_angle: float
     """Largest half-angle at which the four normals positively span, theta* [rad]."""
     critical_friction: float
-    """Smallest Coulomb coefficient at which the contacts can be in equilibrium."""
+    """Smallest Coulomb coefficient above which the contacts are in force closure."""
     closure_margin: float
     """Margin of the exact closure test at the planned friction (see `force_closure`)."""
 
@@ -201,9 +201,9 @@ class FamilyCounts:
     pruned: int = 0
     """Quadruples skipped because a bound showed they cannot enter the best `limit`."""
     solved: int = 0
-    """Linear programs solved."""
+    """Choices of one convex piece per face that were considered."""
     infeasible: int = 0
-    """Quadruples proved to hold no grasp of this family at the planned angle."""
+    """Quadruples without a placement that has discs of the least radius, at the planned angle."""
     found: int = 0
     """Grasps certified by the exact closure test."""
     rejected: int = 0

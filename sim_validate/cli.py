@@ -5,6 +5,7 @@ Nothing heavy is imported here, so that help and usage errors answer at once.
 
 import sys
 import tomllib
+import traceback
 from collections.abc import Sequence
 from dataclasses import field
 from enum import IntEnum
@@ -184,7 +185,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         command: Command = tyro.cli(
             FlagCreatePairsOff[Command],  # type: ignore[valid-type]
             prog="graspproof",
-            description="Four-finger force-closure grasps, proved and simulated.",
+            description=(
+                "Four-finger force-closure grasps, proved and simulated. Every command also takes "
+                "--config FILE.toml, whose keys are flags; flags given override it."
+            ),
             args=_with_config(arguments),
         )
     except SystemExit as stop:
@@ -195,24 +199,28 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _dispatch(command: Command) -> int:
-    from sim_validate import commands
-
     try:
+        from sim_validate import commands
+
         return commands.execute(command)
-    except InputError as error:
-        return _complain(str(error), Exit.INPUT)
-    except (SolverError, UndecidedError) as error:
-        return _complain(f"{type(error).__name__}: {error}", Exit.INTERNAL)
-    except GraspError as error:
-        return _complain(str(error), Exit.NEGATIVE)
-    except OSError as error:
-        return _complain(f"{error.filename or 'output'}: {error.strerror}", Exit.INPUT)
     except KeyboardInterrupt:
         return _complain("interrupted", Exit.INTERRUPTED)
+    except (GraspError, OSError) as error:
+        return _complain(_reason(error), _code(error))
     except Exception as error:
         if command.speech.verbose:
-            raise
+            traceback.print_exc()
         return _complain(f"internal error: {error!r}; -v shows where", Exit.INTERNAL)
+
+
+def _reason(error: GraspError | OSError) -> str:
+    if isinstance(error, OSError):
+        return f"{error.filename or 'output'}: {error.strerror}"
+    return str(error)
+
+
+def _code(error: GraspError | OSError) -> Exit:
+    return Exit.INTERNAL if isinstance(error, (SolverError, UndecidedError)) else Exit.INPUT
 
 
 def _complain(message: str, code: Exit) -> int:
@@ -224,19 +232,25 @@ def _complain(message: str, code: Exit) -> int:
 
 def _with_config(arguments: list[str]) -> list[str]:
     """Put the settings of `--config FILE.toml` before the flags, which then override them."""
-    if "--config" not in arguments:
+    words = [part for word in arguments for part in _split_config(word)]
+    if "--config" not in words:
         return arguments
-    place = arguments.index("--config")
-    if place + 1 >= len(arguments):
+    place = words.index("--config")
+    if place + 1 >= len(words):
         raise InputError("--config needs the name of a TOML file")
-    path = Path(arguments[place + 1])
-    rest = arguments[:place] + arguments[place + 2 :]
+    path = Path(words[place + 1])
+    rest = words[:place] + words[place + 2 :]
     try:
         settings = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"--config {path}: {error}") from error
     flags = [word for name, value in settings.items() for word in _as_flags(name, value)]
     return [*rest[:1], *flags, *rest[1:]]
+
+
+def _split_config(word: str) -> list[str]:
+    """`--config=FILE` as two words."""
+    return word.split("=", 1) if word.startswith("--config=") else [word]
 
 
 def _as_flags(name: str, value: Any) -> list[str]:

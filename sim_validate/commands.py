@@ -1,15 +1,18 @@
 """What each command does, from its flags to files, tables and an exit code."""
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
 from grasp_core.closure import critical_friction, force_closure
+from grasp_core.concurrent_grasps import PYRAMID_SIDES
 from grasp_core.errors import InputError
 from grasp_core.mesh import FORMATS, load_polyhedron
-from grasp_core.planner import FAMILIES, LEAST_SPAN_ANGLE, MAX_FACES, plan
+from grasp_core.planner import FAMILIES, MAX_FACES, plan
+from grasp_core.ranking import LEAST_SPAN_ANGLE
 from grasp_core.records import SavedGrasps, grasps_from_json, plan_to_json
 from grasp_core.spanning import spanning_quadruples
 from grasp_core.values import Grasp, Plan, Polyhedron
@@ -37,7 +40,7 @@ def execute(command: cli.Command) -> int:
 def _load(name: str, unit: str) -> Polyhedron:
     """A mesh file, or a built-in object when the name has no mesh ending."""
     path = Path(name)
-    if path.suffix.lower().lstrip(".") in FORMATS or path.exists():
+    if path.suffix.lower().lstrip(".") in FORMATS or path.is_file():
         return load_polyhedron(path, unit=unit)
     if path.suffix or len(path.parts) > 1:
         raise InputError(f"{name}: no such file, and the ending is none of {', '.join(FORMATS)}")
@@ -48,6 +51,7 @@ def _planned(name: str, planning: cli.Planning, reporter: Reporter) -> tuple[Pol
     body = _load(name, planning.unit)
     for note in body.notes:
         reporter.warn(f"{body.name}: {note}")
+    reporter.detail(f"{body.name}: mesh {body.content_sha256}, {len(body.triangles)} triangles")
     with reporter.progress("planning") as steps:
         found = plan(
             body,
@@ -63,7 +67,7 @@ def _planned(name: str, planning: cli.Planning, reporter: Reporter) -> tuple[Pol
 
 def _run(command: cli.Run, reporter: Reporter) -> int:
     body, found = _planned(command.object, command.planning, reporter)
-    folder = command.out or Path("graspproof-out") / body.name
+    folder = command.out or Path("graspproof-out") / _folder_name(body.name)
     write_text(folder / "grasps.json", plan_to_json(body, found))
     _say_counts(body, found, reporter)
     if found.absence:
@@ -79,6 +83,11 @@ def _run(command: cli.Run, reporter: Reporter) -> int:
     code = _test(saved, command.testing, folder, reporter)
     reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
     return code
+
+
+def _folder_name(name: str) -> str:
+    """A file name that is one plain part of a path."""
+    return re.sub(r"[^\w-]+", "_", name) or "object"
 
 
 def _plan(command: cli.Plan, reporter: Reporter) -> int:
@@ -126,7 +135,9 @@ def _say_cut(count: int, reporter: Reporter) -> None:
 def _validate(command: cli.Validate, reporter: Reporter) -> int:
     saved = grasps_from_json(read_text(command.grasps))
     if not saved.grasps:
-        reporter.say(f"{command.grasps} holds no grasp")
+        absence = f"{command.grasps} holds no grasp"
+        reporter.say(absence)
+        reporter.document({"absence": absence})
         return cli.Exit.NONE
     chosen = SavedGrasps(
         saved.body,
@@ -211,12 +222,18 @@ def _scene(command: cli.Scene, reporter: Reporter) -> int:
     if command.out is None and len(chosen) > 1:
         raise InputError("several scenes need --out DIR; or choose one with --grasp ID")
     friction = saved.friction if command.friction is None else command.friction
+    written: list[str] = []
     for grasp in chosen:
         scene = build_scene(saved.body, grasp, friction, max_normal_force=command.max_normal_force)
-        if command.out is None:
-            print(scene.xml, end="")  # noqa: T201 - the document itself
+        if command.out is not None:
+            written.append(str(write_text(command.out / f"{grasp.id}.xml", scene.xml)))
+            reporter.say(f"wrote {written[-1]}")
+        elif reporter.json_only:
+            reporter.document({"id": grasp.id, "xml": scene.xml})
         else:
-            reporter.say(f"wrote {write_text(command.out / f'{grasp.id}.xml', scene.xml)}")
+            print(scene.xml, end="")  # noqa: T201 - the document itself
+    if command.out is not None:
+        reporter.document({"scenes": written})
     return cli.Exit.GOOD
 
 
@@ -268,8 +285,9 @@ def _doctor(_: cli.Doctor, reporter: Reporter) -> int:
     body = example_object("tetrahedron")
     grasp = plan(body).grasps[0]
     verdict = validate(body, grasp)
+    cone = math.tan(grasp.force_cones[0].half_angle) * math.cos(math.pi / PYRAMID_SIDES)
     checks = {
-        "linear programs": abs(grasp.radius / body.radius - 0.11538) < 1e-4,  # noqa: PLR2004
+        "linear programs": math.isclose(3.0 * grasp.radius / body.radius, cone, rel_tol=1e-6),
         "conic programs": force_closure(grasp).verify(),
         "critical friction": critical_friction(grasp) == 0.0,
         "simulated grasp holds": verdict.held,

@@ -6,7 +6,10 @@ forces planned for it are applied together, things settle, friction is lowered t
 under test, and the object must stay where it is.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import asdict, dataclass
+
+from grasp_core.errors import InputError
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,6 +20,9 @@ class HoldProtocol:
     axis they are closest to: 2e-4 is 10 um for contacts that span a decimetre. A servo
     hides an unbalanced force of stiffness times displacement, here a thousandth of the
     largest normal force, so looser thresholds would certify the wrong thing.
+
+    Raises:
+        InputError: A number is not positive and finite, or a share is not below one.
     """
 
     squeeze_s: float = 0.16
@@ -34,7 +40,20 @@ class HoldProtocol:
     """Least planned normal force, in largest normal forces: keeps idle fingers in touch."""
     hold_threshold: float = 2e-4
     """Largest displacement while holding, in grasp sizes."""
-    total_threshold: float = 2e-2
-    """Largest displacement from the planned pose, in grasp sizes."""
+    total_threshold: float = 2e-4
+    """Largest displacement from the planned pose, in grasp sizes: a tilt acts like as much
+    more friction."""
+    least_excess: float = 5e-4
+    """Contacts whose forces must leave their cones by this share of their sum even without a
+    load (minus the closure margin) have to slip without one: less, and the servos, which hide a
+    few thousandths of the largest normal force, might hold them."""
     gap_threshold: float = 2e-4
     """A fingertip farther than this from its face has lost contact, in grasp sizes."""
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"{name} must be a positive number, got {value}")
+        for name in ("load_share", "least_normal_share"):
+            if getattr(self, name) >= 1.0:
+                raise InputError(f"{name} must be below 1, got {getattr(self, name)}")

@@ -74,7 +74,7 @@ class Bench:
         self.tip_bodies = [self.model.body(f"finger{i}").id for i in range(self.fingers)]
         self.start = np.empty(0)
         self.idle = np.zeros((self.fingers, 3))
-        self.stepped = 0
+        self.stepped = self.squeezed = self.warned = 0
 
     def squeeze(self, forces: Array, friction: float) -> None:
         """Close the fingers on the unloaded object and remember the state reached.
@@ -100,11 +100,16 @@ class Bench:
             self.model, self.data, self.start, mujoco.mjtState.mjSTATE_INTEGRATION
         )  # fmt: skip
         self.stepped = self.squeezed
+        self.warned = self._warnings()
         self._set_friction(settling_friction)
         self._ramp(Load(np.zeros(6), self.idle), load, self.protocol.load_s)
         self._ramp(load, load, self.protocol.settle_s)
         self._set_friction(friction)
         return self._watch(self.protocol.hold_s)
+
+    def _warnings(self) -> int:
+        """Warnings so far: restoring a state does not reset their counters."""
+        return int(sum(warning.number for warning in self.data.warning))
 
     def _set_friction(self, friction: float) -> None:
         self.model.geom_friction[self.touching, 0] = friction
@@ -173,7 +178,7 @@ class Bench:
             gaps_m=gaps,
             start_m=start,
             finite=bool(np.isfinite(state).all() and np.isfinite(moves).all()),
-            warnings=int(sum(w.number for w in self.data.warning)),
+            warnings=self._warnings() - self.warned,
             clock_error_s=float(self.data.time - self.stepped * self.model.opt.timestep),
         )
 
@@ -203,8 +208,3 @@ def rotation_angle(rotation: Array) -> float:
         ]
     )
     return float(np.arctan2(np.linalg.norm(axis), np.trace(rotation) - 1.0))
-
-
-def simulator_version() -> str:
-    """Version of MuJoCo."""
-    return str(mujoco.__version__)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure import contact_frictions
+from grasp_core.closure import contact_frictions, critical_friction, force_closure
 from grasp_core.errors import InputError
 from grasp_core.forces import closest_forces, least_friction_forces
 from grasp_core.quality import WrenchBody, axis_wrenches
@@ -33,6 +33,7 @@ DIGITS = 9
 hides."""
 SEPARATING = "separating"
 """The wrench that a control's certificate says is not resisted."""
+UNLOADED = "unloaded"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,12 +56,27 @@ class ControlVerdict:
 
     control: Control
     tried: tuple[WrenchVerdict, ...]
-    """Wrenches up to and including the first that did not hold."""
+    """Loads that no contact forces can balance."""
 
     @property
     def held(self) -> bool:
-        """Whether every wrench held: it must not."""
-        return all(trial.hold.outcome is Outcome.HELD for trial in self.tried)
+        """Whether any of them held: none must."""
+        return any(trial.hold.outcome is Outcome.HELD for trial in self.tried)
+
+    @property
+    def failed(self) -> bool:
+        """Whether all of them ended as they must, by the object moving."""
+        moved = (Outcome.SLIPPED, Outcome.LOST_CONTACT, Outcome.INVALID_START)
+        return all(trial.hold.outcome in moved for trial in self.tried)
+
+
+@dataclass(frozen=True, slots=True)
+class CriticalFriction:
+    """Where the analysis puts the least friction, and where simulation finds it."""
+
+    predicted: float
+    simulated: float | None = None
+    """None where it was not measured."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,7 +84,7 @@ class Verdict:
     """What simulation says about a grasp."""
 
     id: str
-    predicted_critical_friction: float
+    critical_friction: CriticalFriction
     wrenches: tuple[WrenchVerdict, ...]
     controls: tuple[ControlVerdict, ...]
     scene: Scene
@@ -87,8 +103,8 @@ class Verdict:
 
     @property
     def controls_failed(self) -> bool:
-        """Whether the simulator told every control from a grasp."""
-        return not any(control.held for control in self.controls)
+        """Whether the simulator let go of every control."""
+        return all(control.failed for control in self.controls)
 
 
 def validate(  # noqa: PLR0913 - the circumstances of a trial
@@ -115,9 +131,10 @@ def validate(  # noqa: PLR0913 - the circumstances of a trial
     Raises:
         InputError: The friction does not exceed the grasp's critical friction.
     """
-    if not friction > grasp.critical_friction:
+    critical = critical_friction(grasp)
+    if not (friction > critical and force_closure(grasp, friction=friction).closed):
         raise InputError(
-            f"grasp {grasp.id} needs friction above {grasp.critical_friction:.6g}, got {friction}"
+            f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got {friction}"
         )
     protocol = protocol or HoldProtocol()
     physics = physics or PhysicsSettings()
@@ -127,7 +144,8 @@ def validate(  # noqa: PLR0913 - the circumstances of a trial
         _control(body, control, max_normal_force, protocol, physics)
         for control in negative_controls(body, grasp, friction, seed)
     )
-    return Verdict(grasp.id, grasp.critical_friction, wrenches, controls, rig.scene, protocol)
+    limits = CriticalFriction(predicted=critical)
+    return Verdict(grasp.id, limits, wrenches, controls, rig.scene, protocol)
 
 
 def _control(
@@ -135,12 +153,7 @@ def _control(
     physics: PhysicsSettings,
 ) -> ControlVerdict:  # fmt: skip
     rig = _Rig(body, control.contacts, control.friction, max_normal_force, protocol, physics)
-    tried: list[WrenchVerdict] = []
-    for test in rig.hopeless_loads(control):
-        tried.append(rig.hold(*test))
-        if tried[-1].hold.outcome is not Outcome.HELD:
-            break
-    return ControlVerdict(control, tuple(tried))
+    return ControlVerdict(control, tuple(rig.hold(*load) for load in rig.hopeless_loads(control)))
 
 
 class _Rig:
@@ -177,7 +190,7 @@ class _Rig:
             yield name, _rounded(share * limit * wrench), 1.0 / share
 
     def hopeless_loads(self, control: Control) -> Iterator[tuple[str, Array, float]]:
-        """The separating wrench, then the axis wrenches, all of the same size."""
+        """The separating wrench, and no wrench at all where not even that can be balanced."""
         twist = control.certificate.separating_wrench
         assert twist is not None  # noqa: S101 - controls are refuted by construction
         center, radius = self.body.center_of_mass, self.body.radius
@@ -185,10 +198,9 @@ class _Rig:
         scale = np.array([1.0] * 3 + [radius] * 3)
         facing = -about_center * scale**2
         size = self.protocol.control_load * self.max_normal_force
-        axes = axis_wrenches(radius)
-        for name, wrench in zip((SEPARATING, *AXIS_NAMES), (facing, *axes), strict=True):
-            applied = _rounded(size * wrench / float(np.linalg.norm(wrench / scale)))
-            yield name, applied, self.resisted.limit(applied).limit
+        yield SEPARATING, _rounded(size * facing / float(np.linalg.norm(facing / scale))), 0.0
+        if control.certificate.margin < -self.protocol.least_excess:
+            yield UNLOADED, np.zeros(6), 0.0
 
     def hold(self, name: str, wrench: Array, predicted_limit: float) -> WrenchVerdict:
         """Apply one wrench in simulation and judge what happens."""

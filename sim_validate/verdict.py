@@ -48,14 +48,16 @@ def judge(trace: HoldTrace, grasp_size_m: float, protocol: HoldProtocol) -> Hold
         protocol: Where the thresholds come from.
     """
     sound = trace.finite and trace.warnings == 0 and abs(trace.clock_error_s) < CLOCK_SLACK_S
-    total = trace.start_m + trace.displacements_m
+    limit = protocol.total_threshold * grasp_size_m
     moved = trace.displacements_m >= protocol.hold_threshold * grasp_size_m
-    strayed = total >= protocol.total_threshold * grasp_size_m
+    strayed = trace.start_m + trace.displacements_m >= limit
     apart = trace.gaps_m.max(axis=1) > protocol.gap_threshold * grasp_size_m
     failing = np.flatnonzero(moved | strayed | apart)
     first = int(failing[0]) if failing.size else None
     if not sound:
         outcome = Outcome.DIVERGED
+    elif trace.start_m >= limit:
+        outcome = Outcome.INVALID_START
     elif first is None:
         outcome = Outcome.HELD
     else:

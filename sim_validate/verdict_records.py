@@ -56,10 +56,7 @@ def _verdict_record(verdict: Verdict) -> dict[str, object]:
         "id": verdict.id,
         "outcome": verdict.outcome.value,
         "held": verdict.held,
-        "critical_friction": {
-            "predicted": verdict.predicted_critical_friction,
-            "simulated": None,
-        },
+        "critical_friction": asdict(verdict.critical_friction),
         "wrenches": [_wrench_record(trial) for trial in verdict.wrenches],
         "controls": {
             control.control.name: _control_record(control) for control in verdict.controls

@@ -159,8 +159,28 @@ def test_a_balanced_pair_beside_idle_contacts_is_decided():
     normals = np.array([[1.0, 0, 0], [-1, 0, 0], [0, -0.6, 0.8], [0, 0.6, -0.8]])
     certificate = gc.force_closure(positions, normals, 0.3)
     assert not certificate.closed
-    assert certificate.margin == 0.0
+    assert certificate.margin == pytest.approx(0.0, abs=1e-9)
     assert certificate.verify()
+
+
+def test_zero_friction_is_decided_for_any_number_of_contacts():
+    """Without friction four contacts never close; seven or more may."""
+    rng = np.random.default_rng(16)
+    seen = {True: 0, False: 0}
+    for _ in range(150):
+        positions, normals = random_contacts(rng, int(rng.integers(2, 13)), spread=1.5)
+        for friction in (np.zeros(len(normals)), rng.choice([0.0, 0.4], len(normals))):
+            certificate = gc.force_closure(positions, normals, friction)
+            assert certificate.verify()
+            if not friction.any() and len(normals) < 7:
+                assert not certificate.closed
+            seen[certificate.closed] += 1
+    assert min(seen.values()) >= 20
+
+
+@pytest.mark.parametrize("friction", [1e-5, 1e-3, 0.05, 0.144, 10.0])
+def test_symmetric_contacts_are_decided_at_small_and_large_friction(friction):
+    assert gc.force_closure(TETRA_CENTERS, TETRA_NORMALS, friction).verify()
 
 
 def test_the_boundary_itself_is_left_undecided():

@@ -136,9 +136,15 @@ def test_tilted_cones_hold_a_box_by_its_four_sides():
     placed = place_concurrent(pieces, cones, least_radius=1e-4)
     assert isinstance(placed, ConcurrentPlacement)
     assert 0.98 * 0.2284 < placed.radius * box.radius < 0.2290
-    for _ in range(20):
-        points = box.radius * placed.positions
-        assert gc.force_closure(points, [p.normal for p in pieces], 0.5).closed
+    rng = np.random.default_rng(4)
+    for turns in rng.uniform(0, 2 * np.pi, (20, 4)):
+        points = [
+            box.radius * (center + radius * piece.frame @ [math.cos(turn), math.sin(turn)])
+            for piece, center, radius, turn in zip(
+                pieces, placed.positions, placed.radii, turns, strict=True
+            )
+        ]
+        assert gc.force_closure(points, [p.normal for p in pieces], 0.5 + 1e-5).closed
 
 
 def test_facets_lie_inside_the_circular_cone():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.planner import LEAST_RADIUS
+from grasp_core.ranking import LEAST_RADIUS
 from scenes.objects import example_object
 from tests.judges import pyramid_margin, random_rotation
 
@@ -56,7 +56,7 @@ def test_a_bar_whose_ends_are_far_apart_has_no_concurrent_grasp_at_ten_degrees()
     found = gc.plan(example_object("double-wedge-bar"), TEN_DEGREES)
     assert found.counts.spanning == 9
     assert found.counts.families["concurrent"].infeasible == 9
-    assert "no point" in found.absence or "none of them a point" in found.absence
+    assert "9 face quadruples span" in found.absence
 
 
 OBJECTS = ["wedge", "icosahedron", "random-20-7", "random-12-1", "random-30-2", "screwdriver"]
@@ -131,6 +131,13 @@ def test_a_smaller_theta_is_allowed_and_gives_smaller_discs():
     assert narrow.grasps[0].force_cones[0].half_angle <= math.radians(5.0)
 
 
+@pytest.mark.parametrize("friction", [0.01, 0.05, 0.144])
+def test_symmetric_objects_are_planned_at_small_friction(friction):
+    found = gc.plan(example_object("dodecahedron"), friction)
+    assert len(found.grasps) == 30
+    assert {grasp.critical_friction for grasp in found.grasps} == {0.0}
+
+
 def test_a_limit_returns_the_best_of_all_grasps():
     body = example_object("random-14-1")
     everything, few = gc.plan(body, 0.5), gc.plan(body, 0.5, limit=7)
@@ -151,7 +158,7 @@ def test_progress_is_reported_for_each_quadruple():
     seen = []
     gc.plan(example_object("wedge"), progress=lambda *numbers: seen.append(numbers))
     assert [done for done, _, _ in seen] == list(range(1, len(seen) + 1))
-    assert seen[-1][1] == len(seen) == 13
+    assert seen[-1][1] >= len(seen) >= 13
 
 
 @pytest.mark.parametrize(
@@ -175,18 +182,25 @@ def test_an_object_with_too_many_faces_is_refused_at_once():
     import trimesh
 
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
-    with pytest.raises(gc.InputError, match="over the limit of 400"):
+    with pytest.raises(gc.InputError, match="over the limit of 200"):
         gc.plan(gc.Polyhedron.from_mesh(ball.vertices, ball.faces))
 
 
 def test_regions_are_larger_than_discs_but_smaller_than_faces():
     tested = 0
-    for grasp in gc.plan(example_object("icosahedron"), 0.2, limit=20).grasps:
-        assert grasp.radius > LEAST_RADIUS * 0.06
-        for region in grasp.regions:
-            assert len(region.polygon) >= 3
+    body = example_object("icosahedron")
+    for grasp in gc.plan(body, 0.2, limit=20).grasps:
+        assert grasp.radius > LEAST_RADIUS * body.radius
+        for face, region in zip(grasp.faces, grasp.regions, strict=True):
+            disc = math.pi * region.inscribed_radius**2
+            assert disc <= _area(region.polygon) <= body.faces[face].area * (1 + 1e-9)
             tested += 1
     assert tested >= 80
+
+
+def _area(polygon):
+    fan = np.cross(polygon[1:-1] - polygon[0], polygon[2:] - polygon[0])
+    return 0.5 * np.linalg.norm(fan.sum(axis=0))
 
 
 def _inside(point, polygon, normal):

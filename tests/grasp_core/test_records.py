@@ -60,6 +60,9 @@ CHANGES = {
         lambda d: _set(d, ["grasps", 0, "contacts", 0, "position_m", 0], 0.5),
         "face",
     ),
+    "contact beyond the border": (lambda d: _slid(d, 0.05), "outside the border"),
+    "id that is a path": (lambda d: _set(d, ["grasps", 0, "id"], "../../x"), "id"),
+    "two equal ids": (lambda d: _set(d, ["grasps", 1, "id"], d["grasps"][0]["id"]), "same id"),
     "no such face": (lambda d: _set(d, ["grasps", 0, "faces", 0], 99), "names face 99"),
 }
 
@@ -70,6 +73,14 @@ def test_changed_files_are_refused_by_field(text, case):
     changed = change(json.loads(text))
     with pytest.raises(gc.InputError, match=where):
         grasps_from_json(changed if isinstance(changed, str) else json.dumps(changed))
+
+
+def _slid(document, distance):
+    """Move a contact along its face."""
+    contact = document["grasps"][0]["contacts"][0]
+    along = np.cross(contact["normal"], [0.3, 0.5, 0.7])
+    moved = np.array(contact["position_m"]) + distance * along / np.linalg.norm(along)
+    return _set(document, ["grasps", 0, "contacts", 0, "position_m"], moved.tolist())
 
 
 def _set(document, path, value):

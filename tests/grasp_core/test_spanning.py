@@ -116,6 +116,12 @@ def test_cones_of_unequal_angles_generalise_the_span_angle():
     assert not gc.cones_positively_span(TETRA_NORMALS[[0, 0, 1, 2]], np.zeros(4))
 
 
+@pytest.mark.parametrize("angle", [-0.2, 2.9, math.nan])
+def test_angles_that_are_no_half_angles_are_refused(angle):
+    with pytest.raises(gc.InputError, match="half_angles"):
+        gc.cones_positively_span(TETRA_NORMALS, [0.1, 0.1, 0.1, angle])
+
+
 def test_the_span_angle_does_not_depend_on_frame_or_order():
     rng = np.random.default_rng(5)
     normals = example_object("random-12-1").normals

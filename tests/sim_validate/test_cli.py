@@ -79,11 +79,13 @@ def test_one_and_two_processes_give_the_same_verdicts(here):
 
 @pytest.mark.usefixtures("here")
 def test_json_output_is_one_document_and_the_rest_goes_elsewhere(capsys):
-    for command in (
-        ["plan", "wedge", "--json"], ["inspect", "box", "--json"], ["objects", "--json"],
-        ["run", "tetrahedron", "--json"], ["doctor", "--json"], ["run", "box", "--json"],
-    ):  # fmt: skip
-        main(command)
+    commands = {
+        "plan wedge --out p": 0, "inspect box": 0, "objects": 0, "run tetrahedron": 0, "doctor": 0,
+        "run box": 5, "plan box --out b": 5, "validate b/grasps.json": 5,
+        "scene p/grasps.json --out s": 0, "scene p/grasps.json --grasp c-0-1-5-7": 0,
+    }  # fmt: skip
+    for command, code in commands.items():
+        assert main([*command.split(), "--json"]) == code
         json.loads(capsys.readouterr().out)
 
 
@@ -144,7 +146,7 @@ def test_a_config_file_sets_flags_and_flags_override_it(here, capsys):
     assert main(["plan", "wedge", "--config", "c.toml"]) == Exit.GOOD
     plan = json.loads(capsys.readouterr().out)
     assert (plan["friction"], len(plan["grasps"])) == (0.3, 2)
-    assert main(["plan", "wedge", "--config", "c.toml", "--limit", "1"]) == Exit.GOOD
+    assert main(["plan", "wedge", "--config=c.toml", "--limit", "1"]) == Exit.GOOD
     assert len(json.loads(capsys.readouterr().out)["grasps"]) == 1
     (here / "bad.toml").write_text("frction = 0.3\n")
     assert main(["plan", "wedge", "--config", "bad.toml"]) == Exit.USAGE
@@ -162,6 +164,23 @@ def test_a_run_without_controls_says_so(monkeypatch, capsys):
     monkeypatch.setattr("sim_validate.validation.negative_controls", lambda *_: ())
     assert main(["run", "tetrahedron", "--jobs", "1"]) == Exit.GOOD
     assert "no negative controls" in capsys.readouterr().err
+
+
+def test_a_folder_named_like_an_object_does_not_hide_it(here, capsys):
+    (here / "wedge").mkdir()
+    assert main(["plan", "wedge", "-q"]) == Exit.GOOD
+    assert "error" not in capsys.readouterr().err
+
+
+def test_an_unexpected_error_is_internal_and_shows_its_place_when_asked(monkeypatch, capsys):
+    def broken(*_, **__):
+        raise RuntimeError("boom")
+
+    monkeypatch.setattr("sim_validate.commands.plan", broken)
+    assert main(["plan", "wedge"]) == Exit.INTERNAL
+    assert "internal error" in capsys.readouterr().err
+    assert main(["plan", "wedge", "-v"]) == Exit.INTERNAL
+    assert "boom" in capsys.readouterr().err
 
 
 def test_control_characters_in_a_name_do_not_reach_the_terminal(here, capsys):

@@ -175,6 +175,46 @@ def test_nothing_is_written_beside_the_results(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_good_hold_after_a_blow_up_is_judged_on_its_own():
+    body, (grasp, *_) = grasps("tetrahedron", 0.5, 1)
+    bench, forces = _bench(body, grasp)
+    bench.squeeze(forces, 1.5)
+    bench.hold(Load(np.full(6, 1e14), forces), 1.5, 0.5)
+    after = bench.hold(Load(np.zeros(6), forces), 1.5, 0.5)
+    assert judge(after, bench.layout.grasp_size_m, HoldProtocol()).outcome is Outcome.HELD
+
+
+def test_contacts_that_are_not_closed_are_refused_whatever_they_claim():
+    """Four contacts on one line through a box, with a critical friction of zero written on."""
+    body, (grasp, *_) = grasps("tetrahedron", 0.5, 1)
+    line = [gc.Contact([0.0, 0, z], [0.0, 0, s]) for z, s in ((-2, 1), (-1, 1), (1, -1), (2, -1))]
+    with pytest.raises(gc.InputError, match="needs friction above inf"):
+        sv.validate(body, replace(grasp, contacts=tuple(line)), 0.5)
+
+
+def test_a_simulator_with_too_much_friction_is_caught_by_the_controls(monkeypatch):
+    """Half as much friction again in the simulation only: low-friction controls then hold."""
+    set_friction = Bench._set_friction
+    monkeypatch.setattr(Bench, "_set_friction", lambda bench, mu: set_friction(bench, 1.5 * mu))
+    caught = tested = 0
+    for name in ("random-12-1", "random-30-2", "screwdriver"):
+        body, found = grasps(name, 0.5, 10)
+        for grasp in found:
+            if grasp.critical_friction > 0.03:
+                caught += not sv.validate(body, grasp, 0.5).controls_failed
+                tested += 1
+    assert tested >= 5
+    assert caught == tested
+
+
+@pytest.mark.parametrize(
+    "bad", [{"hold_s": -1.0}, {"hold_threshold": float("nan")}, {"load_share": 1.0}]
+)
+def test_a_protocol_that_proves_nothing_is_refused(bad):
+    with pytest.raises(gc.InputError, match=next(iter(bad))):
+        HoldProtocol(**bad)
+
+
 def test_friction_at_or_below_critical_is_refused():
     body, found = grasps("chamfered-box", 0.5, 5)
     grasp = next(g for g in found if g.critical_friction > 0)
