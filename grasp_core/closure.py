@@ -41,7 +41,9 @@ FRICTIONLESS = 1e-6
 """Critical frictions below this are reported as zero: a contact in a file with six digits is
 not placed better."""
 UNPROVED = 1e-6
-"""Relative width of a bracket that may be left when neither side has a proof any more."""
+"""Width of a bracket that may be left when neither side has a proof any more, absolute below
+a coefficient of one: margins may grow by as little as 1e-5 of the coefficient, and are known to
+1e-11. The upper end, which is returned, is proved to suffice."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,7 +135,7 @@ def critical_friction(positions: ArrayLike | Grasp, normals: ArrayLike | None = 
         normals: Unit vectors into the object, (k, 3).
 
     Returns:
-        The upper end of the bracket, to `FRICTION_ACCURACY`; 0.0 below `FRICTIONLESS`;
+        The upper end of the bracket, to `FRICTION_ACCURACY` or `UNPROVED`; 0.0 below `FRICTIONLESS`;
         `math.inf` when `LARGEST_FRICTION` does not suffice.
 
     Raises:
@@ -150,7 +152,7 @@ def critical_friction(positions: ArrayLike | Grasp, normals: ArrayLike | None = 
             upper = min(trial, _steepest(answer.forces, units))
         elif answer.twist is not None:
             lower = max(trial, _least_friction_not_separated(answer.twist, arms, units))
-        elif upper <= lower * (1.0 + UNPROVED):
+        elif upper - lower <= UNPROVED * max(upper, 1.0):
             break
         else:
             raise UndecidedError(

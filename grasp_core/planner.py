@@ -178,7 +178,7 @@ def _search_concurrent(
             best = best[:limit]
         if progress is not None:
             progress(done + 1, len(quadruples), counts["found"])
-    return tuple(_grasp(body, found) for found in best), FamilyCounts(**counts)
+    return tuple(_grasp(body, friction, found) for found in best), FamilyCounts(**counts)
 
 
 def _by_radius(found: _Found) -> tuple[float, tuple[int, ...]]:
@@ -230,7 +230,15 @@ def _at(body: Polyhedron, unit_points: Array) -> Array:
     return body.center_of_mass + body.radius * unit_points
 
 
-def _grasp(body: Polyhedron, found: _Found) -> Grasp:
+def _critical(positions: Array, normals: Array, friction: float) -> float:
+    """The critical friction; where it cannot be bracketed, the friction that is proved enough."""
+    try:
+        return critical_friction(positions, normals)
+    except UndecidedError:
+        return friction
+
+
+def _grasp(body: Polyhedron, friction: float, found: _Found) -> Grasp:
     quadruple, pieces, placement = found.quadruple, found.pieces, found.placement
     positions = _at(body, placement.positions)
     normals = np.array([piece.normal for piece in pieces])
@@ -250,6 +258,6 @@ def _grasp(body: Polyhedron, found: _Found) -> Grasp:
         regions=four(regions),
         radius=body.radius * placement.radius,
         span_angle=quadruple.span_angle,
-        critical_friction=critical_friction(positions, normals),
+        critical_friction=_critical(positions, normals, friction),
         closure_margin=found.margin,
     )

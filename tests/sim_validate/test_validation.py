@@ -197,8 +197,8 @@ def test_a_simulator_with_too_much_friction_is_caught_by_the_controls(monkeypatc
     set_friction = Bench._set_friction
     monkeypatch.setattr(Bench, "_set_friction", lambda bench, mu: set_friction(bench, 1.5 * mu))
     caught = tested = 0
-    for name in ("random-12-1", "random-30-2", "screwdriver"):
-        body, found = grasps(name, 0.5, 10)
+    for name in ("random-12-1", "random-30-2", "screwdriver", "double-wedge-bar", "random-8-3"):
+        body, found = grasps(name, 0.5, 12)
         for grasp in found:
             if grasp.critical_friction > 0.03:
                 caught += not sv.validate(body, grasp, 0.5).controls_failed

@@ -16,7 +16,7 @@ def trace(**changes):
         "rotations_rad": np.full(5, 1e-7),
         "slips_m": np.full((5, 3), 1e-9),
         "gaps_m": np.full((5, 3), -1e-6),
-        "start_m": 1e-6,
+        "start_m": 1e-7,
         "finite": True,
         "warnings": 0,
         "clock_error_s": 0.0,
