@@ -135,7 +135,8 @@ def critical_friction(positions: ArrayLike | Grasp, normals: ArrayLike | None = 
         normals: Unit vectors into the object, (k, 3).
 
     Returns:
-        The upper end of the bracket, to `FRICTION_ACCURACY` or `UNPROVED`; 0.0 below `FRICTIONLESS`;
+        The upper end of the bracket, to `FRICTION_ACCURACY` or `UNPROVED`; 0.0 below
+        `FRICTIONLESS`;
         `math.inf` when `LARGEST_FRICTION` does not suffice.
 
     Raises:
