@@ -1,5 +1,6 @@
 """Arrays checked once on the way in, and read-only ever after."""
 
+import math
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -12,6 +13,9 @@ Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.int64]
 """Any integer array of indices."""
 
+DIGITS = 9
+"""Digits kept by `to_digits`: a thousand times more than any result needs, a million times fewer
+than solvers' noise reaches."""
 UNIT_SLACK = 1e-9
 """How far the length of a unit vector may be from 1: rounding of a file with ten digits."""
 
@@ -65,3 +69,15 @@ def frozen_indices(value: Any, shape: tuple[int | None, ...], name: str) -> Indi
     indices = numbers.astype(np.int64)
     indices.setflags(write=False)
     return indices
+
+
+def to_digits(values: Array) -> Array:
+    """Values rounded to `DIGITS` digits of the largest of them.
+
+    The last bits of solvers' and factorisations' answers depend on where their numbers lie in
+    memory; what is simulated or written must not.
+    """
+    largest = float(np.abs(values).max(initial=0.0))
+    if largest == 0.0:
+        return values
+    return np.round(values, DIGITS - 1 - math.floor(math.log10(largest)))

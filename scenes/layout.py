@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array, Indices, to_digits
 from grasp_core.closure import force_closure
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.values import Contact, Grasp, Polyhedron
@@ -141,14 +141,12 @@ def arrange(
 def grasp_size(positions: Array) -> float:
     """Root mean square distance of contacts from the axis they are closest to [m].
 
-    To nine digits: the last bits of a singular value depend on where numbers lie in memory,
-    and the same grasp must give the same scene.
-
     Args:
         positions: (k, 3) [m].
     """
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
-    return float(f"{float(np.linalg.norm(spread[1:])) / math.sqrt(len(positions)):.9g}")
+    lever = np.linalg.norm(spread[1:]) / math.sqrt(len(positions))
+    return float(to_digits(np.array(lever, dtype=np.float64)))
 
 
 def _pushes(positions: Array, normals: Array, friction: float) -> Array:
@@ -161,4 +159,4 @@ def _pushes(positions: Array, normals: Array, friction: float) -> Array:
     except UndecidedError:
         forces = None
     local = np.einsum("kij,ki->kj", contact_frames(normals), normals if forces is None else forces)
-    return local / local[:, 0].max()
+    return to_digits(local / local[:, 0].max())

@@ -35,6 +35,12 @@ class Control:
     friction: float
     certificate: ClosureCertificate
 
+    def separating_wrench(self, center: Array) -> Array:
+        """The certificate's wrench with its torque about a centre, (6,)."""
+        wrench = self.certificate.separating_wrench
+        assert wrench is not None  # noqa: S101 - controls are refuted by construction
+        return np.concatenate([wrench[:3] + np.cross(wrench[3:], center), wrench[3:]])
+
 
 def negative_controls(
     body: Polyhedron, grasp: Grasp, friction: float, seed: int

@@ -5,13 +5,12 @@ it is applied in simulation, with forces planned to need the least friction. The
 confirmed when all wrenches hold, and the run can be trusted when no control does.
 """
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, to_digits
 from grasp_core.closure import contact_frictions, critical_friction, force_closure
 from grasp_core.errors import InputError
 from grasp_core.forces import closest_forces, least_friction_forces
@@ -28,9 +27,6 @@ AXIS_NAMES = tuple(
     f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"
 )
 WEAKEST = "weakest"
-DIGITS = 9
-"""Digits kept of planned forces and wrenches: their rounding is a millionth of what a servo
-hides."""
 SEPARATING = "separating"
 """The wrench that a control's certificate says is not resisted."""
 UNLOADED = "unloaded"
@@ -187,18 +183,14 @@ class _Rig:
         for name, wrench in zip((*AXIS_NAMES, WEAKEST), (*axes, weakest), strict=True):
             limit = self.resisted.limit(wrench).limit
             share = self.protocol.load_share
-            yield name, _rounded(share * limit * wrench), 1.0 / share
+            yield name, to_digits(share * limit * wrench), 1.0 / share
 
     def hopeless_loads(self, control: Control) -> Iterator[tuple[str, Array, float]]:
         """The separating wrench, and no wrench at all where not even that can be balanced."""
-        twist = control.certificate.separating_wrench
-        assert twist is not None  # noqa: S101 - controls are refuted by construction
-        center, radius = self.body.center_of_mass, self.body.radius
-        about_center = np.concatenate([twist[:3] + np.cross(twist[3:], center), twist[3:]])
-        scale = np.array([1.0] * 3 + [radius] * 3)
-        facing = -about_center * scale**2
+        scale = np.array([1.0] * 3 + [self.body.radius] * 3)
+        facing = -control.separating_wrench(self.body.center_of_mass) * scale**2
         size = self.protocol.control_load * self.max_normal_force
-        yield SEPARATING, _rounded(size * facing / float(np.linalg.norm(facing / scale))), 0.0
+        yield SEPARATING, to_digits(size * facing / float(np.linalg.norm(facing / scale))), 0.0
         if control.certificate.margin < -self.protocol.least_excess:
             yield UNLOADED, np.zeros(6), 0.0
 
@@ -216,20 +208,9 @@ class _Rig:
         limits, center = (least, self.max_normal_force), self.body.center_of_mass
         balanced = least_friction_forces(*contacts, wrench, normal_force=limits, center=center)
         if balanced is not None:
-            return _rounded(balanced[0]), float(f"{balanced[1]:.{DIGITS}g}")
+            return to_digits(balanced[0]), float(to_digits(np.array(balanced[1])))
         forces = closest_forces(*contacts, wrench, normal_force=limits, center=center)
-        return _rounded(forces), None
+        return to_digits(forces), None
 
     def _settling(self, needed: float | None) -> float:
         return self.protocol.settling_friction * max(self.friction, needed or 0.0)
-
-
-def _rounded(values: Array) -> Array:
-    """Values to `DIGITS` digits of the largest of them.
-
-    Solvers' last bits depend on where their numbers lie in memory; what is simulated does not.
-    """
-    largest = float(np.abs(values).max())
-    if largest == 0.0:
-        return values
-    return np.round(values, DIGITS - 1 - math.floor(math.log10(largest)))

@@ -34,7 +34,7 @@ def verdicts_to_json(
         "friction": friction,
         "complete": complete,
         "summary": summary(listed),
-        "verdicts": [_verdict_record(verdict) for verdict in listed],
+        "verdicts": [_verdict_record(body, verdict) for verdict in listed],
     }
     return json.dumps(document, allow_nan=False, indent=1) + "\n"
 
@@ -51,7 +51,7 @@ def summary(verdicts: Iterable[Verdict]) -> dict[str, int]:
     }
 
 
-def _verdict_record(verdict: Verdict) -> dict[str, object]:
+def _verdict_record(body: Polyhedron, verdict: Verdict) -> dict[str, object]:
     return {
         "id": verdict.id,
         "outcome": verdict.outcome.value,
@@ -59,7 +59,7 @@ def _verdict_record(verdict: Verdict) -> dict[str, object]:
         "critical_friction": asdict(verdict.critical_friction),
         "wrenches": [_wrench_record(trial) for trial in verdict.wrenches],
         "controls": {
-            control.control.name: _control_record(control) for control in verdict.controls
+            control.control.name: _control_record(body, control) for control in verdict.controls
         },
         "settings": _settings(verdict),
         "versions": versions(),
@@ -82,9 +82,8 @@ def _wrench_record(trial: WrenchVerdict) -> dict[str, object]:
     }
 
 
-def _control_record(verdict: ControlVerdict) -> dict[str, object]:
+def _control_record(body: Polyhedron, verdict: ControlVerdict) -> dict[str, object]:
     control = verdict.control
-    wrench = control.certificate.separating_wrench
     return {
         "held": verdict.held,
         "friction": control.friction,
@@ -93,7 +92,7 @@ def _control_record(verdict: ControlVerdict) -> dict[str, object]:
             for contact in control.contacts
         ],
         "closure_margin": control.certificate.margin,
-        "separating_wrench": None if wrench is None else wrench.tolist(),
+        "separating_wrench": control.separating_wrench(body.center_of_mass).tolist(),
         "wrenches": [_wrench_record(trial) for trial in verdict.tried],
     }
 
