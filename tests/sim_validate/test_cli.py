@@ -69,12 +69,16 @@ def test_plan_validate_and_scene_work_on_the_same_file(here, capsys):
 
 
 def test_one_and_two_processes_give_the_same_verdicts(here):
+    """Everything is equal; numbers to 1e-5, since ProxQP's answers move with memory alignment in
+    digits beyond its tolerance, and are not always polished.
+    """
     assert main(["plan", "icosahedron", "--limit", "16", "--out", "p", "-q"]) == Exit.GOOD
     for jobs in ("1", "2"):
         command = ["validate", "p/grasps.json", "--jobs", jobs, "--out", jobs, "-q"]
         assert main(command) == Exit.GOOD
-    one, two = ((here / jobs / "verdicts.json").read_bytes() for jobs in ("1", "2"))
-    assert one == two
+    one, two = (json.loads((here / jobs / "verdicts.json").read_text()) for jobs in ("1", "2"))
+    assert _alike(one, two)
+    assert not _alike(one, two | {"friction": 0.6})
 
 
 @pytest.mark.usefixtures("here")
@@ -223,6 +227,16 @@ def test_help_answers_without_loading_a_simulator():
     )
     assert "HEAVY []" in answer.stdout
     assert "validate" in answer.stdout
+
+
+def _alike(one, two):
+    if isinstance(one, dict):
+        return one.keys() == two.keys() and all(_alike(one[k], two[k]) for k in one)
+    if isinstance(one, list):
+        return len(one) == len(two) and all(map(_alike, one, two))
+    if isinstance(one, float):
+        return one == pytest.approx(two, rel=1e-5, abs=1e-9)
+    return one == two
 
 
 def _always_held(trace, *_):
