@@ -203,4 +203,8 @@ def contact_frictions(friction: ArrayLike, count: int) -> Array:
     mu = frozen(np.full(count, values) if values.ndim == 0 else values, (count,), "friction")
     if (mu < 0.0).any():
         raise InputError(f"friction must not be negative, got {float(mu.min()):.6g}")
+    if (mu > LARGEST_FRICTION).any():
+        raise InputError(
+            f"friction must be at most {LARGEST_FRICTION:g}, got {float(mu.max()):.6g}"
+        )
     return mu

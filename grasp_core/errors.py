@@ -38,6 +38,7 @@ class MeshRefusal(StrEnum):
     WINDING = "GP-MESH-WINDING"
     ZERO_VOLUME = "GP-MESH-ZERO-VOLUME"
     OVERLAP = "GP-MESH-OVERLAP"
+    SEPARATE = "GP-MESH-SEPARATE"
 
 
 class MeshError(InputError):

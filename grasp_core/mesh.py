@@ -149,7 +149,7 @@ def _parsed(name: str, kind: str, data: bytes) -> tuple[Array, Indices]:
         )
         whole = scene.to_mesh() if scene.geometry else None
     except Exception as error:  # trimesh's parsers raise whatever the bytes led them to
-        message = f"{name}: not a whole {kind.upper()} file ({type(error).__name__}: {error})"
+        message = f"{name}: not a whole {kind.upper()} file; export it again"
         raise MeshError(MeshRefusal.UNREADABLE, message) from error
     if whole is None or not len(getattr(whole, "faces", ())):
         raise MeshError(MeshRefusal.EMPTY, f"{name}: holds no triangles")
@@ -266,8 +266,11 @@ def _oriented(points: Array, corners: Indices) -> tuple[Indices, bool]:
     cavities = [Solid(part.vertices, part.triangles[:, ::-1]) for part in parts if part.volume <= 0]
     slack = OVERLAP * abs(total)
     if len(bodies) > 1 and sum(body.volume for body in bodies) - union_volume(bodies) > slack:
-        message = f"{len(bodies)} separate solids overlap; unite them into one surface first"
+        message = f"{len(bodies)} solids overlap; unite them into one surface first"
         raise MeshError(MeshRefusal.OVERLAP, message)
+    if len(bodies) > 1:
+        message = f"{len(bodies)} separate solids; a grasp holds one, so give one solid a file"
+        raise MeshError(MeshRefusal.SEPARATE, message)
     for cavity in cavities:
         inside = sum(intersection_volume(body, cavity) for body in bodies)
         if cavity.volume - inside > slack:

@@ -16,7 +16,7 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import UNIT_SLACK, Array
-from grasp_core.closure import critical_friction, force_closure
+from grasp_core.closure import LARGEST_FRICTION, critical_friction, force_closure
 from grasp_core.concurrent_grasps import (
     ConcurrentPlacement,
     cone_footprint,
@@ -103,8 +103,10 @@ def plan(  # noqa: PLR0913 - the contract's keywords
 
 
 def _planned_half_angle(friction: float, theta_deg: float | None) -> float:
-    if not (math.isfinite(friction) and friction > 0.0):
-        raise InputError(f"friction must be a positive number, got {friction}")
+    if not 0.0 < friction <= LARGEST_FRICTION:
+        raise InputError(
+            f"friction must be a positive number up to {LARGEST_FRICTION:g}, got {friction}"
+        )
     theta = math.atan(friction)
     if theta_deg is None:
         return theta

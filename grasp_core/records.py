@@ -12,16 +12,13 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.mesh import polyhedron_from_mesh
+from grasp_core.on_faces import check_on_faces
 from grasp_core.values import Contact, ContactRegion, ForceCone, Grasp, Plan, Polyhedron, four
 from grasp_core.versions import versions
 
 SCHEMA = 1
-ON_FACE = 1e-6
-"""How far a contact read from a file may be off its face, in object radii."""
-
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Triple = tuple[Finite, Finite, Finite]
 
@@ -217,24 +214,5 @@ def _grasp_from_record(body: Polyhedron, record: GraspRecord) -> Grasp:
         critical_friction=record.critical_friction,
         closure_margin=record.closure_margin,
     )
-    _check_on_faces(body, grasp)
+    check_on_faces(body, grasp)
     return grasp
-
-
-def _check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
-    for finger, (face, contact) in enumerate(zip(grasp.faces, grasp.contacts, strict=True)):
-        where = f"grasps file: {grasp.id}: contact {finger}"
-        if not 0 <= face < len(body.faces):
-            raise InputError(f"{where} names face {face}; there are 0..{len(body.faces) - 1}")
-        plane, slack = body.faces[face], ON_FACE * body.radius
-        off = abs(float(plane.normal @ (contact.position - plane.centroid)))
-        if off > slack or float(np.abs(contact.normal - plane.normal).max()) > ON_FACE:
-            raise InputError(f"{where} does not lie on face {face} with that face's normal")
-        if not any(_inside(contact.position, piece, plane.normal, slack) for piece in plane.pieces):
-            raise InputError(f"{where} lies outside the border of face {face}")
-
-
-def _inside(point: Array, polygon: Array, normal: Array, slack: float) -> bool:
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    inward = np.cross(normal, edges) / np.linalg.norm(edges, axis=1, keepdims=True)
-    return bool((np.einsum("ki,ki->k", inward, point - polygon) >= -slack).all())

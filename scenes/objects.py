@@ -48,6 +48,8 @@ def example_object(name: str) -> Polyhedron:
     else:
         near = difflib.get_close_matches(key, example_names(), n=3)
         hint = f"did you mean {' or '.join(near)}?" if near else "see `graspproof objects`"
+        if key.startswith("random"):
+            hint = f"write random-FACES-SEED with {RANDOM_FACES[0]} to {RANDOM_FACES[-1]} faces"
         raise InputError(f"there is no built-in object {name!r}; {hint}")
     return Polyhedron.from_mesh(solid.vertices, solid.triangles, name=key)
 

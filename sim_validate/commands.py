@@ -198,8 +198,8 @@ def _show(grasps: Sequence[Grasp], verdicts: Sequence[Verdict], reporter: Report
         held = sum(control.held for control in verdict.controls)
         rows.append(
             (grasp.id, grasp.family, f"{1e3 * grasp.radius:.3g}",
-             f"{grasp.critical_friction:.4f}", verdict.outcome.value, f"{1e6 * worst:.2g}",
-             f"{held}/{len(verdict.controls)} held")
+             f"{verdict.critical_friction.predicted:.4f}", verdict.outcome.value,
+             f"{1e6 * worst:.2g}", f"{held}/{len(verdict.controls)} held")
         )  # fmt: skip
     columns = ("grasp", "family", "radius mm", "mu*", "simulated", "moved um", "controls")
     reporter.table("verdicts", columns, rows)

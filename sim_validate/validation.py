@@ -6,7 +6,7 @@ confirmed when all wrenches hold, and the run can be trusted when no control doe
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from grasp_core.arrays import Array, to_digits
 from grasp_core.closure import contact_frictions, critical_friction, force_closure
 from grasp_core.errors import InputError
 from grasp_core.forces import closest_forces, least_friction_forces
+from grasp_core.on_faces import check_on_faces
 from grasp_core.quality import WrenchBody, axis_wrenches
 from grasp_core.values import Contact, Grasp, Polyhedron
 from scenes.mjcf import Scene, build_scene
@@ -125,8 +126,9 @@ def validate(  # noqa: PLR0913 - the circumstances of a trial
         seed: Chooses how contacts are moved for a negative control.
 
     Raises:
-        InputError: The friction does not exceed the grasp's critical friction.
+        InputError: The contacts are not on the body's faces, or not closed at this friction.
     """
+    check_on_faces(body, grasp)
     critical = critical_friction(grasp)
     if not (friction > critical and force_closure(grasp, friction=friction).closed):
         raise InputError(
@@ -138,7 +140,9 @@ def validate(  # noqa: PLR0913 - the circumstances of a trial
     wrenches = tuple(rig.hold(*test) for test in rig.loads())
     controls = tuple(
         _control(body, control, max_normal_force, protocol, physics)
-        for control in negative_controls(body, grasp, friction, seed)
+        for control in negative_controls(
+            body, replace(grasp, critical_friction=critical), friction, seed
+        )
     )
     limits = CriticalFriction(predicted=critical)
     return Verdict(grasp.id, limits, wrenches, controls, rig.scene, protocol)

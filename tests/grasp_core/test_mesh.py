@@ -88,6 +88,8 @@ BAD_ARRAYS = {
         lambda v, t: (np.vstack([v, v + 0.04]), np.vstack([t, t + 8])), MeshRefusal.OVERLAP),
     "nested solids": (
         lambda v, t: (np.vstack([v, 0.5 * v]), np.vstack([t, t + 8])), MeshRefusal.OVERLAP),
+    "two solids side by side": (
+        lambda v, t: (np.vstack([v, v + 1.0]), np.vstack([t, t + 8])), MeshRefusal.SEPARATE),
     "a part inside out": (
         lambda v, t: (np.vstack([v, 0.5 * v + 1]), np.vstack([t, t[:, ::-1] + 8])),
         MeshRefusal.WINDING),

@@ -197,11 +197,19 @@ def test_a_good_hold_after_a_blow_up_is_judged_on_its_own():
 
 
 def test_contacts_that_are_not_closed_are_refused_whatever_they_claim():
-    """Four contacts on one line through a box, with a critical friction of zero written on."""
-    body, (grasp, *_) = grasps("tetrahedron", 0.5, 1)
-    line = [gc.Contact([0.0, 0, z], [0.0, 0, s]) for z, s in ((-2, 1), (-1, 1), (1, -1), (2, -1))]
-    with pytest.raises(gc.InputError, match="needs friction above inf"):
-        sv.validate(body, replace(grasp, contacts=tuple(line)), 0.5)
+    """Contacts moved on their faces until closure is lost, with a critical friction of zero."""
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
+    controls = {control.name: control for control in negative_controls(body, grasp, 0.5, seed=0)}
+    moved = controls["contacts_moved"].contacts
+    with pytest.raises(gc.InputError, match="needs friction above"):
+        sv.validate(body, replace(grasp, contacts=moved, critical_friction=0.0), 0.5)
+
+
+def test_a_grasp_of_another_object_is_refused():
+    _, (grasp, *_) = grasps("wedge", 0.5, 1)
+    for name in ("octahedron", "box"):
+        with pytest.raises(gc.InputError, match=r"names face|does not lie on face"):
+            sv.validate(scenes.example_object(name), grasp, 0.5)
 
 
 def test_a_simulator_with_too_much_friction_is_caught_by_the_controls(monkeypatch):
