@@ -1,8 +1,8 @@
 """Four-finger force-closure grasps of polyhedra: planning, and proofs either way."""
 
 from grasp_core.closure import ClosureCertificate as ClosureCertificate
-from grasp_core.closure import critical_friction as critical_friction
 from grasp_core.closure import force_closure as force_closure
+from grasp_core.critical import critical_friction as critical_friction
 from grasp_core.errors import GraspError as GraspError
 from grasp_core.errors import InputError as InputError
 from grasp_core.errors import MeshError as MeshError
@@ -11,7 +11,9 @@ from grasp_core.errors import NoForcesError as NoForcesError
 from grasp_core.errors import SolverError as SolverError
 from grasp_core.errors import UndecidedError as UndecidedError
 from grasp_core.forces import contact_forces as contact_forces
+from grasp_core.lines import classify_lines as classify_lines
 from grasp_core.mesh import load_polyhedron as load_polyhedron
+from grasp_core.planner import iter_grasps as iter_grasps
 from grasp_core.planner import plan as plan
 from grasp_core.quality import max_resisted_wrench as max_resisted_wrench
 from grasp_core.spanning import cones_positively_span as cones_positively_span
@@ -23,3 +25,4 @@ from grasp_core.values import ForceCone as ForceCone
 from grasp_core.values import Grasp as Grasp
 from grasp_core.values import Plan as Plan
 from grasp_core.values import Polyhedron as Polyhedron
+from grasp_core.values import Witness as Witness

@@ -21,7 +21,6 @@ Source: Sudsang & Ponce 1995, Definition 1 and Proposition 1, with the condition
 made explicit; the cone program is standard.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,19 +30,9 @@ from grasp_core.arrays import Array, frozen
 from grasp_core.closure_margin import decide, proves_closure, refutes_closure
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.values import Grasp, contact_arrays
-from grasp_core.wrenches import normal_and_tangential
 
 LARGEST_FRICTION = 1e3
 """Coefficients above this are reported as infinite; no material comes near it."""
-FRICTION_ACCURACY = 1e-8
-"""Relative width of the final bracket of a critical friction."""
-FRICTIONLESS = 1e-6
-"""Critical frictions below this are reported as zero: a contact in a file with six digits is
-not placed better."""
-UNPROVED = 1e-6
-"""Width of a bracket that may be left when neither side has a proof any more, absolute below
-a coefficient of one: margins may grow by as little as 1e-5 of the coefficient, and are known to
-1e-11. The upper end, which is returned, is proved to suffice."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,14 +65,14 @@ class ClosureCertificate:
     def verify(self) -> bool:
         """Re-check the verdict in plain arithmetic, without any solver."""
         if self.closed:
-            arms, _, _ = _unit_size(self.positions)
+            arms, _, _ = unit_size(self.positions)
             return self.forces is not None and proves_closure(
                 self.forces, arms, self.normals, self.friction
             )
         return self.separating_wrench is not None and self._separates(self.separating_wrench)
 
     def _separates(self, wrench: Array) -> bool:
-        arms, center, size = _unit_size(self.positions)
+        arms, center, size = unit_size(self.positions)
         twist = np.concatenate(
             [wrench[:3] + np.cross(wrench[3:], center), wrench[3:] * size]
         )  # about the contacts' centre, at unit size
@@ -109,7 +98,7 @@ def force_closure(
     """
     points, units = contact_arrays(positions, normals)
     mu = contact_frictions(friction, len(points))
-    arms, center, size = _unit_size(points)
+    arms, center, size = unit_size(points)
     answer = decide(arms, units, mu)
     if answer.forces is not None:
         return ClosureCertificate(True, answer.margin, points, units, mu, answer.forces, None)
@@ -124,66 +113,7 @@ def force_closure(
     )
 
 
-def critical_friction(positions: ArrayLike | Grasp, normals: ArrayLike | None = None) -> float:
-    """Smallest common Coulomb coefficient above which the contacts are in force closure.
-
-    A bracket is narrowed from both sides by certificates: balancing forces in all cones
-    bound it from above by their own steepest angle, a separating twist from below.
-
-    Args:
-        positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
-        normals: Unit vectors into the object, (k, 3).
-
-    Returns:
-        The upper end of the bracket, to `FRICTION_ACCURACY` or `UNPROVED`; 0.0 below
-        `FRICTIONLESS`;
-        `math.inf` when `LARGEST_FRICTION` does not suffice.
-
-    Raises:
-        InputError: Shapes or lengths are wrong.
-        UndecidedError: The contacts are so close to degenerate that no bracket can be proved.
-        SolverError: A program's answer failed its check.
-    """
-    points, units = contact_arrays(positions, normals)
-    arms, _, _ = _unit_size(points)
-    lower, upper, trial = 0.0, math.inf, 0.5
-    while upper > FRICTIONLESS and upper > lower * (1.0 + FRICTION_ACCURACY):
-        answer = decide(arms, units, np.full(len(points), trial))
-        if answer.forces is not None:
-            upper = min(trial, _steepest(answer.forces, units))
-        elif answer.twist is not None:
-            lower = max(trial, _least_friction_not_separated(answer.twist, arms, units))
-        elif upper - lower <= UNPROVED * max(upper, 1.0):
-            break
-        else:
-            raise UndecidedError(
-                f"the critical friction lies in [{lower:.6g}, {upper:.6g}] and neither closure "
-                f"nor its opposite can be proved at {trial:.6g}; move the contacts slightly"
-            )
-        if lower >= LARGEST_FRICTION:
-            return math.inf
-        trial = _between(lower, upper)
-    return 0.0 if upper <= FRICTIONLESS else upper
-
-
-def _between(lower: float, upper: float) -> float:
-    """Halve the bracket of cone angles: it treats small and large friction alike."""
-    return math.tan(0.5 * (math.atan(lower) + math.atan(min(upper, 4.0 * LARGEST_FRICTION))))
-
-
-def _steepest(forces: Array, normals: Array) -> float:
-    along, across = normal_and_tangential(forces, normals)
-    return float((across / along).max())
-
-
-def _least_friction_not_separated(twist: Array, arms: Array, normals: Array) -> float:
-    """Up to which common friction a twist keeps separating."""
-    velocities = twist[:3] + np.cross(twist[3:], arms)
-    along, across = normal_and_tangential(velocities, normals)
-    return float(np.min(-along / np.maximum(across, np.finfo(np.float64).tiny)))
-
-
-def _unit_size(points: Array) -> tuple[Array, Array, float]:
+def unit_size(points: Array) -> tuple[Array, Array, float]:
     """Arms from the mean contact over the longest one, with that centre and length."""
     center = points.mean(axis=0)
     arms = points - center

@@ -27,7 +27,6 @@ Source: Sudsang & Ponce 1995, section 3.1 and Proposition 5.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -35,6 +34,7 @@ from grasp_core.arrays import Array
 from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece
 from grasp_core.lp import LinearProgram, Optimum, maximize
+from grasp_core.placements import NoPlacement, Placement, balanced_forces
 from grasp_core.polygons import clip
 from grasp_core.values import FINGERS, ForceCone
 
@@ -45,40 +45,16 @@ KEPT = 1e-9
 asked of the first."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ConcurrentPlacement:
-    """Focus point and discs of one quadruple of faces, in the pieces' units."""
-
-    focus: Array
-    """(3,)"""
-    positions: Array
-    """Disc centres, (4, 3)."""
-    radii: Array
-    """Radius of each disc, (4,); contacts anywhere in the four discs are in equilibrium."""
-    radius: float
-    """The smallest of them."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NoConcurrentPlacement:
-    """No focus point serves these faces and cones with discs of positive radius.
-
-    `bound` is the largest radius that the program's multipliers allow.
-    """
-
-    bound: float
-
-
 def place_concurrent(
-    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], *, least_radius: float
-) -> ConcurrentPlacement | NoConcurrentPlacement:
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], *, least: float
+) -> Placement | NoPlacement:
     """Place a focus point and four discs of the largest common radius.
 
     Args:
         pieces: Four convex pieces, in finger order, in units where the object has size one.
         cones: The force cones, in the same order; together they must satisfy the
             generalised P3 for the result to mean equilibrium.
-        least_radius: Smaller discs count as none.
+        least: Smaller discs count as none.
 
     Raises:
         SolverError: A program's answer failed its check.
@@ -87,8 +63,8 @@ def place_concurrent(
     first = maximize(LinearProgram(_unit(A.shape[1], 15), A, b))
     if not isinstance(first, Optimum):
         raise SolverError("a program that is feasible for small enough radii was called infeasible")
-    if first.value < least_radius:
-        return NoConcurrentPlacement(first.value)
+    if first.value < least:
+        return NoPlacement(first.value)
     keep = -_unit(A.shape[1], 15)
     even = LinearProgram(
         _unit(A.shape[1], 11, 12, 13, 14),
@@ -99,7 +75,9 @@ def place_concurrent(
     x = second.x if isinstance(second, Optimum) else first.x
     y, radii = x[3:11].reshape(FINGERS, 2), x[11:15]
     positions = np.array([piece.point(at) for piece, at in zip(pieces, y, strict=True)])
-    return ConcurrentPlacement(x[:3], positions, radii, float(radii.min()))
+    focus = x[:3]
+    forces = balanced_forces(pieces, focus - positions)
+    return Placement(positions, forces, focus[None], radii, float(radii.min()))
 
 
 def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array) -> Array:
@@ -132,23 +110,18 @@ def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES)
     return np.sin(psi) * cone.axis - np.cos(psi) * across
 
 
-def radius_bounds(normals: Array, offsets: Array, half_angles: Array) -> Array:
-    """Upper bounds on the discs of many quadruples whose force cones surround the normals.
+def concurrent_radius_bounds(depths: Array, half_angles: Array) -> Array:
+    """Upper bounds on the discs of quadruples whose force cones surround the normals.
 
     A disc needs r <= d_i tan(half_angle) cos(pi / sides) with d_i = n_i.x0 - h_i. With the
     positive weights of sum lam_i n_i = 0, sum lam_i d_i = -sum lam_i h_i wherever the focus
-    is, so the least d_i is at most that sum over sum lam_i.
+    is, so the least d_i is at most the mean depth.
 
     Args:
-        normals: Positively spanning unit vectors, (q, 4, 3).
-        offsets: h_i = n_i.x on each face's plane, (q, 4).
+        depths: -sum lam h / sum lam of each quadruple, (q,).
         half_angles: (q,) [rad].
     """
-    weights = np.abs(
-        [np.linalg.det(np.delete(normals, left_out, axis=1)) for left_out in range(FINGERS)]
-    ).T
-    depth = -np.einsum("qi,qi->q", weights, offsets) / weights.sum(axis=1)
-    return depth * np.tan(half_angles) * np.cos(np.pi / PYRAMID_SIDES)
+    return depths * np.tan(half_angles) * np.cos(np.pi / PYRAMID_SIDES)
 
 
 def _rows(pieces: Sequence[FacePiece], cones: Sequence[ForceCone]) -> tuple[Array, Array]:

@@ -22,6 +22,14 @@ a certificate of their own, so this only catches answers that are wrong outright
 REQUESTED = 1e-11
 """Tolerance asked of the solver."""
 
+WAYS: tuple[tuple[str, float] | None, ...] = (
+    None,
+    ("equilibrate_enable", False),
+    ("max_step_fraction", 0.9),
+)
+"""Changes to the solver's settings, in the order they are tried: at frictions below 1e-3 it stops
+early now and then, and succeeds another way."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConicProgram:
@@ -55,8 +63,18 @@ def minimize(program: ConicProgram) -> ConicSolution:
     """Solve a feasible and bounded conic program.
 
     Raises:
-        SolverError: The answer failed our check; an infeasible program ends here too.
+        SolverError: Every answer failed our check; an infeasible program ends here too.
     """
+    failure = SolverError("no way of solving was tried")
+    for change in WAYS:
+        try:
+            return _solved(program, change)
+        except SolverError as error:
+            failure = error
+    raise failure
+
+
+def _solved(program: ConicProgram, change: tuple[str, float] | None) -> ConicSolution:
     clarabel, sparse = _modules()
     kinds: list[Any] = []
     if program.zeros:
@@ -67,7 +85,7 @@ def minimize(program: ConicProgram) -> ConicSolution:
     n = len(program.q)
     solver = clarabel.DefaultSolver(
         sparse.csc_matrix((n, n)), program.q, sparse.csc_matrix(program.A), program.b, kinds,
-        _settings(),
+        _settings(change),
     )  # fmt: skip
     answer = solver.solve()
     solution = ConicSolution(np.array(answer.x), np.array(answer.z), 0.0)
@@ -110,9 +128,11 @@ def _modules() -> tuple[Any, Any]:
 
 
 @cache
-def _settings() -> Any:
+def _settings(change: tuple[str, float] | None) -> Any:
     settings = _modules()[0].DefaultSettings()
     settings.verbose = False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = REQUESTED
     settings.max_threads = 1
+    if change is not None:
+        setattr(settings, *change)
     return settings

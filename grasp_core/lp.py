@@ -24,6 +24,10 @@ objects to unit size): ten times the tolerance the solver is asked for."""
 FARTHEST = 1e4
 """A proof of infeasibility excludes all points with |x|_1 up to this, at unit size."""
 
+STRATEGIES = (1, 4)
+"""HiGHS's dual and primal simplex, in the order they are tried: one program in some thousand ends
+as unknown under the one and is solved under the other."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearProgram:
@@ -71,7 +75,33 @@ def maximize(program: LinearProgram) -> Optimum | Infeasible:
     Raises:
         SolverError: The solver's answer failed our check, or the program is unbounded.
     """
-    solver, status = _run(program)
+    failure = SolverError("no way of solving was tried")
+    for strategy in STRATEGIES:
+        try:
+            return _solved(program, strategy)
+        except SolverError as error:
+            failure = error
+    return _refuted_by_least_violation(program, failure)
+
+
+def _refuted_by_least_violation(program: LinearProgram, failure: SolverError) -> Infeasible:
+    """Infeasible if every point violates some row: that program always has an optimum."""
+    G, h = program.stacked()
+    rows = len(program.b)
+    relaxed = np.vstack([G, -G[rows:]])
+    limits = np.concatenate([h, -h[rows:]])
+    violation = np.append(np.zeros(G.shape[1]), -1.0)
+    with_violation = np.hstack([relaxed, -np.ones((len(relaxed), 1))])
+    answer = _solved(LinearProgram(violation, with_violation, limits), STRATEGIES[0])
+    if not isinstance(answer, Optimum) or answer.value > -RESIDUAL:
+        raise failure
+    multipliers = answer.multipliers[: len(G)].copy()
+    multipliers[rows:] -= answer.multipliers[len(G) :]
+    return _checked_ray(program, multipliers)
+
+
+def _solved(program: LinearProgram, strategy: int) -> Optimum | Infeasible:
+    solver, status = _run(program, strategy)
     kinds = _highspy().HighsModelStatus
     if status == kinds.kOptimal:
         solution = solver.getSolution()
@@ -116,7 +146,7 @@ def _checked_ray(program: LinearProgram, ray: Array) -> Infeasible:
     raise SolverError("called infeasible, but the proof does not check")
 
 
-def _run(program: LinearProgram) -> tuple[Any, Any]:
+def _run(program: LinearProgram, strategy: int) -> tuple[Any, Any]:
     highspy = _highspy()
     G, h = program.stacked()
     lower = np.full(len(h), -np.inf)
@@ -135,6 +165,7 @@ def _run(program: LinearProgram) -> tuple[Any, Any]:
     model.a_matrix_.value_ = G[filled]
     solver = _solver()
     solver.clearSolver()
+    solver.setOptionValue("simplex_strategy", strategy)
     solver.passModel(model)
     solver.run()
     return solver, solver.getModelStatus()

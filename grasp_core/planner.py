@@ -1,54 +1,30 @@
-"""Tries the constructions over face quadruples, certifies what they find, and keeps counts.
+"""Runs the methods over the face quadruples of an object and gathers their grasps.
 
-Quadruples are taken in the order of an upper bound on their radius; with a `limit`, the
-search ends when the bound falls below the worst radius kept, so the grasps returned are the
-best ones and not merely some.
+The three constructions of the paper work on quadruples whose normals span (P3), in the order of
+an upper bound on their radius; with a `limit`, a search ends when the bound falls below the worst
+radius kept, so the grasps returned are the best ones and not merely some. The free method goes
+through all quadruples of faces and proves for the others that they hold no grasp.
 """
 
 import math
-from bisect import insort
-from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from itertools import product
-from typing import TypeAlias
+import time
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain, zip_longest
+from typing import TypeAlias, get_args
 
-import numpy as np
+from grasp_core.arrays import UNIT_SLACK
+from grasp_core.certified import Certified, to_grasp
+from grasp_core.closure import LARGEST_FRICTION
+from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS
+from grasp_core.errors import InputError
+from grasp_core.ranking import Ranking, candidate_quadruples, pieces_by_face
+from grasp_core.search import Search, search_construction, search_free
+from grasp_core.values import FINGERS, Family, Grasp, Method, Plan, PlanCounts, Polyhedron
 
-from grasp_core.arrays import UNIT_SLACK, Array
-from grasp_core.closure import LARGEST_FRICTION, critical_friction, force_closure
-from grasp_core.concurrent_grasps import (
-    ConcurrentPlacement,
-    cone_footprint,
-    place_concurrent,
-)
-from grasp_core.errors import InputError, UndecidedError
-from grasp_core.face_pieces import FacePiece, inscribed_disc_radius
-from grasp_core.ranking import (
-    LEAST_RADIUS,
-    PiecesByFace,
-    Quadruple,
-    Ranking,
-    pieces_by_face,
-    rank_quadruples,
-)
-from grasp_core.spanning import cones_positively_span
-from grasp_core.values import (
-    FINGERS,
-    Contact,
-    ContactRegion,
-    Family,
-    FamilyCounts,
-    ForceCone,
-    Grasp,
-    Plan,
-    PlanCounts,
-    Polyhedron,
-    four,
-)
-
-FAMILIES: tuple[Family, ...] = ("concurrent",)
-"""The families that can be planned."""
+FAMILIES: tuple[Family, ...] = get_args(Family)
+"""The families of the paper, each with its construction."""
+METHODS: tuple[Method, ...] = get_args(Method)
+"""Everything that `families` may name: the three constructions and `free`."""
 MAX_FACES = 200
 """65 million quadruples, some 6 million of which span: half a gigabyte."""
 Progress: TypeAlias = Callable[[int, int, int], None]
@@ -59,10 +35,11 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     body: Polyhedron,
     friction: float = 0.5,
     *,
-    families: Sequence[Family] = FAMILIES,
+    families: Sequence[Method] = FAMILIES,
     theta_deg: float | None = None,
     limit: int | None = None,
     seed: int = 0,
+    cells: int = 1,
     progress: Progress | None = None,
 ) -> Plan:
     """Find the four-finger force-closure grasps of an object.
@@ -70,11 +47,13 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     Args:
         body: The object.
         friction: Coulomb coefficient at every contact.
-        families: Which constructions to try.
+        families: Which constructions to try; `free` is the method without a fixed type.
         theta_deg: Half-angle of the friction cones to plan with [deg]; atan(friction) when
             None, and never more than that.
-        limit: Keep only this many grasps, those with the largest radius.
-        seed: Recorded with the plan; these constructions draw no random numbers.
+        limit: Keep only this many grasps, the best of each family in turn: those with the
+            largest discs. Reguli and free grasps have no discs; of these the first found count.
+        seed: For the restarts of the free method.
+        cells: Into how many parts the free method may cut the faces of one quadruple.
         progress: Called after each quadruple.
 
     Returns:
@@ -84,22 +63,117 @@ def plan(  # noqa: PLR0913 - the contract's keywords
         InputError: An argument is out of range, or the object has too many faces.
         SolverError: A program was neither solved nor proved infeasible.
     """
-    theta = _planned_half_angle(friction, theta_deg)
-    _check_request(body, families, limit)
-    pieces = pieces_by_face(body)
-    quadruples = rank_quadruples(body, pieces, theta)
-    grasps, counts = _search_concurrent(body, pieces, friction, quadruples, limit, progress)
-    faces = len(body.faces)
-    return Plan(
-        grasps=grasps,
-        friction=friction,
-        theta=theta,
-        seed=seed,
-        counts=PlanCounts(
-            faces, math.comb(faces, FINGERS), len(quadruples), {"concurrent": counts}
-        ),
-        absence=None if grasps else _absence(body.name, len(quadruples)),
-    )
+    searches = _Searches(body, friction, families, theta_deg, limit, seed, cells)
+    for _ in searches.run(progress):
+        pass
+    return searches.plan()
+
+
+def iter_grasps(
+    body: Polyhedron,
+    friction: float = 0.5,
+    *,
+    families: Sequence[Method] = FAMILIES,
+    theta_deg: float | None = None,
+    seed: int = 0,
+) -> Iterator[Grasp]:
+    """Like `plan`, but yields each grasp as soon as it is certified, in no particular order.
+
+    Raises:
+        InputError: As `plan`.
+        SolverError: As `plan`.
+    """
+    searches = _Searches(body, friction, families, theta_deg, None, seed, 1)
+    for found in searches.run(None):
+        yield to_grasp(body, friction, found)
+
+
+class _Searches:
+    """One search per method, run one after the other."""
+
+    def __init__(  # noqa: PLR0913, PLR0917 - as `plan`
+        self,
+        body: Polyhedron,
+        friction: float,
+        families: Sequence[Method],
+        theta_deg: float | None,
+        limit: int | None,
+        seed: int,
+        cells: int,
+    ) -> None:
+        self.body, self.friction, self.seed, self.cells = body, friction, seed, cells
+        self.theta = _planned_half_angle(friction, theta_deg)
+        _check_request(body, families, limit, cells)
+        self.pieces = pieces_by_face(body)
+        self.candidates = candidate_quadruples(body, self.pieces, self.theta)
+        self.quadruples = math.comb(len(body.faces), FINGERS)
+        self.rankings: dict[Method, Ranking] = {}
+        self.by_method: dict[Method, Search] = {}
+        for family in FAMILIES:
+            if family in families:
+                self.rankings[family] = self.candidates.ranked(CONSTRUCTIONS[family])
+                self.by_method[family] = Search(limit, len(self.rankings[family]))
+        if "free" in families:
+            self.by_method["free"] = Search(limit, self.quadruples)
+        self.limit = limit
+
+    def run(self, progress: Progress | None) -> Iterator[Certified]:
+        """Yield each certified grasp, in the order of the search."""
+        total = sum(search.total for search in self.by_method.values())
+        before = found = 0
+        for method, search in self.by_method.items():
+            start = time.process_time()
+            for done, grasps in enumerate(self._steps(method, search), start=1):
+                found += len(grasps)
+                search.seconds = time.process_time() - start
+                if progress is not None:
+                    progress(before + done, total, found)
+                yield from grasps
+            before += search.total
+
+    def _steps(self, method: Method, search: Search) -> Iterator[list[Certified]]:
+        if method == "free":
+            return search_free(
+                self.pieces, self.friction, self.theta, self.seed, self.cells, search
+            )
+        return search_construction(
+            CONSTRUCTIONS[method], self.pieces, self.friction, self.rankings[method], search
+        )
+
+    def plan(self) -> Plan:
+        """What was found so far."""
+        kept = _best_of_each_in_turn([s.best for s in self.by_method.values()], self.limit)
+        grasps = [to_grasp(self.body, self.friction, found) for found in kept]
+        grasps.sort(key=lambda grasp: -float(f"{grasp.radius:.9g}"))
+        counts = PlanCounts(
+            len(self.body.faces),
+            self.quadruples,
+            len(self.candidates),
+            {method: search.counts for method, search in self.by_method.items()},
+        )
+        return Plan(
+            grasps=tuple(grasps),
+            friction=self.friction,
+            theta=self.theta,
+            seed=self.seed,
+            counts=counts,
+            absence=None if grasps else _absence(self.body.name, counts),
+            absences={
+                faces: proofs
+                for search in self.by_method.values()
+                for faces, proofs in search.absences.items()
+            },
+            seconds={method: search.seconds for method, search in self.by_method.items()},
+        )
+
+
+def _best_of_each_in_turn(
+    lists: Sequence[Sequence[Certified]], limit: int | None
+) -> list[Certified]:
+    """At most `limit` of all, as many of each as there are; each list keeps its order."""
+    turns = chain.from_iterable(zip_longest(*lists))
+    chosen = {found.id for found in [one for one in turns if one is not None][:limit]}
+    return [found for found in chain.from_iterable(lists) if found.id in chosen]
 
 
 def _planned_half_angle(friction: float, theta_deg: float | None) -> float:
@@ -118,12 +192,15 @@ def _planned_half_angle(friction: float, theta_deg: float | None) -> float:
     return min(math.radians(theta_deg), theta)
 
 
-def _check_request(body: Polyhedron, families: Sequence[Family], limit: int | None) -> None:
-    unknown = [family for family in families if family not in FAMILIES]
+def _check_request(
+    body: Polyhedron, families: Sequence[Method], limit: int | None, cells: int
+) -> None:
+    unknown = [family for family in families if family not in METHODS]
     if unknown or not families:
-        raise InputError(f"families must be among {', '.join(FAMILIES)}; got {list(families)}")
-    if limit is not None and limit < 1:
-        raise InputError(f"limit must be at least 1, got {limit}")
+        raise InputError(f"families must be among {', '.join(METHODS)}; got {list(families)}")
+    for name, value in (("limit", limit), ("cells", cells)):
+        if value is not None and value < 1:
+            raise InputError(f"{name} must be at least 1, got {value}")
     if len(body.faces) > MAX_FACES:
         raise InputError(
             f"{body.name} has {len(body.faces)} planar faces, over the limit of {MAX_FACES}; "
@@ -131,135 +208,24 @@ def _check_request(body: Polyhedron, families: Sequence[Family], limit: int | No
         )
 
 
-def _absence(name: str, spanning: int) -> str:
-    if not spanning:
+def _absence(name: str, counts: PlanCounts) -> str:
+    free = counts.families.get("free")
+    if free is not None:
+        if free.undecided:
+            return (
+                f"{name}: no grasp was found; {free.undecided} of {free.tried} face quadruples "
+                "are undecided, all others are proved to hold none"
+            )
+        return f"{name}: each of {free.tried} face quadruples is proved to hold no grasp"
+    if not counts.spanning:
         return (
             f"{name} has no four faces whose normals keep positively spanning space when each "
-            "may tilt within a force cone (P3; no box or prism has), so this construction "
-            "offers no grasp"
+            "may tilt within a force cone (P3; no box or prism has), so the paper's "
+            "constructions offer no grasp; the free method may (--family free)"
         )
+    tried = " or ".join(counts.families)
     return (
-        f"{name}: {spanning} face quadruples span (P3), but none has a point that four discs of "
-        f"at least {LEAST_RADIUS:g} object radii can aim at, so there is no concurrent grasp"
-    )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Found:
-    """A certified placement, before it is written out as a grasp."""
-
-    quadruple: Quadruple
-    pieces: tuple[FacePiece, ...]
-    placement: ConcurrentPlacement
-    margin: float
-
-
-def _search_concurrent(
-    body: Polyhedron,
-    pieces: PiecesByFace,
-    friction: float,
-    quadruples: Ranking,
-    limit: int | None,
-    progress: Progress | None,
-) -> tuple[tuple[Grasp, ...], FamilyCounts]:
-    """The best grasps: the search ends when no bound reaches the worst one kept."""
-    best: list[_Found] = []
-    counts: Counter[str] = Counter()
-    for done, quadruple in enumerate(quadruples):
-        full = limit is not None and len(best) == limit
-        if full and quadruple.bound < best[-1].placement.radius * (1.0 - UNIT_SLACK):
-            counts["pruned"] = len(quadruples) - done
-            break
-        candidates = list(product(*(pieces[face] for face in quadruple.faces)))
-        placed = _largest_placement(quadruple, candidates)
-        found = placed and _certified(body, friction, quadruple, *placed)
-        outcome = "found" if found else "rejected" if placed else "infeasible"
-        counts.update({"tried": 1, "solved": len(candidates), outcome: 1})
-        if found:
-            insort(best, found, key=_by_radius)
-            best = best[:limit]
-        if progress is not None:
-            progress(done + 1, len(quadruples), counts["found"])
-    return tuple(_grasp(body, friction, found) for found in best), FamilyCounts(**counts)
-
-
-def _by_radius(found: _Found) -> tuple[float, tuple[int, ...]]:
-    """Largest radius first; ties are broken by the faces, not by rounding."""
-    return -float(f"{found.placement.radius:.9g}"), found.quadruple.faces
-
-
-def _cones(quadruple: Quadruple, pieces: Sequence[FacePiece]) -> list[ForceCone]:
-    return [ForceCone(piece.normal, quadruple.half_angle) for piece in pieces]
-
-
-def _largest_placement(
-    quadruple: Quadruple, candidates: Sequence[tuple[FacePiece, ...]]
-) -> tuple[tuple[FacePiece, ...], ConcurrentPlacement] | None:
-    """The best over all choices of one convex piece per face."""
-    best = None
-    for pieces in candidates:
-        floor = best[1].radius if best else LEAST_RADIUS
-        if min(piece.inradius for piece in pieces) < floor:
-            continue
-        placement = place_concurrent(pieces, _cones(quadruple, pieces), least_radius=floor)
-        if isinstance(placement, ConcurrentPlacement):
-            best = pieces, placement
-    return best
-
-
-def _certified(
-    body: Polyhedron,
-    friction: float,
-    quadruple: Quadruple,
-    pieces: tuple[FacePiece, ...],
-    placement: ConcurrentPlacement,
-) -> _Found | None:
-    """The placement with its margin, if its cones span (P3) and the exact closure test agrees."""
-    normals = np.array([piece.normal for piece in pieces])
-    if not cones_positively_span(normals, [quadruple.half_angle] * FINGERS):
-        return None
-    try:
-        certificate = force_closure(_at(body, placement.positions), normals, friction)
-    except UndecidedError:
-        return None
-    if not certificate.closed:
-        return None
-    return _Found(quadruple, pieces, placement, certificate.margin)
-
-
-def _at(body: Polyhedron, unit_points: Array) -> Array:
-    """Points in the pieces' units back in the object's frame [m]."""
-    return body.center_of_mass + body.radius * unit_points
-
-
-def _critical(positions: Array, normals: Array, friction: float) -> float:
-    """The critical friction; where it cannot be bracketed, the friction that is proved enough."""
-    try:
-        return critical_friction(positions, normals)
-    except UndecidedError:
-        return friction
-
-
-def _grasp(body: Polyhedron, friction: float, found: _Found) -> Grasp:
-    quadruple, pieces, placement = found.quadruple, found.pieces, found.placement
-    positions = _at(body, placement.positions)
-    normals = np.array([piece.normal for piece in pieces])
-    cones = _cones(quadruple, pieces)
-    regions: list[ContactRegion] = []
-    for piece, cone in zip(pieces, cones, strict=True):
-        polygon = cone_footprint(piece, cone, placement.focus)
-        disc = body.radius * inscribed_disc_radius(polygon, piece)
-        regions.append(ContactRegion("cone", _at(body, polygon), disc))
-    return Grasp(
-        id="c-" + "-".join(str(face) for face in quadruple.faces),
-        family="concurrent",
-        faces=quadruple.faces,
-        contacts=four(Contact(p, n) for p, n in zip(positions, normals, strict=True)),
-        focus_points=_at(body, placement.focus[None]),
-        force_cones=four(cones),
-        regions=four(regions),
-        radius=body.radius * placement.radius,
-        span_angle=quadruple.span_angle,
-        critical_friction=_critical(positions, normals, friction),
-        closure_margin=found.margin,
+        f"{name}: {counts.spanning} face quadruples span (P3), but none carries a {tried} grasp "
+        f"with discs of at least {LEAST_RADIUS:g} object radii; the free method may find others "
+        "(--family free)"
     )

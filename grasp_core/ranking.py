@@ -12,13 +12,11 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.concurrent_grasps import radius_bounds
+from grasp_core.constructions import LEAST_RADIUS, Construction
 from grasp_core.face_pieces import FacePiece, unit_pieces
 from grasp_core.spanning import spanning_quadruples
-from grasp_core.values import Polyhedron, four
+from grasp_core.values import FINGERS, FaceQuadruple, Polyhedron, four
 
-LEAST_RADIUS = 1e-3
-"""Smaller discs, relative to the object's radius, do not count as a region to stand in."""
 LEAST_SPAN_ANGLE = math.atan(LEAST_RADIUS)
 """With narrower cones no disc at a depth of one object radius would count."""
 BELOW_SPAN_ANGLE = 0.999
@@ -34,21 +32,23 @@ PiecesByFace: TypeAlias = list[list[FacePiece]]
 class Quadruple:
     """Four faces to try, with the half-angle to plan them at."""
 
-    faces: tuple[int, int, int, int]
+    faces: FaceQuadruple
     span_angle: float
     half_angle: float
     bound: float
-    """No disc can be larger, relative to the object's radius."""
+    """No disc can be larger, relative to the object's radius; infinite without discs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ranking:
-    """The spanning quadruples, largest radius bound first."""
+    """Quadruples that span, most promising first."""
 
     faces: Indices
     """(q, 4)"""
     numbers: Array
     """Span angle, half-angle and bound of each, (q, 3)."""
+    dropped: int
+    """Quadruples left out because their bound is below the least radius."""
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -58,8 +58,41 @@ class Ranking:
             yield Quadruple(four(int(face) for face in faces), *(float(x) for x in numbers))
 
 
-def rank_quadruples(body: Polyhedron, pieces: PiecesByFace, theta: float) -> Ranking:
-    """Quadruples that span, by what their cones can reach and their faces have room for.
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """The quadruples of an object that span, with what bounds their grasps."""
+
+    faces: Indices
+    """(q, 4)"""
+    span_angles: Array
+    """theta* of each, (q,) [rad]."""
+    half_angles: Array
+    """theta_plan of each, (q,) [rad]."""
+    depths: Array
+    """Mean depth of any point below the four planes, weighted by the balancing weights of the
+    normals: it does not depend on the point, (q,), in object radii."""
+    rooms: Array
+    """Radius of the largest disc that fits in each of the four faces, (q,)."""
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+    def ranked(self, construction: Construction) -> Ranking:
+        """In the order of an upper bound on the radius; for reguli, widest force cones first."""
+        if construction.bounds is None:
+            bounds = np.full(len(self), np.inf)
+            order = np.argsort(-self.half_angles, kind="stable")
+        else:
+            reach = construction.bounds(self.depths, self.half_angles)
+            bounds = np.minimum(reach, self.rooms)
+            order = np.argsort(-bounds, kind="stable")
+        order = order[bounds[order] >= LEAST_RADIUS]
+        numbers = np.column_stack([self.span_angles, self.half_angles, bounds])
+        return Ranking(self.faces[order], numbers[order], len(self) - len(order))
+
+
+def candidate_quadruples(body: Polyhedron, pieces: PiecesByFace, theta: float) -> Candidates:
+    """The quadruples of an object that span, with the angle to plan each at.
 
     Args:
         body: The object.
@@ -68,15 +101,15 @@ def rank_quadruples(body: Polyhedron, pieces: PiecesByFace, theta: float) -> Ran
     """
     normals = body.normals
     found = spanning_quadruples(normals, LEAST_SPAN_ANGLE)
-    angles = np.minimum(INSIDE_FRICTION * theta, BELOW_SPAN_ANGLE * found.span_angles)
-    centroids = np.array([face.centroid for face in body.faces])
-    heights = np.einsum("fi,fi->f", normals, centroids - body.center_of_mass) / body.radius
-    reach = radius_bounds(normals[found.indices], heights[found.indices], angles)
+    quads = found.indices
     room = np.array([max((p.inradius for p in choices), default=0.0) for choices in pieces])
-    bounds = np.minimum(reach, room[found.indices].min(axis=1, initial=np.inf))
-    order = np.argsort(-bounds, kind="stable")
-    numbers = np.column_stack([found.span_angles, angles, bounds])
-    return Ranking(found.indices[order], numbers[order])
+    return Candidates(
+        faces=quads,
+        span_angles=found.span_angles,
+        half_angles=np.minimum(INSIDE_FRICTION * theta, BELOW_SPAN_ANGLE * found.span_angles),
+        depths=_mean_depths(normals[quads], _heights(body)[quads]),
+        rooms=room[quads].min(axis=1, initial=np.inf),
+    )
 
 
 def pieces_by_face(body: Polyhedron) -> PiecesByFace:
@@ -85,3 +118,17 @@ def pieces_by_face(body: Polyhedron) -> PiecesByFace:
     for piece in unit_pieces(body):
         pieces[piece.face].append(piece)
     return pieces
+
+
+def _heights(body: Polyhedron) -> Array:
+    """Height n.x of each face's plane, about the centre of mass over the radius, (faces,)."""
+    centroids = np.array([face.centroid for face in body.faces])
+    return np.einsum("fi,fi->f", body.normals, centroids - body.center_of_mass) / body.radius
+
+
+def _mean_depths(normals: Array, heights: Array) -> Array:
+    """-sum lam h / sum lam, with the positive weights of sum lam n = 0, (q,)."""
+    weights = np.abs(
+        [np.linalg.det(np.delete(normals, left_out, axis=1)) for left_out in range(FINGERS)]
+    ).T
+    return -np.einsum("qi,qi->q", weights, heights) / weights.sum(axis=1)

@@ -12,10 +12,22 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from grasp_core.certified import check_witness
 from grasp_core.errors import InputError
 from grasp_core.mesh import polyhedron_from_mesh
 from grasp_core.on_faces import check_on_faces
-from grasp_core.values import Contact, ContactRegion, ForceCone, Grasp, Plan, Polyhedron, four
+from grasp_core.values import (
+    Contact,
+    ContactRegion,
+    Family,
+    ForceCone,
+    Grasp,
+    Plan,
+    Polyhedron,
+    RegionKind,
+    Witness,
+    four,
+)
 from grasp_core.versions import versions
 
 SCHEMA = 1
@@ -61,9 +73,17 @@ class ConeRecord(_Record):
 class RegionRecord(_Record):
     """Where a finger may stand."""
 
-    kind: Literal["cone"]
+    kind: RegionKind
     polygon_m: list[Triple]
     inscribed_radius_m: Finite
+
+
+class WitnessRecord(_Record):
+    """Balanced forces along four lines, normal parts summing to one."""
+
+    points_m: tuple[Triple, Triple, Triple, Triple]
+    directions: tuple[Triple, Triple, Triple, Triple]
+    forces: tuple[Triple, Triple, Triple, Triple]
 
 
 class GraspRecord(_Record):
@@ -71,7 +91,7 @@ class GraspRecord(_Record):
 
     id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,99}$")
     """Also the name of the grasp's scene file, hence no dots or slashes."""
-    family: Literal["concurrent", "pencil", "regulus"]
+    family: Family
     faces: tuple[int, int, int, int]
     contacts: tuple[ContactRecord, ContactRecord, ContactRecord, ContactRecord]
     focus_points_m: list[Triple]
@@ -82,6 +102,7 @@ class GraspRecord(_Record):
     critical_friction: Finite
     closure_margin: Finite
     ferrari_canny: tuple[Finite, Finite] | None
+    witness: WitnessRecord
 
 
 class GraspsRecord(_Record):
@@ -160,6 +181,11 @@ def _grasp_to_record(grasp: Grasp) -> Mapping[str, object]:
         "critical_friction": grasp.critical_friction,
         "closure_margin": grasp.closure_margin,
         "ferrari_canny": None,
+        "witness": {
+            "points_m": grasp.witness.points.tolist(),
+            "directions": grasp.witness.directions.tolist(),
+            "forces": grasp.witness.forces.tolist(),
+        },
     }
 
 
@@ -185,13 +211,13 @@ def grasps_from_json(text: str) -> SavedGrasps:
     )
     if body.content_sha256 != record.object.content_sha256:
         raise InputError("grasps file: object.content_sha256 does not match its mesh")
-    grasps = tuple(_grasp_from_record(body, grasp) for grasp in record.grasps)
+    grasps = tuple(_grasp_from_record(body, grasp, record.friction) for grasp in record.grasps)
     if len({grasp.id for grasp in grasps}) < len(grasps):
         raise InputError("grasps file: two grasps have the same id")
     return SavedGrasps(body, record.friction, record.seed, grasps)
 
 
-def _grasp_from_record(body: Polyhedron, record: GraspRecord) -> Grasp:
+def _grasp_from_record(body: Polyhedron, record: GraspRecord, friction: float) -> Grasp:
     grasp = Grasp(
         id=record.id,
         family=record.family,
@@ -213,6 +239,8 @@ def _grasp_from_record(body: Polyhedron, record: GraspRecord) -> Grasp:
         span_angle=math.radians(record.span_angle_deg),
         critical_friction=record.critical_friction,
         closure_margin=record.closure_margin,
+        witness=Witness(np.array(record.witness.points_m), np.array(record.witness.forces)),
     )
     check_on_faces(body, grasp)
+    check_witness(body, grasp, friction)
     return grasp

@@ -80,11 +80,25 @@ def cones_positively_span(axes: ArrayLike, half_angles: ArrayLike) -> bool:
 
 def positively_span(vectors: Array) -> bool:
     """Whether some positive combination of four vectors, (4, 3), vanishes and they span R^3."""
-    signed = [
+    signed = _signed_determinants(vectors)
+    return min(signed) > DEPENDENT or max(signed) < -DEPENDENT
+
+
+def balancing_weights(vectors: Array) -> Array:
+    """The weights of sum w_i v_i = 0, summing to one in absolute value, (4,).
+
+    All are positive where the four vectors, (4, 3), positively span R^3.
+    """
+    signed = np.array(_signed_determinants(vectors))
+    return signed / np.abs(signed).sum() * np.sign(signed.sum())
+
+
+def _signed_determinants(vectors: Array) -> list[float]:
+    """Weights of a vanishing combination, by Cramer's rule."""
+    return [
         (-1) ** left_out * float(np.linalg.det(np.delete(vectors, left_out, axis=0)))
         for left_out in range(4)
     ]
-    return min(signed) > DEPENDENT or max(signed) < -DEPENDENT
 
 
 def triple_sine(one: Array, two: Array, three: Array) -> Array:

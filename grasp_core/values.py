@@ -6,7 +6,7 @@ point into the object. Arrays are copied, checked and made read-only on construc
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Self, TypeAlias, TypeVar
+from typing import Literal, Protocol, Self, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,10 +15,24 @@ from grasp_core.arrays import Array, Indices, frozen, frozen_indices, frozen_uni
 from grasp_core.errors import InputError
 
 Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
+"""The class of a grasp's witness lines."""
+Method: TypeAlias = Literal["concurrent", "pencil", "regulus", "free"]
+"""How grasps are looked for: by one of the paper's constructions, or free of any type."""
+RegionKind: TypeAlias = Literal["cone", "disc", "point"]
+FaceQuadruple: TypeAlias = tuple[int, int, int, int]
+"""Indices of four faces, in finger order."""
 
 Item = TypeVar("Item")
 
 FINGERS = 4
+
+
+class Proof(Protocol):
+    """A claim that can be re-checked without any solver."""
+
+    def verify(self) -> bool:
+        """Whether plain arithmetic confirms the claim."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,15 +155,35 @@ class Contact:
 class ContactRegion:
     """Where one finger may stand while the others stay anywhere in their own regions."""
 
-    kind: Literal["cone"]
-    """What certifies it: `cone` is the inverted force cone of a focus point cut with the face."""
+    kind: RegionKind
+    """What certifies it: `cone` is the inverted force cone of a focus point cut with the face,
+    `disc` a disc around the contact of a pencil; `point` claims nothing but the contact."""
     polygon: Array
-    """Convex polygon on the face, (k, 3) [m]."""
+    """Convex polygon on the face, (k, 3) [m]; of a disc, points of its border."""
     inscribed_radius: float
-    """Radius of the largest disc inside the polygon [m]."""
+    """Radius of the largest disc inside the region [m]."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "polygon", frozen(self.polygon, (None, 3), "polygon"))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Witness:
+    """Balanced forces, whose four lines show what family a grasp belongs to."""
+
+    points: Array
+    """A point on each line, the contact, (4, 3) [m]."""
+    forces: Array
+    """Forces along the lines, into the object, normal parts summing to one, (4, 3)."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", frozen(self.points, (FINGERS, 3), "points"))
+        object.__setattr__(self, "forces", frozen(self.forces, (FINGERS, 3), "forces"))
+
+    @property
+    def directions(self) -> Array:
+        """Unit vectors along the lines, (4, 3)."""
+        return self.forces / np.linalg.norm(self.forces, axis=1, keepdims=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,21 +192,24 @@ class Grasp:
 
     id: str
     family: Family
-    faces: tuple[int, int, int, int]
+    faces: FaceQuadruple
     contacts: tuple[Contact, Contact, Contact, Contact]
     focus_points: Array
-    """Where the witness lines of force meet, (k, 3) [m]: one point for a concurrent grasp."""
+    """Where witness lines of force meet, (k, 3) [m]: one point for a concurrent grasp, one for
+    each pair of a pencil. For a regulus, the points between the two lines of each pair, or none."""
     force_cones: tuple[ForceCone, ForceCone, ForceCone, ForceCone]
     """The cones the construction used; each lies inside its contact's friction cone."""
     regions: tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
     radius: float
-    """Radius of the smallest of the four independent discs [m]."""
+    """Radius of the smallest of the four independent discs [m]; 0.0 where none is claimed."""
     span_angle: float
     """Largest half-angle at which the four normals positively span, theta* [rad]."""
     critical_friction: float
     """Smallest Coulomb coefficient above which the contacts are in force closure."""
     closure_margin: float
     """Margin of the exact closure test at the planned friction (see `force_closure`)."""
+    witness: Witness
+    """Balanced forces whose lines are of the grasp's family."""
 
     def __post_init__(self) -> None:
         for name in ("faces", "contacts", "force_cones", "regions"):
@@ -193,21 +230,31 @@ class Grasp:
 
 
 @dataclass(frozen=True, slots=True)
-class FamilyCounts:
-    """What happened to the face quadruples of one family."""
+class MethodCounts:
+    """What became of the candidates of one method.
+
+    A candidate is a set of four faces; for pencils and reguli, with one of the three ways to pair
+    them. Tried candidates end as one of the last five.
+    """
 
     tried: int = 0
-    """Quadruples whose programs were set up."""
+    """Candidates whose programs were set up."""
     pruned: int = 0
-    """Quadruples skipped because a bound showed they cannot enter the best `limit`."""
+    """Candidates skipped because a bound showed that their discs are too small, or that they
+    cannot enter the best `limit`."""
     solved: int = 0
     """Choices of one convex piece per face that were considered."""
     infeasible: int = 0
-    """Quadruples without a placement that has discs of the least radius, at the planned angle."""
+    """No placement with discs of the least radius at the planned angle; for the free method,
+    proved to have no grasp at all."""
+    undecided: int = 0
+    """Free method only: neither a grasp nor a proof of absence."""
+    duplicates: int = 0
+    """Found again at the same contacts, with another pairing."""
     found: int = 0
-    """Grasps certified by the exact closure test."""
+    """Grasps whose witness is of its family and which exact force closure certified."""
     rejected: int = 0
-    """Grasps of the construction that the exact closure test did not certify: a bug if not 0."""
+    """Placements that either test did not confirm: a bug if not 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +266,8 @@ class PlanCounts:
     """All sets of four faces."""
     spanning: int
     """Those whose normals positively span at the least planned angle (P3)."""
-    families: Mapping[str, FamilyCounts] = field(default_factory=dict[str, FamilyCounts])
+    families: Mapping[str, MethodCounts] = field(default_factory=dict[str, MethodCounts])
+    """By method, the three families and perhaps `free`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -234,6 +282,13 @@ class Plan:
     counts: PlanCounts
     absence: str | None = None
     """Why there is no grasp, as a sentence; None when there is one."""
+    absences: Mapping[FaceQuadruple, tuple[Proof, ...]] = field(
+        default_factory=dict[FaceQuadruple, tuple[Proof, ...]]
+    )
+    """Face quadruples that the free method proved to hold no grasp at this friction, with a proof
+    for each choice of one convex piece per face."""
+    seconds: Mapping[str, float] = field(default_factory=dict[str, float])
+    """Processor time of each method's search."""
 
 
 def four(items: Iterable[Item]) -> tuple[Item, Item, Item, Item]:

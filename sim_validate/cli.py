@@ -63,8 +63,9 @@ class Planning:
     """Coulomb coefficient at every contact."""
     theta_deg: Positive | None = None
     """Half-angle of the friction cones to plan with [deg]; the friction angle if not given."""
-    family: UseAppendAction[tuple[Literal["concurrent"], ...]] = ()
-    """Construction to try; all if not given, may be repeated."""
+    family: UseAppendAction[tuple[Literal["concurrent", "pencil", "regulus", "free"], ...]] = ()
+    """Construction to try, may be repeated; the first three if not given. `free` looks for grasps
+    of any type on any four faces, and proves for the others that there is none."""
     limit: Count | None = None
     """Keep at most this many grasps, those with the largest independent discs; None for all."""
     seed: Seed = 0

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from grasp_core.closure import critical_friction, force_closure
+from grasp_core.closure import force_closure
+from grasp_core.critical import critical_friction
 from grasp_core.concurrent_grasps import PYRAMID_SIDES
 from grasp_core.errors import InputError
 from grasp_core.mesh import FORMATS, load_polyhedron
@@ -120,10 +121,12 @@ def _say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
         f"{counts.spanning} spanning (P3), friction {found.friction:g}, "
         f"theta {math.degrees(found.theta):.4g} deg"
     )
-    for family, tally in counts.families.items():
+    for method, tally in counts.families.items():
+        undecided = f"{tally.undecided} undecided, " if method == "free" else ""
         reporter.say(
-            f"{family}: {tally.tried} tried, {tally.pruned} pruned, {tally.infeasible} "
-            f"infeasible, {tally.found} found, {tally.rejected} rejected by exact closure"
+            f"{method}: {tally.tried} tried, {tally.pruned} pruned, {tally.infeasible} "
+            f"infeasible, {undecided}{tally.duplicates} duplicates, {tally.found} found, "
+            f"{tally.rejected} rejected by exact closure, {found.seconds[method]:.2f} s"
         )
 
 

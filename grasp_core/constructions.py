@@ -1,0 +1,90 @@
+"""The paper's three constructions behind one interface, so that the planner treats them alike."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.concurrent_grasps import (
+    concurrent_radius_bounds,
+    cone_footprint,
+    place_concurrent,
+)
+from grasp_core.face_pieces import FacePiece, inscribed_disc_radius
+from grasp_core.pencil_grasps import pencil_radius_bounds, place_pencil
+from grasp_core.placements import NoPlacement, Placement
+from grasp_core.regulus_grasps import place_regulus
+from grasp_core.values import ContactRegion, Family, ForceCone, RegionKind
+
+FingerOrder: TypeAlias = tuple[int, int, int, int]
+
+AS_LISTED: tuple[FingerOrder, ...] = ((0, 1, 2, 3),)
+PAIRINGS: tuple[FingerOrder, ...] = ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2))
+"""The three ways to group four faces into the pairs (first, second) and (third, fourth)."""
+LEAST_RADIUS = 1e-3
+"""Smaller discs, relative to the object's radius, do not count as a region to stand in; pencils'
+foci closer than this count as one point."""
+DISC_CORNERS = 64
+"""How many points of a disc's border are listed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Construction:
+    """How one family is built on a quadruple of face pieces."""
+
+    family: Family
+    orders: tuple[FingerOrder, ...]
+    """Finger orders that give different grasps of the same faces."""
+    place: Callable[[Sequence[FacePiece], Sequence[ForceCone], float], Placement | NoPlacement]
+    """From pieces, force cones and the least merit worth having."""
+    bounds: Callable[[Array, Array], Array] | None
+    """Upper bounds on the radius from depths and half-angles, see `concurrent_radius_bounds`;
+    None where no disc is claimed."""
+    region: Callable[[FacePiece, ForceCone, Placement, int], ContactRegion]
+    """The region of one finger, in the pieces' units."""
+
+
+def _cone_region(piece: FacePiece, cone: ForceCone, placed: Placement, _: int) -> ContactRegion:
+    polygon = cone_footprint(piece, cone, placed.foci[0])
+    return ContactRegion("cone", polygon, inscribed_disc_radius(polygon, piece))
+
+
+def _disc_region(piece: FacePiece, _: ForceCone, placed: Placement, finger: int) -> ContactRegion:
+    turns = 2.0 * np.pi * np.arange(DISC_CORNERS) / DISC_CORNERS
+    ring = np.column_stack([np.cos(turns), np.sin(turns)]) @ piece.frame.T
+    radius = float(placed.radii[finger])
+    return ContactRegion("disc", placed.positions[finger] + radius * ring, radius)
+
+
+def point_region(_: FacePiece, __: ForceCone, placed: Placement, finger: int) -> ContactRegion:
+    """Nothing but the contact."""
+    kind: RegionKind = "point"
+    return ContactRegion(kind, placed.positions[finger][None], 0.0)
+
+
+CONSTRUCTIONS: dict[Family, Construction] = {
+    "concurrent": Construction(
+        "concurrent",
+        AS_LISTED,
+        lambda pieces, cones, least: place_concurrent(
+            pieces, cones, least=max(least, LEAST_RADIUS)
+        ),
+        concurrent_radius_bounds,
+        _cone_region,
+    ),
+    "pencil": Construction(
+        "pencil",
+        PAIRINGS,
+        lambda pieces, cones, least: place_pencil(
+            pieces, cones, least=max(least, LEAST_RADIUS), least_gap=LEAST_RADIUS
+        ),
+        pencil_radius_bounds,
+        _disc_region,
+    ),
+    "regulus": Construction(
+        "regulus", PAIRINGS, lambda pieces, cones, _: place_regulus(pieces, cones), None,
+        point_region,
+    ),
+}  # fmt: skip

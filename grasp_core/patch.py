@@ -1,0 +1,302 @@
+"""Grasps of four convex faces without a type fixed in advance, or a proof that there is none.
+
+Solved: whether any four contacts, one on each of four convex faces, are in force closure at a
+given friction, at any friction and for any normals.
+
+Derivation. Put a contact at every corner of the four faces: the patch. A force at any point of
+a convex face is a convex combination of the same force at its corners, so if four contacts on
+the faces were in force closure, the patch would be too. A separating twist of the patch is
+therefore a proof of absence; by convexity of the supports it separates every grasp on these
+faces.
+
+If the patch is closed, add its forces face by face. The sums F_i lie inside the cones and
+balance as forces. With these forces fixed, equilibrium is linear in the positions
+x_i = o_i + T_i y_i:
+
+    maximise t  subject to  sum_i (o_i + T_i y_i) x F_i = 0,    e.y_i + t <= b for all edges.
+
+Any solution inside the faces, unless all on one line, is in force closure, as far from the
+edges as these forces allow.
+If there is none, the centres of pressure of the patch are tried as contacts, then patches of
+smaller random pieces of the faces, which give other forces. What is still open can be split:
+each face quadruple is cut through its longest face, parts are dropped with their proof of
+absence, until a grasp is found, nothing is left, or the budget is spent.
+
+Nothing here depends on P3. The lines of force are of the most general type, as a rule a
+regulus, with u, slopes and pitch free; so this also answers the freedom that the paper leaves
+unused when it fixes the direction u (its section 4).
+
+Source: Sudsang & Ponce 1995, Propositions 1 and 3; the relaxation by many contacts on a face
+is that of Omata's virtual fingers (1991), the rest is this project's.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from heapq import heappop, heappush
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure import ClosureCertificate, force_closure
+from grasp_core.errors import InputError, UndecidedError
+from grasp_core.face_pieces import FacePiece
+from grasp_core.lines import classify_lines
+from grasp_core.lp import LinearProgram, Optimum, maximize
+from grasp_core.placements import Placement
+from grasp_core.polygons import clip
+from grasp_core.values import FINGERS
+from grasp_core.wrenches import cross_matrix, grasp_map, normal_and_tangential
+
+RESTARTS = 12
+"""Smaller random patches that are tried before giving up or splitting."""
+SMALLER = 0.5
+"""Their size, as a share of the face."""
+LEAST_INSET = 1e-4
+"""Least distance of a contact from the edges of its face, in object radii."""
+LEAST_SPREAD = 1e-3
+"""Least extent of the contacts across the line they are closest to, in object radii."""
+Corners = tuple[Array, ...]
+"""Corners of a convex part of each piece, (k, 2) in its plane."""
+Path = tuple[int, ...]
+"""Which half was taken at each cut."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Absence:
+    """Proof that no four contacts on four convex pieces are in force closure."""
+
+    pieces: tuple[FacePiece, ...]
+    friction: float
+    leaves: tuple[tuple[Path, ClosureCertificate], ...]
+    """Parts that together cover the pieces, each with a twist that separates its patch."""
+
+    def verify(self) -> bool:
+        """Re-check in plain arithmetic that the parts cover the pieces and are all separated."""
+        paths = [path for path, _ in self.leaves]
+        halves = all(half in {0, 1} for path in paths for half in path)
+        apart = not any(
+            two[: len(one)] == one
+            for i, one in enumerate(paths)
+            for j, two in enumerate(paths)
+            if i != j
+        )
+        covered = halves and apart and sum(0.5 ** len(path) for path in paths) == 1.0
+        return covered and all(self._separated(path, proof) for path, proof in self.leaves)
+
+    def _separated(self, path: Path, proof: ClosureCertificate) -> bool:
+        points, normals = _contacts(self.pieces, _part(self.pieces, path))
+        return (
+            not proof.closed
+            and proof.positions.shape == points.shape
+            and bool((proof.positions == points).all() and (proof.normals == normals).all())
+            and bool((proof.friction >= self.friction).all())
+            and proof.verify()
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Undecided:
+    """Neither a grasp nor a proof of absence within the budget."""
+
+    open_parts: int
+
+
+def place_free(
+    pieces: Sequence[FacePiece],
+    friction: float,
+    *,
+    rng: np.random.Generator,
+    cells: int = 1,
+) -> Placement | Absence | Undecided:
+    """Find a grasp of four convex pieces, or prove that there is none.
+
+    Args:
+        pieces: Four convex pieces, in finger order, in units where the object has size one.
+        friction: Coulomb coefficient at every contact, positive.
+        rng: Chooses the restarts.
+        cells: How many parts of the pieces to examine at most: with 1 there is no splitting.
+
+    Raises:
+        InputError: The friction is not positive.
+        SolverError: A program's answer failed its check.
+    """
+    if not friction > 0.0:
+        raise InputError(f"friction must be positive, got {friction}")
+    leaves: list[tuple[Path, ClosureCertificate]] = []
+    waiting: list[tuple[float, Path]] = [(0.0, ())]
+    examined = 0
+    while waiting and examined < cells:
+        _, path = heappop(waiting)
+        part = _part(pieces, path)
+        patch = close_patch(pieces, part, friction)
+        examined += 1
+        if patch is not None and not patch.closed:
+            leaves.append((path, patch))
+            continue
+        found = _grasp(pieces, part, patch, friction) if patch is not None else None
+        if found is None and not path:
+            found = _restarted(pieces, friction, rng)
+        if found is not None:
+            return _of_general_type(pieces, found, friction, rng)
+        margin = patch.margin if patch is not None else 0.0
+        for half in (0, 1):
+            heappush(waiting, (-margin, (*path, half)))
+    if waiting:
+        return Undecided(len(waiting))
+    return Absence(tuple(pieces), friction, tuple(leaves))
+
+
+def close_patch(
+    pieces: Sequence[FacePiece], part: Corners, friction: float
+) -> ClosureCertificate | None:
+    """Force closure of contacts at all corners of a part; None too close to the boundary."""
+    try:
+        return force_closure(*_contacts(pieces, part), friction)
+    except UndecidedError:
+        return None
+
+
+def place_by_forces(pieces: Sequence[FacePiece], forces: Array) -> Placement | None:
+    """Contacts at which given forces balance, as far from the edges as possible.
+
+    Args:
+        pieces: Four convex pieces.
+        forces: One for each, summing to zero, (4, 3).
+    """
+    A_eq = np.zeros((3, 2 * FINGERS + 1))
+    b_eq = np.zeros(3)
+    rows: list[Array] = []
+    limits: list[Array] = []
+    for i, (piece, force) in enumerate(zip(pieces, forces, strict=True)):
+        turn = -cross_matrix(force)
+        A_eq[:, 2 * i : 2 * i + 2] = turn @ piece.frame
+        b_eq -= turn @ piece.origin
+        inside = np.zeros((len(piece.E), 2 * FINGERS + 1))
+        inside[:, 2 * i : 2 * i + 2], inside[:, -1] = piece.E, 1.0
+        rows.append(inside)
+        limits.append(piece.b)
+    objective = np.eye(2 * FINGERS + 1)[-1]
+    scale = float(np.abs(forces).max())
+    found = maximize(
+        LinearProgram(objective, np.vstack(rows), np.hstack(limits), A_eq / scale, b_eq / scale)
+    )
+    if not isinstance(found, Optimum) or found.value < LEAST_INSET:
+        return None
+    y = found.x[:-1].reshape(FINGERS, 2)
+    positions = np.array([piece.point(at) for piece, at in zip(pieces, y, strict=True)])
+    if _on_one_line(positions):
+        return None
+    return Placement(positions, forces, np.empty((0, 3)), np.zeros(FINGERS), found.value)
+
+
+def _grasp(
+    pieces: Sequence[FacePiece], part: Corners, patch: ClosureCertificate, friction: float
+) -> Placement | None:
+    """A grasp made from the forces of a closed patch."""
+    if patch.forces is None:
+        return None
+    owner = np.repeat(np.arange(FINGERS), [len(corners) for corners in part])
+    forces = np.array([patch.forces[owner == i].sum(axis=0) for i in range(FINGERS)])
+    if found := place_by_forces(pieces, forces - forces.mean(axis=0)):
+        return found
+    pushes, _ = normal_and_tangential(patch.forces, patch.normals)
+    centers = np.array(
+        [np.average(patch.positions[owner == i], axis=0, weights=pushes[owner == i])
+         for i in range(FINGERS)]
+    )  # fmt: skip
+    return _held_at(pieces, centers, friction)
+
+
+def _of_general_type(
+    pieces: Sequence[FacePiece], found: Placement, friction: float, rng: np.random.Generator
+) -> Placement:
+    """The same contacts with forces that form a regulus.
+
+    On symmetric faces the patch's forces may all meet, or lie in one plane. Adding internal
+    forces, half as large as the cones have room for, makes the lines skew.
+    """
+    if classify_lines(found.positions, found.forces) == "regulus":
+        return found
+    normals = np.array([piece.normal for piece in pieces])
+    _, _, right = np.linalg.svd(grasp_map(found.positions))
+    internal = (right[6:].T @ rng.normal(size=len(right) - 6)).reshape(FINGERS, 3)
+    along, across = normal_and_tangential(found.forces, normals)
+    inward, sideways = normal_and_tangential(internal, normals)
+    room = (friction * along - across) / (sideways + friction * np.abs(inward))
+    forces = found.forces + 0.5 * float(room.min()) * internal
+    pushes = float(np.einsum("ki,ki->", forces, normals))
+    return replace(found, forces=forces / pushes)
+
+
+def _held_at(pieces: Sequence[FacePiece], positions: Array, friction: float) -> Placement | None:
+    """The placement at given contacts, if they are in force closure."""
+    inset = min(
+        float((piece.b - piece.E @ (piece.frame.T @ (at - piece.origin))).min())
+        for piece, at in zip(pieces, positions, strict=True)
+    )
+    normals = np.array([piece.normal for piece in pieces])
+    try:
+        certificate = force_closure(positions, normals, friction)
+    except UndecidedError:
+        return None
+    if certificate.forces is None or inset < LEAST_INSET or _on_one_line(positions):
+        return None
+    return Placement(positions, certificate.forces, np.empty((0, 3)), np.zeros(FINGERS), inset)
+
+
+def _on_one_line(positions: Array) -> bool:
+    """Whether contacts can do next to nothing against turning about the line through them."""
+    spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
+    return bool(spread[1] < LEAST_SPREAD)
+
+
+def _restarted(
+    pieces: Sequence[FacePiece], friction: float, rng: np.random.Generator
+) -> Placement | None:
+    for part in _random_parts(pieces, rng):
+        patch = close_patch(pieces, part, friction)
+        if patch is not None and (found := _grasp(pieces, part, patch, friction)):
+            return found
+    return None
+
+
+def _random_parts(pieces: Sequence[FacePiece], rng: np.random.Generator) -> Iterator[Corners]:
+    """The pieces shrunk about random points of theirs."""
+    for _ in range(RESTARTS):
+        parts: list[Array] = []
+        for piece in pieces:
+            about = rng.dirichlet(np.ones(len(piece.corners))) @ piece.corners
+            parts.append(about + SMALLER * (piece.corners - about))
+        yield tuple(parts)
+
+
+def _contacts(pieces: Sequence[FacePiece], part: Corners) -> tuple[Array, Array]:
+    """Positions and normals of contacts at all corners of a part."""
+    points = [p.origin + corners @ p.frame.T for p, corners in zip(pieces, part, strict=True)]
+    normals = [np.tile(p.normal, (len(c), 1)) for p, c in zip(pieces, part, strict=True)]
+    return np.vstack(points), np.vstack(normals)
+
+
+def _part(pieces: Sequence[FacePiece], path: Path) -> Corners:
+    """The part reached by cutting the longest polygon again and again."""
+    part = [piece.corners for piece in pieces]
+    for half in path:
+        spans = [_longest(corners) for corners in part]
+        widest = max(range(FINGERS), key=lambda i: spans[i][0])
+        part[widest] = _half(part[widest], spans[widest][1], half)
+    return tuple(part)
+
+
+def _longest(corners: Array) -> tuple[float, Array]:
+    """Length and direction of the longest line between two corners."""
+    between = (corners[:, None] - corners[None]).reshape(-1, 2)
+    lengths = np.linalg.norm(between, axis=1)
+    far = int(np.argmax(lengths))
+    return float(lengths[far]), between[far] / lengths[far]
+
+
+def _half(corners: Array, along: Array, half: int) -> Array:
+    heights = corners @ along
+    middle = 0.5 * float(heights.min() + heights.max())
+    sign = 1.0 if half == 0 else -1.0
+    return clip(corners, sign * along[None], np.array([sign * middle]))

@@ -1,0 +1,214 @@
+"""Pencil grasps: two pairs of lines of force, each meeting in a focus on a common line.
+
+Solved: for four convex faces with a force cone each, grouped into the pairs (0, 1) and
+(2, 3), two focus points c_1, c_2 and discs of the largest common radius r, one inside each
+face, such that any four contacts in the discs have equilibrium forces forming two flat
+pencils. The four cones must positively span whatever direction each contributes (P3).
+
+Derivation. Let a_ij be the axes of pair i, P_i the plane they span with unit normal N_i, and
+lam > 0 the weights with sum lam_ij a_ij = 0. Then w = lam_11 a_11 + lam_12 a_12 lies in both
+planes; u = w / |w| is the direction of the focus line c_1 c_2. From c_i the axis a_ij leads
+back to the disc centre q_ij = c_i - s_ij a_ij, s_ij = n_ij.(c_i - o_ij) / (n_ij.a_ij). A ball
+of radius R about c_i lies in the cone of every point of the disc of radius r_ij iff
+
+    s_ij sin(psi) >= R + kappa_ij r_ij,   kappa = 1 if the axis leans by alpha >= psi from the
+                                          normal, else cos(psi - alpha).
+
+Now take any contacts x_ij in the discs and project them along N_i into the plane of the focus
+line and P_i. The direction c_i - x_ij stays in the cone when projected, and P3 keeps it off
+the line u and on the side of a_ij; the two axes are on opposite sides. So the line L_i through
+x_i1 and x_i2 passes the focus line at some e_i with an offset of at most max_j r_ij <= R along
+N_i, and c_1 - e_1 and e_2 - c_2, sums of cone directions, point along +w. Join the two crossing
+points by a line L. If c_1 and c_2 lie between e_1 and e_2, the offset of L there is a convex
+combination of two offsets of at most R, so L meets both balls, in z_1 and z_2. The lines
+(x_ij, z_i) lie in the cones and form two flat pencils that share L: dependent, and by P3 in
+equilibrium. The order is safe in two cells, c_1 = x0 -+ k u, c_2 = x0 +- k u with k >= 0:
+
+    A   (c_2 - c_1).w >= 0: e_1 < c_1 <= c_2 < e_2 whatever the contacts;
+    B   (c_2 - c_1).w <= 0 and 2 k <= s_ij a_ij.u_i - r_ij |T_ij'u|, u_1 = u, u_2 = -u: the right
+        side bounds |c_i - e_i| from below, so neither focus passes the other crossing.
+
+Each is a linear program in (x0, k, R, r_11..r_22, r). The paper's text leaves out the order:
+outside both cells extending L beyond e_1 and e_2 can magnify its offset without limit, and the
+paper's program, which prefers that side, returns regions that hold contacts out of equilibrium.
+As R >= r_ij is needed, the radii are at most depth times tan(theta / 2) when axis = normal.
+
+As for concurrent grasps, r is free in sign and a second program evens out the four radii.
+
+Source: Sudsang & Ponce 1995, section 3.2; the order and the two cells are this project's.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.errors import SolverError
+from grasp_core.face_pieces import FacePiece
+from grasp_core.lp import LinearProgram, Optimum, maximize
+from grasp_core.placements import NoPlacement, Placement, balanced_forces
+from grasp_core.spanning import balancing_weights
+from grasp_core.values import FINGERS, ForceCone
+
+Cell: TypeAlias = tuple[float, float]
+CELL_A, CELL_B = (-1.0, 1.0), (1.0, -1.0)
+"""Sign of k u in c_1 and c_2."""
+X0, K, BALL, RADII, SMALLEST = slice(0, 3), 3, 4, slice(5, 9), 9
+"""Where the variables are."""
+VARIABLES = 10
+KEPT = 1e-9
+"""Share of the smallest radius that the second program may give up."""
+
+
+def place_pencil(
+    pieces: Sequence[FacePiece],
+    cones: Sequence[ForceCone],
+    *,
+    least: float,
+    least_gap: float,
+    cells: Sequence[Cell] = (CELL_A, CELL_B),
+) -> Placement | NoPlacement:
+    """Place two foci and four discs of the largest common radius, in the better cell.
+
+    Args:
+        pieces: Four convex pieces; the pencils are (0, 1) and (2, 3).
+        cones: The force cones, in the same order; they must satisfy the generalised P3.
+        least: Smaller discs count as none.
+        least_gap: The foci must be this far apart: nearer ones would make the grasp concurrent.
+        cells: Orders of the foci to try.
+
+    Raises:
+        SolverError: A program's answer failed its check.
+    """
+    axes = np.array([cone.axis for cone in cones])
+    w = balancing_weights(axes)[:2] @ axes[:2]
+    u = w / np.linalg.norm(w)
+    best, bound = None, -math.inf
+    for cell in cells:
+        found = _place_in_cell(pieces, cones, u, cell, least, least_gap)
+        if isinstance(found, Placement):
+            best, least = found, found.merit
+        else:
+            bound = max(bound, found.bound)
+    return best or NoPlacement(bound)
+
+
+def pencil_radius_bounds(depths: Array, half_angles: Array) -> Array:
+    """Upper bounds on the discs of quadruples whose force cones surround the normals.
+
+    With positive weights of sum lam n = 0 and depths d_ij of the foci below their faces,
+    sum lam_ij d_ij = -sum lam_ij h_ij - (c_2 - c_1).w. In cell A the last term only lowers it.
+    In cell B it is 2 k |w|, at most half of the left side, which can therefore double.
+
+    Args:
+        depths: -sum lam h / sum lam of each quadruple, (q,).
+        half_angles: (q,) [rad].
+    """
+    return 2.0 * depths * np.tan(half_angles / 2.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Disc:
+    """One disc centre as a function of the variables v: depth s.v + s0, centre Q v + q."""
+
+    s: Array
+    s0: float
+    Q: Array
+    q: Array
+
+
+def _place_in_cell(
+    pieces: Sequence[FacePiece],
+    cones: Sequence[ForceCone],
+    u: Array,
+    cell: Cell,
+    least: float,
+    least_gap: float,
+) -> Placement | NoPlacement:
+    focus = [_focus(u, sign) for sign in cell for _ in range(2)]
+    discs = [_disc(*each) for each in zip(pieces, cones, focus, strict=True)]
+    A, b = _rows(pieces, cones, discs, u, least_gap, near=cell is CELL_B)
+    first = maximize(LinearProgram(_unit(VARIABLES, SMALLEST), A, b))
+    if not isinstance(first, Optimum):
+        raise SolverError("a program that is feasible for small enough radii was called infeasible")
+    if first.value < least:
+        return NoPlacement(first.value)
+    keep = -_unit(VARIABLES, SMALLEST)
+    even = LinearProgram(
+        _unit(VARIABLES, *range(RADII.start, RADII.stop)),
+        np.vstack([A, keep]),
+        np.append(b, -first.value * (1.0 - KEPT)),
+    )
+    second = maximize(even)
+    v = second.x if isinstance(second, Optimum) else first.x
+    positions = [p.point(disc.Q @ v + disc.q) for p, disc in zip(pieces, discs, strict=True)]
+    return Placement(
+        positions=np.array(positions),
+        forces=balanced_forces(pieces, np.array([cone.axis for cone in cones])),
+        foci=np.array([focus[0] @ v, focus[2] @ v]),
+        radii=v[RADII],
+        merit=first.value,
+    )
+
+
+def _focus(u: Array, sign: float) -> Array:
+    """Matrix from the variables to a focus, (3, VARIABLES)."""
+    C = np.zeros((3, VARIABLES))
+    C[:, X0], C[:, K] = np.eye(3), sign * u
+    return C
+
+
+def _disc(piece: FacePiece, cone: ForceCone, C: Array) -> _Disc:
+    n, a, T = piece.normal, cone.axis, piece.frame
+    s, s0 = n @ C / (n @ a), -float(n @ piece.origin) / float(n @ a)
+    Q = T.T @ (C - np.outer(a, s))
+    return _Disc(s, s0, Q, T.T @ (-s0 * a - piece.origin))
+
+
+def _rows(
+    pieces: Sequence[FacePiece],
+    cones: Sequence[ForceCone],
+    discs: Sequence[_Disc],
+    u: Array,
+    least_gap: float,
+    *,
+    near: bool,
+) -> tuple[Array, Array]:
+    radius = np.eye(VARIABLES)[RADII]
+    ball, k = _unit(VARIABLES, BALL), _unit(VARIABLES, K)
+    rows: list[Array] = [-2.0 * k]
+    limits: list[Array | float] = [-least_gap]
+    for i, (piece, cone, disc) in enumerate(zip(pieces, cones, discs, strict=True)):
+        r_i = radius[i]
+        rows += [
+            ball + _kappa(piece, cone) * r_i - math.sin(cone.half_angle) * disc.s,
+            piece.E @ disc.Q + r_i,
+            r_i - ball,
+            _unit(VARIABLES, SMALLEST) - r_i,
+        ]
+        limits += [
+            math.sin(cone.half_angle) * disc.s0,
+            piece.b - piece.E @ disc.q,
+            0.0,
+            0.0,
+        ]
+        if near:
+            toward = float(cone.axis @ u) * (1.0 if i < FINGERS // 2 else -1.0)
+            rows.append(2.0 * k + float(np.linalg.norm(piece.frame.T @ u)) * r_i - toward * disc.s)
+            limits.append(toward * disc.s0)
+    return np.vstack(rows), np.hstack(limits)
+
+
+def _kappa(piece: FacePiece, cone: ForceCone) -> float:
+    """How far a disc of radius one reaches towards the cone's facets at most."""
+    lean = math.acos(min(1.0, float(piece.normal @ cone.axis)))
+    return 1.0 if lean >= cone.half_angle else math.cos(cone.half_angle - lean)
+
+
+def _unit(length: int, *places: int) -> Array:
+    vector = np.zeros(length)
+    vector[list(places)] = 1.0
+    return vector

@@ -1,0 +1,47 @@
+"""What a construction returns: contacts with the forces that witness them, or a bound.
+
+Everything is in the pieces' units, where the object has size one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.face_pieces import FacePiece
+from grasp_core.spanning import balancing_weights
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """Four contacts, one on each piece, and the forces that hold them."""
+
+    positions: Array
+    """(4, 3)"""
+    forces: Array
+    """Balanced forces along the witness lines, normal parts summing to one, (4, 3)."""
+    foci: Array
+    """Where witness lines meet, (k, 3): one point for a concurrent grasp, two for a pencil; for
+    a regulus the point midway between the two lines of each pair, or nothing."""
+    radii: Array
+    """Radius of the independent disc around each contact, (4,); zeros where none is claimed."""
+    merit: float
+    """What the construction maximised."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NoPlacement:
+    """The construction offers nothing on these pieces.
+
+    `bound` is the largest merit that its programs' multipliers allow.
+    """
+
+    bound: float
+
+
+def balanced_forces(pieces: Sequence[FacePiece], directions: Array) -> Array:
+    """Forces along four positively spanning directions that balance as vectors, (4, 3)."""
+    forces = balancing_weights(directions)[:, None] * directions
+    normals = np.array([piece.normal for piece in pieces])
+    return forces / float(np.einsum("ki,ki->", forces, normals))

@@ -1,0 +1,200 @@
+"""Regulus grasps: two pairs of lines of force that pass each other at equal pitch.
+
+Solved: for four convex faces with a force cone each, grouped into the pairs (0, 1) and
+(2, 3), four contacts near the middle of their faces and forces in the cones whose lines lie
+on one regulus. The cones must positively span whatever direction each contributes (P3).
+
+Derivation. With axes a_ij, planes P_i, and u along both planes as for pencils, let N_i be the
+unit normal of P_i and v_i = N_i x u. The two lines of pair i pass the focus line on either side
+of c_i = x0 +- k u, at d_i1 = c_i + l_i N_i and d_i2 = c_i - l_i N_i, along
+
+    f_i1 = x_i u + y_i v_i + z_i N_i,      f_i2 = x_i u - y_i v_i - z_i N_i,
+
+and the contacts are x_ij = d_ij - f_ij. With equal weights the two forces of a pair amount to
+the force 2 x_i u with the moment 2 x_i (x0 x u) - 2 l_i y_i u, so pairs 1 and 2 cancel iff
+
+    l_1 y_1 / x_1 = l_2 y_2 / x_2                                      (equal pitch).
+
+The paper calls the lines "clearly linearly dependent", but without this equation they are
+independent in general, and half of the grasps its program returns are not in equilibrium.
+The equation is bilinear. Fixing both slopes tau_i = y_i / x_i makes it linear: l_1 = p tau_2 and
+l_2 = p tau_1 with one free p. The projection of f_ij into P_i stays within psi of a_ij, so if
+phi_ij is the angle of a_ij from the resultant of its pair, +u or -u, then
+
+    max_j phi_ij - psi <= atan(tau_i) <= min_j phi_ij + psi,
+
+an interval of which a few values are tried. It is empty unless the pair is nearly symmetric
+about u, |phi_i1 - phi_i2| <= 2 psi. Linear in (x0, k, p, x_i, z_i, t), the program is
+
+    minimise t  subject to  x_ij on its face, |x_ij - centre| <= t along both axes of the face,
+                            f_ij in an inscribed pyramid, n_ij.f_ij >= a least depth,
+                            p beyond a least gap, on either side.
+
+The last two keep out the zero force, and lines that meet: those are pencils.
+
+Source: Sudsang & Ponce 1995, section 3.3; the pitch equation and its use are this project's.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.concurrent_grasps import inscribed_facets
+from grasp_core.face_pieces import FacePiece
+from grasp_core.lp import Infeasible, LinearProgram, Optimum, maximize
+from grasp_core.placements import NoPlacement, Placement, balanced_forces
+from grasp_core.spanning import balancing_weights
+from grasp_core.values import FINGERS, ForceCone
+
+SLOPES = (0.5, 0.2, 0.8)
+"""Where in its interval each slope's angle is tried."""
+LEAST_DEPTH = 0.02
+"""Least height of the passing points over their faces, in object radii."""
+LEAST_GAP = 0.01
+"""Least distance l_i of a line from the focus line, in object radii."""
+X0, K, P, X, Z, T = slice(0, 3), 3, 4, slice(5, 7), slice(7, 9), 9
+"""Where the variables are."""
+VARIABLES = 10
+
+
+def place_regulus(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone]
+) -> Placement | NoPlacement:
+    """Place four contacts on the lines of one regulus, as near to the faces' centres as can be.
+
+    Args:
+        pieces: Four convex pieces; the pairs are (0, 1) and (2, 3).
+        cones: The force cones, in the same order; they must satisfy the generalised P3.
+
+    Returns:
+        The placement, with minus the largest offset t as its merit, or that there is none for
+        the slopes tried.
+
+    Raises:
+        SolverError: A program's answer failed its check.
+    """
+    pairs = _pairs(cones)
+    facets = [inscribed_facets(c, p.frame[:, 0]) for c, p in zip(cones, pieces, strict=True)]
+    best: Placement | NoPlacement = NoPlacement(-math.inf)
+    for slopes in product(*(_slopes(pair) for pair in pairs)):
+        lines = [_line(pairs, slopes, finger) for finger in range(FINGERS)]
+        A, b, A_eq, b_eq = _rows(pieces, facets, lines)
+        for side in (1.0, -1.0):
+            gap = np.zeros(VARIABLES)
+            gap[P] = -side
+            far = -LEAST_GAP / min(abs(slope) for slope in slopes)
+            program = LinearProgram(
+                -np.eye(VARIABLES)[T], np.vstack([A, gap]), np.append(b, far), A_eq, b_eq
+            )
+            found = maximize(program)
+            if isinstance(found, Infeasible) or found.value <= _merit(best):
+                continue
+            best = _placement(pieces, lines, found)
+    return best
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pair:
+    """Frame of one pair, and the angles its slope may have."""
+
+    u: Array
+    v: Array
+    N: Array
+    resultant: float
+    """+1 where the pair pushes along u, -1 where against it."""
+    least_angle: float
+    largest_angle: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Line:
+    """Force direction F v and contact D v - F v as functions of the variables v."""
+
+    D: Array
+    F: Array
+
+
+def _pairs(cones: Sequence[ForceCone]) -> list[_Pair]:
+    axes = np.array([cone.axis for cone in cones])
+    w = balancing_weights(axes)[:2] @ axes[:2]
+    u = _unit(w)
+    pairs: list[_Pair] = []
+    for resultant, first in ((1.0, 0), (-1.0, 2)):
+        a, c = axes[first], axes[first + 1]
+        N = _unit(np.cross(a, c) * np.sign(np.cross(np.cross(a, c), u) @ a))
+        v = np.cross(N, u)
+        phi = [math.acos(max(-1.0, min(1.0, resultant * float(axis @ u)))) for axis in (a, c)]
+        psi = [cones[first].half_angle, cones[first + 1].half_angle]
+        least = max(phi[0] - psi[0], phi[1] - psi[1])
+        largest = min(phi[0] + psi[0], phi[1] + psi[1], math.pi / 2.0)
+        pairs.append(_Pair(u, v, N, resultant, least, largest))
+    return pairs
+
+
+def _unit(vector: Array) -> Array:
+    return vector / np.linalg.norm(vector)
+
+
+def _slopes(pair: _Pair) -> list[float]:
+    """Values of y / x to try; none where the pair is too far from symmetric."""
+    width = pair.largest_angle - pair.least_angle
+    if width <= 0.0:
+        return []
+    return [pair.resultant * math.tan(pair.least_angle + share * width) for share in SLOPES]
+
+
+def _line(pairs: Sequence[_Pair], slopes: Sequence[float], finger: int) -> _Line:
+    i, side = finger // 2, 1.0 if finger % 2 == 0 else -1.0
+    pair = pairs[i]
+    D = np.zeros((3, VARIABLES))
+    D[:, X0], D[:, K] = np.eye(3), pair.resultant * pair.u
+    D[:, P] = side * slopes[1 - i] * pair.N
+    F = np.zeros((3, VARIABLES))
+    F[:, X.start + i] = pair.u + side * slopes[i] * pair.v
+    F[:, Z.start + i] = side * pair.N
+    return _Line(D, F)
+
+
+def _rows(
+    pieces: Sequence[FacePiece], facets: Sequence[Array], lines: Sequence[_Line]
+) -> tuple[Array, Array, Array, Array]:
+    offset = np.eye(VARIABLES)[T]
+    rows: list[Array] = []
+    limits: list[Array | float] = []
+    for piece, G, line in zip(pieces, facets, lines, strict=True):
+        flat, middle = piece.frame.T @ (line.D - line.F), piece.frame.T @ piece.origin
+        rows += [
+            piece.E @ flat,
+            flat - offset,
+            -flat - offset,
+            -G @ line.F,
+            -piece.normal @ line.F,
+        ]
+        limits += [piece.b + piece.E @ middle, middle, -middle, np.zeros(len(G)), -LEAST_DEPTH]
+    normals = np.array([piece.normal for piece in pieces])
+    A_eq = np.array([n @ (line.D - line.F) for n, line in zip(normals, lines, strict=True)])
+    b_eq = np.array([piece.normal @ piece.origin for piece in pieces])
+    return np.vstack(rows), np.hstack(limits), A_eq, b_eq
+
+
+def _placement(pieces: Sequence[FacePiece], lines: Sequence[_Line], found: Optimum) -> Placement:
+    positions: list[Array] = []
+    for piece, line in zip(pieces, lines, strict=True):
+        contact = (line.D - line.F) @ found.x
+        positions.append(contact - piece.normal * (piece.normal @ (contact - piece.origin)))
+    passing = np.array([line.D @ found.x for line in lines])
+    return Placement(
+        positions=np.array(positions),
+        forces=balanced_forces(pieces, np.array([line.F @ found.x for line in lines])),
+        foci=np.array([passing[:2].mean(axis=0), passing[2:].mean(axis=0)]),
+        radii=np.zeros(FINGERS),
+        merit=found.value,
+    )
+
+
+def _merit(found: Placement | NoPlacement) -> float:
+    return found.merit if isinstance(found, Placement) else -math.inf

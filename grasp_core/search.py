@@ -1,0 +1,248 @@
+"""One method over the face quadruples of one object: what it finds, best first, and counts."""
+
+from bisect import insort
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations, product
+from math import comb
+
+import numpy as np
+
+from grasp_core.arrays import UNIT_SLACK
+from grasp_core.certified import Certified, closure_margin, witness_fault
+from grasp_core.constructions import Construction, FingerOrder, point_region
+from grasp_core.face_pieces import FacePiece
+from grasp_core.patch import Absence, Undecided, place_free
+from grasp_core.placements import Placement
+from grasp_core.ranking import PiecesByFace, Quadruple, Ranking
+from grasp_core.spanning import cones_positively_span, span_angle
+from grasp_core.values import (
+    FINGERS,
+    FaceQuadruple,
+    Family,
+    ForceCone,
+    MethodCounts,
+    Proof,
+    four,
+)
+
+SAME_CONTACTS = 1e-6
+"""Contacts closer than this, in object radii, are the same grasp found twice."""
+
+
+@dataclass(slots=True, eq=False)
+class Search:
+    """What one method has found so far."""
+
+    limit: int | None
+    total: int
+    """Quadruples to go through."""
+    best: list[Certified] = field(default_factory=list[Certified])
+    """At most `limit` grasps, best first."""
+    tally: Counter[str] = field(default_factory=Counter[str])
+    absences: dict[FaceQuadruple, tuple[Proof, ...]] = field(
+        default_factory=dict[FaceQuadruple, tuple[Proof, ...]]
+    )
+    seconds: float = 0.0
+
+    @property
+    def counts(self) -> MethodCounts:
+        """The tally as a frozen value."""
+        return MethodCounts(**self.tally)
+
+    @property
+    def full(self) -> bool:
+        """Whether another grasp would push one out."""
+        return self.limit is not None and len(self.best) == self.limit
+
+    def keep(self, found: Certified) -> None:
+        """Count a grasp and sort it in."""
+        self.tally["found"] += 1
+        insort(self.best, found, key=_best_first)
+        if self.limit is not None:
+            del self.best[self.limit :]
+
+
+def _best_first(found: Certified) -> tuple[float, FaceQuadruple]:
+    """Largest merit first; ties are broken by the faces, not by rounding."""
+    return -float(f"{found.placement.merit:.9g}"), found.faces
+
+
+def search_construction(
+    construction: Construction,
+    pieces: PiecesByFace,
+    friction: float,
+    ranking: Ranking,
+    search: Search,
+) -> Iterator[list[Certified]]:
+    """Go through ranked quadruples, yielding what each gave.
+
+    With a limit the search ends when no bound reaches the worst grasp kept; a construction
+    without bounds ends as soon as the limit is reached.
+    """
+    orders = construction.orders
+    search.tally["pruned"] += ranking.dropped * len(orders)
+    for done, quadruple in enumerate(ranking):
+        if search.full and not _can_improve(construction, quadruple, search):
+            search.tally["pruned"] += (len(ranking) - done) * len(orders)
+            return
+        tries = [
+            _try_order(construction, pieces, friction, quadruple, order, search.tally)
+            for order in orders
+        ]
+        found = _without_duplicates([one for one in tries if one is not None], search.tally)
+        for one in found:
+            search.keep(one)
+        yield found
+
+
+def _can_improve(construction: Construction, quadruple: Quadruple, search: Search) -> bool:
+    worst = search.best[-1].placement.merit
+    return construction.bounds is not None and quadruple.bound >= worst * (1.0 - UNIT_SLACK)
+
+
+def _try_order(
+    construction: Construction,
+    pieces: PiecesByFace,
+    friction: float,
+    quadruple: Quadruple,
+    order: FingerOrder,
+    tally: Counter[str],
+) -> Certified | None:
+    faces = four(quadruple.faces[finger] for finger in order)
+    choices = list(product(*(pieces[face] for face in faces)))
+    tally.update({"tried": 1, "solved": len(choices)})
+    placed = _best_placement(construction, quadruple, choices)
+    if placed is None:
+        tally["infeasible"] += 1
+        return None
+    chosen, placement = placed
+    cones = _cones(chosen, quadruple.half_angle)
+    spans = cones_positively_span([cone.axis for cone in cones], [quadruple.half_angle] * FINGERS)
+    margin = closure_margin(chosen, placement, friction)
+    if (
+        margin is None
+        or not spans
+        or _fault(chosen, placement, friction, construction.family) is not None
+    ):
+        tally["rejected"] += 1
+        return None
+    return Certified(
+        id=_name(construction.family[0], faces),
+        faces=faces,
+        family=construction.family,
+        span_angle=quadruple.span_angle,
+        pieces=chosen,
+        cones=cones,
+        regions=tuple(
+            construction.region(piece, cone, placement, finger)
+            for finger, (piece, cone) in enumerate(zip(chosen, cones, strict=True))
+        ),
+        placement=placement,
+        margin=margin,
+    )
+
+
+def _best_placement(
+    construction: Construction, quadruple: Quadruple, choices: Sequence[tuple[FacePiece, ...]]
+) -> tuple[tuple[FacePiece, ...], Placement] | None:
+    """The best over all choices of one convex piece per face."""
+    best = None
+    least = -np.inf
+    for chosen in choices:
+        if construction.bounds is not None and min(piece.inradius for piece in chosen) < least:
+            continue
+        placed = construction.place(chosen, _cones(chosen, quadruple.half_angle), least)
+        if isinstance(placed, Placement) and placed.merit > least:
+            best, least = (chosen, placed), placed.merit
+    return best
+
+
+def _without_duplicates(found: list[Certified], tally: Counter[str]) -> list[Certified]:
+    """Grasps of the same faces with different contacts, the best of each."""
+    kept: list[Certified] = []
+    for one in sorted(found, key=_best_first):
+        here = one.placement.positions[np.argsort(one.faces)]
+        if any(
+            np.abs(here - other.placement.positions[np.argsort(other.faces)]).max() < SAME_CONTACTS
+            for other in kept
+        ):
+            tally["duplicates"] += 1
+        else:
+            kept.append(one)
+    return kept
+
+
+def search_free(
+    pieces: PiecesByFace, friction: float, theta: float, seed: int, cells: int, search: Search
+) -> Iterator[list[Certified]]:
+    """Go through all quadruples of faces, spanning or not, until a limit is reached."""
+    for done, faces in enumerate(combinations(range(len(pieces)), FINGERS)):
+        if search.full:
+            search.tally["pruned"] += comb(len(pieces), FINGERS) - done
+            return
+        choices = list(product(*(pieces[face] for face in faces)))
+        search.tally.update({"tried": 1, "solved": len(choices)})
+        rng = np.random.default_rng([seed, *faces])
+        answers = [
+            (chosen, place_free(chosen, friction, rng=rng, cells=cells)) for chosen in choices
+        ]
+        found = _free_grasp(faces, answers, friction, theta, search)
+        if found is not None:
+            search.keep(found)
+        yield [found] if found else []
+
+
+def _free_grasp(
+    faces: FaceQuadruple,
+    answers: Sequence[tuple[tuple[FacePiece, ...], Placement | Absence | Undecided]],
+    friction: float,
+    theta: float,
+    search: Search,
+) -> Certified | None:
+    placed = [(chosen, found) for chosen, found in answers if isinstance(found, Placement)]
+    proofs = [proof for _, proof in answers if isinstance(proof, Absence)]
+    if not placed:
+        if len(proofs) == len(answers):
+            search.tally["infeasible"] += 1
+            search.absences[faces] = tuple(proofs)
+        else:
+            search.tally["undecided"] += 1
+        return None
+    chosen, placement = max(placed, key=lambda pair: pair[1].merit)
+    margin = closure_margin(chosen, placement, friction)
+    if margin is None or _fault(chosen, placement, friction, "regulus") is not None:
+        search.tally["rejected"] += 1
+        return None
+    cones = _cones(chosen, theta)
+    return Certified(
+        id=_name("f", faces),
+        faces=faces,
+        family="regulus",
+        span_angle=span_angle(np.array([piece.normal for piece in chosen])),
+        pieces=chosen,
+        cones=cones,
+        regions=tuple(
+            point_region(piece, cone, placement, finger)
+            for finger, (piece, cone) in enumerate(zip(chosen, cones, strict=True))
+        ),
+        placement=placement,
+        margin=margin,
+    )
+
+
+def _fault(
+    pieces: Sequence[FacePiece], placement: Placement, friction: float, family: Family
+) -> str | None:
+    normals = np.array([piece.normal for piece in pieces])
+    return witness_fault(placement.positions, normals, placement.forces, friction, family)
+
+
+def _cones(pieces: Sequence[FacePiece], half_angle: float) -> tuple[ForceCone, ...]:
+    """The paper's force cones: about the normals."""
+    return tuple(ForceCone(piece.normal, half_angle) for piece in pieces)
+
+
+def _name(letter: str, faces: FaceQuadruple) -> str:
+    return f"{letter}-" + "-".join(str(face) for face in faces)
