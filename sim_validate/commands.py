@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from grasp_core.closure import force_closure
-from grasp_core.critical import critical_friction
 from grasp_core.concurrent_grasps import PYRAMID_SIDES
+from grasp_core.critical import critical_friction
 from grasp_core.errors import InputError
 from grasp_core.mesh import FORMATS, load_polyhedron
 from grasp_core.planner import FAMILIES, MAX_FACES, plan
