@@ -26,10 +26,10 @@ FRICTION_ACCURACY = 1e-8
 FRICTIONLESS = 1e-6
 """Critical frictions below this are reported as zero: a contact in a file with six digits is
 not placed better."""
-UNPROVED = 1e-6
-"""Width of a bracket that may be left when neither side has a proof any more, absolute below
-a coefficient of one: margins may grow by as little as 1e-5 of the coefficient, and are known to
-1e-11. The upper end, which is returned, is proved to suffice."""
+UNPROVED = 4e-6
+"""Width of a bracket that may be left when neither side has a proof any more, absolute below a
+coefficient of one: on symmetric contacts the margin grows with the square of the coefficient
+and is known to 1e-12. The upper end, which is returned, is proved to suffice."""
 FIRST_TRIAL = 0.5
 CAUTION = 0.02
 """A trial keeps this share of the bracket away from both ends."""
@@ -146,7 +146,7 @@ class _Bracket:
             return above if self.upper > above else self.center - self.spread
         if self.below is None:
             self.share *= self.share
-            return 2.0 * self.share * self.upper
+            return max(2.0 * self.share * self.upper, FRICTIONLESS)
         if self.above is None or not math.isfinite(self.below[1]) or self.below[1] == 0.0:
             return _between(self.lower, self.upper)
         (low, negative), (high, positive) = self.below, self.above

@@ -269,9 +269,9 @@ def test_an_adversary_breaks_printed_pencils_but_no_corrected_one():
             assert in_a_safe_cell(quad, discs)
             assert adversarial_margin(quad, discs, friction) > 0.0
             corrected += 1
-    assert printed >= 50
+    assert printed >= 40
     assert broken >= 2
-    assert corrected >= 80
+    assert corrected >= 60
 
 
 @dataclass(frozen=True)
@@ -317,7 +317,9 @@ def fourth_singular_value(points, directions):
 
 
 def test_lines_of_the_printed_regulus_program_are_independent_and_often_open():
-    """Same quadruples, same cones, same least depth: the pitch equation is all that differs."""
+    """Same quadruples, cones and least depth. The corrected program only adds the equal pitch, by
+    fixed slopes, and a least gap, so it cannot come nearer to the centres of the faces.
+    """
     theta = math.radians(10.0)
     friction = math.tan(theta)
     printed, independent, unclosed, corrected = 0, 0, 0, 0
@@ -344,7 +346,7 @@ def test_lines_of_the_printed_regulus_program_are_independent_and_often_open():
 
 def test_without_a_least_depth_the_printed_regulus_program_accepts_the_zero_force():
     """Zero lies in every friction cone. The two forces of a pair then vanish together, the other
-    two cannot balance, and the program calls that a grasp where there is none.
+    two cannot balance, and the program calls that a grasp.
     """
     theta, vanishing = math.radians(10.0), 0
     for quad, cones in paired_quadruples("random-16-1", theta):
@@ -355,6 +357,8 @@ def test_without_a_least_depth_the_printed_regulus_program_accepts_the_zero_forc
         if lengths.min() < TOLERANCE:
             assert (lengths < TOLERANCE).sum() == 2
             assert printed_regulus(quad, cones, LEAST_DEPTH) is None
+            normals = [piece.normal for piece in quad]
+            assert not gc.force_closure(found.positions, normals, math.tan(theta)).closed
             assert not isinstance(place_regulus(quad, cones), Placement)
             vanishing += 1
     assert vanishing >= 1
@@ -379,7 +383,7 @@ def assembled(u, n, c, lengths, xyz):
 
 
 def test_only_equal_pitch_makes_the_four_lines_dependent():
-    """l_2 = l_1 y_1 x_2 / (x_1 y_2); without it, no l_2 but that one will do."""
+    """The paper: "clearly linearly dependent". They are with l_2 = l_1 y_1 x_2 / (x_1 y_2)."""
     rng, loose, pitched = np.random.default_rng(0), [], []
     for _ in range(1000):
         u, n, c, lengths, xyz = regulus_lines(rng)
@@ -387,6 +391,6 @@ def test_only_equal_pitch_makes_the_four_lines_dependent():
         (x1, y1, _), (x2, y2, _) = xyz
         equal = lengths[0] * np.array([1.0, y1 * x2 / (x1 * y2)])
         pitched.append(fourth_singular_value(*assembled(u, n, c, equal, xyz)))
-    assert min(loose) > DEPENDENT
+    assert min(loose) > 10 * TOLERANCE
     assert max(pitched) < DEPENDENT
     assert len(loose) == len(pitched) == 1000
