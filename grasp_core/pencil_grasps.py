@@ -29,8 +29,8 @@ equilibrium. The order is safe in two cells, c_1 = x0 -+ k u, c_2 = x0 +- k u wi
         side bounds |c_i - e_i| from below, so neither focus passes the other crossing.
 
 Each is a linear program in (x0, k, R, r_11..r_22, r). The paper's text leaves out the order:
-outside both cells extending L beyond e_1 and e_2 can magnify its offset without limit, and the
-paper's program, which prefers that side, returns regions that hold contacts out of equilibrium.
+outside both cells extending L beyond e_1 and e_2 can magnify its offset without limit. The
+paper's program often ends there, and some of its regions then hold contacts out of equilibrium.
 As R >= r_ij is needed, the radii are at most depth times tan(theta / 2) when axis = normal.
 
 As for concurrent grasps, r is free in sign and a second program evens out the four radii.

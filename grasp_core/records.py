@@ -31,6 +31,8 @@ from grasp_core.values import (
 from grasp_core.versions import versions
 
 SCHEMA = 1
+SAME_DIRECTION = 1e-6
+"""How far a witness direction may be from its force's: what six digits in a file keep."""
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Triple = tuple[Finite, Finite, Finite]
 
@@ -243,4 +245,7 @@ def _grasp_from_record(body: Polyhedron, record: GraspRecord, friction: float) -
     )
     check_on_faces(body, grasp)
     check_witness(body, grasp, friction)
+    off = np.abs(grasp.witness.directions - np.array(record.witness.directions)).max()
+    if off > SAME_DIRECTION:
+        raise InputError(f"grasp {grasp.id}: a witness direction is not that of its force")
     return grasp

@@ -16,7 +16,8 @@ the force 2 x_i u with the moment 2 x_i (x0 x u) - 2 l_i y_i u, so pairs 1 and 2
     l_1 y_1 / x_1 = l_2 y_2 / x_2                                      (equal pitch).
 
 The paper calls the lines "clearly linearly dependent", but without this equation they are
-independent in general, and half of the grasps its program returns are not in equilibrium.
+independent in general, and of the grasps its program returns on random polyhedra two in five
+are not in equilibrium.
 The equation is bilinear. Fixing both slopes tau_i = y_i / x_i makes it linear: l_1 = p tau_2 and
 l_2 = p tau_1 with one free p. The projection of f_ij into P_i stays within psi of a_ij, so if
 phi_ij is the angle of a_ij from the resultant of its pair, +u or -u, then

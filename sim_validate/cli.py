@@ -67,7 +67,9 @@ class Planning:
     """Construction to try, may be repeated; the first three if not given. `free` looks for grasps
     of any type on any four faces, and proves for the others that there is none."""
     limit: Count | None = None
-    """Keep at most this many grasps, those with the largest independent discs; None for all."""
+    """Keep at most this many grasps, the best of each family in turn; None for all."""
+    cells: Count = 1
+    """Into how many parts the free method may cut the four faces where it is undecided."""
     seed: Seed = 0
     """For everything random."""
     unit: Literal["m", "cm", "mm", "in"] = "m"

@@ -61,6 +61,7 @@ def _planned(name: str, planning: cli.Planning, reporter: Reporter) -> tuple[Pol
             theta_deg=planning.theta_deg,
             limit=planning.limit,
             seed=planning.seed,
+            cells=planning.cells,
             progress=lambda done, total, grasps: steps.update(done, total, f"({grasps} grasps)"),
         )
     return body, found

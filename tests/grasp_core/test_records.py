@@ -11,12 +11,12 @@ from scenes.objects import example_object
 @pytest.fixture(scope="module")
 def text():
     body = example_object("wedge")
-    return plan_to_json(body, gc.plan(body, 0.5, limit=3))
+    return plan_to_json(body, gc.plan(body, 0.5, limit=6))
 
 
 def test_a_plan_survives_the_file_to_the_last_bit(text):
     body = example_object("wedge")
-    plan = gc.plan(body, 0.5, limit=3)
+    plan = gc.plan(body, 0.5, limit=6)
     saved = grasps_from_json(text)
     assert saved.body.content_sha256 == body.content_sha256
     assert saved.friction == 0.5
@@ -25,6 +25,8 @@ def test_a_plan_survives_the_file_to_the_last_bit(text):
         np.testing.assert_array_equal(one.positions, two.positions)
         np.testing.assert_array_equal(one.normals, two.normals)
         assert one.critical_friction == two.critical_friction
+        assert one.family == two.family
+        np.testing.assert_array_equal(one.witness.forces, two.witness.forces)
         for a, b in zip(one.regions, two.regions, strict=True):
             np.testing.assert_array_equal(a.polygon, b.polygon)
 
@@ -61,6 +63,22 @@ CHANGES = {
         "face",
     ),
     "contact beyond the border": (lambda d: _slid(d, 0.05), "outside the border"),
+    "witness out of balance": (
+        lambda d: _set(d, ["grasps", 0, "witness", "forces", 0], [0.1, 0.1, 0.1]),
+        "witness",
+    ),
+    "witness beside the contacts": (
+        lambda d: _set(d, ["grasps", 0, "witness", "points_m", 0], [0.1, 0.1, 0.1]),
+        "witness lines do not pass",
+    ),
+    "witness direction that is not its force's": (
+        lambda d: _set(d, ["grasps", 0, "witness", "directions", 0], [1.0, 0.0, 0.0]),
+        "direction",
+    ),
+    "another family": (
+        lambda d: _set(d, ["grasps", 0, "family"], "regulus"),
+        "witness lines are concurrent, not regulus",
+    ),
     "id that is a path": (lambda d: _set(d, ["grasps", 0, "id"], "../../x"), "id"),
     "two equal ids": (lambda d: _set(d, ["grasps", 1, "id"], d["grasps"][0]["id"]), "same id"),
     "no such face": (lambda d: _set(d, ["grasps", 0, "faces", 0], 99), "names face 99"),
