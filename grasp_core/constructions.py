@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.concurrent_grasps import (
@@ -15,7 +16,7 @@ from grasp_core.concurrent_grasps import (
 from grasp_core.face_pieces import FacePiece, inscribed_disc_radius
 from grasp_core.pencil_grasps import pencil_radius_bounds, place_pencil
 from grasp_core.placements import NoPlacement, Placement
-from grasp_core.regulus_grasps import place_regulus
+from grasp_core.regulus_grasps import nearly_symmetric, place_regulus
 from grasp_core.values import ContactRegion, Family, ForceCone, RegionKind
 
 FingerOrder: TypeAlias = tuple[int, int, int, int]
@@ -42,8 +43,15 @@ class Construction:
     bounds: Callable[[Array, Array], Array] | None
     """Upper bounds on the radius from depths and half-angles, see `concurrent_radius_bounds`;
     None where no disc is claimed."""
+    admits: Callable[[Array, Array], NDArray[np.bool_]]
+    """Whether quadruples are worth a program, from their normals in finger order, (q, 4, 3), and
+    half-angles (q,): False only where none can be feasible."""
     region: Callable[[FacePiece, ForceCone, Placement, int], ContactRegion]
     """The region of one finger, in the pieces' units."""
+
+
+def _all(_: Array, half_angles: Array) -> NDArray[np.bool_]:
+    return np.ones(len(half_angles), dtype=np.bool_)
 
 
 def _cone_region(piece: FacePiece, cone: ForceCone, placed: Placement, _: int) -> ContactRegion:
@@ -72,6 +80,7 @@ CONSTRUCTIONS: dict[Family, Construction] = {
             pieces, cones, least=max(least, LEAST_RADIUS)
         ),
         concurrent_radius_bounds,
+        _all,
         _cone_region,
     ),
     "pencil": Construction(
@@ -81,10 +90,11 @@ CONSTRUCTIONS: dict[Family, Construction] = {
             pieces, cones, least=max(least, LEAST_RADIUS), least_gap=LEAST_RADIUS
         ),
         pencil_radius_bounds,
+        _all,
         _disc_region,
     ),
     "regulus": Construction(
         "regulus", PAIRINGS, lambda pieces, cones, _: place_regulus(pieces, cones), None,
-        point_region,
+        nearly_symmetric, point_region,
     ),
 }  # fmt: skip

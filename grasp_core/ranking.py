@@ -7,15 +7,17 @@ cones lie inside the real ones, so what holds there holds at the friction asked 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import compress
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.constructions import LEAST_RADIUS, Construction
+from grasp_core.constructions import LEAST_RADIUS, Construction, FingerOrder
 from grasp_core.face_pieces import FacePiece, unit_pieces
-from grasp_core.spanning import spanning_quadruples
-from grasp_core.values import FINGERS, FaceQuadruple, Polyhedron, four
+from grasp_core.spanning import balancing_weights, spanning_quadruples
+from grasp_core.values import FaceQuadruple, Polyhedron, four
 
 LEAST_SPAN_ANGLE = math.atan(LEAST_RADIUS)
 """With narrower cones no disc at a depth of one object radius would count."""
@@ -37,6 +39,8 @@ class Quadruple:
     half_angle: float
     bound: float
     """No disc can be larger, relative to the object's radius; infinite without discs."""
+    orders: tuple[FingerOrder, ...]
+    """Finger orders worth a program."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,15 +51,24 @@ class Ranking:
     """(q, 4)"""
     numbers: Array
     """Span angle, half-angle and bound of each, (q, 3)."""
+    worth: NDArray[np.bool_]
+    """Which finger orders are worth a program, (q, orders)."""
+    construction: Construction
     dropped: int
-    """Quadruples left out because their bound is below the least radius."""
+    """Candidates, quadruples with a finger order, that were left out."""
 
     def __len__(self) -> int:
         return len(self.faces)
 
     def __iter__(self) -> Iterator[Quadruple]:
-        for faces, numbers in zip(self.faces, self.numbers, strict=True):
-            yield Quadruple(four(int(face) for face in faces), *(float(x) for x in numbers))
+        for faces, numbers, worth in zip(self.faces, self.numbers, self.worth, strict=True):
+            span, half_angle, bound = (float(x) for x in numbers)
+            orders = tuple(compress(self.construction.orders, worth))
+            yield Quadruple(four(int(face) for face in faces), span, half_angle, bound, orders)
+
+    def candidates_from(self, place: int) -> int:
+        """How many candidates are left from a place in the order on."""
+        return int(self.worth[place:].sum())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,6 +77,8 @@ class Candidates:
 
     faces: Indices
     """(q, 4)"""
+    normals: Array
+    """(q, 4, 3)"""
     span_angles: Array
     """theta* of each, (q,) [rad]."""
     half_angles: Array
@@ -86,9 +101,14 @@ class Candidates:
             reach = construction.bounds(self.depths, self.half_angles)
             bounds = np.minimum(reach, self.rooms)
             order = np.argsort(-bounds, kind="stable")
-        order = order[bounds[order] >= LEAST_RADIUS]
+        worth = np.array(
+            [construction.admits(self.normals[:, finger_order], self.half_angles)
+             for finger_order in construction.orders]
+        ).T & (bounds >= LEAST_RADIUS)[:, None]  # fmt: skip
+        order = order[worth[order].any(axis=1)]
         numbers = np.column_stack([self.span_angles, self.half_angles, bounds])
-        return Ranking(self.faces[order], numbers[order], len(self) - len(order))
+        dropped = int((~worth).sum())
+        return Ranking(self.faces[order], numbers[order], worth[order], construction, dropped)
 
 
 def candidate_quadruples(body: Polyhedron, pieces: PiecesByFace, theta: float) -> Candidates:
@@ -105,6 +125,7 @@ def candidate_quadruples(body: Polyhedron, pieces: PiecesByFace, theta: float) -
     room = np.array([max((p.inradius for p in choices), default=0.0) for choices in pieces])
     return Candidates(
         faces=quads,
+        normals=normals[quads],
         span_angles=found.span_angles,
         half_angles=np.minimum(INSIDE_FRICTION * theta, BELOW_SPAN_ANGLE * found.span_angles),
         depths=_mean_depths(normals[quads], _heights(body)[quads]),
@@ -128,7 +149,4 @@ def _heights(body: Polyhedron) -> Array:
 
 def _mean_depths(normals: Array, heights: Array) -> Array:
     """-sum lam h / sum lam, with the positive weights of sum lam n = 0, (q,)."""
-    weights = np.abs(
-        [np.linalg.det(np.delete(normals, left_out, axis=1)) for left_out in range(FINGERS)]
-    ).T
-    return -np.einsum("qi,qi->q", weights, heights) / weights.sum(axis=1)
+    return -np.einsum("qi,qi->q", balancing_weights(normals), heights)

@@ -42,6 +42,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.concurrent_grasps import inscribed_facets
@@ -96,6 +97,22 @@ def place_regulus(
                 continue
             best = _placement(pieces, lines, found)
     return best
+
+
+def nearly_symmetric(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
+    """Whether both pairs of many quadruples leave their slope an interval, (q,).
+
+    Args:
+        axes: Of the force cones in finger order, (q, 4, 3).
+        half_angles: (q,) [rad].
+    """
+    w = np.einsum("qi,qij->qj", balancing_weights(axes)[:, :2], axes[:, :2])
+    u = w / np.linalg.norm(w, axis=1, keepdims=True)
+    along = np.einsum("qij,qj->qi", axes, u) * (1.0, 1.0, -1.0, -1.0)
+    phi = np.arccos(np.clip(along, -1.0, 1.0)).reshape(-1, 2, 2)
+    least = phi.max(axis=2) - half_angles[:, None]
+    largest = np.minimum(phi.min(axis=2) + half_angles[:, None], np.pi / 2.0)
+    return (least < largest).all(axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

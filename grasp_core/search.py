@@ -81,15 +81,14 @@ def search_construction(
     With a limit the search ends when no bound reaches the worst grasp kept; a construction
     without bounds ends as soon as the limit is reached.
     """
-    orders = construction.orders
-    search.tally["pruned"] += ranking.dropped * len(orders)
+    search.tally["pruned"] += ranking.dropped
     for done, quadruple in enumerate(ranking):
         if search.full and not _can_improve(construction, quadruple, search):
-            search.tally["pruned"] += (len(ranking) - done) * len(orders)
+            search.tally["pruned"] += ranking.candidates_from(done)
             return
         tries = [
             _try_order(construction, pieces, friction, quadruple, order, search.tally)
-            for order in orders
+            for order in quadruple.orders
         ]
         found = _without_duplicates([one for one in tries if one is not None], search.tally)
         for one in found:

@@ -32,6 +32,8 @@ from grasp_core.errors import InputError
 SIGNS = np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=np.float64)
 LARGEST_SPAN_ANGLE = math.asin(1.0 / 3.0)
 """Reached by the regular tetrahedron only [rad]."""
+OTHERS = ([1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2])
+"""The other three, for each of four."""
 DEPENDENT = 1e-12
 """Triples of unit vectors with a smaller determinant are coplanar: a few rounding errors."""
 
@@ -81,24 +83,23 @@ def cones_positively_span(axes: ArrayLike, half_angles: ArrayLike) -> bool:
 def positively_span(vectors: Array) -> bool:
     """Whether some positive combination of four vectors, (4, 3), vanishes and they span R^3."""
     signed = _signed_determinants(vectors)
-    return min(signed) > DEPENDENT or max(signed) < -DEPENDENT
+    return bool(signed.min() > DEPENDENT or signed.max() < -DEPENDENT)
 
 
 def balancing_weights(vectors: Array) -> Array:
-    """The weights of sum w_i v_i = 0, summing to one in absolute value, (4,).
+    """The weights of sum w_i v_i = 0, summing to one in absolute value, (..., 4).
 
-    All are positive where the four vectors, (4, 3), positively span R^3.
+    All are positive where the four vectors, (..., 4, 3), positively span R^3.
     """
-    signed = np.array(_signed_determinants(vectors))
-    return signed / np.abs(signed).sum() * np.sign(signed.sum())
+    signed = _signed_determinants(vectors)
+    total = np.abs(signed).sum(axis=-1, keepdims=True)
+    return signed / total * np.sign(signed.sum(axis=-1, keepdims=True))
 
 
-def _signed_determinants(vectors: Array) -> list[float]:
-    """Weights of a vanishing combination, by Cramer's rule."""
-    return [
-        (-1) ** left_out * float(np.linalg.det(np.delete(vectors, left_out, axis=0)))
-        for left_out in range(4)
-    ]
+def _signed_determinants(vectors: Array) -> Array:
+    """Weights of a vanishing combination, by Cramer's rule, (..., 4)."""
+    minors = np.stack([vectors[..., rest, :] for rest in OTHERS], axis=-3)
+    return np.linalg.det(minors) * (1.0, -1.0, 1.0, -1.0)
 
 
 def triple_sine(one: Array, two: Array, three: Array) -> Array:
