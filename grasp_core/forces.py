@@ -4,8 +4,9 @@ Forces are sought in pyramids inscribed in the friction cones, so that every ans
 the true cones. Two objectives for balanced forces: the least norm, and the least friction,
 that is, the smallest coefficient max_i |tangential part| / normal part. The latter is found
 by Dinkelbach's iteration: with r the current coefficient, forces that minimise the largest
-tangential part minus r times the normal part have a smaller one, until they do not. Where
-nothing balances, `closest_forces` leaves the least imbalance.
+tangential part minus r times the normal part have a smaller one, until they do not; the last
+2 % that pyramids give away come from `least_friction`. Where nothing balances,
+`closest_forces` leaves the least imbalance.
 
 Forces are scaled by the largest normal force and lengths by the longest arm inside. ProxQP
 calls some of these feasible programs infeasible, so it is asked for the closest feasible
@@ -21,6 +22,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.errors import InputError, NoForcesError, SolverError
+from grasp_core.least_friction import lower_friction
 from grasp_core.values import Grasp, contact_arrays
 from grasp_core.wrenches import contact_frames, grasp_map
 
@@ -171,7 +173,10 @@ class _Problem:
             if best is not None and needed > friction * (1.0 - IMPROVEMENT):
                 break
             best, friction = better, needed
-        return best
+        if best is None:
+            return None
+        limits = float(self.lower[0]), float(self.upper[0])
+        return lower_friction(self.G, self.w, limits, best)
 
     def _toward_less_friction(self, friction: float) -> Array | None:
         """Balanced forces whose largest excess over `friction`, a further variable, is least."""

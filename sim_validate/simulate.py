@@ -115,9 +115,11 @@ class Bench:
         self.model.geom_friction[self.touching, 0] = friction
 
     def _ramp(self, start: Load, end: Load, duration_s: float) -> None:
+        """Change the load smoothly: with a sudden start long objects spring loose."""
         rounds = self._rounds(duration_s)
         for done in range(1, rounds + 1):
-            share = done / rounds
+            time = done / rounds
+            share = time**2 * (3.0 - 2.0 * time)
             self._apply(
                 start.forces + share * (end.forces - start.forces),
                 start.wrench + share * (end.wrench - start.wrench),

