@@ -214,7 +214,7 @@ def _absence(name: str, counts: PlanCounts) -> str:
         if free.undecided:
             return (
                 f"{name}: no grasp was found; {free.undecided} of {free.tried} face quadruples "
-                "are undecided, all others are proved to hold none"
+                "are undecided, all others are proved to hold none; try more cells"
             )
         return f"{name}: each of {free.tried} face quadruples is proved to hold no grasp"
     if not counts.spanning:

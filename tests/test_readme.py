@@ -1,9 +1,15 @@
 """The README's example prints what the README says it prints."""
 
+import math
 import re
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
+
+import grasp_core as gc
+import scenes
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
@@ -30,3 +36,19 @@ def test_the_two_commands_are_one_line_each():
     assert len(lines) == 2
     assert lines[0].endswith("graspproof run dodecahedron")
     assert "pytest" in lines[1]
+
+
+def test_the_gallery_shows_what_the_planner_finds():
+    rows = re.findall(
+        r"^\| `([\w-]+)` \| `([\w-]+)` \| (\w+) \| ([\d.]*)[ m]*\| ([\d.]+) \|",
+        README,
+        re.MULTILINE,
+    )
+    assert len(rows) == 5
+    for name, grasp_id, family, disc_mm, critical in rows:
+        plan = gc.plan(
+            scenes.example_object(name), math.tan(math.radians(10.0)), families=(family,)
+        )
+        (grasp,) = (grasp for grasp in plan.grasps if grasp.id == grasp_id)
+        assert f"{1e3 * grasp.radius:.2f}" == (disc_mm or "0.00")
+        assert grasp.critical_friction == pytest.approx(float(critical), abs=5e-5)
