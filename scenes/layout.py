@@ -35,6 +35,9 @@ TIP_RADIUS = 0.1
 PAD_HALF_WIDTH = 0.2
 PAD_DEPTH = 0.1
 """Fingertip radius and pad size, in object radii."""
+FLAT = 1e-6
+"""Share added to all moments of inertia: those of coplanar contacts are the limit of what a
+body can have, and rounding must not pass it."""
 RETREAT = 0.5
 """Distance of approach, in grasp sizes: from much farther the fingers would arrive too fast."""
 
@@ -66,8 +69,8 @@ class Layout:
     grasp_size_m: float
     """Lever of the contacts about the axis through `center` that they are closest to."""
     mass_kg: float
-    inertia_kg_m2: float
-    """The same about every axis."""
+    inertia_kg_m2: Array
+    """About `center`, along the world axes, (3, 3)."""
     contacts: Array
     """(k, 3) [m]"""
     frames: Array
@@ -123,7 +126,7 @@ def arrange(
         center=positions.mean(axis=0) - body.center_of_mass,
         grasp_size_m=size,
         mass_kg=mass,
-        inertia_kg_m2=mass * (size / 2.0) ** 2,
+        inertia_kg_m2=_inertia(mass, positions, size),
         contacts=positions - body.center_of_mass,
         frames=contact_frames(normals),
         friction=friction,
@@ -147,6 +150,21 @@ def grasp_size(positions: Array) -> float:
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
     lever = np.linalg.norm(spread[1:]) / math.sqrt(len(positions))
     return float(to_digits(np.array(lever, dtype=np.float64)))
+
+
+def _inertia(mass: float, positions: Array, size: float) -> Array:
+    """A quarter of the inertia of the mass shared between the contacts, (3, 3) [kg m^2].
+
+    About the axis that the contacts are closest to it is mass (size / 2)^2; about the others it
+    grows with their levers. The same about all axes would let long grasps spring loose.
+    """
+    arms = positions - positions.mean(axis=0)
+    second = arms.T @ arms / len(arms)
+    shared = np.trace(second) * np.eye(3) - second
+    _, axes = np.linalg.eigh(shared)
+    levers = np.maximum(np.einsum("ij,ik,kj->j", axes, shared, axes), size**2)
+    levers += FLAT * levers.max()
+    return to_digits(0.25 * mass * (axes * levers) @ axes.T)
 
 
 def _pushes(positions: Array, normals: Array, friction: float) -> Array:

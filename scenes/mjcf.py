@@ -102,11 +102,11 @@ def to_text(layout: Layout, physics: PhysicsSettings) -> str:
 def _object(world: ElementTree.Element, layout: Layout, physics: PhysicsSettings) -> None:
     body = _add(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)})
     _add(body, "freejoint", {"name": "object"})
-    inertia = (layout.inertia_kg_m2,) * 3
+    inertia = layout.inertia_kg_m2[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     _add(
         body,
         "inertial",
-        {"pos": layout.center, "mass": layout.mass_kg, "diaginertia": inertia},
+        {"pos": layout.center, "mass": layout.mass_kg, "fullinertia": inertia},
     )
     _add(
         body,

@@ -106,5 +106,5 @@ def _settings(verdict: Verdict) -> dict[str, object]:
         "fingers": asdict(layout.drive),
         "grasp_size_m": layout.grasp_size_m,
         "object_mass_kg": layout.mass_kg,
-        "object_inertia_kg_m2": layout.inertia_kg_m2,
+        "object_inertia_kg_m2": layout.inertia_kg_m2.tolist(),
     }

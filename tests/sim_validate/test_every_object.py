@@ -22,6 +22,7 @@ def hold_all(body, friction, limit):
     for grasp in plan.grasps:
         verdict = sv.validate(body, grasp, friction)
         assert verdict.held, (body.name, grasp.id, verdict.outcome)
+        assert verdict.controls, (body.name, grasp.id)
         assert verdict.controls_failed, (body.name, grasp.id)
         controls += len(verdict.controls)
     return len(plan.grasps), controls
@@ -36,7 +37,7 @@ def test_all_planned_grasps_of_built_in_objects_hold_and_controls_do_not(frictio
         held, refuted = hold_all(scenes.example_object(name), friction, 10)
         grasps, controls = grasps + held, controls + refuted
     assert grasps >= 90
-    assert controls >= 2 * grasps
+    assert controls >= 1.5 * grasps
 
 
 @pytest.mark.slow
@@ -48,4 +49,4 @@ def test_all_planned_grasps_of_real_pieces_hold_and_controls_do_not():
         held, refuted = hold_all(gc.load_polyhedron(path), 0.5, 10)
         grasps, controls = grasps + held, controls + refuted
     assert grasps >= 100
-    assert controls >= 2 * grasps
+    assert controls >= 1.5 * grasps
