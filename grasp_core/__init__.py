@@ -15,6 +15,7 @@ from grasp_core.lines import classify_lines as classify_lines
 from grasp_core.mesh import load_polyhedron as load_polyhedron
 from grasp_core.planner import iter_grasps as iter_grasps
 from grasp_core.planner import plan as plan
+from grasp_core.plans import Plan as Plan
 from grasp_core.quality import max_resisted_wrench as max_resisted_wrench
 from grasp_core.spanning import cones_positively_span as cones_positively_span
 from grasp_core.spanning import span_angle as span_angle
@@ -23,6 +24,5 @@ from grasp_core.values import ContactRegion as ContactRegion
 from grasp_core.values import Face as Face
 from grasp_core.values import ForceCone as ForceCone
 from grasp_core.values import Grasp as Grasp
-from grasp_core.values import Plan as Plan
 from grasp_core.values import Polyhedron as Polyhedron
 from grasp_core.values import Witness as Witness

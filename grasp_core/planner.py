@@ -17,9 +17,10 @@ from grasp_core.certified import Certified, to_grasp
 from grasp_core.closure import LARGEST_FRICTION
 from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS
 from grasp_core.errors import InputError
+from grasp_core.plans import Plan, PlanCounts
 from grasp_core.ranking import Ranking, candidate_quadruples, pieces_by_face
 from grasp_core.search import Search, search_construction, search_free
-from grasp_core.values import FINGERS, Family, Grasp, Method, Plan, PlanCounts, Polyhedron
+from grasp_core.values import FINGERS, Family, Grasp, Method, Polyhedron
 
 FAMILIES: tuple[Family, ...] = get_args(Family)
 """The families of the paper, each with its construction."""
@@ -143,7 +144,13 @@ class _Searches:
     def plan(self) -> Plan:
         """What was found so far."""
         kept = _best_of_each_in_turn([s.best for s in self.by_method.values()], self.limit)
-        grasps = [to_grasp(self.body, self.friction, found) for found in kept]
+        grasps: list[Grasp] = []
+        for search in self.by_method.values():
+            start = time.process_time()
+            for found in search.best:
+                if found.id in kept:
+                    grasps.append(to_grasp(self.body, self.friction, found))
+            search.seconds += time.process_time() - start
         grasps.sort(key=lambda grasp: -float(f"{grasp.radius:.9g}"))
         counts = PlanCounts(
             len(self.body.faces),
@@ -167,13 +174,10 @@ class _Searches:
         )
 
 
-def _best_of_each_in_turn(
-    lists: Sequence[Sequence[Certified]], limit: int | None
-) -> list[Certified]:
-    """At most `limit` of all, as many of each as there are; each list keeps its order."""
+def _best_of_each_in_turn(lists: Sequence[Sequence[Certified]], limit: int | None) -> set[str]:
+    """The ids of at most `limit` of all, the first of each list, then the second, and so on."""
     turns = chain.from_iterable(zip_longest(*lists))
-    chosen = {found.id for found in [one for one in turns if one is not None][:limit]}
-    return [found for found in chain.from_iterable(lists) if found.id in chosen]
+    return {found.id for found in [one for one in turns if one is not None][:limit]}
 
 
 def _planned_half_angle(friction: float, theta_deg: float | None) -> float:

@@ -16,13 +16,13 @@ from grasp_core.certified import check_witness
 from grasp_core.errors import InputError
 from grasp_core.mesh import polyhedron_from_mesh
 from grasp_core.on_faces import check_on_faces
+from grasp_core.plans import Plan
 from grasp_core.values import (
     Contact,
     ContactRegion,
     Family,
     ForceCone,
     Grasp,
-    Plan,
     Polyhedron,
     RegionKind,
     Witness,

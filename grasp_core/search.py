@@ -15,6 +15,7 @@ from grasp_core.constructions import Construction, FingerOrder, point_region
 from grasp_core.face_pieces import FacePiece
 from grasp_core.patch import Absence, Undecided, place_free
 from grasp_core.placements import Placement
+from grasp_core.plans import MethodCounts, Proof
 from grasp_core.ranking import PiecesByFace, Quadruple, Ranking
 from grasp_core.spanning import cones_positively_span, span_angle
 from grasp_core.values import (
@@ -22,8 +23,6 @@ from grasp_core.values import (
     FaceQuadruple,
     Family,
     ForceCone,
-    MethodCounts,
-    Proof,
     four,
 )
 

@@ -13,10 +13,11 @@ from grasp_core.critical import critical_friction
 from grasp_core.errors import InputError
 from grasp_core.mesh import FORMATS, load_polyhedron
 from grasp_core.planner import FAMILIES, MAX_FACES, plan
+from grasp_core.plans import Plan
 from grasp_core.ranking import LEAST_SPAN_ANGLE
 from grasp_core.records import SavedGrasps, grasps_from_json, plan_to_json
 from grasp_core.spanning import spanning_quadruples
-from grasp_core.values import Grasp, Plan, Polyhedron
+from grasp_core.values import Grasp, Polyhedron
 from grasp_core.versions import versions
 from scenes.mjcf import build_scene
 from scenes.objects import example_names, example_object

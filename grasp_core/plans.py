@@ -1,0 +1,77 @@
+"""A plan: the grasps found on one object, what was tried, and what was proved absent."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from grasp_core.values import FaceQuadruple, Grasp
+
+
+class Proof(Protocol):
+    """A claim that can be re-checked without any solver."""
+
+    def verify(self) -> bool:
+        """Whether plain arithmetic confirms the claim."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class MethodCounts:
+    """What became of the candidates of one method.
+
+    A candidate is a set of four faces; for pencils and reguli, with one of the three ways to pair
+    them. Tried candidates end as one of the last five.
+    """
+
+    tried: int = 0
+    """Candidates whose programs were set up."""
+    pruned: int = 0
+    """Candidates skipped because a bound showed that their discs are too small, or that they
+    cannot enter the best `limit`."""
+    solved: int = 0
+    """Choices of one convex piece per face that were considered."""
+    infeasible: int = 0
+    """No placement with discs of the least radius at the planned angle; for the free method,
+    proved to have no grasp at all."""
+    undecided: int = 0
+    """Free method only: neither a grasp nor a proof of absence."""
+    duplicates: int = 0
+    """Found again at the same contacts, with another pairing."""
+    found: int = 0
+    """Grasps whose witness is of its family and which exact force closure certified."""
+    rejected: int = 0
+    """Placements that either test did not confirm: a bug if not 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanCounts:
+    """What the planner tried on one object."""
+
+    faces: int
+    quadruples: int
+    """All sets of four faces."""
+    spanning: int
+    """Those whose normals positively span at the least planned angle (P3)."""
+    families: Mapping[str, MethodCounts] = field(default_factory=dict[str, MethodCounts])
+    """By method, the three families and perhaps `free`."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """The grasps found on one object, best radius first, and what was tried."""
+
+    grasps: tuple[Grasp, ...]
+    friction: float
+    theta: float
+    """Half-angle of the friction cones planned with, before each quadruple's own limit [rad]."""
+    seed: int
+    counts: PlanCounts
+    absence: str | None = None
+    """Why there is no grasp, as a sentence; None when there is one."""
+    absences: Mapping[FaceQuadruple, tuple[Proof, ...]] = field(
+        default_factory=dict[FaceQuadruple, tuple[Proof, ...]]
+    )
+    """Face quadruples that the free method proved to hold no grasp at this friction, with a proof
+    for each choice of one convex piece per face."""
+    seconds: Mapping[str, float] = field(default_factory=dict[str, float])
+    """Processor time of each method, from its first program to the last critical friction."""
