@@ -71,6 +71,8 @@ def witness_fault(
         family: What the lines of force should form.
     """
     along, across = normal_and_tangential(forces, normals)
+    if abs(float(along.sum()) - 1.0) > BALANCED:
+        return "the normal parts of the witness forces do not sum to one"
     if along.min() <= 0.0 or (across > friction * along + BALANCED).any():
         return "a witness force is outside its friction cone"
     if np.linalg.norm(grasp_map(points) @ forces.ravel()) > BALANCED:
@@ -91,8 +93,20 @@ def check_witness(body: Polyhedron, grasp: Grasp, friction: float) -> None:
     fault = witness_fault(points, grasp.normals, grasp.witness.forces, friction, grasp.family)
     if np.abs(points - contacts).max() > BALANCED:
         fault = "the witness lines do not pass through the contacts"
+    if grasp.family != "regulus" and _beside_foci(body, grasp):
+        fault = "the witness lines do not pass through the focus points"
     if fault:
         raise InputError(f"grasp {grasp.id}: {fault}")
+
+
+def _beside_foci(body: Polyhedron, grasp: Grasp) -> bool:
+    """Whether a line of force misses its focus: the only one, or that of its pair."""
+    count = 1 if grasp.family == "concurrent" else 2
+    if len(grasp.focus_points) != count:
+        return True
+    foci = np.repeat(grasp.focus_points, len(grasp.contacts) // count, axis=0)
+    misses = np.cross(foci - grasp.witness.points, grasp.witness.directions)
+    return bool(np.linalg.norm(misses, axis=1).max() > BALANCED * body.radius)
 
 
 def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:

@@ -15,11 +15,7 @@ its edges. All of it is linear in (x0, y_1..y_4, r):
                             e.y_i + r <= b                             for all i, edges
 
 The disc centres stay variables: eliminating them by shrinking the face over-estimates r as
-soon as an edge of the shrunk face vanishes. The radius is free in sign, so that the program
-is always feasible and the sign of its optimum, with the multipliers that prove it, decides.
-
-A second program keeps the smallest radius and maximises the sum of the four radii, so that
-contacts whose discs have room do not end up against an arbitrary edge.
+soon as an edge of the shrunk face vanishes.
 
 With axis = normal and half-angle = theta this is section 3.1 of the paper.
 
@@ -31,18 +27,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece
-from grasp_core.lp import LinearProgram, Optimum, maximize
+from grasp_core.largest_discs import largest_discs
 from grasp_core.placements import NoPlacement, Placement, balanced_forces
 from grasp_core.polygons import clip
 from grasp_core.values import FINGERS, ForceCone
 
 PYRAMID_SIDES = 16
 """An inscribed 16-sided pyramid loses 1.9 % of the cone's tangent, on the safe side."""
-KEPT = 1e-9
-"""Share of the smallest radius that the second program may give up: the accuracy
-asked of the first."""
+RADII, SMALLEST = slice(11, 15), 15
+"""Where the radii and their lower bound are among the variables."""
 
 
 def place_concurrent(
@@ -60,22 +54,12 @@ def place_concurrent(
         SolverError: A program's answer failed its check.
     """
     A, b = _rows(pieces, cones)
-    first = maximize(LinearProgram(_unit(A.shape[1], 15), A, b))
-    if not isinstance(first, Optimum):
-        raise SolverError("a program that is feasible for small enough radii was called infeasible")
-    if first.value < least:
-        return NoPlacement(first.value)
-    keep = -_unit(A.shape[1], 15)
-    even = LinearProgram(
-        _unit(A.shape[1], 11, 12, 13, 14),
-        np.vstack([A, keep]),
-        np.append(b, -first.value * (1.0 - KEPT)),
-    )
-    second = maximize(even)
-    x = second.x if isinstance(second, Optimum) else first.x
-    y, radii = x[3:11].reshape(FINGERS, 2), x[11:15]
+    x = largest_discs(A, b, RADII, SMALLEST, least)
+    if isinstance(x, NoPlacement):
+        return x
+    y = x[3:11].reshape(FINGERS, 2)
     positions = np.array([piece.point(at) for piece, at in zip(pieces, y, strict=True)])
-    focus = x[:3]
+    focus, radii = x[:3], x[RADII]
     forces = balanced_forces(pieces, focus - positions)
     return Placement(positions, forces, focus[None], radii, float(radii.min()))
 
@@ -141,9 +125,3 @@ def _rows(pieces: Sequence[FacePiece], cones: Sequence[ForceCone]) -> tuple[Arra
         rows += [aim, inside, smallest]
         limits += [-G @ piece.origin, piece.b, np.zeros(1)]
     return np.vstack(rows), np.concatenate(limits)
-
-
-def _unit(length: int, *places: int) -> Array:
-    vector = np.zeros(length)
-    vector[list(places)] = 1.0
-    return vector

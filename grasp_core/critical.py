@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.closure import LARGEST_FRICTION, unit_size
-from grasp_core.closure_margin import decide, proves_closure
+from grasp_core.closure_margin import ROUNDING, decide, proves_closure
 from grasp_core.errors import UndecidedError
 from grasp_core.values import Grasp, contact_arrays
 from grasp_core.wrenches import normal_and_tangential
@@ -26,11 +26,9 @@ FRICTION_ACCURACY = 1e-8
 FRICTIONLESS = 1e-6
 """Critical frictions below this are reported as zero: a contact in a file with six digits is
 not placed better."""
-UNPROVED = 4e-6
-"""Width of a bracket that may be left when neither side has a proof any more, absolute below a
-coefficient of one: on symmetric contacts the margin grows with the square of the coefficient
-and is known to 1e-12. The upper end, which is returned, is proved to suffice."""
 FIRST_TRIAL = 0.5
+GROWTH = 8.0
+"""How much farther from an undecided friction the next trial is."""
 CAUTION = 0.02
 """A trial keeps this share of the bracket away from both ends."""
 
@@ -50,12 +48,14 @@ def critical_friction(
             the answer is zero at once.
 
     Returns:
-        The upper end of the bracket, to `FRICTION_ACCURACY` or `UNPROVED`; 0.0 below
+        The upper end of the bracket: every larger coefficient suffices, by balanced forces
+        inside the cones. The bracket is as narrow as `FRICTION_ACCURACY` or, where the margin
+        grows with the square of the coefficient, as proofs allow: some 1e-6 wide. 0.0 below
         `FRICTIONLESS`; `math.inf` when `LARGEST_FRICTION` does not suffice.
 
     Raises:
         InputError: Shapes or lengths are wrong.
-        UndecidedError: The contacts are so close to degenerate that no bracket can be proved.
+        UndecidedError: The contacts are so close to degenerate that nothing can be proved.
         SolverError: A program's answer failed its check.
     """
     points, units = contact_arrays(positions, normals)
@@ -104,19 +104,21 @@ class _Bracket:
     @property
     def settled(self) -> bool:
         """Whether the bracket is as narrow as asked for, or as proofs allow."""
-        return self.upper - self.lower <= max(FRICTION_ACCURACY * self.lower, 2.0 * self.spread)
+        narrow = self.upper - self.lower <= FRICTION_ACCURACY * self.lower
+        return narrow or (
+            self.upper <= self.center + self.spread and self.lower >= self.center - self.spread
+        )
 
     def undecided_at(self, friction: float) -> None:
         if math.isnan(self.center):
             self.center, self.spread = friction, 0.4 * FRICTION_ACCURACY * friction
         else:
-            self.spread *= 4.0
-        if self.settled or self.spread <= 0.5 * UNPROVED * max(friction, 1.0):
-            return
-        raise UndecidedError(
-            f"the critical friction lies in [{self.lower:.6g}, {self.upper:.6g}] and neither "
-            f"closure nor its opposite can be proved at {friction:.6g}; move the contacts slightly"
-        )
+            self.spread *= GROWTH
+        if self.spread > LARGEST_FRICTION:
+            raise UndecidedError(
+                "neither closure nor its opposite can be proved at any friction; move the contacts "
+                "slightly"
+            )
 
     def closed_at(self, friction: float, margin: float, steepest: float) -> None:
         self.upper = min(friction, steepest, self.upper)
@@ -143,11 +145,11 @@ class _Bracket:
     def next_trial(self) -> float:
         if not math.isnan(self.center):
             above = self.center + self.spread
-            return above if self.upper > above else self.center - self.spread
+            return above if self.upper > above else max(self.center - self.spread, 0.0)
         if self.below is None:
             self.share *= self.share
             return max(2.0 * self.share * self.upper, FRICTIONLESS)
-        if self.above is None or not math.isfinite(self.below[1]) or self.below[1] == 0.0:
+        if self.above is None or not -math.inf < self.below[1] < -ROUNDING:
             return _between(self.lower, self.upper)
         (low, negative), (high, positive) = self.below, self.above
         root = (low * positive - high * negative) / (positive - negative)

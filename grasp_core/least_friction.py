@@ -16,8 +16,11 @@ from grasp_core.conic import ConicProgram, minimize
 from grasp_core.errors import SolverError
 
 IMPROVEMENT = 1e-4
-"""Iteration ends when the coefficient falls by less than this share."""
+"""Iteration ends when the coefficient falls by less than this share: some 1e-4 from the least."""
 MAX_ROUNDS = 12
+"""Each costs a program; the excess falls by half or more a round, faster unless a finger idles."""
+ROUNDING = 1e-9
+"""Largest imbalance, and distance outside the limits, in units of the largest force."""
 FRICTIONLESS = 1e-6
 """Coefficients below this are not lowered further."""
 
@@ -45,8 +48,9 @@ def lower_friction(G: Array, w: Array, limits: tuple[float, float], forces: Arra
         correction = np.linalg.lstsq(G, G @ better + w, rcond=None)[0]
         better = better - np.asarray(correction, dtype=np.float64)
         needed = needed_friction(better)
-        inside = limits[0] <= better[0::3].min() and better[0::3].max() <= limits[1]
-        if not inside or needed >= friction:
+        outside = max(limits[0] - better[0::3].min(), better[0::3].max() - limits[1])
+        imbalance = float(np.abs(G @ better + w).max())
+        if max(outside, imbalance) > ROUNDING or needed >= friction:
             break
         improved = needed < friction * (1.0 - IMPROVEMENT)
         best, friction = better, needed

@@ -85,18 +85,22 @@ def maximize(program: LinearProgram) -> Optimum | Infeasible:
 
 
 def _refuted_by_least_violation(program: LinearProgram, failure: SolverError) -> Infeasible:
-    """Infeasible if every point violates some row: that program always has an optimum."""
+    """Infeasible if every point violates some row: the least violation always exists.
+
+    The violation, a further variable, is kept above -1 to bound it.
+    """
     G, h = program.stacked()
     rows = len(program.b)
     relaxed = np.vstack([G, -G[rows:]])
     limits = np.concatenate([h, -h[rows:]])
     violation = np.append(np.zeros(G.shape[1]), -1.0)
-    with_violation = np.hstack([relaxed, -np.ones((len(relaxed), 1))])
+    with_violation = np.vstack([np.hstack([relaxed, -np.ones((len(relaxed), 1))]), violation])
+    limits = np.append(limits, 1.0)
     answer = _solved(LinearProgram(violation, with_violation, limits), STRATEGIES[0])
     if not isinstance(answer, Optimum) or answer.value > -RESIDUAL:
         raise failure
     multipliers = answer.multipliers[: len(G)].copy()
-    multipliers[rows:] -= answer.multipliers[len(G) :]
+    multipliers[rows:] -= answer.multipliers[len(G) : -1]
     return _checked_ray(program, multipliers)
 
 
@@ -136,12 +140,11 @@ def _checked_ray(program: LinearProgram, ray: Array) -> Infeasible:
     rows = len(program.b)
     unit = ray / max(float(np.abs(ray).max(initial=0.0)), np.finfo(np.float64).tiny)
     for multipliers in (unit, -unit):
+        if multipliers[:rows].min(initial=0.0) < -RESIDUAL:
+            continue
+        multipliers[:rows] = np.maximum(multipliers[:rows], 0.0)
         combined = np.abs(G.T @ multipliers).max(initial=0.0)
-        gap = -float(h @ multipliers)
-        if (
-            multipliers[:rows].min(initial=0.0) >= -RESIDUAL
-            and gap > FARTHEST * combined + RESIDUAL
-        ):
+        if -float(h @ multipliers) > FARTHEST * combined + RESIDUAL:
             return Infeasible(multipliers)
     raise SolverError("called infeasible, but the proof does not check")
 

@@ -30,7 +30,7 @@ Source: Sudsang & Ponce 1995, Propositions 1 and 3; the relaxation by many conta
 is that of Omata's virtual fingers (1991), the rest is this project's.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 
@@ -39,26 +39,20 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.closure import ClosureCertificate, force_closure
 from grasp_core.errors import InputError, UndecidedError
+from grasp_core.face_parts import Corners, Path, corner_contacts, part_at, random_parts
 from grasp_core.face_pieces import FacePiece
 from grasp_core.lines import classify_lines
 from grasp_core.lp import LinearProgram, Optimum, maximize
 from grasp_core.placements import Placement
-from grasp_core.polygons import clip
 from grasp_core.values import FINGERS
 from grasp_core.wrenches import cross_matrix, grasp_map, normal_and_tangential
 
 RESTARTS = 12
 """Smaller random patches that are tried before giving up or splitting."""
-SMALLER = 0.5
-"""Their size, as a share of the face."""
 LEAST_INSET = 1e-4
 """Least distance of a contact from the edges of its face, in object radii."""
 LEAST_SPREAD = 1e-3
 """Least extent of the contacts across the line they are closest to, in object radii."""
-Corners = tuple[Array, ...]
-"""Corners of a convex part of each piece, (k, 2) in its plane."""
-Path = tuple[int, ...]
-"""Which half was taken at each cut."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,11 +74,13 @@ class Absence:
             for j, two in enumerate(paths)
             if i != j
         )
-        covered = halves and apart and sum(0.5 ** len(path) for path in paths) == 1.0
+        deepest = max((len(path) for path in paths), default=0)
+        shares = sum(1 << (deepest - len(path)) for path in paths)
+        covered = halves and apart and shares == 1 << deepest
         return covered and all(self._separated(path, proof) for path, proof in self.leaves)
 
     def _separated(self, path: Path, proof: ClosureCertificate) -> bool:
-        points, normals = _contacts(self.pieces, _part(self.pieces, path))
+        points, normals = corner_contacts(self.pieces, part_at(self.pieces, path))
         return (
             not proof.closed
             and proof.positions.shape == points.shape
@@ -127,7 +123,7 @@ def place_free(
     examined = 0
     while waiting and examined < cells:
         _, path = heappop(waiting)
-        part = _part(pieces, path)
+        part = part_at(pieces, path)
         patch = close_patch(pieces, part, friction)
         examined += 1
         if patch is not None and not patch.closed:
@@ -137,7 +133,8 @@ def place_free(
         if found is None and not path:
             found = _restarted(pieces, friction, rng)
         if found is not None:
-            return _of_general_type(pieces, found, friction, rng)
+            general = _of_general_type(pieces, found, friction, rng)
+            return general or Undecided(len(waiting) + 1)
         margin = patch.margin if patch is not None else 0.0
         for half in (0, 1):
             heappush(waiting, (-margin, (*path, half)))
@@ -151,7 +148,7 @@ def close_patch(
 ) -> ClosureCertificate | None:
     """Force closure of contacts at all corners of a part; None too close to the boundary."""
     try:
-        return force_closure(*_contacts(pieces, part), friction)
+        return force_closure(*corner_contacts(pieces, part), friction)
     except UndecidedError:
         return None
 
@@ -209,11 +206,12 @@ def _grasp(
 
 def _of_general_type(
     pieces: Sequence[FacePiece], found: Placement, friction: float, rng: np.random.Generator
-) -> Placement:
+) -> Placement | None:
     """The same contacts with forces that form a regulus.
 
     On symmetric faces the patch's forces may all meet, or lie in one plane. Adding internal
-    forces, half as large as the cones have room for, makes the lines skew.
+    forces, half as large as the cones have room for, makes the lines skew; None where that room
+    is too small to tell.
     """
     if classify_lines(found.positions, found.forces) == "regulus":
         return found
@@ -225,6 +223,8 @@ def _of_general_type(
     room = (friction * along - across) / (sideways + friction * np.abs(inward))
     forces = found.forces + 0.5 * float(room.min()) * internal
     pushes = float(np.einsum("ki,ki->", forces, normals))
+    if classify_lines(found.positions, forces) != "regulus":
+        return None
     return replace(found, forces=forces / pushes)
 
 
@@ -253,50 +253,8 @@ def _on_one_line(positions: Array) -> bool:
 def _restarted(
     pieces: Sequence[FacePiece], friction: float, rng: np.random.Generator
 ) -> Placement | None:
-    for part in _random_parts(pieces, rng):
+    for part in random_parts(pieces, rng, RESTARTS):
         patch = close_patch(pieces, part, friction)
         if patch is not None and (found := _grasp(pieces, part, patch, friction)):
             return found
     return None
-
-
-def _random_parts(pieces: Sequence[FacePiece], rng: np.random.Generator) -> Iterator[Corners]:
-    """The pieces shrunk about random points of theirs."""
-    for _ in range(RESTARTS):
-        parts: list[Array] = []
-        for piece in pieces:
-            about = rng.dirichlet(np.ones(len(piece.corners))) @ piece.corners
-            parts.append(about + SMALLER * (piece.corners - about))
-        yield tuple(parts)
-
-
-def _contacts(pieces: Sequence[FacePiece], part: Corners) -> tuple[Array, Array]:
-    """Positions and normals of contacts at all corners of a part."""
-    points = [p.origin + corners @ p.frame.T for p, corners in zip(pieces, part, strict=True)]
-    normals = [np.tile(p.normal, (len(c), 1)) for p, c in zip(pieces, part, strict=True)]
-    return np.vstack(points), np.vstack(normals)
-
-
-def _part(pieces: Sequence[FacePiece], path: Path) -> Corners:
-    """The part reached by cutting the longest polygon again and again."""
-    part = [piece.corners for piece in pieces]
-    for half in path:
-        spans = [_longest(corners) for corners in part]
-        widest = max(range(FINGERS), key=lambda i: spans[i][0])
-        part[widest] = _half(part[widest], spans[widest][1], half)
-    return tuple(part)
-
-
-def _longest(corners: Array) -> tuple[float, Array]:
-    """Length and direction of the longest line between two corners."""
-    between = (corners[:, None] - corners[None]).reshape(-1, 2)
-    lengths = np.linalg.norm(between, axis=1)
-    far = int(np.argmax(lengths))
-    return float(lengths[far]), between[far] / lengths[far]
-
-
-def _half(corners: Array, along: Array, half: int) -> Array:
-    heights = corners @ along
-    middle = 0.5 * float(heights.min() + heights.max())
-    sign = 1.0 if half == 0 else -1.0
-    return clip(corners, sign * along[None], np.array([sign * middle]))

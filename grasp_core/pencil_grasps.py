@@ -33,8 +33,6 @@ outside both cells extending L beyond e_1 and e_2 can magnify its offset without
 paper's program often ends there, and some of its regions then hold contacts out of equilibrium.
 As R >= r_ij is needed, the radii are at most depth times tan(theta / 2) when axis = normal.
 
-As for concurrent grasps, r is free in sign and a second program evens out the four radii.
-
 Source: Sudsang & Ponce 1995, section 3.2; the order and the two cells are this project's.
 """
 
@@ -46,11 +44,14 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece
-from grasp_core.lp import LinearProgram, Optimum, maximize
-from grasp_core.placements import NoPlacement, Placement, balanced_forces
-from grasp_core.spanning import balancing_weights
+from grasp_core.largest_discs import largest_discs
+from grasp_core.placements import (
+    NoPlacement,
+    Placement,
+    balanced_forces,
+    focus_direction,
+)
 from grasp_core.values import FINGERS, ForceCone
 
 Cell: TypeAlias = tuple[float, float]
@@ -59,8 +60,6 @@ CELL_A, CELL_B = (-1.0, 1.0), (1.0, -1.0)
 X0, K, BALL, RADII, SMALLEST = slice(0, 3), 3, 4, slice(5, 9), 9
 """Where the variables are."""
 VARIABLES = 10
-KEPT = 1e-9
-"""Share of the smallest radius that the second program may give up."""
 
 
 def place_pencil(
@@ -83,9 +82,7 @@ def place_pencil(
     Raises:
         SolverError: A program's answer failed its check.
     """
-    axes = np.array([cone.axis for cone in cones])
-    w = balancing_weights(axes)[:2] @ axes[:2]
-    u = w / np.linalg.norm(w)
+    u = focus_direction(np.array([cone.axis for cone in cones]))
     best, bound = None, -math.inf
     for cell in cells:
         found = _place_in_cell(pieces, cones, u, cell, least, least_gap)
@@ -131,26 +128,16 @@ def _place_in_cell(
     focus = [_focus(u, sign) for sign in cell for _ in range(2)]
     discs = [_disc(*each) for each in zip(pieces, cones, focus, strict=True)]
     A, b = _rows(pieces, cones, discs, u, least_gap, near=cell is CELL_B)
-    first = maximize(LinearProgram(_unit(VARIABLES, SMALLEST), A, b))
-    if not isinstance(first, Optimum):
-        raise SolverError("a program that is feasible for small enough radii was called infeasible")
-    if first.value < least:
-        return NoPlacement(first.value)
-    keep = -_unit(VARIABLES, SMALLEST)
-    even = LinearProgram(
-        _unit(VARIABLES, *range(RADII.start, RADII.stop)),
-        np.vstack([A, keep]),
-        np.append(b, -first.value * (1.0 - KEPT)),
-    )
-    second = maximize(even)
-    v = second.x if isinstance(second, Optimum) else first.x
+    v = largest_discs(A, b, RADII, SMALLEST, least)
+    if isinstance(v, NoPlacement):
+        return v
     positions = [p.point(disc.Q @ v + disc.q) for p, disc in zip(pieces, discs, strict=True)]
     return Placement(
         positions=np.array(positions),
         forces=balanced_forces(pieces, np.array([cone.axis for cone in cones])),
         foci=np.array([focus[0] @ v, focus[2] @ v]),
         radii=v[RADII],
-        merit=first.value,
+        merit=float(v[RADII].min()),
     )
 
 
@@ -178,7 +165,7 @@ def _rows(
     near: bool,
 ) -> tuple[Array, Array]:
     radius = np.eye(VARIABLES)[RADII]
-    ball, k = _unit(VARIABLES, BALL), _unit(VARIABLES, K)
+    ball, k = np.eye(VARIABLES)[BALL], np.eye(VARIABLES)[K]
     rows: list[Array] = [-2.0 * k]
     limits: list[Array | float] = [-least_gap]
     for i, (piece, cone, disc) in enumerate(zip(pieces, cones, discs, strict=True)):
@@ -187,7 +174,7 @@ def _rows(
             ball + _kappa(piece, cone) * r_i - math.sin(cone.half_angle) * disc.s,
             piece.E @ disc.Q + r_i,
             r_i - ball,
-            _unit(VARIABLES, SMALLEST) - r_i,
+            np.eye(VARIABLES)[SMALLEST] - r_i,
         ]
         limits += [
             math.sin(cone.half_angle) * disc.s0,
@@ -206,9 +193,3 @@ def _kappa(piece: FacePiece, cone: ForceCone) -> float:
     """How far a disc of radius one reaches towards the cone's facets at most."""
     lean = math.acos(min(1.0, float(piece.normal @ cone.axis)))
     return 1.0 if lean >= cone.half_angle else math.cos(cone.half_angle - lean)
-
-
-def _unit(length: int, *places: int) -> Array:
-    vector = np.zeros(length)
-    vector[list(places)] = 1.0
-    return vector

@@ -34,7 +34,8 @@ class Placement:
 class NoPlacement:
     """The construction offers nothing on these pieces.
 
-    `bound` is the largest merit that its programs' multipliers allow.
+    `bound` is the largest merit that its programs' multipliers allow; minus infinity where only a
+    sample of slopes was tried.
     """
 
     bound: float
@@ -45,3 +46,17 @@ def balanced_forces(pieces: Sequence[FacePiece], directions: Array) -> Array:
     forces = balancing_weights(directions)[:, None] * directions
     normals = np.array([piece.normal for piece in pieces])
     return forces / float(np.einsum("ki,ki->", forces, normals))
+
+
+def focus_direction(axes: Array) -> Array:
+    """Direction u of the line between the foci of pairs (0, 1) and (2, 3), (..., 3).
+
+    It lies in the planes of both pairs, and the first pair pushes along it: with positive
+    weights lam of sum lam a = 0, it is that of w = lam_0 a_0 + lam_1 a_1 = -lam_2 a_2 - lam_3 a_3.
+
+    Args:
+        axes: Of four force cones that positively span, in finger order, (..., 4, 3).
+    """
+    first = np.einsum("...i,...ij->...j", balancing_weights(axes)[..., :2], axes[..., :2, :])
+    w = np.asarray(first, dtype=np.float64)
+    return w / np.linalg.norm(w, axis=-1, keepdims=True)

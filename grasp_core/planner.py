@@ -36,7 +36,7 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     body: Polyhedron,
     friction: float = 0.5,
     *,
-    families: Sequence[Method] = FAMILIES,
+    families: Sequence[Method] | Method = FAMILIES,
     theta_deg: float | None = None,
     limit: int | None = None,
     seed: int = 0,
@@ -74,9 +74,10 @@ def iter_grasps(
     body: Polyhedron,
     friction: float = 0.5,
     *,
-    families: Sequence[Method] = FAMILIES,
+    families: Sequence[Method] | Method = FAMILIES,
     theta_deg: float | None = None,
     seed: int = 0,
+    cells: int = 1,
 ) -> Iterator[Grasp]:
     """Like `plan`, but yields each grasp as soon as it is certified, in no particular order.
 
@@ -84,9 +85,8 @@ def iter_grasps(
         InputError: As `plan`.
         SolverError: As `plan`.
     """
-    searches = _Searches(body, friction, families, theta_deg, None, seed, 1)
-    for found in searches.run(None):
-        yield to_grasp(body, friction, found)
+    searches = _Searches(body, friction, families, theta_deg, None, seed, cells)
+    return (to_grasp(body, friction, found) for found in searches.run(None))
 
 
 class _Searches:
@@ -96,7 +96,7 @@ class _Searches:
         self,
         body: Polyhedron,
         friction: float,
-        families: Sequence[Method],
+        families: Sequence[Method] | Method,
         theta_deg: float | None,
         limit: int | None,
         seed: int,
@@ -104,6 +104,7 @@ class _Searches:
     ) -> None:
         self.body, self.friction, self.seed, self.cells = body, friction, seed, cells
         self.theta = _planned_half_angle(friction, theta_deg)
+        families = (families,) if isinstance(families, str) else families
         _check_request(body, families, limit, cells)
         self.pieces = pieces_by_face(body)
         self.candidates = candidate_quadruples(body, self.pieces, self.theta)
@@ -151,7 +152,7 @@ class _Searches:
                 if found.id in kept:
                     grasps.append(to_grasp(self.body, self.friction, found))
             search.seconds += time.process_time() - start
-        grasps.sort(key=lambda grasp: -float(f"{grasp.radius:.9g}"))
+        grasps.sort(key=lambda grasp: -float(f"{grasp.radius:.6g}"))
         counts = PlanCounts(
             len(self.body.faces),
             self.quadruples,
@@ -170,6 +171,9 @@ class _Searches:
                 for search in self.by_method.values()
                 for faces, proofs in search.absences.items()
             },
+            undecided=tuple(
+                faces for search in self.by_method.values() for faces in search.undecided
+            ),
             seconds={method: search.seconds for method, search in self.by_method.items()},
         )
 
@@ -215,10 +219,10 @@ def _check_request(
 def _absence(name: str, counts: PlanCounts) -> str:
     free = counts.families.get("free")
     if free is not None:
-        if free.undecided:
+        if not_proved := free.undecided + free.rejected:
             return (
-                f"{name}: no grasp was found; {free.undecided} of {free.tried} face quadruples "
-                "are undecided, all others are proved to hold none; try more cells"
+                f"{name}: no grasp was found; {not_proved} of {free.tried} face quadruples are "
+                "undecided, all others are proved to hold none; try more cells"
             )
         return f"{name}: each of {free.tried} face quadruples is proved to hold no grasp"
     if not counts.spanning:
@@ -229,7 +233,7 @@ def _absence(name: str, counts: PlanCounts) -> str:
         )
     tried = " or ".join(counts.families)
     return (
-        f"{name}: {counts.spanning} face quadruples span (P3), but none carries a {tried} grasp "
-        f"with discs of at least {LEAST_RADIUS:g} object radii; the free method may find others "
-        "(--family free)"
+        f"{name}: {counts.spanning} face quadruples span (P3), but no {tried} grasp was found on "
+        f"them (discs below {LEAST_RADIUS:g} object radii do not count); the free method may find "
+        "others (--family free)"
     )

@@ -40,7 +40,7 @@ class MethodCounts:
     found: int = 0
     """Grasps whose witness is of its family and which exact force closure certified."""
     rejected: int = 0
-    """Placements that either test did not confirm: a bug if not 0."""
+    """Placements that the witness or the exact closure test did not confirm: a bug if not 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,10 @@ class Plan:
     absences: Mapping[FaceQuadruple, tuple[Proof, ...]] = field(
         default_factory=dict[FaceQuadruple, tuple[Proof, ...]]
     )
-    """Face quadruples that the free method proved to hold no grasp at this friction, with a proof
-    for each choice of one convex piece per face."""
+    """Face quadruples that the free method proved to hold no grasp with friction tan(theta), with
+    a proof for each choice of one convex piece per face. Pieces too small for a contact, a
+    millionth of the object, are left out."""
+    undecided: tuple[FaceQuadruple, ...] = ()
+    """Face quadruples on which the free method found neither."""
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
     """Processor time of each method, from its first program to the last critical friction."""

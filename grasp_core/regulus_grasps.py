@@ -22,12 +22,13 @@ The equation is bilinear. Fixing both slopes tau_i = y_i / x_i makes it linear: 
 l_2 = p tau_1 with one free p. The projection of f_ij into P_i stays within psi of a_ij, so if
 phi_ij is the angle of a_ij from the resultant of its pair, +u or -u, then
 
-    max_j phi_ij - psi <= atan(tau_i) <= min_j phi_ij + psi,
+    max_j phi_ij - psi <= atan|tau_i| <= min(min_j phi_ij + psi, pi / 2),
 
-an interval of which a few values are tried. It is empty unless the pair is nearly symmetric
-about u, |phi_i1 - phi_i2| <= 2 psi. Linear in (x0, k, p, x_i, z_i, t), the program is
+an interval of which a few values are tried; tau_i has the sign of x_i. It is empty unless the
+pair is nearly symmetric about u, |phi_i1 - phi_i2| <= 2 psi. In (x0, k, p, x_i, z_i, t) the
+program is linear:
 
-    minimise t  subject to  x_ij on its face, |x_ij - centre| <= t along both axes of the face,
+    minimise t  subject to  x_ij inside its face, |x_ij - centre| <= t along both axes of the face,
                             f_ij in an inscribed pyramid, n_ij.f_ij >= a least depth,
                             p beyond a least gap, on either side.
 
@@ -48,16 +49,22 @@ from grasp_core.arrays import Array
 from grasp_core.concurrent_grasps import inscribed_facets
 from grasp_core.face_pieces import FacePiece
 from grasp_core.lp import Infeasible, LinearProgram, Optimum, maximize
-from grasp_core.placements import NoPlacement, Placement, balanced_forces
-from grasp_core.spanning import balancing_weights
+from grasp_core.placements import (
+    NoPlacement,
+    Placement,
+    balanced_forces,
+    focus_direction,
+)
 from grasp_core.values import FINGERS, ForceCone
 
 SLOPES = (0.5, 0.2, 0.8)
 """Where in its interval each slope's angle is tried."""
 LEAST_DEPTH = 0.02
 """Least height of the passing points over their faces, in object radii."""
+LEAST_INSET = 1e-3
+"""Least distance of a contact from the edges of its face, in object radii."""
 LEAST_GAP = 0.01
-"""Least distance l_i of a line from the focus line, in object radii."""
+"""Least distance l_i, along N_i, at which a line passes the focus line, in object radii."""
 X0, K, P, X, Z, T = slice(0, 3), 3, 4, slice(5, 7), slice(7, 9), 9
 """Where the variables are."""
 VARIABLES = 10
@@ -106,13 +113,23 @@ def nearly_symmetric(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
         axes: Of the force cones in finger order, (q, 4, 3).
         half_angles: (q,) [rad].
     """
-    w = np.einsum("qi,qij->qj", balancing_weights(axes)[:, :2], axes[:, :2])
-    u = w / np.linalg.norm(w, axis=1, keepdims=True)
-    along = np.einsum("qij,qj->qi", axes, u) * (1.0, 1.0, -1.0, -1.0)
-    phi = np.arccos(np.clip(along, -1.0, 1.0)).reshape(-1, 2, 2)
-    least = phi.max(axis=2) - half_angles[:, None]
-    largest = np.minimum(phi.min(axis=2) + half_angles[:, None], np.pi / 2.0)
-    return (least < largest).all(axis=1)
+    least, largest = _slope_angles(axes, half_angles[:, None])
+    return np.all(least < largest, axis=1)
+
+
+def _slope_angles(axes: Array, half_angles: Array) -> tuple[Array, Array]:
+    """Least and largest angle of each pair's forces from its resultant, each (..., 2).
+
+    Args:
+        axes: (..., 4, 3)
+        half_angles: One for all fingers, (..., 1), or one each, (..., 4).
+    """
+    along = np.einsum("...ij,...j->...i", axes, focus_direction(axes)) * (1.0, 1.0, -1.0, -1.0)
+    phi = np.arccos(np.clip(along, -1.0, 1.0))
+    in_pairs = (*phi.shape[:-1], 2, 2)
+    least = (phi - half_angles).reshape(in_pairs).max(axis=-1)
+    largest = (phi + half_angles).reshape(in_pairs).min(axis=-1)
+    return least, np.minimum(largest, np.pi / 2.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,23 +155,16 @@ class _Line:
 
 def _pairs(cones: Sequence[ForceCone]) -> list[_Pair]:
     axes = np.array([cone.axis for cone in cones])
-    w = balancing_weights(axes)[:2] @ axes[:2]
-    u = _unit(w)
+    u = focus_direction(axes)
+    least, largest = _slope_angles(axes, np.array([cone.half_angle for cone in cones]))
     pairs: list[_Pair] = []
-    for resultant, first in ((1.0, 0), (-1.0, 2)):
-        a, c = axes[first], axes[first + 1]
-        N = _unit(np.cross(a, c) * np.sign(np.cross(np.cross(a, c), u) @ a))
-        v = np.cross(N, u)
-        phi = [math.acos(max(-1.0, min(1.0, resultant * float(axis @ u)))) for axis in (a, c)]
-        psi = [cones[first].half_angle, cones[first + 1].half_angle]
-        least = max(phi[0] - psi[0], phi[1] - psi[1])
-        largest = min(phi[0] + psi[0], phi[1] + psi[1], math.pi / 2.0)
-        pairs.append(_Pair(u, v, N, resultant, least, largest))
+    for pair, resultant in enumerate((1.0, -1.0)):
+        a, c = axes[2 * pair], axes[2 * pair + 1]
+        across = np.cross(a, c) * np.sign(np.cross(np.cross(a, c), u) @ a)
+        N = np.asarray(across / np.linalg.norm(across), dtype=np.float64)
+        angles = float(least[pair]), float(largest[pair])
+        pairs.append(_Pair(u, np.asarray(np.cross(N, u)), N, resultant, *angles))
     return pairs
-
-
-def _unit(vector: Array) -> Array:
-    return vector / np.linalg.norm(vector)
 
 
 def _slopes(pair: _Pair) -> list[float]:
@@ -192,7 +202,13 @@ def _rows(
             -G @ line.F,
             -piece.normal @ line.F,
         ]
-        limits += [piece.b + piece.E @ middle, middle, -middle, np.zeros(len(G)), -LEAST_DEPTH]
+        limits += [
+            piece.b - LEAST_INSET + piece.E @ middle,
+            middle,
+            -middle,
+            np.zeros(len(G)),
+            -LEAST_DEPTH,
+        ]
     normals = np.array([piece.normal for piece in pieces])
     A_eq = np.array([n @ (line.D - line.F) for n, line in zip(normals, lines, strict=True)])
     b_eq = np.array([piece.normal @ piece.origin for piece in pieces])

@@ -1,17 +1,17 @@
 """One method over the face quadruples of one object: what it finds, best first, and counts."""
 
+import math
 from bisect import insort
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations, product
-from math import comb
 
 import numpy as np
 
-from grasp_core.arrays import UNIT_SLACK
 from grasp_core.certified import Certified, closure_margin, witness_fault
 from grasp_core.constructions import Construction, FingerOrder, point_region
+from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece
 from grasp_core.patch import Absence, Undecided, place_free
 from grasp_core.placements import Placement
@@ -26,6 +26,8 @@ from grasp_core.values import (
     four,
 )
 
+SAME_MERIT = 1e-5
+"""Merits are compared to six digits, so that ties are broken by the faces and not by rounding."""
 SAME_CONTACTS = 1e-6
 """Contacts closer than this, in object radii, are the same grasp found twice."""
 
@@ -43,6 +45,7 @@ class Search:
     absences: dict[FaceQuadruple, tuple[Proof, ...]] = field(
         default_factory=dict[FaceQuadruple, tuple[Proof, ...]]
     )
+    undecided: list[FaceQuadruple] = field(default_factory=list[FaceQuadruple])
     seconds: float = 0.0
 
     @property
@@ -65,7 +68,7 @@ class Search:
 
 def _best_first(found: Certified) -> tuple[float, FaceQuadruple]:
     """Largest merit first; ties are broken by the faces, not by rounding."""
-    return -float(f"{found.placement.merit:.9g}"), found.faces
+    return -float(f"{found.placement.merit:.6g}"), found.faces
 
 
 def search_construction(
@@ -97,7 +100,7 @@ def search_construction(
 
 def _can_improve(construction: Construction, quadruple: Quadruple, search: Search) -> bool:
     worst = search.best[-1].placement.merit
-    return construction.bounds is not None and quadruple.bound >= worst * (1.0 - UNIT_SLACK)
+    return construction.bounds is not None and quadruple.bound >= worst * (1.0 - SAME_MERIT)
 
 
 def _try_order(
@@ -178,18 +181,27 @@ def search_free(
     """Go through all quadruples of faces, spanning or not, until a limit is reached."""
     for done, faces in enumerate(combinations(range(len(pieces)), FINGERS)):
         if search.full:
-            search.tally["pruned"] += comb(len(pieces), FINGERS) - done
+            search.tally["pruned"] += math.comb(len(pieces), FINGERS) - done
             return
         choices = list(product(*(pieces[face] for face in faces)))
         search.tally.update({"tried": 1, "solved": len(choices)})
         rng = np.random.default_rng([seed, *faces])
         answers = [
-            (chosen, place_free(chosen, friction, rng=rng, cells=cells)) for chosen in choices
+            (chosen, _placed_free(chosen, math.tan(theta), rng, cells)) for chosen in choices
         ]
         found = _free_grasp(faces, answers, friction, theta, search)
         if found is not None:
             search.keep(found)
         yield [found] if found else []
+
+
+def _placed_free(
+    chosen: tuple[FacePiece, ...], friction: float, rng: np.random.Generator, cells: int
+) -> Placement | Absence | Undecided:
+    try:
+        return place_free(chosen, friction, rng=rng, cells=cells)
+    except SolverError:
+        return Undecided(1)
 
 
 def _free_grasp(
@@ -202,11 +214,12 @@ def _free_grasp(
     placed = [(chosen, found) for chosen, found in answers if isinstance(found, Placement)]
     proofs = [proof for _, proof in answers if isinstance(proof, Absence)]
     if not placed:
-        if len(proofs) == len(answers):
+        if proofs and len(proofs) == len(answers):
             search.tally["infeasible"] += 1
             search.absences[faces] = tuple(proofs)
         else:
             search.tally["undecided"] += 1
+            search.undecided.append(faces)
         return None
     chosen, placement = max(placed, key=lambda pair: pair[1].merit)
     margin = closure_margin(chosen, placement, friction)

@@ -99,7 +99,8 @@ def balancing_weights(vectors: Array) -> Array:
 def _signed_determinants(vectors: Array) -> Array:
     """Weights of a vanishing combination, by Cramer's rule, (..., 4)."""
     minors = np.stack([vectors[..., rest, :] for rest in OTHERS], axis=-3)
-    return np.linalg.det(minors) * (1.0, -1.0, 1.0, -1.0)
+    determinants: Array = np.asarray(np.linalg.det(minors), dtype=np.float64)
+    return determinants * (1.0, -1.0, 1.0, -1.0)
 
 
 def triple_sine(one: Array, two: Array, three: Array) -> Array:

@@ -128,8 +128,13 @@ def _say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
         reporter.say(
             f"{method}: {tally.tried} tried, {tally.pruned} pruned, {tally.infeasible} "
             f"infeasible, {undecided}{tally.duplicates} duplicates, {tally.found} found, "
-            f"{tally.rejected} rejected by exact closure, {found.seconds[method]:.2f} s"
+            f"{tally.rejected} rejected, {found.seconds[method]:.2f} s"
         )
+
+    if found.undecided:
+        named = ["-".join(str(face) for face in faces) for faces in found.undecided]
+        reporter.say(f"undecided faces: {', '.join(named[:TABLE_ROWS])}")
+        _say_cut(len(named), reporter)
 
 
 def _say_cut(count: int, reporter: Reporter) -> None:

@@ -7,6 +7,7 @@ import pytest
 import grasp_core as gc
 from grasp_core import patch
 from grasp_core.closure import ClosureCertificate
+from grasp_core.face_parts import part_at
 from grasp_core.face_pieces import unit_pieces
 from grasp_core.patch import Absence, Undecided, close_patch, place_by_forces, place_free
 from grasp_core.placements import Placement
@@ -292,7 +293,7 @@ def test_the_parts_reached_by_cutting_cover_the_faces_without_overlap():
         for _ in range(12):
             path = paths.pop(rng.integers(len(paths)))
             paths += [(*path, 0), (*path, 1)]
-        parts = [patch._part(pieces, path) for path in paths]
+        parts = [part_at(pieces, path) for path in paths]
         for _ in range(50):
             points = [rng.dirichlet(np.ones(len(p.corners))) @ p.corners for p in pieces]
             inside = [
@@ -314,7 +315,7 @@ def halves(absence):
     """The same absence, proved once more with the two halves in place of the whole."""
     leaves = []
     for path in ((0,), (1,)):
-        part = patch._part(absence.pieces, path)
+        part = part_at(absence.pieces, path)
         leaves.append((path, close_patch(absence.pieces, part, absence.friction)))
     return replace(absence, leaves=tuple(leaves))
 
@@ -464,3 +465,18 @@ def test_friction_must_be_positive():
     """Four normals span at most four dimensions of wrenches; the corners of a face span more."""
     with pytest.raises(gc.InputError, match="positive"):
         place(quadruple("tetrahedron", range(4)), 0.0)
+
+
+def test_a_cover_with_a_hole_too_small_for_floating_point_is_refused():
+    """All leaves of a comb of depth 60 but the last: their shares add up to one in floats."""
+    pieces = [piece for piece in faces_of("octahedron") if piece.normal[2] < 0.0]
+    absence = place(pieces, 0.6)
+    comb = [(*([0] * depth), 1) for depth in range(60)]
+    leaves = tuple((path, close_patch(pieces, part_at(pieces, path), 0.6)) for path in comb)
+    last = (*([0] * 59), 0)
+    whole = replace(absence, leaves=leaves[:-1] + tuple(
+        (path, close_patch(pieces, part_at(pieces, path), 0.6)) for path in (comb[-1], last)
+    ))  # fmt: skip
+    assert whole.verify()
+    assert sum(0.5 ** len(path) for path in comb) == pytest.approx(1.0, abs=1e-16)
+    assert not replace(absence, leaves=leaves).verify()

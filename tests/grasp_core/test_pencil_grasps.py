@@ -41,7 +41,9 @@ def test_the_tetrahedron_has_discs_of_half_the_cone_angle_in_all_pairings(theta_
     assert len(found) == 3
     for _, _, placed in found:
         np.testing.assert_allclose(math.sqrt(3.0) * placed.radii, radius, atol=1e-6)
-    for quad, _, placed in pencils("tetrahedron", theta, cells=(CELL_B,)):
+    near = list(pencils("tetrahedron", theta, cells=(CELL_B,)))
+    assert len(near) == 3
+    for quad, _, placed in near:
         assert math.sqrt(3.0) * placed.merit > 1.1 * radius
         assert min(closure_margins(quad, placed, extremes(quad), math.tan(theta) + BORDER)) > 0.0
 

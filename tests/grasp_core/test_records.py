@@ -64,8 +64,20 @@ CHANGES = {
     ),
     "contact beyond the border": (lambda d: _slid(d, 0.05), "outside the border"),
     "witness out of balance": (
+        lambda d: _scaled_forces(d, [1.1, 1.0, 1.0, 1.0]),
+        "do not balance",
+    ),
+    "witness so small that nothing seems out of balance": (
+        lambda d: _scaled_forces(d, [1e-7, 1e-7, 2e-8, 5e-7], keep_sum=False),
+        "do not sum to one",
+    ),
+    "witness outside its cone": (
         lambda d: _set(d, ["grasps", 0, "witness", "forces", 0], [0.1, 0.1, 0.1]),
         "witness",
+    ),
+    "focus beside the lines": (
+        lambda d: _set(d, ["grasps", 0, "focus_points_m", 0], [0.01, 0.0, 0.0]),
+        "focus points",
     ),
     "witness beside the contacts": (
         lambda d: _set(d, ["grasps", 0, "witness", "points_m", 0], [0.1, 0.1, 0.1]),
@@ -99,6 +111,16 @@ def _slid(document, distance):
     along = np.cross(contact["normal"], [0.3, 0.5, 0.7])
     moved = np.array(contact["position_m"]) + distance * along / np.linalg.norm(along)
     return _set(document, ["grasps", 0, "contacts", 0, "position_m"], moved.tolist())
+
+
+def _scaled_forces(document, factors, *, keep_sum=True):
+    """Scale each witness force along itself, so that it stays in its cone."""
+    grasp = document["grasps"][0]
+    forces = np.array(grasp["witness"]["forces"]) * np.array(factors)[:, None]
+    if keep_sum:
+        normals = np.array([contact["normal"] for contact in grasp["contacts"]])
+        forces /= np.einsum("ki,ki->", forces, normals)
+    return _set(document, ["grasps", 0, "witness", "forces"], forces.tolist())
 
 
 def _set(document, path, value):

@@ -6,7 +6,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.lines import plucker_vectors
 from grasp_core.placements import Placement
-from grasp_core.regulus_grasps import LEAST_DEPTH, place_regulus
+from grasp_core.regulus_grasps import LEAST_DEPTH, nearly_symmetric, place_regulus
 from tests.grasp_core.quadruples import paired_quadruples
 
 TOLERANCE = 1e-7
@@ -38,7 +38,7 @@ def test_the_four_lines_lie_on_one_regulus_and_never_meet(reguli):
                 assert abs(meeting) > 1e-9
 
 
-def test_forces_balance_strictly_inside_their_cones(reguli):
+def test_forces_balance_inside_their_cones(reguli):
     for quad, cones, placed in reguli:
         np.testing.assert_allclose(placed.forces.sum(axis=0), 0.0, atol=TOLERANCE)
         torque = np.cross(placed.positions, placed.forces).sum(axis=0)
@@ -96,3 +96,13 @@ def test_the_passing_points_keep_their_height_over_the_faces(reguli):
             focus = placed.foci[finger // 2]
             (share, _), *_ = np.linalg.lstsq(np.column_stack([f[finger], N]), focus - x[finger])
             assert share * (f[finger] @ piece.normal) >= LEAST_DEPTH - TOLERANCE
+
+
+def test_pairings_that_are_dropped_unseen_have_no_regulus():
+    theta, dropped = math.radians(10.0), 0
+    for quad, cones in paired_quadruples("random-30-1", theta, 60):
+        axes = np.array([[cone.axis for cone in cones]])
+        if not nearly_symmetric(axes, np.array([theta]))[0]:
+            assert not isinstance(place_regulus(quad, cones), Placement)
+            dropped += 1
+    assert dropped >= 100

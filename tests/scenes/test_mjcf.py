@@ -168,3 +168,15 @@ def test_bad_numbers_are_refused(bad):
     body = scenes.example_object("tetrahedron")
     with pytest.raises(gc.InputError, match=f"{next(iter(bad))} must be a positive number"):
         scenes.build_scene(body, gc.plan(body).grasps[0], **bad)
+
+
+def test_coplanar_and_symmetric_contacts_make_scenes_that_load():
+    """Moments of inertia of coplanar contacts are the limit of what a body can have."""
+    body = scenes.example_object("box")
+    for z in (0.0, 0.01):
+        contacts = [gc.Contact([s * 0.05, 0.0, z], [-s, 0.0, 0.0]) for s in (1.0, -1.0)] + [
+            gc.Contact([0.0, s * 0.035, -z], [0.0, -s, 0.0]) for s in (1.0, -1.0)
+        ]
+        scene = scenes.build_scene(body, contacts, 0.5)
+        model = mujoco.MjModel.from_xml_string(scene.xml)
+        assert model.body("object").inertia.min() > 0.0
