@@ -24,7 +24,7 @@ from scenes.objects import example_names, example_object
 from sim_validate import cli
 from sim_validate.console import Reporter
 from sim_validate.engines import each
-from sim_validate.files import read_text, write_text
+from sim_validate.files import read_text, remove_results, write_text
 from sim_validate.validation import Verdict, validate
 from sim_validate.verdict_records import summary, verdicts_to_json
 
@@ -71,6 +71,7 @@ def _planned(name: str, planning: cli.Planning, reporter: Reporter) -> tuple[Pol
 def _run(command: cli.Run, reporter: Reporter) -> int:
     body, found = _planned(command.object, command.planning, reporter)
     folder = command.out or Path("graspproof-out") / _folder_name(body.name)
+    remove_results(folder)
     write_text(folder / "grasps.json", plan_to_json(body, found))
     _say_counts(body, found, reporter)
     if found.absence:

@@ -41,3 +41,10 @@ def write_text(path: Path, text: str) -> Path:
         temporary.unlink(missing_ok=True)
         raise
     return path
+
+
+def remove_results(folder: Path) -> None:
+    """Remove the verdicts and scenes of an earlier run, which would contradict the new grasps."""
+    old = [folder / "verdicts.json", *folder.glob("scenes/[cprf]-*-*-*-*.xml")]
+    for path in old:
+        path.unlink(missing_ok=True)

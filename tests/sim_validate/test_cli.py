@@ -35,6 +35,16 @@ def test_run_writes_grasps_verdicts_and_scenes_and_tells(here, capsys):
     assert verdicts["summary"]["controls_held"] == 0
 
 
+def test_a_second_run_leaves_nothing_of_the_first_behind(here):
+    options = ["--out", "results", "--family", "free", "--limit", "2", "-q"]
+    assert main(["run", "box", *options]) == Exit.GOOD
+    kept = here / "results" / "scenes" / "mine.xml"
+    kept.write_text("<mujoco/>")
+    assert main(["run", "box", "--out", "results", "-q"]) == Exit.NONE
+    names = sorted(p.name for p in (here / "results").rglob("*") if p.is_file())
+    assert names == ["grasps.json", "mine.xml"]
+
+
 def test_a_verdict_has_the_fields_that_users_rely_on(here, capsys):
     assert main(["run", "wedge", "--limit", "1", "--json"]) == Exit.GOOD
     document = json.loads(capsys.readouterr().out)
