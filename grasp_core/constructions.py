@@ -17,9 +17,10 @@ from grasp_core.face_pieces import FacePiece, inscribed_disc_radius
 from grasp_core.pencil_grasps import pencil_radius_bounds, place_pencil
 from grasp_core.placements import NoPlacement, Placement
 from grasp_core.regulus_grasps import nearly_symmetric, place_regulus
-from grasp_core.values import ContactRegion, Family, ForceCone, RegionKind
+from grasp_core.values import ContactRegion, Family, ForceCone
 
 FingerOrder: TypeAlias = tuple[int, int, int, int]
+Region: TypeAlias = Callable[[FacePiece, ForceCone, Placement, int], ContactRegion]
 
 AS_LISTED: tuple[FingerOrder, ...] = ((0, 1, 2, 3),)
 PAIRINGS: tuple[FingerOrder, ...] = ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2))
@@ -46,11 +47,11 @@ class Construction:
     admits: Callable[[Array, Array], NDArray[np.bool_]]
     """Whether quadruples are worth a program, from their normals in finger order, (q, 4, 3), and
     half-angles (q,): False only where none can be feasible."""
-    region: Callable[[FacePiece, ForceCone, Placement, int], ContactRegion]
+    region: Region
     """The region of one finger, in the pieces' units."""
 
 
-def _all(_: Array, half_angles: Array) -> NDArray[np.bool_]:
+def _always_admitted(_: Array, half_angles: Array) -> NDArray[np.bool_]:
     return np.ones(len(half_angles), dtype=np.bool_)
 
 
@@ -68,8 +69,7 @@ def _disc_region(piece: FacePiece, _: ForceCone, placed: Placement, finger: int)
 
 def point_region(_: FacePiece, __: ForceCone, placed: Placement, finger: int) -> ContactRegion:
     """Nothing but the contact."""
-    kind: RegionKind = "point"
-    return ContactRegion(kind, placed.positions[finger][None], 0.0)
+    return ContactRegion("point", placed.positions[finger][None], 0.0)
 
 
 CONSTRUCTIONS: dict[Family, Construction] = {
@@ -80,7 +80,7 @@ CONSTRUCTIONS: dict[Family, Construction] = {
             pieces, cones, least=max(least, LEAST_RADIUS)
         ),
         concurrent_radius_bounds,
-        _all,
+        _always_admitted,
         _cone_region,
     ),
     "pencil": Construction(
@@ -90,7 +90,7 @@ CONSTRUCTIONS: dict[Family, Construction] = {
             pieces, cones, least=max(least, LEAST_RADIUS), least_gap=LEAST_RADIUS
         ),
         pencil_radius_bounds,
-        _all,
+        _always_admitted,
         _disc_region,
     ),
     "regulus": Construction(

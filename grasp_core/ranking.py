@@ -35,8 +35,8 @@ class Quadruple:
     """Four faces to try, with the half-angle to plan them at."""
 
     faces: FaceQuadruple
-    span_angle: float
     half_angle: float
+    """Of the force cones [rad]."""
     bound: float
     """No disc can be larger, relative to the object's radius; infinite without discs."""
     orders: tuple[FingerOrder, ...]
@@ -50,7 +50,7 @@ class Ranking:
     faces: Indices
     """(q, 4)"""
     numbers: Array
-    """Span angle, half-angle and bound of each, (q, 3)."""
+    """Half-angle and bound of each, (q, 2)."""
     worth: NDArray[np.bool_]
     """Which finger orders are worth a program, (q, orders)."""
     construction: Construction
@@ -62,9 +62,9 @@ class Ranking:
 
     def __iter__(self) -> Iterator[Quadruple]:
         for faces, numbers, worth in zip(self.faces, self.numbers, self.worth, strict=True):
-            span, half_angle, bound = (float(x) for x in numbers)
+            half_angle, bound = (float(x) for x in numbers)
             orders = tuple(compress(self.construction.orders, worth))
-            yield Quadruple(four(int(face) for face in faces), span, half_angle, bound, orders)
+            yield Quadruple(four(int(face) for face in faces), half_angle, bound, orders)
 
     def candidates_from(self, place: int) -> int:
         """How many candidates are left from a place in the order on."""
@@ -79,8 +79,6 @@ class Candidates:
     """(q, 4)"""
     normals: Array
     """(q, 4, 3)"""
-    span_angles: Array
-    """theta* of each, (q,) [rad]."""
     half_angles: Array
     """theta_plan of each, (q,) [rad]."""
     depths: Array
@@ -106,7 +104,7 @@ class Candidates:
              for finger_order in construction.orders]
         ).T & (bounds >= LEAST_RADIUS)[:, None]  # fmt: skip
         order = order[worth[order].any(axis=1)]
-        numbers = np.column_stack([self.span_angles, self.half_angles, bounds])
+        numbers = np.column_stack([self.half_angles, bounds])
         dropped = int((~worth).sum())
         return Ranking(self.faces[order], numbers[order], worth[order], construction, dropped)
 
@@ -126,7 +124,6 @@ def candidate_quadruples(body: Polyhedron, pieces: PiecesByFace, theta: float) -
     return Candidates(
         faces=quads,
         normals=normals[quads],
-        span_angles=found.span_angles,
         half_angles=np.minimum(INSIDE_FRICTION * theta, BELOW_SPAN_ANGLE * found.span_angles),
         depths=_mean_depths(normals[quads], _heights(body)[quads]),
         rooms=room[quads].min(axis=1, initial=np.inf),

@@ -10,7 +10,7 @@ from itertools import combinations, product
 import numpy as np
 
 from grasp_core.certified import Certified, closure_margin, witness_fault
-from grasp_core.constructions import Construction, FingerOrder, point_region
+from grasp_core.constructions import Construction, FingerOrder, Region, point_region
 from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece
 from grasp_core.patch import Absence, Undecided, place_free
@@ -120,29 +120,16 @@ def _try_order(
         return None
     chosen, placement = placed
     cones = _cones(chosen, quadruple.half_angle)
-    spans = cones_positively_span([cone.axis for cone in cones], [quadruple.half_angle] * FINGERS)
-    margin = closure_margin(chosen, placement, friction)
-    if (
-        margin is None
-        or not spans
-        or _fault(chosen, placement, friction, construction.family) is not None
+    certified = _certified(
+        construction.family[0], faces, construction.family, chosen, cones, placement, friction,
+        construction.region,
+    )  # fmt: skip
+    if certified is None or not cones_positively_span(
+        [cone.axis for cone in cones], [quadruple.half_angle] * FINGERS
     ):
         tally["rejected"] += 1
         return None
-    return Certified(
-        id=_name(construction.family[0], faces),
-        faces=faces,
-        family=construction.family,
-        span_angle=quadruple.span_angle,
-        pieces=chosen,
-        cones=cones,
-        regions=tuple(
-            construction.region(piece, cone, placement, finger)
-            for finger, (piece, cone) in enumerate(zip(chosen, cones, strict=True))
-        ),
-        placement=placement,
-        margin=margin,
-    )
+    return certified
 
 
 def _best_placement(
@@ -222,38 +209,46 @@ def _free_grasp(
             search.undecided.append(faces)
         return None
     chosen, placement = max(placed, key=lambda pair: pair[1].merit)
-    margin = closure_margin(chosen, placement, friction)
-    if margin is None or _fault(chosen, placement, friction, "regulus") is not None:
+    certified = _certified(
+        "f", faces, "regulus", chosen, _cones(chosen, theta), placement, friction, point_region
+    )
+    if certified is None:
         search.tally["rejected"] += 1
+    return certified
+
+
+def _certified(  # noqa: PLR0913, PLR0917 - everything a grasp is made of
+    letter: str,
+    faces: FaceQuadruple,
+    family: Family,
+    pieces: tuple[FacePiece, ...],
+    cones: tuple[ForceCone, ...],
+    placement: Placement,
+    friction: float,
+    region: Region,
+) -> Certified | None:
+    """The placement, if its witness and the exact closure test both confirm it."""
+    normals = np.array([piece.normal for piece in pieces])
+    margin = closure_margin(pieces, placement, friction)
+    fault = witness_fault(placement.positions, normals, placement.forces, friction, family)
+    if margin is None or fault is not None:
         return None
-    cones = _cones(chosen, theta)
     return Certified(
-        id=_name("f", faces),
+        id=f"{letter}-" + "-".join(str(face) for face in faces),
         faces=faces,
-        family="regulus",
-        span_angle=span_angle(np.array([piece.normal for piece in chosen])),
-        pieces=chosen,
+        family=family,
+        span_angle=span_angle(normals),
+        pieces=pieces,
         cones=cones,
         regions=tuple(
-            point_region(piece, cone, placement, finger)
-            for finger, (piece, cone) in enumerate(zip(chosen, cones, strict=True))
+            region(piece, cone, placement, finger)
+            for finger, (piece, cone) in enumerate(zip(pieces, cones, strict=True))
         ),
         placement=placement,
         margin=margin,
     )
 
 
-def _fault(
-    pieces: Sequence[FacePiece], placement: Placement, friction: float, family: Family
-) -> str | None:
-    normals = np.array([piece.normal for piece in pieces])
-    return witness_fault(placement.positions, normals, placement.forces, friction, family)
-
-
 def _cones(pieces: Sequence[FacePiece], half_angle: float) -> tuple[ForceCone, ...]:
     """The paper's force cones: about the normals."""
     return tuple(ForceCone(piece.normal, half_angle) for piece in pieces)
-
-
-def _name(letter: str, faces: FaceQuadruple) -> str:
-    return f"{letter}-" + "-".join(str(face) for face in faces)
