@@ -46,6 +46,7 @@ def test_a_package_is_imported_at_its_door_only(package):
 def test_importing_stays_light(module, heavy):
     code = f"import sys, {module}; print([m for m in {heavy!r} if m in sys.modules])"
     answer = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
     )
+    assert answer.returncode == 0, answer.stderr
     assert answer.stdout.strip() == "[]"

@@ -234,8 +234,9 @@ def test_help_answers_without_loading_a_simulator():
         "print('HEAVY', [m for m in ('mujoco', 'trimesh', 'scipy') if m in sys.modules])"
     )
     answer = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
     )
+    assert answer.returncode == 0, answer.stderr
     assert "HEAVY []" in answer.stdout
     assert "validate" in answer.stdout
 
