@@ -145,7 +145,7 @@ class _Bracket:
     def next_trial(self) -> float:
         if not math.isnan(self.center):
             above = self.center + self.spread
-            return above if self.upper > above else max(self.center - self.spread, 0.0)
+            return above if self.upper > above else self.center - self.spread
         if self.below is None:
             self.share *= self.share
             return max(2.0 * self.share * self.upper, FRICTIONLESS)

@@ -65,7 +65,8 @@ class Planning:
     """Half-angle of the friction cones to plan with [deg]; the friction angle if not given."""
     family: UseAppendAction[tuple[Literal["concurrent", "pencil", "regulus", "free"], ...]] = ()
     """Construction to try, may be repeated; the first three if not given. `free` looks for grasps
-    of any type on any four faces, and proves for the others that there is none."""
+    of any type on any four faces; for the others it proves that there is none, or says that it
+    is undecided."""
     limit: Count | None = None
     """Keep at most this many grasps, the best of each family in turn; None for all."""
     cells: Count = 1

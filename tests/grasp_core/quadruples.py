@@ -1,5 +1,9 @@
 """Face quadruples of convex example objects, as the constructions take them."""
 
+import math
+
+import numpy as np
+
 from grasp_core.constructions import PAIRINGS
 from grasp_core.face_pieces import unit_pieces
 from grasp_core.spanning import spanning_quadruples
@@ -15,3 +19,16 @@ def paired_quadruples(name, theta, limit=None):
         for order in PAIRINGS:
             quad = [pieces[faces[finger]] for finger in order]
             yield quad, [ForceCone(piece.normal, theta) for piece in quad]
+
+
+def tilted_side_cones(pieces, tilt, half_angle):
+    """Force cones for the four sides of an upright box, tilted up on one pair, down on the other.
+
+    The normals of a box never satisfy P3; these axes do.
+    """
+    cones = []
+    for piece in pieces:
+        sign = 1.0 if abs(piece.normal[0]) > 0.5 else -1.0
+        axis = math.cos(tilt) * piece.normal + sign * math.sin(tilt) * np.array([0.0, 0, 1.0])
+        cones.append(ForceCone(axis / np.linalg.norm(axis), half_angle))
+    return cones

@@ -15,6 +15,7 @@ from grasp_core.placements import NoPlacement, Placement
 from grasp_core.spanning import balancing_weights, spanning_quadruples
 from grasp_core.values import ForceCone
 from scenes.objects import example_object
+from tests.grasp_core.quadruples import tilted_side_cones
 
 TOLERANCE = 1e-7
 """Ten times the residual at which a program's answer is accepted, in object radii."""
@@ -126,11 +127,7 @@ def test_tilted_cones_hold_a_box_by_its_four_sides():
     box = gc.Polyhedron.from_mesh(*cube_mesh())
     pieces = [p for p in unit_pieces(box) if abs(p.normal[2]) < 0.5]
     tilt, half_angle = math.radians(14.036), math.radians(12.529)
-    cones = []
-    for piece in pieces:
-        sign = 1.0 if abs(piece.normal[0]) > 0.5 else -1.0
-        axis = math.cos(tilt) * piece.normal + sign * math.sin(tilt) * np.array([0.0, 0, 1.0])
-        cones.append(ForceCone(axis / np.linalg.norm(axis), half_angle))
+    cones = tilted_side_cones(pieces, tilt, half_angle)
     assert gc.cones_positively_span([c.axis for c in cones], [half_angle - 1e-4] * 4)
     placed = place_concurrent(pieces, cones, least=1e-4)
     assert isinstance(placed, Placement)

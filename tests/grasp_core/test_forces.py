@@ -49,7 +49,10 @@ def test_forces_balance_within_cones_and_limits():
 
 
 def test_least_friction_is_near_the_true_minimum():
-    """The true one by bisection on exact cones without a lower limit, which can only be less."""
+    """The true one by bisection on exact cones without a lower limit, which can only be less.
+
+    Pyramids of 16 sides alone would miss it by up to 2 %.
+    """
     tested = 0
     for body, grasp, wrench in cases(per_object=1):
         arms = grasp.positions - body.center_of_mass

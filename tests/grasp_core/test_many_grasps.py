@@ -63,6 +63,7 @@ def test_no_contacts_in_the_regions_of_two_hundred_grasps_lose_closure(family):
     for name in ("random-20-7", "icosahedron", "random-24-2", "random-16-1", "dodecahedron"):
         body = example_object(name)
         planned = gc.plan(body, FRICTION, families=(family,), limit=240).grasps
+        # with narrow cones, margins on the borders come near what the closure test can decide
         wide = [grasp for grasp in planned if grasp.force_cones[0].half_angle > 0.5 * THETA]
         for grasp in wide[:: max(1, len(wide) // 44)]:
             borders = [region.polygon for region in grasp.regions]

@@ -9,9 +9,8 @@ from grasp_core.face_pieces import unit_pieces
 from grasp_core.pencil_grasps import CELL_A, CELL_B, pencil_radius_bounds, place_pencil
 from grasp_core.placements import Placement
 from grasp_core.spanning import balancing_weights
-from grasp_core.values import ForceCone
 from scenes.objects import example_object
-from tests.grasp_core.quadruples import paired_quadruples
+from tests.grasp_core.quadruples import paired_quadruples, tilted_side_cones
 
 TOLERANCE = 1e-7
 """Ten times the residual at which a program's answer is accepted, in object radii."""
@@ -180,11 +179,7 @@ def test_tilted_cones_hold_a_box_by_its_four_sides():
     """P3 fails for the normals of a box; cones tilted inside the friction cones satisfy it."""
     pieces = [p for p in unit_pieces(example_object("box")) if abs(p.normal[2]) < 0.5]
     tilt, half_angle = math.radians(14.036), math.radians(12.5)
-    cones = []
-    for piece in pieces:
-        sign = 1.0 if abs(piece.normal[0]) > 0.5 else -1.0
-        axis = math.cos(tilt) * piece.normal + sign * math.sin(tilt) * np.array([0.0, 0, 1.0])
-        cones.append(ForceCone(axis / np.linalg.norm(axis), half_angle))
+    cones = tilted_side_cones(pieces, tilt, half_angle)
     assert gc.cones_positively_span([c.axis for c in cones], [half_angle] * 4)
     rng, tested = np.random.default_rng(0), 0
     for order in ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2)):

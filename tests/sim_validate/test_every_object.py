@@ -7,6 +7,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
+from sim_validate.controls import FRICTION_SHARE, LEAST_FRICTION
 
 PIECES = Path(__file__).parents[3] / "shared" / "objects" / "ycb" / "pieces"
 NAMES = [n for n in scenes.example_names() if "FACES" not in n] + [
@@ -15,14 +16,21 @@ NAMES = [n for n in scenes.example_names() if "FACES" not in n] + [
 
 
 def hold_all(body, friction, limit):
-    """Counts of grasps and controls, after checking that the former hold and the latter do not."""
+    """Counts of grasps and controls, after checking that the former hold and the latter do not.
+
+    Some two or three fingers never hold, so every grasp has that control; one of low friction
+    exists where the grasp needs any.
+    """
     plan = gc.plan(body, friction, limit=limit)
     assert all(counts.rejected == 0 for counts in plan.counts.families.values())
     controls = 0
     for grasp in plan.grasps:
         verdict = sv.validate(body, grasp, friction)
         assert verdict.held, (body.name, grasp.id, verdict.outcome)
-        assert verdict.controls, (body.name, grasp.id)
+        names = {trial.control.name for trial in verdict.controls}
+        assert "fingers_removed" in names, (body.name, grasp.id)
+        needs_friction = FRICTION_SHARE * verdict.critical_friction.predicted >= LEAST_FRICTION
+        assert ("low_friction" in names) == needs_friction, (body.name, grasp.id)
         assert verdict.controls_failed, (body.name, grasp.id)
         controls += len(verdict.controls)
     return len(plan.grasps), controls
@@ -36,8 +44,7 @@ def test_all_planned_grasps_of_built_in_objects_hold_and_controls_do_not(frictio
     for name in NAMES:
         held, refuted = hold_all(scenes.example_object(name), friction, 10)
         grasps, controls = grasps + held, controls + refuted
-    assert grasps >= 90
-    assert controls >= 1.5 * grasps
+    assert controls >= grasps >= 90
 
 
 @pytest.mark.slow
@@ -48,5 +55,4 @@ def test_all_planned_grasps_of_real_pieces_hold_and_controls_do_not():
     for path in sorted(PIECES.glob("*.obj")):
         held, refuted = hold_all(gc.load_polyhedron(path), 0.5, 10)
         grasps, controls = grasps + held, controls + refuted
-    assert grasps >= 100
-    assert controls >= 1.5 * grasps
+    assert controls >= grasps >= 100
