@@ -26,8 +26,8 @@ class MethodCounts:
     tried: int = 0
     """Candidates whose programs were set up."""
     pruned: int = 0
-    """Candidates skipped because a bound showed that their discs are too small, or that they
-    cannot enter the best `limit`."""
+    """Candidates skipped because a bound showed that their discs are too small, their pairs too
+    far from symmetric for a regulus, or that they cannot enter the best `limit`."""
     solved: int = 0
     """Choices of one convex piece per face that were considered."""
     infeasible: int = 0
