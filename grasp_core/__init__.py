@@ -16,7 +16,9 @@ from grasp_core.mesh import load_polyhedron as load_polyhedron
 from grasp_core.planner import iter_grasps as iter_grasps
 from grasp_core.planner import plan as plan
 from grasp_core.plans import Plan as Plan
-from grasp_core.quality import max_resisted_wrench as max_resisted_wrench
+from grasp_core.quality import FerrariCanny as FerrariCanny
+from grasp_core.quality import ferrari_canny as ferrari_canny
+from grasp_core.resisted_wrenches import max_resisted_wrench as max_resisted_wrench
 from grasp_core.spanning import cones_positively_span as cones_positively_span
 from grasp_core.spanning import span_angle as span_angle
 from grasp_core.values import Contact as Contact

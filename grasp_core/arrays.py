@@ -71,6 +71,18 @@ def frozen_indices(value: Any, shape: tuple[int | None, ...], name: str) -> Indi
     return indices
 
 
+def positive(value: float, name: str) -> float:
+    """A positive finite number.
+
+    Raises:
+        InputError: It is not.
+    """
+    number = float(value)
+    if not (math.isfinite(number) and number > 0.0):
+        raise InputError(f"{name} must be positive, got {value}")
+    return number
+
+
 def to_digits(values: Array) -> Array:
     """Values rounded to `DIGITS` digits of the largest of them.
 

@@ -1,171 +1,235 @@
-"""How much a grasp resists: the largest multiple of a wrench, and the weakest wrench.
+"""Ferrari-Canny quality with exact circular cones: proved lower and upper bounds.
 
-With each normal force at most f_max, the wrenches that the contacts can apply form a convex
-body W around the origin. An external wrench w is resisted up to the largest lambda with
--lambda w in W, a conic program. Its dual is a facet of W: a twist y with y.w = -1 and
-lambda = h(y) = f_max sum_i max(0, s_i(y)), the support of W (s_i as in `closure`). The
-wrench -y / |y| meets that facet squarely, so its limit is at most h(y) / |y|: stepping from
-a wrench to the one its limiting facet points at never raises the limit, and stops at a
-wrench that is locally the weakest.
+Solved: Q, the radius of the largest ball around the zero wrench inside the set W of wrenches
+that bounded contact forces can apply (see `wrench_sets`); if zero lies outside W, minus its
+distance from W.
 
-Torques are compared with forces through a stated length.
+Q is the least support of W over unit directions y, so any direction bounds it from above. A
+polytope inside W bounds it from below: no plane of its boundary is nearer to zero. The polytope is
+grown where it is weakest: the point of W farthest along the normal of the nearest plane is added,
+until that plane and its support agree. If zero is outside, the nearest point of W is found by
+a cone program; its forces bound the distance from above, its direction from below.
+
+Without closure, Q of `l1` is negative; that of `linf` is zero, since fingers may then rest.
+
+Both proofs are kept and can be checked again in plain arithmetic. That a ball of radius `lower`
+lies inside the polytope: every ridge belongs to an even number of simplices and one generic ray
+from zero crosses an odd number of them, so every ray crosses some simplex, at a combination of its
+corners; and no corner is lower than `lower` along the normal of its simplex.
+
+Source: Ferrari & Canny 1992; the growing polytope is the expanding-polytope algorithm of
+collision detection in six dimensions (also Zheng 2013 for this metric).
 """
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen
-from grasp_core.closure import contact_frictions
+from grasp_core.arrays import Array, Indices, positive
 from grasp_core.conic import ConicProgram, minimize
-from grasp_core.errors import InputError
-from grasp_core.polygons import plane_frame
-from grasp_core.values import Grasp, contact_arrays
-from grasp_core.wrenches import grasp_map
+from grasp_core.growing_hull import MOST_POINTS, GrowingHull, spread_simplex
+from grasp_core.values import Grasp
+from grasp_core.wrench_sets import Norm, WrenchSet
 
-SETTLED = 1e-3
-"""The search for the weakest wrench ends when a step lowers the limit by less than this share."""
-MAX_STEPS = 30
-STARTS = 3
-"""From how many of the weakest axis wrenches the search starts."""
+GAP = 1e-4
+"""Default of the largest (upper - lower) / upper."""
+MOST_SIMPLICES = 60_000
+"""The polytope stops growing here; its bounds hold all the same, a little farther apart."""
+ROUNDING = 1e-12
+"""Slack of the plain-arithmetic checks, relative to the longest wrench."""
+SAME_RAY = 1e-6
+"""A flat simplex, which no generic ray crosses, misses the ray by more than this."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WrenchLimit:
-    """How far one external wrench is resisted, with both sides of the proof."""
+class InnerPolytope:
+    """A polytope inside a wrench set whose planes bound the quality from below."""
 
-    wrench: Array
-    """(6,) [N, N m], torque about the stated centre."""
-    limit: float
-    """Largest multiple of `wrench` that is resisted."""
     forces: Array
-    """Contact forces that resist it at the limit, (k, 3) [N]."""
-    facet: Array
-    """Twist y of the limiting facet, (6,), with y.wrench = -1 and the limit as support."""
+    """Local contact forces whose wrenches are the points, (n, 3k)."""
+    corners: Indices
+    """Points of each simplex of the boundary, (m, 6)."""
+    normals: Array
+    """Outward unit normals of the simplices, (m, 6)."""
+
+    def radius(self, wrenches: WrenchSet) -> float:
+        """Least height of a corner along the normal of its simplex."""
+        if len(self.normals) != len(self.corners):
+            return -np.inf
+        points = self.forces @ wrenches.G.T
+        units = self.normals / np.linalg.norm(self.normals, axis=1, keepdims=True)
+        return float(np.einsum("mcj,mj->mc", points[self.corners], units).min())
+
+    def surrounds_zero(self, wrenches: WrenchSet) -> bool:
+        """Whether simplices meet evenly at ridges, and a ray from zero crosses an odd number."""
+        ordered = np.sort(self.corners, axis=1)
+        d = ordered.shape[1]
+        others = [[i for i in range(d) if i != j] for j in range(d)]
+        ridges = ordered[:, others].reshape(-1, d - 1)
+        _, counts = np.unique(ridges, axis=0, return_counts=True)
+        if (counts % 2).any():
+            return False
+        cells = (self.forces @ wrenches.G.T)[self.corners].transpose(0, 2, 1)
+        ray = np.cos(1.0 + np.arange(d))
+        shares: Array = np.linalg.pinv(cells) @ ray
+        missed: Array = (cells @ shares[:, :, None])[:, :, 0] - ray
+        hit = np.abs(missed).max(axis=1) < SAME_RAY
+        return int((hit & (shares > 0.0).all(axis=1)).sum()) % 2 == 1
 
 
-def max_resisted_wrench(
+@dataclass(frozen=True, slots=True, eq=False)
+class FerrariCanny:
+    """Bounds of a quality with what proves them."""
+
+    lower: float
+    upper: float
+    wrenches: WrenchSet
+    direction: Array
+    """Unit twist, (6,), torque scale applied, in which the support is at most `upper`."""
+    polytope: InnerPolytope | None
+    """If zero is inside: what proves `lower`."""
+    forces: Array | None
+    """If not: local forces, (3k,), whose wrench is no longer than -`lower`."""
+
+    def verify(self) -> bool:
+        """Re-check both bounds in plain arithmetic, without any solver."""
+        slack = ROUNDING * self.wrenches.size
+        length = float(np.linalg.norm(self.direction))
+        support, _ = self.wrenches.support(self.direction)
+        above = abs(length - 1.0) <= ROUNDING and support <= self.upper + slack
+        return above and self._proves_lower(slack)
+
+    def _proves_lower(self, slack: float) -> bool:
+        if self.polytope is not None:
+            return (
+                self.wrenches.holds(self.polytope.forces, ROUNDING)
+                and self.polytope.radius(self.wrenches) >= self.lower - slack
+                and self.polytope.surrounds_zero(self.wrenches)
+            )
+        return (
+            self.forces is not None
+            and self.wrenches.holds(self.forces[None], ROUNDING)
+            and float(np.linalg.norm(self.wrenches.G @ self.forces)) <= -self.lower + slack
+        )
+
+
+def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
     positions: ArrayLike | Grasp,
-    normals: ArrayLike | None,
-    friction: ArrayLike,
-    wrench: ArrayLike,
+    normals: ArrayLike | None = None,
+    friction: ArrayLike = 0.5,
     *,
-    max_normal_force: float,
     center: ArrayLike = (0.0, 0.0, 0.0),
-) -> float:
-    """Largest multiple of an external wrench that the contacts can resist.
+    torque_scale: float,
+    norm: Norm = "l1",
+    gap: float = GAP,
+) -> FerrariCanny:
+    """Largest wrench resisted in every direction with bounded contact forces.
 
     Args:
-        positions: Contact points, (k, 3) [m]; or a Grasp, with `normals` None.
+        positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
         normals: Unit vectors into the object, (k, 3).
-        friction: Coulomb coefficient, one for all contacts or one each.
-        wrench: External (force, torque), (6,) [N, N m], torque about `center`.
-        max_normal_force: Largest normal force of each contact [N].
-        center: (3,) [m]
+        friction: Coulomb coefficient, one for all contacts or one each, (k,).
+        center: About which torques are taken, (3,) [m].
+        torque_scale: Length that makes a torque comparable with a force [m], such as the
+            object's radius. Values with different scales cannot be compared.
+        norm: `l1`, normal forces sum to 1 N, or `linf`, each is at most 1 N.
+        gap: Wanted (upper - lower) / upper. Where more points would be needed than are kept, the
+            bounds are farther apart.
+
+    Returns:
+        Bounds in newtons. Without closure: of `l1`, minus the distance of the zero wrench from the
+        set; of `linf`, zero.
 
     Raises:
-        InputError: Shapes or limits are wrong, or the wrench is zero.
+        InputError: Shapes, lengths or signs are wrong.
+        SolverError: The cone program's answer failed its check.
     """
-    points, units = contact_arrays(positions, normals)
-    load = frozen(wrench, (6,), "wrench")
-    if not load.any():
-        raise InputError("wrench must not be zero: every multiple of it is resisted")
-    about = frozen(center, (3,), "center")
-    body = WrenchBody(
-        points - about, units, contact_frictions(friction, len(points)), max_normal_force
+    wrenches = WrenchSet.of(
+        positions, normals, friction, center=center, torque_scale=torque_scale, norm=norm
     )
-    return body.limit(load).limit
+    return wrench_set_quality(wrenches, positive(gap, "gap"))
 
 
-class WrenchBody:
-    """The wrenches that contacts can apply with bounded normal forces."""
-
-    def __init__(
-        self, arms: Array, normals: Array, friction: Array, max_normal_force: float
-    ) -> None:
-        """Set up the conic program, whose last column is the wrench asked about.
-
-        Args:
-            arms: Contact points from the centre of torques, (k, 3) [m].
-            normals: Unit vectors into the object, (k, 3).
-            friction: Coulomb coefficients, (k,).
-            max_normal_force: [N]
-        """
-        if not (math.isfinite(max_normal_force) and max_normal_force > 0.0):
-            raise InputError(f"max_normal_force must be positive, got {max_normal_force}")
-        self.max_normal_force = max_normal_force
-        self.count = k = len(arms)
-        self.size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
-        self.scale = np.array([1.0] * 3 + [self.size] * 3)
-        cones = np.zeros((3 * k, 3 * k + 1))
-        caps = np.zeros((k, 3 * k + 1))
-        for i, (normal, mu) in enumerate(zip(normals, friction, strict=True)):
-            block = slice(3 * i, 3 * i + 3)
-            caps[i, block] = normal
-            cones[3 * i, block] = -mu * normal
-            cones[3 * i + 1 : 3 * i + 3, block] = -plane_frame(normal).T
-        balance = np.hstack([grasp_map(arms / self.size), np.zeros((6, 1))])
-        self.A = np.vstack([balance, caps, -caps, cones])
-        self.b = np.concatenate([np.zeros(6), np.ones(k), np.zeros(4 * k)])
-
-    def limit(self, wrench: Array) -> WrenchLimit:
-        """Largest multiple of an external wrench that is resisted, with its proof."""
-        unit = wrench / self.scale
-        length = float(np.linalg.norm(unit))
-        A = self.A.copy()
-        A[:6, -1] = unit / length
-        q = np.zeros(A.shape[1])
-        q[-1] = -1.0
-        k = self.count
-        answer = minimize(ConicProgram(q, A, self.b, 6, 2 * k, (3,) * k))
-        share = self.max_normal_force / length
-        return WrenchLimit(
-            wrench=wrench,
-            limit=max(share * float(answer.x[-1]), 0.0),
-            forces=self.max_normal_force * answer.x[:-1].reshape(k, 3),
-            facet=-answer.z[:6] / (length * self.scale),
-        )
-
-    def weakest(self, wrenches: Array, torque_scale: float) -> WrenchLimit:
-        """A wrench of unit size that is locally the hardest to resist.
-
-        Args:
-            wrenches: Where to start, (n, 6); the weakest of them are followed.
-            torque_scale: Length that makes a torque comparable with a force [m].
-
-        Returns:
-            The weakest found: a wrench with |(force, torque / torque_scale)| = 1.
-        """
-        scale = np.array([1.0] * 3 + [torque_scale] * 3)
-        starts = sorted(
-            (self.limit(_unit(w, scale)) for w in wrenches), key=lambda found: found.limit
-        )
-        return min(
-            (self._descend(start, scale) for start in starts[:STARTS]), key=lambda w: w.limit
-        )
-
-    def _descend(self, start: WrenchLimit, scale: Array) -> WrenchLimit:
-        best = start
-        for _ in range(MAX_STEPS):
-            facing = -best.facet * scale**2
-            found = self.limit(_unit(facing, scale))
-            if found.limit > best.limit * (1.0 - SETTLED):
-                break
-            best = found
-        return best
+def wrench_set_quality(wrenches: WrenchSet, gap: float = GAP) -> FerrariCanny:
+    """Signed distance of zero from the boundary of a wrench set, with its proof."""
+    direction, polytope = _grown(wrenches, gap)
+    slack = ROUNDING * wrenches.size
+    if direction is not None and polytope is not None:
+        lower, upper = polytope.radius(wrenches) - slack, wrenches.support(direction)[0]
+        if lower > 0.0:
+            return FerrariCanny(min(lower, upper), upper, wrenches, direction, polytope, None)
+    return _outside(wrenches, direction)
 
 
-def axis_wrenches(torque_scale: float) -> Array:
-    """The twelve wrenches along and against each axis, (12, 6) [N, N m].
+def _grown(wrenches: WrenchSet, gap: float) -> tuple[Array | None, InnerPolytope | None]:
+    """The weakest direction found, and a polytope that shows there is no much weaker one."""
+    edges = wrenches.edges()
+    points = edges @ wrenches.G.T
+    start = spread_simplex(points)
+    if start is None:
+        return None, None
+    hull, forces = GrowingHull(points[start]), list(edges[start])
+    upper, weakest = np.inf, None
+    while True:
+        normal, offset = hull.lowest()
+        support, force = wrenches.support(normal)
+        if support < upper:
+            upper, weakest = support, normal.copy()
+        full = len(forces) == MOST_POINTS or hull.size > MOST_SIMPLICES
+        if upper <= 0.0 or full or upper - offset <= gap * upper:
+            break
+        if not hull.add(wrenches.G @ force):
+            break
+        forces.append(force)
+    if upper <= 0.0 or hull.lowest()[1] <= 0.0:
+        return weakest, None
+    normals, corners = hull.simplices()
+    return weakest, InnerPolytope(np.array(forces), corners, normals)
 
-    Args:
-        torque_scale: Torque that goes with a force of one newton [m].
-    """
-    scale = np.array([1.0] * 3 + [torque_scale] * 3)
-    return np.vstack([np.eye(6), -np.eye(6)]) * scale
+
+def _outside(wrenches: WrenchSet, direction: Array | None) -> FerrariCanny:
+    """Bounds where zero is not inside the set, or that cannot be told."""
+    unit = replace(wrenches, norm="l1")
+    forces, facing = _nearest(unit)
+    wrench = unit.G @ forces
+    length = float(np.linalg.norm(wrench))
+    trials = [] if direction is None else [direction]
+    _, _, right = np.linalg.svd(wrenches.edges() @ wrenches.G.T)
+    trials += [_unit(y) for y in (-wrench, facing, right[-1], -right[-1]) if y.any()]
+    weakest = min(trials, key=lambda y: wrenches.support(y)[0])
+    upper = wrenches.support(weakest)[0]
+    if wrenches.norm == "linf":
+        forces, length = np.zeros_like(forces), 0.0
+    return FerrariCanny(-length, max(upper, -length), wrenches, weakest, None, forces)
 
 
-def _unit(wrench: Array, scale: Array) -> Array:
-    return wrench / float(np.linalg.norm(wrench / scale))
+def _nearest(wrenches: WrenchSet) -> tuple[Array, Array]:
+    """Local forces, normal parts summing to one, of the wrench nearest to zero; the way there."""
+    m, n = wrenches.G.shape
+    k = n // 3
+    q = np.append(np.zeros(n), 1.0)
+    share = np.append(np.tile([1.0, 0.0, 0.0], k), 0.0)
+    distance = np.vstack([-q, np.hstack([-wrenches.G / wrenches.size, np.zeros((m, 1))])])
+    steepness = np.kron(np.diag(wrenches.friction), [1.0, 0.0, 0.0])
+    cones = [-np.vstack([steepness[i], np.eye(n)[3 * i + 1 : 3 * i + 3]]) for i in range(k)]
+    sides = np.hstack([np.vstack(cones), np.zeros((n, 1))])
+    A = np.vstack([share, distance, sides])
+    b = np.append(1.0, np.zeros(len(A) - 1))
+    answer = minimize(ConicProgram(q, A, b, 1, 0, (m + 1, *(3,) * k)))
+    facing = answer.z[2 : m + 2]
+    return _into_cones(answer.x[:n], wrenches.friction), facing
+
+
+def _unit(direction: Array) -> Array:
+    return direction / float(np.linalg.norm(direction))
+
+
+def _into_cones(forces: Array, friction: Array) -> Array:
+    """Forces near these, in the cones and with normal parts that sum to one exactly."""
+    each = forces.reshape(-1, 3).copy()
+    each[:, 0] = np.maximum(each[:, 0], 0.0)
+    across = np.hypot(each[:, 1], each[:, 2])
+    least = np.finfo(np.float64).tiny
+    each[:, 1:] *= np.minimum(1.0, friction * each[:, 0] / np.maximum(across, least))[:, None]
+    return each.ravel() / each[:, 0].sum()

@@ -22,6 +22,18 @@ def grasp_map(positions: Array, center: Array | None = None) -> Array:
     return np.hstack(blocks)
 
 
+def local_grasp_map(arms: Array, frames: Array) -> Array:
+    """Matrix from local contact forces, (normal, tangent, tangent) each, to wrenches, (6, 3k).
+
+    Args:
+        arms: Contact points from the centre of torques, (k, 3).
+        frames: As `contact_frames`, (k, 3, 3).
+    """
+    torques = np.cross(arms[:, None], frames.transpose(0, 2, 1)).reshape(-1, 3)
+    forces = frames.transpose(0, 2, 1).reshape(-1, 3)
+    return np.vstack([forces.T, torques.T])
+
+
 def cross_matrix(vector: Array) -> Array:
     """Matrix C of a cross product: C @ b is vector x b."""
     x, y, z = vector

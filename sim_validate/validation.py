@@ -16,7 +16,7 @@ from grasp_core.critical import critical_friction
 from grasp_core.errors import InputError
 from grasp_core.forces import closest_forces, least_friction_forces
 from grasp_core.on_faces import check_on_faces
-from grasp_core.quality import WrenchBody, axis_wrenches
+from grasp_core.resisted_wrenches import WrenchBody, axis_wrenches
 from grasp_core.values import Contact, Grasp, Polyhedron
 from scenes.mjcf import Scene, build_scene
 from scenes.physics import PhysicsSettings

@@ -5,7 +5,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.forces import NoForcesError, closest_forces, contact_forces, least_friction_forces
-from grasp_core.quality import WrenchBody, axis_wrenches
+from grasp_core.resisted_wrenches import WrenchBody, axis_wrenches
 from grasp_core.wrenches import grasp_map, normal_and_tangential
 from scenes.objects import example_object
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS

@@ -1,0 +1,120 @@
+"""The wrenches that contacts can apply with bounded forces, by closed-form support points.
+
+Ferrari & Canny bound the contact forces in two ways:
+
+    l1:    the normal forces sum to one; the set is the hull of all single contacts' cones,
+           cut at unit normal force;
+    linf:  each normal force is at most one; the set is the sum of such hulls with zero.
+
+With s_i(y) the support of cone i cut at unit normal force (see `closure`), the support of the
+set in the direction y is max_i s_i(y), or the sum of the positive s_i(y). The force of contact
+i that attains s_i(y) is n_i + mu_i t, with t along the tangential part of its velocity; so the
+circular cones need no pyramid.
+
+Source: Ferrari & Canny, "Planning optimal grasps" (ICRA 1992), with circular cones.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, Self, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, frozen, positive
+from grasp_core.closure import contact_frictions
+from grasp_core.errors import InputError
+from grasp_core.values import Grasp, contact_arrays
+from grasp_core.wrenches import contact_frames, local_grasp_map
+
+Norm: TypeAlias = Literal["l1", "linf"]
+"""How contact forces are bounded."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WrenchSet:
+    """The wrenches of contacts with bounded normal forces.
+
+    Contact forces are local here: (normal, tangent, tangent) of each contact in turn.
+    """
+
+    G: Array
+    """Local contact forces to their wrench, torques over the torque scale, (6, 3k)."""
+    friction: Array
+    """(k,)"""
+    norm: Norm
+
+    @classmethod
+    def of(
+        cls,
+        positions: ArrayLike | Grasp,
+        normals: ArrayLike | None,
+        friction: ArrayLike,
+        *,
+        center: ArrayLike,
+        torque_scale: float,
+        norm: Norm = "l1",
+    ) -> Self:
+        """From contacts, (k, 3) each; torques are about `center`, divided by `torque_scale` [m].
+
+        Raises:
+            InputError: Shapes, lengths or signs are wrong.
+        """
+        points, units = contact_arrays(positions, normals)
+        if norm not in {"l1", "linf"}:
+            raise InputError(f"norm must be l1 or linf, got {norm!r}")
+        scale = positive(torque_scale, "torque_scale")
+        arms = (points - frozen(center, (3,), "center")) / scale
+        G = local_grasp_map(arms, contact_frames(units))
+        return cls(G, contact_frictions(friction, len(points)), norm)
+
+    @property
+    def size(self) -> float:
+        """No wrench of a unit normal force at one contact is longer [N]."""
+        longest = np.linalg.norm(self.G, axis=0).max()
+        return float(longest * np.sqrt(1.0 + self.friction.max() ** 2))
+
+    def supports(self, direction: Array) -> Array:
+        """Support of each contact's cone, cut at unit normal force, (k,)."""
+        slopes = (direction @ self.G).reshape(-1, 3)
+        return slopes[:, 0] + self.friction * np.hypot(slopes[:, 1], slopes[:, 2])
+
+    def support(self, direction: Array) -> tuple[float, Array]:
+        """Support of the set in a direction, with the local forces that attain it, (3k,)."""
+        slopes = (direction @ self.G).reshape(-1, 3)
+        across = np.hypot(slopes[:, 1], slopes[:, 2])
+        each = slopes[:, 0] + self.friction * across
+        forces = np.zeros_like(slopes)
+        if self.norm == "l1":
+            i = int(each.argmax())
+            forces[i, 0] = 1.0
+            if across[i] > 0.0:
+                forces[i, 1:] = slopes[i, 1:] * (self.friction[i] / across[i])
+            return float(each[i]), forces.ravel()
+        pushing = each > 0.0
+        forces[pushing, 0] = 1.0
+        sliding = pushing & (across > 0.0)
+        forces[sliding, 1:] = (
+            slopes[sliding, 1:] * (self.friction[sliding] / across[sliding])[:, None]
+        )
+        return float(each[pushing].sum()), forces.ravel()
+
+    def edges(self) -> Array:
+        """Local forces whose wrenches span what the set spans, (n, 3k)."""
+        k = len(self.friction)
+        frame = np.array([[1.0, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1]])
+        forces = np.zeros((4 * k + 1, k, 3))
+        for i, mu in enumerate(self.friction):
+            forces[4 * i : 4 * i + 4, i] = frame * [1.0, mu, mu]
+        rows = forces.reshape(-1, 3 * k)
+        return rows if self.norm == "linf" else rows[:-1]
+
+    def holds(self, forces: Array, slack: float) -> bool:
+        """Whether local forces, (n, 3k), lie within cones and bounds, up to a slack."""
+        each = forces.reshape(len(forces), -1, 3)
+        pushes, slides = each[:, :, 0], np.hypot(each[:, :, 1], each[:, :, 2])
+        if self.norm == "l1":
+            bounded = np.abs(pushes.sum(axis=1) - 1.0) <= slack
+        else:
+            bounded = pushes.max(axis=1) <= 1.0 + slack
+        in_cones = (slides <= self.friction * pushes + slack).all(axis=1)
+        return bool((bounded & in_cones & (pushes.min(axis=1) >= -slack)).all())
