@@ -7,14 +7,18 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.conic import ConicProgram, minimize
-from grasp_core.polygons import plane_frame
-from grasp_core.wrenches import grasp_map, normal_and_tangential
+from grasp_core.wrenches import (
+    WRENCH,
+    contact_frames,
+    grasp_map,
+    in_frames,
+    normal_and_tangential,
+)
 
-WRENCH = 6
-"""Dimension of a wrench."""
 DECIDED = 1e-9
 """Margins closer to zero are left undecided unless a certificate settles them: a hundred
 times the tolerance asked of the solver."""
@@ -37,11 +41,10 @@ def supports(twist: Array, arms: Array, normals: Array, friction: Array) -> Arra
 
 def _generators(arms: Array, normals: Array, friction: Array) -> Array:
     """Wrenches that span what each contact can apply: three per contact, one if frictionless."""
-    columns = [
-        grasp_map(arm[None]) @ (np.eye(3) if mu > 0.0 else normal[:, None])
-        for arm, normal, mu in zip(arms, normals, friction, strict=True)
-    ]
-    return np.hstack(columns)
+    G = grasp_map(arms)
+    if (friction > 0.0).all():
+        return G
+    return in_frames(G, contact_frames(normals))[:, _allowed(friction)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,37 +152,41 @@ def _margin_program(balance: Array, normals: Array, friction: Array) -> tuple[fl
         friction: (k,)
     """
     k, m = len(normals), len(balance)
-    bases = [
-        np.column_stack([normal, mu * plane_frame(normal)]) if mu > 0.0 else normal[:, None]
-        for normal, mu in zip(normals, friction, strict=True)
-    ]
-    starts = np.cumsum([0, *(basis.shape[1] for basis in bases)])
-    n = int(starts[-1]) + 1
-    rows = np.hstack([balance[:, 3 * i : 3 * i + 3] @ basis for i, basis in enumerate(bases)])
-    share = np.zeros(n)
-    share[starts[:-1]] = 1.0
-    departing = _departing_twist(rows, share[:-1])
-    if departing is not None:
+    frames = contact_frames(normals) * np.array([np.ones(k), friction, friction]).T[:, None]
+    allowed = _allowed(friction)
+    rows = in_frames(balance, frames)[:, allowed]
+    pushing = np.tile([True, False, False], k)[allowed]
+    if (departing := _departing_twist(rows, pushing * 1.0)) is not None:
         return -math.inf, np.zeros((k, 3)), departing
+    n = int(allowed.sum())
     largest = float(friction.max()) or 1.0
-    pushes = np.zeros((k, n))
-    pushes[np.arange(k), starts[:-1]] = -1.0
-    pushes[:, -1] = np.where(friction > 0.0, largest / np.maximum(friction, _TINY), largest)
-    round_cones = [i for i in range(k) if friction[i] > 0.0]
-    slides = [np.eye(n)[starts[i] + 1 : starts[i] + 3] for i in round_cones]
-    cones = [np.vstack([pushes[i], -slide]) for i, slide in zip(round_cones, slides, strict=True)]
-    A = np.vstack([np.hstack([rows, np.zeros((m, 1))]), share, pushes[friction == 0.0], *cones])
-    b, q = np.zeros(len(A)), np.zeros(n)
+    flat = friction == 0.0
+    A = np.zeros((m + 1 + n, n + 1))
+    A[:m, :n], A[m, :n] = rows, pushing
+    order = np.argsort(~np.repeat(flat, 3)[allowed], kind="stable")  # frictionless rows first
+    A[m + 1 + np.arange(n), order] = -1.0
+    depths = largest / np.where(flat, 1.0, np.maximum(friction, _TINY))
+    A[m + 1 :, n] = np.where(pushing, np.repeat(depths, 3)[allowed], 0.0)[order]
+    b, q = np.zeros(len(A)), np.zeros(n + 1)
     b[m], q[-1] = 1.0, -1.0
-    flat = k - len(round_cones)
-    solution = minimize(ConicProgram(q, A, b, m + 1, flat, (3,) * len(round_cones)))
-    local = solution.x[:-1]
-    local = local - np.asarray(np.linalg.lstsq(rows, rows @ local, rcond=None)[0], dtype=np.float64)
-    forces = [basis @ local[starts[i] : starts[i + 1]] for i, basis in enumerate(bases)]
-    return largest * float(solution.x[-1]), np.array(forces), -solution.z[:m]
+    flats = int(flat.sum())
+    solution = minimize(ConicProgram(q, A, b, m + 1, flats, (3,) * (k - flats)))
+    local = np.zeros(3 * k)
+    x = solution.x[:-1]
+    local[allowed] = x - np.asarray(
+        np.linalg.lstsq(rows, rows @ x, rcond=None)[0], dtype=np.float64
+    )
+    forces = np.einsum("kij,kj->ki", frames, local.reshape(k, 3))
+    return largest * float(solution.x[-1]), forces, -solution.z[:m]
 
 
 _TINY = float(np.finfo(np.float64).tiny)
+
+
+def _allowed(friction: Array) -> NDArray[np.bool_]:
+    """Which of the local forces (normal, tangent, tangent) of each contact may be non-zero."""
+    sliding = friction > 0.0
+    return np.column_stack([np.ones_like(sliding), sliding, sliding]).ravel()
 
 
 def _departing_twist(rows: Array, share: Array) -> Array | None:

@@ -7,6 +7,7 @@ the dual cone and satisfies A'z + q = 0; at the optimum q.x = -b.z.
 """
 
 import importlib
+import math
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -75,7 +76,7 @@ def minimize(program: ConicProgram) -> ConicSolution:
 
 
 def _solved(program: ConicProgram, change: tuple[str, float] | None) -> ConicSolution:
-    clarabel, sparse = _modules()
+    clarabel, _ = _modules()
     kinds: list[Any] = []
     if program.zeros:
         kinds.append(clarabel.ZeroConeT(program.zeros))
@@ -84,8 +85,7 @@ def _solved(program: ConicProgram, change: tuple[str, float] | None) -> ConicSol
     kinds += [clarabel.SecondOrderConeT(length) for length in program.cones]
     n = len(program.q)
     solver = clarabel.DefaultSolver(
-        sparse.csc_matrix((n, n)), program.q, sparse.csc_matrix(program.A), program.b, kinds,
-        _settings(change),
+        _no_squares(n), program.q, _columns(program.A), program.b, kinds, _settings(change),
     )  # fmt: skip
     answer = solver.solve()
     solution = ConicSolution(np.array(answer.x), np.array(answer.z), 0.0)
@@ -117,9 +117,24 @@ def _outside(program: ConicProgram, rows: Array, *, dual: bool) -> float:
     worst = max(worst, -float(rows[start : start + program.nonnegatives].min(initial=0.0)))
     start += program.nonnegatives
     for length in program.cones:
-        worst = max(worst, float(np.linalg.norm(rows[start + 1 : start + length]) - rows[start]))
+        tail = rows[start + 1 : start + length]
+        worst = max(worst, math.sqrt(tail @ tail) - rows[start])
         start += length
-    return worst
+    return float(worst)
+
+
+def _columns(A: Array) -> Any:
+    """The matrix as compressed columns, without the detour through coordinates."""
+    columns = A.T
+    filled = columns != 0.0
+    starts = np.concatenate([[0], filled.sum(axis=1).cumsum()])
+    places = filled.nonzero()[1]
+    return _modules()[1].csc_matrix((columns[filled], places, starts), shape=A.shape)
+
+
+@cache
+def _no_squares(n: int) -> Any:
+    return _modules()[1].csc_matrix((n, n))
 
 
 @cache

@@ -5,6 +5,7 @@ polygon is also the set {y : E y <= b}, with the rows of E unit outward edge nor
 """
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
@@ -16,6 +17,8 @@ CONVEX_SLACK = 1e-9
 """How far a corner may turn inwards and still count as straight, relative to the two edge
 lengths' product: well above the rounding of coordinates, well below a visible notch."""
 
+Row: TypeAlias = tuple[float, float, float]
+
 
 def plane_frame(normal: Array) -> Array:
     """Two orthonormal columns spanning the plane with this normal, (3, 2).
@@ -23,7 +26,11 @@ def plane_frame(normal: Array) -> Array:
     (column 0, column 1, normal) is right-handed. The choice is deterministic and
     depends on the normal only, so that all figures on one face share it.
     """
-    x, y, z = (float(part) for part in normal)
+    return np.array(plane_tangents(*normal.tolist())).T
+
+
+def plane_tangents(x: float, y: float, z: float) -> tuple[Row, Row]:
+    """The columns of `plane_frame`, of the normal (x, y, z)."""
     smallest = min(abs(x), abs(y), abs(z))
     if abs(x) == smallest:
         u, v, w = 0.0, -z, y
@@ -33,7 +40,7 @@ def plane_frame(normal: Array) -> Array:
         u, v, w = -y, x, 0.0
     length = math.sqrt(u * u + v * v + w * w)
     u, v, w = u / length, v / length, w / length
-    return np.array([[u, y * w - z * v], [v, z * u - x * w], [w, x * v - y * u]])
+    return (u, v, w), (y * w - z * v, z * u - x * w, x * v - y * u)
 
 
 def signed_area(polygon: Array) -> float:

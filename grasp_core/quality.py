@@ -70,10 +70,11 @@ class InnerPolytope:
         _, counts = np.unique(ridges, axis=0, return_counts=True)
         if (counts % 2).any():
             return False
-        cells = (self.forces @ wrenches.G.T)[self.corners].transpose(0, 2, 1)
+        points: Array = self.forces @ wrenches.G.T
+        cells = points[self.corners].transpose(0, 2, 1)
         ray = np.cos(1.0 + np.arange(d))
-        shares: Array = np.linalg.pinv(cells) @ ray
-        missed: Array = (cells @ shares[:, :, None])[:, :, 0] - ray
+        shares = np.asarray(np.linalg.pinv(cells) @ ray, dtype=np.float64)
+        missed = np.asarray(cells @ shares[:, :, None], dtype=np.float64)[:, :, 0] - ray
         hit = np.abs(missed).max(axis=1) < SAME_RAY
         return int((hit & (shares > 0.0).all(axis=1)).sum()) % 2 == 1
 

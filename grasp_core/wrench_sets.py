@@ -24,7 +24,7 @@ from grasp_core.arrays import Array, frozen, positive
 from grasp_core.closure import contact_frictions
 from grasp_core.errors import InputError
 from grasp_core.values import Grasp, contact_arrays
-from grasp_core.wrenches import contact_frames, local_grasp_map
+from grasp_core.wrenches import contact_frames, grasp_map, in_frames
 
 Norm: TypeAlias = Literal["l1", "linf"]
 """How contact forces are bounded."""
@@ -64,7 +64,7 @@ class WrenchSet:
             raise InputError(f"norm must be l1 or linf, got {norm!r}")
         scale = positive(torque_scale, "torque_scale")
         arms = (points - frozen(center, (3,), "center")) / scale
-        G = local_grasp_map(arms, contact_frames(units))
+        G = in_frames(grasp_map(arms), contact_frames(units))
         return cls(G, contact_frictions(friction, len(points)), norm)
 
     @property

@@ -7,7 +7,10 @@ what the finger applies to the object, in the object's frame.
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.polygons import plane_frame
+from grasp_core.polygons import plane_tangents
+
+WRENCH = 6
+"""Dimension of a wrench."""
 
 
 def grasp_map(positions: Array, center: Array | None = None) -> Array:
@@ -18,20 +21,19 @@ def grasp_map(positions: Array, center: Array | None = None) -> Array:
         center: (3,) [m]; the origin when None.
     """
     arms = positions if center is None else positions - center
-    blocks = [np.vstack([np.eye(3), cross_matrix(arm)]) for arm in arms]
-    return np.hstack(blocks)
+    x, y, z = arms.T
+    G = np.zeros((WRENCH, len(arms), 3))
+    G[0, :, 0] = G[1, :, 1] = G[2, :, 2] = 1.0
+    G[3, :, 1], G[3, :, 2] = -z, y
+    G[4, :, 0], G[4, :, 2] = z, -x
+    G[5, :, 0], G[5, :, 1] = -y, x
+    return G.reshape(WRENCH, -1)
 
 
-def local_grasp_map(arms: Array, frames: Array) -> Array:
-    """Matrix from local contact forces, (normal, tangent, tangent) each, to wrenches, (6, 3k).
-
-    Args:
-        arms: Contact points from the centre of torques, (k, 3).
-        frames: As `contact_frames`, (k, 3, 3).
-    """
-    torques = np.cross(arms[:, None], frames.transpose(0, 2, 1)).reshape(-1, 3)
-    forces = frames.transpose(0, 2, 1).reshape(-1, 3)
-    return np.vstack([forces.T, torques.T])
+def in_frames(G: Array, frames: Array) -> Array:
+    """A matrix on stacked forces (m, 3k), as one on their coordinates in (k, 3, 3) frames."""
+    m, k = len(G), len(frames)
+    return np.einsum("mki,kij->mkj", G.reshape(m, k, 3), frames).reshape(m, 3 * k)
 
 
 def cross_matrix(vector: Array) -> Array:
@@ -42,10 +44,12 @@ def cross_matrix(vector: Array) -> Array:
 
 def contact_frames(normals: Array) -> Array:
     """Orthonormal frames with the columns (normal, tangent, tangent), (k, 3, 3)."""
-    return np.array([np.column_stack([normal, plane_frame(normal)]) for normal in normals])
+    columns = [((x, y, z), *plane_tangents(x, y, z)) for x, y, z in normals.tolist()]
+    return np.array(columns).transpose(0, 2, 1)
 
 
 def normal_and_tangential(forces: Array, normals: Array) -> tuple[Array, Array]:
     """Normal components (k,) and lengths of the tangential parts (k,) of forces (k, 3)."""
     along = np.einsum("ki,ki->k", forces, normals)
-    return along, np.linalg.norm(forces - along[:, None] * normals, axis=1)
+    across = forces - along[:, None] * normals
+    return along, np.sqrt(np.einsum("ki,ki->k", across, across))
