@@ -13,12 +13,17 @@ from grasp_core.errors import UndecidedError as UndecidedError
 from grasp_core.forces import contact_forces as contact_forces
 from grasp_core.lines import classify_lines as classify_lines
 from grasp_core.mesh import load_polyhedron as load_polyhedron
+from grasp_core.metrics import hull_volume as hull_volume
+from grasp_core.metrics import min_weight as min_weight
+from grasp_core.metrics import smallest_singular_value as smallest_singular_value
 from grasp_core.planner import iter_grasps as iter_grasps
 from grasp_core.planner import plan as plan
 from grasp_core.plans import Plan as Plan
 from grasp_core.quality import FerrariCanny as FerrariCanny
 from grasp_core.quality import ferrari_canny as ferrari_canny
+from grasp_core.resisted_wrenches import WrenchLimit as WrenchLimit
 from grasp_core.resisted_wrenches import max_resisted_wrench as max_resisted_wrench
+from grasp_core.resisted_wrenches import wrench_limits as wrench_limits
 from grasp_core.spanning import cones_positively_span as cones_positively_span
 from grasp_core.spanning import span_angle as span_angle
 from grasp_core.values import Contact as Contact

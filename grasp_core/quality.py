@@ -64,7 +64,7 @@ class InnerPolytope:
     def surrounds_zero(self, wrenches: WrenchSet) -> bool:
         """Whether simplices meet evenly at ridges, and a ray from zero crosses an odd number."""
         ordered = np.sort(self.corners, axis=1)
-        d = ordered.shape[1]
+        d = self.corners.shape[1]
         others = [[i for i in range(d) if i != j] for j in range(d)]
         ridges = ordered[:, others].reshape(-1, d - 1)
         _, counts = np.unique(ridges, axis=0, return_counts=True)
@@ -72,10 +72,11 @@ class InnerPolytope:
             return False
         points: Array = self.forces @ wrenches.G.T
         cells = points[self.corners].transpose(0, 2, 1)
-        ray = np.cos(1.0 + np.arange(d))
-        shares = np.asarray(np.linalg.pinv(cells) @ ray, dtype=np.float64)
-        missed = np.asarray(cells @ shares[:, :, None], dtype=np.float64)[:, :, 0] - ray
-        hit = np.abs(missed).max(axis=1) < SAME_RAY
+        ray = np.cos(np.arange(1, d + 1, dtype=np.float64))
+        inverses = np.asarray(np.linalg.pinv(cells), dtype=np.float64)
+        shares = inverses @ ray
+        reached = np.asarray(np.einsum("mjc,mc->mj", cells, shares), dtype=np.float64)
+        hit = np.linalg.norm(reached - ray, axis=1) < SAME_RAY
         return int((hit & (shares > 0.0).all(axis=1)).sum()) % 2 == 1
 
 

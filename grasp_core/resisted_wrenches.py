@@ -1,4 +1,4 @@
-"""How much a grasp resists: the largest multiple of a wrench, and the weakest wrench.
+"""How much contacts resist: the largest multiple of a wrench, and the weakest of several.
 
 With each normal force at most f_max, the wrenches that the contacts can apply form a convex
 body W around the origin. An external wrench w is resisted up to the largest lambda with
@@ -6,24 +6,24 @@ body W around the origin. An external wrench w is resisted up to the largest lam
 lambda = h(y) = f_max sum_i max(0, s_i(y)), the support of W (s_i as in `closure`). The
 wrench -y / |y| meets that facet squarely, so its limit is at most h(y) / |y|: stepping from
 a wrench to the one its limiting facet points at never raises the limit, and stops at a
-wrench that is locally the weakest.
+wrench that is locally the weakest. No wrench of unit size has a limit below f_max times the `linf`
+quality of the contacts (see `quality`), which is the bound over all directions.
 
 Torques are compared with forces through a stated length.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen
+from grasp_core.arrays import Array, frozen, positive
 from grasp_core.closure import contact_frictions
 from grasp_core.conic import ConicProgram, minimize
 from grasp_core.errors import InputError
-from grasp_core.polygons import plane_frame
 from grasp_core.values import Grasp, contact_arrays
-from grasp_core.wrenches import grasp_map
+from grasp_core.wrench_sets import WrenchSet
+from grasp_core.wrenches import WRENCH, contact_frames, grasp_map, in_frames
 
 SETTLED = 1e-3
 """The search for the weakest wrench ends when a step lowers the limit by less than this share."""
@@ -39,11 +39,13 @@ class WrenchLimit:
     wrench: Array
     """(6,) [N, N m], torque about the stated centre."""
     limit: float
-    """Largest multiple of `wrench` that is resisted."""
+    """Largest multiple of `wrench` that is resisted: `forces` balance it, to rounding."""
+    upper: float
+    """No multiple above this is resisted: the support of `facet`, in plain arithmetic."""
     forces: Array
     """Contact forces that resist it at the limit, (k, 3) [N]."""
     facet: Array
-    """Twist y of the limiting facet, (6,), with y.wrench = -1 and the limit as support."""
+    """Twist y of the limiting facet, (6,), with y.wrench = -1, about the stated centre."""
 
 
 def max_resisted_wrench(
@@ -68,15 +70,46 @@ def max_resisted_wrench(
     Raises:
         InputError: Shapes or limits are wrong, or the wrench is zero.
     """
+    loads = frozen(wrench, (6,), "wrench")[None]
+    return wrench_limits(
+        positions, normals, friction, loads, max_normal_force=max_normal_force, center=center
+    )[0].limit
+
+
+def wrench_limits(
+    positions: ArrayLike | Grasp,
+    normals: ArrayLike | None,
+    friction: ArrayLike,
+    wrenches: ArrayLike,
+    *,
+    max_normal_force: float,
+    center: ArrayLike = (0.0, 0.0, 0.0),
+) -> tuple[WrenchLimit, ...]:
+    """How far each of several wrenches is resisted, with the forces that do it and a bound.
+
+    The weakest of them is `min(limits, key=lambda found: found.limit)`.
+
+    Args:
+        positions: Contact points, (k, 3) [m]; or a Grasp, with `normals` None.
+        normals: Unit vectors into the object, (k, 3).
+        friction: Coulomb coefficient, one for all contacts or one each.
+        wrenches: External (force, torque), (n, 6) [N, N m], torque about `center`.
+        max_normal_force: Largest normal force of each contact [N].
+        center: (3,) [m]
+
+    Raises:
+        InputError: Shapes or limits are wrong, or a wrench is zero.
+        SolverError: A program's answer failed its check.
+    """
     points, units = contact_arrays(positions, normals)
-    load = frozen(wrench, (6,), "wrench")
-    if not load.any():
+    loads = frozen(wrenches, (None, 6), "wrenches")
+    if not loads.any(axis=1).all():
         raise InputError("wrench must not be zero: every multiple of it is resisted")
     about = frozen(center, (3,), "center")
     body = WrenchBody(
         points - about, units, contact_frictions(friction, len(points)), max_normal_force
     )
-    return body.limit(load).limit
+    return tuple(body.limit(load) for load in loads)
 
 
 class WrenchBody:
@@ -93,21 +126,19 @@ class WrenchBody:
             friction: Coulomb coefficients, (k,).
             max_normal_force: [N]
         """
-        if not (math.isfinite(max_normal_force) and max_normal_force > 0.0):
-            raise InputError(f"max_normal_force must be positive, got {max_normal_force}")
-        self.max_normal_force = max_normal_force
+        self.max_normal_force = positive(max_normal_force, "max_normal_force")
         self.count = k = len(arms)
         self.size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
         self.scale = np.array([1.0] * 3 + [self.size] * 3)
-        cones = np.zeros((3 * k, 3 * k + 1))
-        caps = np.zeros((k, 3 * k + 1))
-        for i, (normal, mu) in enumerate(zip(normals, friction, strict=True)):
-            block = slice(3 * i, 3 * i + 3)
-            caps[i, block] = normal
-            cones[3 * i, block] = -mu * normal
-            cones[3 * i + 1 : 3 * i + 3, block] = -plane_frame(normal).T
-        balance = np.hstack([grasp_map(arms / self.size), np.zeros((6, 1))])
-        self.A = np.vstack([balance, caps, -caps, cones])
+        self.frames = contact_frames(normals)
+        G = in_frames(grasp_map(arms / self.size), self.frames)
+        self.bounded = WrenchSet(G, friction, "linf")
+        self.A = np.zeros((WRENCH + 5 * k, 3 * k + 1))
+        self.A[:WRENCH, :-1] = G
+        caps, cones = WRENCH + np.arange(2 * k), WRENCH + 2 * k + np.arange(3 * k)
+        self.A[caps, np.tile(np.arange(0, 3 * k, 3), 2)] = np.repeat([1.0, -1.0], k)
+        self.A[cones, np.arange(3 * k)] = -1.0
+        self.A[cones[::3], np.arange(0, 3 * k, 3)] = -friction
         self.b = np.concatenate([np.zeros(6), np.ones(k), np.zeros(4 * k)])
 
     def limit(self, wrench: Array) -> WrenchLimit:
@@ -121,11 +152,15 @@ class WrenchBody:
         k = self.count
         answer = minimize(ConicProgram(q, A, self.b, 6, 2 * k, (3,) * k))
         share = self.max_normal_force / length
+        facet = answer.z[:6] / -float(answer.z[:6] @ unit)
+        limit = max(share * float(answer.x[-1]), 0.0)
+        local = answer.x[:-1].reshape(k, 3)
         return WrenchLimit(
             wrench=wrench,
-            limit=max(share * float(answer.x[-1]), 0.0),
-            forces=self.max_normal_force * answer.x[:-1].reshape(k, 3),
-            facet=-answer.z[:6] / (length * self.scale),
+            limit=limit,
+            upper=max(limit, self.max_normal_force * self.bounded.support(facet)[0]),
+            forces=self.max_normal_force * np.einsum("kij,kj->ki", self.frames, local),
+            facet=facet / self.scale,
         )
 
     def weakest(self, wrenches: Array, torque_scale: float) -> WrenchLimit:

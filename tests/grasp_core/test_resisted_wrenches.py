@@ -39,6 +39,7 @@ def test_limits_are_attained_by_forces_and_bounded_by_their_facets():
         total = grasp_map(positions) @ found.forces.ravel() + found.limit * wrench
         assert np.abs(total).max() < 1e-5 * (1 + np.abs(found.forces).max())
         assert found.facet @ wrench == pytest.approx(-1.0, abs=1e-6)
+        assert found.limit <= found.upper <= found.limit * (1.0 + 1e-7) + 1e-7
         pushes = 3.0 * rng.uniform(size=(50, 4))
         slides = rng.normal(size=(50, 4, 3))
         slides -= np.einsum("ski,ki->sk", slides, normals)[..., None] * normals
@@ -76,6 +77,30 @@ def test_limits_scale_with_force_and_inversely_with_the_wrench():
     one = max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, wrench, max_normal_force=1.0)
     ten = max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, wrench / 2, max_normal_force=5.0)
     assert ten == pytest.approx(10 * one, rel=1e-6)
+
+
+def test_the_weakest_of_several_wrenches_is_above_the_bound_over_all():
+    rng, tested = np.random.default_rng(2), 0
+    while tested < 10:
+        positions, normals = random_contacts(rng)
+        every = gc.ferrari_canny(positions, normals, 0.6, torque_scale=1.0, norm="linf")
+        wrenches = rng.normal(size=(25, 6))
+        wrenches /= np.linalg.norm(wrenches, axis=1, keepdims=True)
+        limits = gc.wrench_limits(positions, normals, 0.6, wrenches, max_normal_force=4.0)
+        weakest = min(limits, key=lambda found: found.limit)
+        assert weakest.limit >= 4.0 * every.lower - 1e-7
+        tested += every.lower > 0.0
+
+
+def test_friction_may_differ_between_contacts():
+    """A force across the line of two fingers, at the second one: only that finger resists it."""
+    positions = np.array([[-1.0, 0, 0], [1, 0, 0]])
+    at_the_second = [[0.0, 0, 1, 0, -1, 0]]
+    for friction, expected in (([0.5, 0.0], 0.0), ([0.0, 0.5], 0.5 * 2.0)):
+        found = gc.wrench_limits(
+            positions, -positions, friction, at_the_second, max_normal_force=2.0
+        )[0]
+        assert found.limit == pytest.approx(expected, abs=1e-6)
 
 
 def test_a_zero_wrench_and_a_bad_force_are_refused():

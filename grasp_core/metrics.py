@@ -1,0 +1,154 @@
+"""Metrics that users of other tools know, by those tools' definitions.
+
+Each replaces the friction cones by inscribed pyramids, whose edges are forces of unit normal part
+n + mu t; the first t is the first tangent of the contact's frame (see `wrenches.contact_frames`).
+How the pyramids are turned changes the second digit. For a quality without pyramids see `quality`.
+"""
+
+import importlib
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, frozen, positive
+from grasp_core.closure import unit_size
+from grasp_core.errors import InputError
+from grasp_core.lp import LinearProgram, Optimum, maximize
+from grasp_core.values import Grasp, contact_arrays
+from grasp_core.wrench_sets import WrenchSet
+from grasp_core.wrenches import WRENCH, grasp_map
+
+FEWEST_EDGES = 3
+RANK = 1e-9
+"""Singular values below this share of the largest count as zero."""
+UNREACHABLE = 1e-9
+"""How far from zero the affine combinations of unit-size wrenches must stay to miss it."""
+
+
+def pyramid_wrenches(wrenches: WrenchSet, edges: int) -> Array:
+    """Wrenches of the edges of pyramids inscribed in the friction cones, (k edges, 6).
+
+    Raises:
+        InputError: Fewer than three edges.
+    """
+    if edges < FEWEST_EDGES:
+        raise InputError(f"edges must be at least {FEWEST_EDGES}, got {edges}")
+    turns = 2.0 * np.pi * np.arange(edges) / edges
+    circle = np.column_stack([np.ones(edges), np.cos(turns), np.sin(turns)])
+    slopes = wrenches.friction
+    each = circle * np.array([np.ones_like(slopes), slopes, slopes]).T[:, None]
+    G = wrenches.G.reshape(len(wrenches.G), -1, 3)
+    return np.einsum("kej,wkj->kew", each, G).reshape(-1, len(wrenches.G))
+
+
+def min_weight(
+    positions: ArrayLike | Grasp,
+    normals: ArrayLike | None = None,
+    friction: ArrayLike = 0.5,
+    *,
+    edges: int = 8,
+) -> float:
+    """Largest l such that weights of at least l, summing to one, balance the pyramids' edges.
+
+    Solved as the dual program: over twists y, with w_j the N wrenches and m their mean,
+
+        l = 1/N - max y.m  subject to  y.(m - w_j) <= 1/N.
+
+    Args:
+        positions: Contact points, (k, 3) [m]; or a Grasp.
+        normals: Unit vectors into the object, (k, 3).
+        friction: Coulomb coefficient, one for all contacts or one each, (k,).
+        edges: Of each pyramid.
+
+    Returns:
+        Positive exactly when the pyramids are in force closure, and at most 1/N; -inf when no
+        weights of whatever sign balance.
+
+    Raises:
+        InputError: Shapes, lengths or signs are wrong.
+        SolverError: The program's answer failed its check.
+
+    Source:
+        Li, Culbertson, Burdick & Ames, "FRoGGeR" (IROS 2023).
+    """
+    points, units = contact_arrays(positions, normals)
+    _, center, size = unit_size(points)
+    wrenches = WrenchSet.of(points, units, friction, center=center, torque_scale=size)
+    W = pyramid_wrenches(wrenches, edges)
+    N, mean = len(W), W.mean(axis=0)
+    if not _balanced_by_any_weights(W):
+        return -math.inf
+    best = maximize(LinearProgram(N * mean, N * (mean - W), np.ones(N)))
+    return (1.0 - best.value) / N if isinstance(best, Optimum) else -math.inf
+
+
+def _balanced_by_any_weights(W: Array) -> bool:
+    """Whether weights of whatever sign, summing to one, make the rows vanish."""
+    rows = np.vstack([W.T, np.ones(len(W))])
+    wanted = np.append(np.zeros(len(rows) - 1), 1.0)
+    weights = np.asarray(np.linalg.lstsq(rows, wanted, rcond=RANK)[0], dtype=np.float64)
+    return float(np.abs(rows @ weights - wanted).max()) <= UNREACHABLE
+
+
+def hull_volume(
+    positions: ArrayLike | Grasp,
+    normals: ArrayLike | None = None,
+    friction: ArrayLike = 0.5,
+    *,
+    center: ArrayLike = (0.0, 0.0, 0.0),
+    torque_scale: float,
+    edges: int = 8,
+) -> float:
+    """Volume of the hull of the pyramids' edges in wrench space [N^6].
+
+    Args:
+        positions: Contact points, (k, 3) [m]; or a Grasp.
+        normals: Unit vectors into the object, (k, 3).
+        friction: Coulomb coefficient, one for all contacts or one each, (k,).
+        center: About which torques are taken, (3,) [m].
+        torque_scale: Length that makes a torque comparable with a force [m].
+        edges: Of each pyramid.
+
+    Returns:
+        Zero if the wrenches lie in a plane.
+
+    Raises:
+        InputError: Shapes, lengths or signs are wrong.
+
+    Source:
+        Miller & Allen, "Examples of 3D grasp quality computations" (ICRA 1999).
+    """
+    wrenches = WrenchSet.of(positions, normals, friction, center=center, torque_scale=torque_scale)
+    W = pyramid_wrenches(wrenches, edges)
+    extents = np.linalg.svd(W - W.mean(axis=0), compute_uv=False)
+    if len(extents) < WRENCH or extents[-1] <= RANK * extents[0]:
+        return 0.0
+    spatial: Any = importlib.import_module("scipy.spatial")
+    return float(spatial.ConvexHull(W, qhull_options="QJ Pp").volume)
+
+
+def smallest_singular_value(
+    positions: ArrayLike | Grasp, *, center: ArrayLike = (0.0, 0.0, 0.0), torque_scale: float
+) -> float:
+    """Smallest singular value of the map from contact forces to wrenches.
+
+    Zero for contacts on one line, and for two: they turn nothing about their line.
+
+    Args:
+        positions: Contact points, (k, 3) [m]; or a Grasp.
+        center: About which torques are taken, (3,) [m].
+        torque_scale: Length that makes a torque comparable with a force [m].
+
+    Raises:
+        InputError: Shapes or signs are wrong.
+
+    Source:
+        Li & Sastry, "Task-oriented optimal grasping by multifingered robot hands" (1988).
+    """
+    given = positions.positions if isinstance(positions, Grasp) else positions
+    points = frozen(given, (None, 3), "positions")
+    arms = (points - frozen(center, (3,), "center")) / positive(torque_scale, "torque_scale")
+    values = np.linalg.svd(grasp_map(arms), compute_uv=False)
+    return float(values[-1]) if len(values) == WRENCH else 0.0

@@ -1,0 +1,114 @@
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
+
+import grasp_core as gc
+from grasp_core.wrenches import contact_frames
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
+
+
+def edge_wrenches(positions, normals, friction, edges):
+    """Wrenches of n + mu (cos t1 + sin t2), about the origin, with the frames of the package."""
+    rows = []
+    for point, frame in zip(positions, contact_frames(normals), strict=True):
+        for turn in 2.0 * np.pi * np.arange(edges) / edges:
+            force = frame @ [1.0, friction * np.cos(turn), friction * np.sin(turn)]
+            rows.append([*force, *np.cross(point, force)])
+    return np.array(rows)
+
+
+def min_weight_by_definition(W):
+    """The program as FRoGGeR states it: weights and their least are the unknowns."""
+    count = len(W)
+    equalities = np.zeros((7, count + 1))
+    equalities[:6, :count], equalities[6, :count] = W.T, 1.0
+    answer = linprog(
+        np.append(np.zeros(count), -1.0),
+        A_ub=np.hstack([-np.eye(count), np.ones((count, 1))]), b_ub=np.zeros(count),
+        A_eq=equalities, b_eq=np.append(np.zeros(6), 1.0),
+        bounds=[(None, None)] * (count + 1), method="highs",
+    )  # fmt: skip
+    return -answer.fun if answer.status == 0 else -math.inf
+
+
+@pytest.mark.parametrize("edges", [4, 8])
+def test_min_weight_is_what_its_definition_says(edges):
+    rng = np.random.default_rng(edges)
+    signs = {True: 0, False: 0}
+    for _ in range(150):
+        positions, normals = random_contacts(rng)
+        here = gc.min_weight(positions, normals, 0.5, edges=edges)
+        W = edge_wrenches(positions, normals, 0.5, edges)
+        assert here == pytest.approx(min_weight_by_definition(W), abs=1e-9)
+        signs[here > 0.0] += 1
+    assert min(signs.values()) >= 20
+
+
+def test_min_weight_is_positive_only_with_closure_and_bounds_the_quality():
+    """A ball of the least weight times the shortest edge sum fits; here only the sign is used."""
+    rng = np.random.default_rng(1)
+    positive = 0
+    for _ in range(100):
+        positions, normals = random_contacts(rng)
+        if gc.min_weight(positions, normals, 0.4) > 1e-9:
+            assert gc.force_closure(positions, normals, 0.4).closed
+            positive += 1
+    assert positive >= 15
+
+
+def test_weights_of_contacts_that_push_one_way_cannot_balance():
+    normals = np.tile([0.0, 0, 1], (4, 1))
+    assert gc.min_weight(TETRA_CENTERS, normals, 0.5) == -math.inf
+
+
+def test_min_weight_and_singular_value_do_not_depend_on_order():
+    rng = np.random.default_rng(2)
+    positions, normals = random_contacts(rng)
+    order = rng.permutation(4)
+    assert gc.min_weight(positions[order], normals[order]) == pytest.approx(
+        gc.min_weight(positions, normals), abs=1e-12
+    )
+    R = random_rotation(rng)
+    one = gc.smallest_singular_value(positions, torque_scale=2.0)
+    assert gc.smallest_singular_value(positions[order] @ R.T, torque_scale=2.0) == pytest.approx(
+        one
+    )
+
+
+def test_hull_volume_is_that_of_qhull_on_the_edges():
+    rng = np.random.default_rng(3)
+    for _ in range(10):
+        positions, normals = random_contacts(rng)
+        center, scale = rng.normal(size=3), 0.7
+        W = edge_wrenches((positions - center) / scale, normals, 0.5, 8)
+        volume = gc.hull_volume(positions, normals, 0.5, center=center, torque_scale=scale)
+        assert volume > 0.0
+        assert volume == pytest.approx(ConvexHull(W, qhull_options="QJ Pp").volume, rel=1e-6)
+
+
+def test_without_friction_four_contacts_span_no_volume():
+    assert gc.hull_volume(TETRA_CENTERS, TETRA_NORMALS, 0.0, torque_scale=1.0) == 0.0
+
+
+def test_the_singular_value_of_six_unit_contacts_is_known():
+    """At +-1 on each axis: G G' is 6 for forces and 4 for torques."""
+    positions = np.vstack([np.eye(3), -np.eye(3)])
+    assert gc.smallest_singular_value(positions, torque_scale=1.0) == pytest.approx(2.0)
+    assert gc.smallest_singular_value(positions, torque_scale=2.0) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_contacts_on_a_line_leave_a_turn_unopposed(count):
+    positions = np.outer(np.arange(count), [1.0, 2.0, 3.0])
+    value = gc.smallest_singular_value(positions, torque_scale=1.0)
+    assert value == pytest.approx(0.0, abs=1e-12)
+
+
+def test_bad_arguments_are_refused():
+    with pytest.raises(gc.InputError, match="edges must be at least 3"):
+        gc.min_weight(TETRA_CENTERS, TETRA_NORMALS, 0.5, edges=2)
+    with pytest.raises(gc.InputError, match="torque_scale must be positive"):
+        gc.hull_volume(TETRA_CENTERS, TETRA_NORMALS, 0.5, torque_scale=-1.0)
