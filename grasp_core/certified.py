@@ -7,11 +7,14 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure import force_closure
+from grasp_core.constructions import Region
 from grasp_core.critical import critical_friction
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.face_pieces import FacePiece
 from grasp_core.lines import classify_lines
 from grasp_core.placements import Placement
+from grasp_core.quality import ferrari_canny
+from grasp_core.spanning import span_angle
 from grasp_core.values import (
     Contact,
     ContactRegion,
@@ -44,6 +47,35 @@ class Certified:
     """In the pieces' units."""
     placement: Placement
     margin: float
+
+
+def named(letter: str, faces: FaceQuadruple) -> str:
+    """The id of a grasp: the method's letter and the faces in finger order."""
+    return f"{letter}-" + "-".join(str(face) for face in faces)
+
+
+def certify(  # noqa: PLR0913, PLR0917 - everything a grasp is made of
+    name: str,
+    faces: FaceQuadruple,
+    family: Family,
+    pieces: tuple[FacePiece, ...],
+    cones: tuple[ForceCone, ...],
+    placement: Placement,
+    friction: float,
+    region: Region,
+) -> Certified | None:
+    """The placement, if its witness and the exact closure test both confirm it."""
+    normals = np.array([piece.normal for piece in pieces])
+    margin = closure_margin(pieces, placement, friction)
+    fault = witness_fault(placement.positions, normals, placement.forces, friction, family)
+    if margin is None or fault is not None:
+        return None
+    regions = tuple(
+        region(piece, cone, placement, finger)
+        for finger, (piece, cone) in enumerate(zip(pieces, cones, strict=True))
+    )
+    angle = span_angle(normals)
+    return Certified(name, faces, family, angle, pieces, cones, regions, placement, margin)
 
 
 def closure_margin(
@@ -131,6 +163,7 @@ def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:
         span_angle=found.span_angle,
         critical_friction=_critical(placement, normals, friction),
         closure_margin=found.margin,
+        ferrari_canny=_quality(placement, normals, friction),
         witness=Witness(positions, placement.forces),
     )
 
@@ -138,6 +171,11 @@ def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:
 def _at(body: Polyhedron, unit_points: Array) -> Array:
     """Points in the pieces' units back in the object's frame [m]."""
     return body.center_of_mass + body.radius * unit_points
+
+
+def _quality(placement: Placement, normals: Array, friction: float) -> tuple[float, float]:
+    found = ferrari_canny(placement.positions, normals, friction, torque_scale=1.0)
+    return found.lower, found.upper
 
 
 def _critical(placement: Placement, normals: Array, friction: float) -> float:

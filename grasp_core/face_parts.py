@@ -46,6 +46,20 @@ def part_at(pieces: Sequence[FacePiece], path: Path) -> Corners:
     return tuple(part)
 
 
+def cover_everything(paths: Sequence[Path]) -> bool:
+    """Whether parts, none within another, together are the whole."""
+    halves = all(half in {0, 1} for path in paths for half in path)
+    apart = not any(
+        two[: len(one)] == one
+        for i, one in enumerate(paths)
+        for j, two in enumerate(paths)
+        if i != j
+    )
+    deepest = max((len(path) for path in paths), default=0)
+    shares = sum(1 << (deepest - len(path)) for path in paths)
+    return halves and apart and shares == 1 << deepest
+
+
 def _longest(corners: Array) -> tuple[float, Array]:
     """Length and direction of the longest line between two corners."""
     between = (corners[:, None] - corners[None]).reshape(-1, 2)

@@ -3,17 +3,20 @@
 The programs work on these: their tolerances then mean the same for every object.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.lp import LinearProgram, Optimum, maximize
-from grasp_core.polygons import edge_rows
+from grasp_core.polygons import clip, edge_rows
 from grasp_core.values import Face, Polyhedron
 
 THINNEST = 1e-6
 """Pieces without room for a disc of this radius (object size one) hold no contact."""
+
+LARGEST_INSET = 0.5
+"""Most that edges are kept clear of, in radii of the piece's largest disc."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,6 +46,19 @@ class FacePiece:
     def point(self, y: Array) -> Array:
         """The point in space of plane coordinates, (3,)."""
         return self.origin + self.frame @ y
+
+
+def inset_piece(piece: FacePiece, inset: float) -> FacePiece:
+    """The part of a piece that keeps clear of its edges.
+
+    Args:
+        piece: Any convex piece.
+        inset: How far to stay from the edges; at most half the radius of the largest disc counts.
+    """
+    away = min(inset, LARGEST_INSET * piece.inradius)
+    b = piece.b - away
+    corners = clip(piece.corners, piece.E, b)
+    return replace(piece, corners=corners, b=b, inradius=piece.inradius - away)
 
 
 def unit_pieces(body: Polyhedron) -> tuple[FacePiece, ...]:

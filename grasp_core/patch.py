@@ -39,7 +39,14 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.closure import ClosureCertificate, force_closure
 from grasp_core.errors import InputError, UndecidedError
-from grasp_core.face_parts import Corners, Path, corner_contacts, part_at, random_parts
+from grasp_core.face_parts import (
+    Corners,
+    Path,
+    corner_contacts,
+    cover_everything,
+    part_at,
+    random_parts,
+)
 from grasp_core.face_pieces import FacePiece
 from grasp_core.lines import classify_lines
 from grasp_core.lp import LinearProgram, Optimum, maximize
@@ -66,17 +73,7 @@ class Absence:
 
     def verify(self) -> bool:
         """Re-check in plain arithmetic that the parts cover the pieces and are all separated."""
-        paths = [path for path, _ in self.leaves]
-        halves = all(half in {0, 1} for path in paths for half in path)
-        apart = not any(
-            two[: len(one)] == one
-            for i, one in enumerate(paths)
-            for j, two in enumerate(paths)
-            if i != j
-        )
-        deepest = max((len(path) for path in paths), default=0)
-        shares = sum(1 << (deepest - len(path)) for path in paths)
-        covered = halves and apart and shares == 1 << deepest
+        covered = cover_everything([path for path, _ in self.leaves])
         return covered and all(self._separated(path, proof) for path, proof in self.leaves)
 
     def _separated(self, path: Path, proof: ClosureCertificate) -> bool:
@@ -133,7 +130,7 @@ def place_free(
         if found is None and not path:
             found = _restarted(pieces, friction, rng)
         if found is not None:
-            general = _of_general_type(pieces, found, friction, rng)
+            general = of_general_type(pieces, found, friction, rng)
             return general or Undecided(len(waiting) + 1)
         margin = patch.margin if patch is not None else 0.0
         for half in (0, 1):
@@ -204,7 +201,7 @@ def _grasp(
     return _held_at(pieces, centers, friction)
 
 
-def _of_general_type(
+def of_general_type(
     pieces: Sequence[FacePiece], found: Placement, friction: float, rng: np.random.Generator
 ) -> Placement | None:
     """The same contacts with forces that form a regulus.

@@ -103,7 +103,7 @@ class GraspRecord(_Record):
     span_angle_deg: Finite
     critical_friction: Finite
     closure_margin: Finite
-    ferrari_canny: tuple[Finite, Finite] | None
+    ferrari_canny: tuple[Finite, Finite]
     witness: WitnessRecord
 
 
@@ -182,7 +182,7 @@ def _grasp_to_record(grasp: Grasp) -> Mapping[str, object]:
         "span_angle_deg": math.degrees(grasp.span_angle),
         "critical_friction": grasp.critical_friction,
         "closure_margin": grasp.closure_margin,
-        "ferrari_canny": None,
+        "ferrari_canny": list(grasp.ferrari_canny),
         "witness": {
             "points_m": grasp.witness.points.tolist(),
             "directions": grasp.witness.directions.tolist(),
@@ -241,6 +241,7 @@ def _grasp_from_record(body: Polyhedron, record: GraspRecord, friction: float) -
         span_angle=math.radians(record.span_angle_deg),
         critical_friction=record.critical_friction,
         closure_margin=record.closure_margin,
+        ferrari_canny=record.ferrari_canny,
         witness=Witness(np.array(record.witness.points_m), np.array(record.witness.forces)),
     )
     check_on_faces(body, grasp)

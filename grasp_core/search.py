@@ -9,19 +9,18 @@ from itertools import combinations, product
 
 import numpy as np
 
-from grasp_core.certified import Certified, closure_margin, witness_fault
-from grasp_core.constructions import Construction, FingerOrder, Region, point_region
+from grasp_core.certified import Certified, certify, named
+from grasp_core.constructions import Construction, FingerOrder, point_region
 from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece
 from grasp_core.patch import Absence, Undecided, place_free
 from grasp_core.placements import Placement
 from grasp_core.plans import MethodCounts, Proof
 from grasp_core.ranking import PiecesByFace, Quadruple, Ranking
-from grasp_core.spanning import cones_positively_span, span_angle
+from grasp_core.spanning import cones_positively_span
 from grasp_core.values import (
     FINGERS,
     FaceQuadruple,
-    Family,
     ForceCone,
     four,
 )
@@ -120,8 +119,9 @@ def _try_order(
         return None
     chosen, placement = placed
     cones = _cones(chosen, quadruple.half_angle)
-    certified = _certified(
-        construction.family[0], faces, construction.family, chosen, cones, placement, friction,
+    family = construction.family
+    certified = certify(
+        named(family[0], faces), faces, family, chosen, cones, placement, friction,
         construction.region,
     )  # fmt: skip
     if certified is None or not cones_positively_span(
@@ -209,44 +209,13 @@ def _free_grasp(
             search.undecided.append(faces)
         return None
     chosen, placement = max(placed, key=lambda pair: pair[1].merit)
-    certified = _certified(
-        "f", faces, "regulus", chosen, _cones(chosen, theta), placement, friction, point_region
-    )
+    certified = certify(
+        named("f", faces), faces, "regulus", chosen, _cones(chosen, theta), placement, friction,
+        point_region,
+    )  # fmt: skip
     if certified is None:
         search.tally["rejected"] += 1
     return certified
-
-
-def _certified(  # noqa: PLR0913, PLR0917 - everything a grasp is made of
-    letter: str,
-    faces: FaceQuadruple,
-    family: Family,
-    pieces: tuple[FacePiece, ...],
-    cones: tuple[ForceCone, ...],
-    placement: Placement,
-    friction: float,
-    region: Region,
-) -> Certified | None:
-    """The placement, if its witness and the exact closure test both confirm it."""
-    normals = np.array([piece.normal for piece in pieces])
-    margin = closure_margin(pieces, placement, friction)
-    fault = witness_fault(placement.positions, normals, placement.forces, friction, family)
-    if margin is None or fault is not None:
-        return None
-    return Certified(
-        id=f"{letter}-" + "-".join(str(face) for face in faces),
-        faces=faces,
-        family=family,
-        span_angle=span_angle(normals),
-        pieces=pieces,
-        cones=cones,
-        regions=tuple(
-            region(piece, cone, placement, finger)
-            for finger, (piece, cone) in enumerate(zip(pieces, cones, strict=True))
-        ),
-        placement=placement,
-        margin=margin,
-    )
 
 
 def _cones(pieces: Sequence[FacePiece], half_angle: float) -> tuple[ForceCone, ...]:

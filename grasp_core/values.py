@@ -200,6 +200,9 @@ class Grasp:
     """Smallest Coulomb coefficient above which the contacts are in force closure."""
     closure_margin: float
     """Margin of the exact closure test at the planned friction (see `force_closure`)."""
+    ferrari_canny: tuple[float, float]
+    """Proved bounds of the `l1` quality at the planned friction, torques about the centre of mass
+    and over the object's radius [N]."""
     witness: Witness
     """Balanced forces whose lines are of the grasp's family."""
 

@@ -73,10 +73,11 @@ class WrenchSet:
         longest = np.linalg.norm(self.G, axis=0).max()
         return float(longest * np.sqrt(1.0 + self.friction.max() ** 2))
 
-    def supports(self, direction: Array) -> Array:
-        """Support of each contact's cone, cut at unit normal force, (k,)."""
-        slopes = (direction @ self.G).reshape(-1, 3)
-        return slopes[:, 0] + self.friction * np.hypot(slopes[:, 1], slopes[:, 2])
+    def supports(self, directions: Array) -> Array:
+        """Support of the set in each of several directions, (n, 6), without forces, (n,)."""
+        slopes = (directions @ self.G).reshape(len(directions), -1, 3)
+        each = slopes[:, :, 0] + self.friction * np.hypot(slopes[:, :, 1], slopes[:, :, 2])
+        return each.max(axis=1) if self.norm == "l1" else np.maximum(each, 0.0).sum(axis=1)
 
     def support(self, direction: Array) -> tuple[float, Array]:
         """Support of the set in a direction, with the local forces that attain it, (3k,)."""

@@ -1,0 +1,167 @@
+"""A grasp moved on its four faces to where its Ferrari-Canny quality is larger.
+
+The climb of `quality_ascent` has many local optima, so it starts from the grasp's own contacts and
+from random ones. The best end is certified like any grasp, and replaces the given one only if its
+proved lower bound is larger.
+
+Contacts stay a finger's radius from the edges of their faces, or half the radius of the largest
+disc in the face if that is less; a contact that starts nearer to an edge may stay, not approach it.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array, positive
+from grasp_core.certified import certify, to_grasp
+from grasp_core.closure import force_closure
+from grasp_core.constructions import point_region
+from grasp_core.errors import InputError, UndecidedError
+from grasp_core.face_pieces import FacePiece, inset_piece, unit_pieces
+from grasp_core.on_faces import check_on_faces
+from grasp_core.patch import of_general_type
+from grasp_core.placements import Placement
+from grasp_core.quality import FerrariCanny, ferrari_canny
+from grasp_core.quality_ascent import ContactFaces
+from grasp_core.values import FINGERS, ForceCone, Grasp, Polyhedron
+
+FINGER_RADIUS = 0.1
+"""In object radii, where none is given."""
+RANDOM_STARTS = 3
+"""Followed besides the grasp itself: the best of `RANDOM_TRIALS`."""
+RANDOM_TRIALS = 24
+ROUGH = 2e-2
+"""Gap of the quality's bounds while starting points are compared."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Improvement:
+    """A grasp moved on its faces, with the proved bounds before and after."""
+
+    grasp: Grasp
+    """The moved grasp; the given one where no better one was found."""
+    before: FerrariCanny
+    after: FerrariCanny
+
+    @property
+    def gain(self) -> float:
+        """How many times larger the quality has become: the ratio of lower bounds."""
+        return self.after.lower / self.before.lower
+
+
+def optimize_contacts(
+    body: Polyhedron,
+    grasp: Grasp,
+    friction: float = 0.5,
+    *,
+    finger_radius: float | None = None,
+    seed: int = 0,
+) -> Improvement:
+    """Move a grasp's contacts on their faces to raise its Ferrari-Canny quality (`l1`).
+
+    Torques are taken about the centre of mass and divided by the object's radius.
+
+    Args:
+        body: The object.
+        grasp: A grasp of it in force closure at this friction.
+        friction: Coulomb coefficient at every contact.
+        finger_radius: How far contacts stay from edges [m]; a tenth of the object's radius if
+            None.
+        seed: For the random starting points.
+
+    Returns:
+        A certified grasp of quality no lower than the given one's. If moved, its witness is of the
+        general type, a regulus, and it claims no regions.
+
+    Raises:
+        InputError: An argument is out of range, or the grasp is not one of the body at this
+            friction.
+        SolverError: A program's answer failed its check.
+    """
+    check_on_faces(body, grasp)
+    radius = FINGER_RADIUS * body.radius if finger_radius is None else finger_radius
+    before = _quality(body, grasp, friction)
+    if before.lower <= 0.0:
+        raise InputError(f"grasp {grasp.id} is not in force closure at friction {friction}")
+    pieces = _pieces_under(body, grasp)
+    inset = positive(radius, "finger_radius") / body.radius
+    rooms = [inset_piece(piece, inset) for piece in pieces]
+    here = np.array([_in_plane(*on) for on in zip(pieces, _unit_points(body, grasp), strict=True)])
+    limits = [np.maximum(room.b, room.E @ at) for room, at in zip(rooms, here, strict=True)]
+    faces = ContactFaces(pieces, tuple(limits), friction)
+    rng = np.random.default_rng([seed, *grasp.faces])
+    starts = [here, *_random_starts(faces, rooms, rng)]
+    ends = sorted((faces.climbed(y) for y in starts), key=lambda end: -end[1].lower)
+    for y, found in ends:
+        if found.lower <= before.lower:
+            break
+        moved = _certified(body, grasp, faces, y, rng)
+        if moved is not None and (after := _quality(body, moved, friction)).lower > before.lower:
+            return Improvement(moved, before, after)
+    return Improvement(grasp, before, before)
+
+
+def _quality(body: Polyhedron, grasp: Grasp, friction: float) -> FerrariCanny:
+    return ferrari_canny(
+        grasp, friction=friction, center=body.center_of_mass, torque_scale=body.radius
+    )
+
+
+def _pieces_under(body: Polyhedron, grasp: Grasp) -> tuple[FacePiece, ...]:
+    """The convex piece that each contact lies on."""
+    pieces = unit_pieces(body)
+    return tuple(
+        max(
+            (piece for piece in pieces if piece.face == face),
+            key=lambda piece: float((piece.b - piece.E @ _in_plane(piece, point)).min()),
+        )
+        for face, point in zip(grasp.faces, _unit_points(body, grasp), strict=True)
+    )
+
+
+def _unit_points(body: Polyhedron, grasp: Grasp) -> Array:
+    return (grasp.positions - body.center_of_mass) / body.radius
+
+
+def _in_plane(piece: FacePiece, point: Array) -> Array:
+    return piece.frame.T @ (point - piece.origin)
+
+
+def _random_starts(
+    faces: ContactFaces, rooms: Sequence[FacePiece], rng: np.random.Generator
+) -> Iterator[Array]:
+    """The best of some random contacts that are in closure, (4, 2) each."""
+    trials = [
+        np.array([rng.dirichlet(np.ones(len(room.corners))) @ room.corners for room in rooms])
+        for _ in range(RANDOM_TRIALS)
+    ]
+    rated = [(faces.quality(y, ROUGH).lower, i) for i, y in enumerate(trials)]
+    best = sorted((rating for rating in rated if rating[0] > 0.0), reverse=True)
+    return (trials[i] for _, i in best[:RANDOM_STARTS])
+
+
+def _certified(
+    body: Polyhedron, grasp: Grasp, faces: ContactFaces, y: Array, rng: np.random.Generator
+) -> Grasp | None:
+    """The grasp at these contacts, if closure and a witness of the general type confirm it."""
+    positions = faces.positions(y)
+    normals = np.array([piece.normal for piece in faces.pieces])
+    try:
+        closed = force_closure(positions, normals, faces.friction)
+    except UndecidedError:
+        return None
+    if closed.forces is None:
+        return None
+    plain = Placement(positions, closed.forces, np.empty((0, 3)), np.zeros(FINGERS), 0.0)
+    placement = of_general_type(faces.pieces, plain, faces.friction, rng)
+    if placement is None:
+        return None
+    theta = math.atan(faces.friction)
+    cones = tuple(ForceCone(piece.normal, theta) for piece in faces.pieces)
+    found = certify(
+        f"o-{grasp.id}", grasp.faces, "regulus", faces.pieces, cones, placement,
+        faces.friction, point_region,
+    )  # fmt: skip
+    return None if found is None else to_grasp(body, faces.friction, found)

@@ -1,0 +1,159 @@
+"""An upper bound of the Ferrari-Canny quality over all contacts on four faces.
+
+Solved: how much better than a known grasp any other on the same faces can be.
+
+Derivation. In any direction y the support of a contact's cone, n.v + mu |tangential part of v| with
+v the velocity of the contact under y, is convex in the contact's position. On a product of convex
+parts of the faces it is therefore largest at corners, and contacts at all corners together have a
+quality no smaller than any four contacts in the parts. The support of all corners in a single
+direction, any one, is an upper bound already.
+
+Branch and bound: the part with the highest bound is cut through its longest face, until all are near
+the target. Directions that bound one part well often bound its neighbours, so all found so far are
+tried before another is searched.
+
+Every part left carries its direction, so the bound can be checked again in plain arithmetic.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import product
+
+import numpy as np
+
+from grasp_core.arrays import Array, positive
+from grasp_core.best_contacts import FINGER_RADIUS
+from grasp_core.closure import contact_frictions
+from grasp_core.errors import InputError
+from grasp_core.face_parts import Path, corner_contacts, cover_everything, part_at
+from grasp_core.face_pieces import FacePiece, inset_piece, unit_pieces
+from grasp_core.quality import wrench_set_quality
+from grasp_core.values import FINGERS, FaceQuadruple, Polyhedron
+from grasp_core.wrench_sets import WrenchSet
+from grasp_core.wrenches import contact_frames, grasp_map, in_frames
+
+PART_GAP = 0.02
+"""Gap of the quality of corner contacts: finer bounds do not help while parts are large."""
+ENOUGH = 0.01
+"""Parts whose bound is within this share of what is known are not cut any more."""
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Leaf:
+    """A part of the faces with a direction in which nothing on it is strong."""
+
+    choice: int
+    """Which combination of convex pieces, one per face."""
+    path: Path
+    direction: Array
+    """Unit twist, (6,)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class QualityCeiling:
+    """No contacts on the faces, clear of the edges, have a larger quality than `upper`."""
+
+    upper: float
+    choices: tuple[tuple[FacePiece, ...], ...]
+    """Convex pieces without their margins, at unit size."""
+    friction: float
+    leaves: tuple[Leaf, ...]
+
+    def verify(self) -> bool:
+        """Re-check in plain arithmetic that the parts cover the faces and are all bounded."""
+        covered = all(
+            cover_everything([leaf.path for leaf in self.leaves if leaf.choice == index])
+            for index in range(len(self.choices))
+        )
+        return covered and all(
+            self._bound(leaf) <= self.upper * (1.0 + ROUNDING) for leaf in self.leaves
+        )
+
+    def _bound(self, leaf: Leaf) -> float:
+        corners = _corner_wrenches(self.choices[leaf.choice], leaf.path, self.friction)
+        unit = leaf.direction / np.linalg.norm(leaf.direction)
+        return corners.support(unit)[0]
+
+
+def quality_ceiling(
+    body: Polyhedron,
+    faces: FaceQuadruple,
+    friction: float = 0.5,
+    *,
+    known: float = 0.0,
+    finger_radius: float | None = None,
+    parts: int = 200,
+) -> QualityCeiling:
+    """Bound the `l1` quality of all contacts on four faces.
+
+    Torques are taken about the centre of mass and divided by the object's radius, as in
+    `optimize_contacts`.
+
+    Args:
+        body: The object.
+        faces: Indices of four faces.
+        friction: Coulomb coefficient at every contact.
+        known: A quality that is attained, where bounding may stop.
+        finger_radius: As in `optimize_contacts`: contacts nearer to an edge are not bounded.
+        parts: How many parts of the faces to examine at most.
+
+    Raises:
+        InputError: An argument is out of range.
+        SolverError: A program's answer failed its check.
+    """
+    radius = FINGER_RADIUS * body.radius if finger_radius is None else finger_radius
+    choices = _choices(body, faces, positive(radius, "finger_radius") / body.radius)
+    friction = float(contact_frictions(friction, 1)[0])
+    if parts < len(choices):
+        raise InputError(f"parts must be at least {len(choices)}, one per choice of pieces")
+    directions: list[Array] = []
+    waiting: list[tuple[float, int, Path, Array]] = []
+    leaves: list[Leaf] = []
+    fresh: list[tuple[int, Path]] = [(index, ()) for index in range(len(choices))]
+    examined = 0
+    target = known * (1.0 + ENOUGH)
+    while True:
+        for index, path in fresh:
+            bound, direction = _bounded(choices[index], path, friction, directions, target)
+            heappush(waiting, (-bound, index, path, direction))
+            examined += 1
+        if -waiting[0][0] <= target or examined + 2 > parts:
+            break
+        _, index, path, _ = heappop(waiting)
+        fresh = [(index, (*path, half)) for half in (0, 1)]
+    leaves = [Leaf(index, path, direction) for _, index, path, direction in waiting]
+    return QualityCeiling(max(-waiting[0][0], 0.0), choices, friction, tuple(leaves))
+
+
+def _choices(
+    body: Polyhedron, faces: Sequence[int], inset: float
+) -> tuple[tuple[FacePiece, ...], ...]:
+    if len(faces) != FINGERS or not all(0 <= face < len(body.faces) for face in faces):
+        raise InputError(f"faces must be {FINGERS} of 0..{len(body.faces) - 1}, got {faces}")
+    pieces = unit_pieces(body)
+    by_face = [[inset_piece(p, inset) for p in pieces if p.face == face] for face in faces]
+    return tuple(product(*by_face))
+
+
+def _bounded(
+    choice: Sequence[FacePiece], path: Path, friction: float, directions: list[Array],
+    target: float,
+) -> tuple[float, Array]:  # fmt: skip
+    """An upper bound on a part with its direction; a new one joins those to try."""
+    corners = _corner_wrenches(choice, path, friction)
+    if directions:
+        bounds = corners.supports(np.array(directions))
+        best = int(bounds.argmin())
+        if bounds[best] <= target:
+            return float(bounds[best]), directions[best]
+    found = wrench_set_quality(corners, PART_GAP)
+    directions.append(found.direction)
+    return found.upper, found.direction
+
+
+def _corner_wrenches(choice: Sequence[FacePiece], path: Path, friction: float) -> WrenchSet:
+    points, normals = corner_contacts(choice, part_at(choice, path))
+    G = in_frames(grasp_map(points), contact_frames(normals))
+    return WrenchSet(G, np.full(len(points), friction), "l1")
