@@ -1,5 +1,7 @@
 """Four-finger force-closure grasps of polyhedra: planning, and proofs either way."""
 
+from grasp_core.best_contacts import Improvement as Improvement
+from grasp_core.best_contacts import optimize_contacts as optimize_contacts
 from grasp_core.closure import ClosureCertificate as ClosureCertificate
 from grasp_core.closure import force_closure as force_closure
 from grasp_core.critical import critical_friction as critical_friction
@@ -21,6 +23,8 @@ from grasp_core.planner import plan as plan
 from grasp_core.plans import Plan as Plan
 from grasp_core.quality import FerrariCanny as FerrariCanny
 from grasp_core.quality import ferrari_canny as ferrari_canny
+from grasp_core.quality_ceiling import QualityCeiling as QualityCeiling
+from grasp_core.quality_ceiling import quality_ceiling as quality_ceiling
 from grasp_core.resisted_wrenches import WrenchLimit as WrenchLimit
 from grasp_core.resisted_wrenches import max_resisted_wrench as max_resisted_wrench
 from grasp_core.resisted_wrenches import wrench_limits as wrench_limits

@@ -85,7 +85,7 @@ def optimize_contacts(
     before = _quality(body, grasp, friction)
     if before.lower <= 0.0:
         raise InputError(f"grasp {grasp.id} is not in force closure at friction {friction}")
-    pieces = _pieces_under(body, grasp)
+    pieces = pieces_under(body, grasp)
     inset = positive(radius, "finger_radius") / body.radius
     rooms = [inset_piece(piece, inset) for piece in pieces]
     here = np.array([_in_plane(*on) for on in zip(pieces, _unit_points(body, grasp), strict=True)])
@@ -109,7 +109,7 @@ def _quality(body: Polyhedron, grasp: Grasp, friction: float) -> FerrariCanny:
     )
 
 
-def _pieces_under(body: Polyhedron, grasp: Grasp) -> tuple[FacePiece, ...]:
+def pieces_under(body: Polyhedron, grasp: Grasp) -> tuple[FacePiece, ...]:
     """The convex piece that each contact lies on."""
     pieces = unit_pieces(body)
     return tuple(

@@ -91,7 +91,7 @@ class ContactFaces:
         self, y: Array, found: FerrariCanny, polytope: InnerPolytope, reach: float
     ) -> tuple[Array, float]:
         """The best move within the trust region, and what it should gain."""
-        distances, slopes = self._nearest_planes(found, polytope)
+        distances, slopes = self.nearest_planes(found, polytope)
         n = y.size
         rows = [np.hstack([-slopes, np.ones((len(slopes), 1))])]
         room = [distances - found.lower]
@@ -107,7 +107,7 @@ class ContactFaces:
             return np.zeros_like(y), 0.0
         return best.x[:n].reshape(y.shape), best.value
 
-    def _nearest_planes(self, found: FerrariCanny, polytope: InnerPolytope) -> tuple[Array, Array]:
+    def nearest_planes(self, found: FerrariCanny, polytope: InnerPolytope) -> tuple[Array, Array]:
         """Distances (m,) and slopes (m, 2k) of the planes nearest to zero."""
         points = polytope.forces @ found.wrenches.G.T
         heights = np.einsum("mcj,mj->mc", points[polytope.corners], polytope.normals).min(axis=1)
