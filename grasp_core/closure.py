@@ -100,9 +100,9 @@ def force_closure(
     mu = contact_frictions(friction, len(points))
     arms, center, size = unit_size(points)
     answer = decide(arms, units, mu)
-    if answer.forces is not None:
+    if answer.closed:
         return ClosureCertificate(True, answer.margin, points, units, mu, answer.forces, None)
-    if answer.twist is not None:
+    if answer.closed is False:
         wrench = _about_origin(answer.twist, center, size)
         verdict = ClosureCertificate(False, answer.margin, points, units, mu, None, wrench)
         if verdict.verify():

@@ -49,24 +49,28 @@ def _generators(arms: Array, normals: Array, friction: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """Margin, with forces that prove closure, or a twist that refutes it, or neither."""
+    """What the margin program says, and what of it is proved."""
 
     margin: float
-    forces: Array | None = None
-    twist: Array | None = None
+    forces: Array
+    """Balancing forces, (k, 3); they prove closure if `closed` is True."""
+    twist: Array
+    """(6,); it refutes closure if `closed` is False."""
+    closed: bool | None
+    """None where neither is proved."""
 
 
 def decide(arms: Array, normals: Array, friction: Array) -> Answer:
     """Decide closure of contacts at unit size."""
     margin, forces, twist = _margin_program(grasp_map(arms), normals, friction)
     if proves_closure(forces, arms, normals, friction):
-        return Answer(margin, forces=forces)
+        return Answer(margin, forces, twist, closed=True)
     if margin < 0.0 and refutes_closure(twist, arms, normals, friction):
-        return Answer(margin, twist=twist)
+        return Answer(margin, forces, twist, closed=False)
     sparing = _twist_sparing_interior_forces(arms, normals, friction, forces)
     if sparing is not None and refutes_closure(sparing, arms, normals, friction):
-        return Answer(0.0, twist=sparing)
-    return Answer(margin)
+        return Answer(0.0, forces, sparing, closed=False)
+    return Answer(margin, forces, twist, closed=None)
 
 
 def refutes_closure(twist: Array, arms: Array, normals: Array, friction: Array) -> bool:
@@ -193,7 +197,7 @@ def _departing_twist(rows: Array, share: Array) -> Array | None:
     """A twist with which every contact leaves along its normal: then no forces balance."""
     sizes = np.maximum(np.linalg.norm(rows, axis=0), _TINY)
     scaled: Array = (rows / sizes).T
-    twist = -np.asarray(np.linalg.pinv(scaled) @ (share / sizes), dtype=np.float64)
+    twist = -np.asarray(np.linalg.lstsq(scaled, share / sizes, rcond=None)[0], dtype=np.float64)
     missed = np.abs(rows.T @ twist + share) / np.maximum(sizes, 1.0)
     if not np.isfinite(missed).all() or missed.max() > ROUNDING * (
         1.0 + float(np.abs(twist).max())

@@ -4,8 +4,14 @@ Solved: where the margin of the closure program changes sign as the common frict
 
 Force closure at one friction is force closure at every larger one, so the threshold is unique.
 It is bracketed by certificates: balancing forces in all cones bound it from above by their own
-steepest angle, a separating twist from below by the friction up to which it separates. Near
-its zero the margin is nearly linear in the friction, which says where to try next.
+steepest angle, a separating twist from below by the friction up to which it separates. On either
+side of its zero the margin is nearly linear in the friction. Its slope follows from the program's
+answer: with tau the margin over mu, and the tangential forces in units of mu, friction enters the
+program only through the balance, whose multiplier is the twist, so that
+
+    d tau / d mu = sum v_i . (tangential part of f_i) / mu,
+
+v_i being the velocity of contact i under the twist. Newton's method says where to try next.
 """
 
 import math
@@ -14,14 +20,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen
+from grasp_core.arrays import Array
 from grasp_core.closure import LARGEST_FRICTION, unit_size
-from grasp_core.closure_margin import ROUNDING, decide, proves_closure
+from grasp_core.closure_margin import RANK, Answer, decide, proves_closure
 from grasp_core.errors import UndecidedError
 from grasp_core.values import Grasp, contact_arrays
 from grasp_core.wrenches import normal_and_tangential
 
-FRICTION_ACCURACY = 1e-8
+FRICTION_ACCURACY = 5e-8
 """Relative width of the final bracket of a critical friction."""
 FRICTIONLESS = 1e-6
 """Critical frictions below this are reported as zero: a contact in a file with six digits is
@@ -29,23 +35,23 @@ not placed better."""
 FIRST_TRIAL = 0.5
 GROWTH = 8.0
 """How much farther from an undecided friction the next trial is."""
-CAUTION = 0.02
-"""A trial keeps this share of the bracket away from both ends."""
+NUDGE = 0.4
+OVERSHOOT = 1.0
+"""Trials pass the expected threshold, to close in from both sides: by this share of the accuracy,
+and by this multiple of the error of Newton's method, the step's square over the friction."""
+HALVING = 6
+"""Every so many trials the bracket is halved, whatever Newton's method says."""
 
 
 def critical_friction(
     positions: ArrayLike | Grasp,
     normals: ArrayLike | None = None,
-    *,
-    balanced: ArrayLike | None = None,
 ) -> float:
     """Smallest common Coulomb coefficient above which the contacts are in force closure.
 
     Args:
         positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
         normals: Unit vectors into the object, (k, 3).
-        balanced: Forces known to balance, (k, 3), such as a witness: where they need no friction
-            the answer is zero at once.
 
     Returns:
         The upper end of the bracket: every larger coefficient suffices, by balanced forces
@@ -60,42 +66,32 @@ def critical_friction(
     """
     points, units = contact_arrays(positions, normals)
     arms, _, _ = unit_size(points)
-    if balanced is not None and _close_without_friction(balanced, arms, units):
+    if _close_without_friction(arms, units):
         return 0.0
-    bracket = _Bracket()
-    trial = FIRST_TRIAL
+    bracket, trial = _Bracket(), FIRST_TRIAL
     while bracket.upper > FRICTIONLESS and not bracket.settled:
         answer = decide(arms, units, np.full(len(points), trial))
-        if answer.forces is not None:
-            bracket.closed_at(trial, answer.margin, _steepest(answer.forces, units))
-        elif answer.twist is not None:
-            separates = _least_friction_not_separated(answer.twist, arms, units)
-            bracket.open_at(trial, answer.margin, separates)
+        if answer.closed:
+            bracket.closed_at(trial, _steepest(answer.forces, units))
+        elif answer.closed is False:
+            bracket.open_at(trial, _least_friction_not_separated(answer.twist, arms, units))
         else:
             bracket.undecided_at(trial)
         if bracket.lower >= LARGEST_FRICTION:
             return math.inf
-        trial = bracket.next_trial()
+        trial = bracket.next_trial(trial, answer.margin, _slope(answer, arms, units))
     return 0.0 if bracket.upper <= FRICTIONLESS else bracket.upper
 
 
 @dataclass(slots=True)
 class _Bracket:
-    """Proved bounds of the threshold, and the margins on either side that suggest where it is.
-
-    When one side moves twice in a row, the margin of the other is halved, so that both keep
-    moving (the Illinois variant of false position).
-    """
+    """Proved bounds of the threshold, and where to try next."""
 
     lower: float = 0.0
     upper: float = math.inf
-    below: tuple[float, float] | None = None
-    """A friction without closure and its margin."""
-    above: tuple[float, float] | None = None
-    """A friction with closure and its margin."""
-    last_closed: bool | None = None
     share: float = 0.5
     """Of the upper end to try next while nothing is known from below."""
+    trials: int = 0
     center: float = math.nan
     """A friction at which neither side could be proved: the threshold, to all appearance."""
     spread: float = 0.0
@@ -111,7 +107,7 @@ class _Bracket:
 
     def undecided_at(self, friction: float) -> None:
         if math.isnan(self.center):
-            self.center, self.spread = friction, 0.4 * FRICTION_ACCURACY * friction
+            self.center, self.spread = friction, NUDGE * FRICTION_ACCURACY * friction
         else:
             self.spread *= GROWTH
         if self.spread > LARGEST_FRICTION:
@@ -120,21 +116,13 @@ class _Bracket:
                 "slightly"
             )
 
-    def closed_at(self, friction: float, margin: float, steepest: float) -> None:
+    def closed_at(self, friction: float, steepest: float) -> None:
         self.upper = min(friction, steepest, self.upper)
-        self.above = friction, margin
-        if self.below is not None and self.last_closed is True:
-            self.below = self.below[0], 0.5 * self.below[1]
-        self.last_closed = True
         if friction < self.center:
             self._forget_center()
 
-    def open_at(self, friction: float, margin: float, separates: float) -> None:
+    def open_at(self, friction: float, separates: float) -> None:
         self.lower = max(friction, separates, self.lower)
-        self.below = friction, margin
-        if self.above is not None and self.last_closed is False:
-            self.above = self.above[0], 0.5 * self.above[1]
-        self.last_closed = False
         if friction > self.center:
             self._forget_center()
 
@@ -142,26 +130,34 @@ class _Bracket:
         """Go on as before: the threshold turned out to be elsewhere."""
         self.center, self.spread = math.nan, 0.0
 
-    def next_trial(self) -> float:
+    def next_trial(self, friction: float, margin: float, slope: float) -> float:
+        """Where the margin vanishes if it goes on like this, a little to the wider side."""
         if not math.isnan(self.center):
             above = self.center + self.spread
             return above if self.upper > above else self.center - self.spread
-        if self.below is None:
-            self.share *= self.share
-            return max(2.0 * self.share * self.upper, FRICTIONLESS)
-        if self.above is None or not -math.inf < self.below[1] < -ROUNDING:
+        self.trials += 1
+        root = friction - margin / slope if slope > 0.0 and math.isfinite(margin) else math.nan
+        if self.lower < root < self.upper and self.trials % HALVING:
+            past = NUDGE * FRICTION_ACCURACY * root + OVERSHOOT * (root - friction) ** 2 / root
+            if self.upper - root > root - self.lower:
+                return root + min(past, 0.5 * (self.upper - root))
+            return root - min(past, 0.5 * (root - self.lower))
+        if self.lower > 0.0:
             return _between(self.lower, self.upper)
-        (low, negative), (high, positive) = self.below, self.above
-        root = (low * positive - high * negative) / (positive - negative)
-        away = CAUTION * (self.upper - self.lower)
-        return min(max(root, self.lower + away), self.upper - away)
+        self.share *= self.share
+        return max(2.0 * self.share * self.upper, FRICTIONLESS)
 
 
-def _close_without_friction(balanced: ArrayLike, arms: Array, normals: Array) -> bool:
-    forces = frozen(balanced, normals.shape, "balanced")
-    pushes = float(np.einsum("ki,ki->", forces, normals))
-    friction = np.full(len(arms), FRICTIONLESS)
-    return pushes > 0.0 and proves_closure(forces / pushes, arms, normals, friction)
+def _close_without_friction(arms: Array, normals: Array) -> bool:
+    """Whether pushes along the normals balance: of those that do, the most even ones are tried."""
+    along_normals = np.hstack([normals, np.cross(arms, normals)])
+    left, values, _ = np.linalg.svd(along_normals)
+    free = left[:, int((values > RANK).sum()) :]
+    pushes = free @ free.sum(axis=0)
+    if pushes.min(initial=math.inf) <= 0.0:
+        return False
+    forces = (pushes / pushes.sum())[:, None] * normals
+    return proves_closure(forces, arms, normals, np.full(len(arms), FRICTIONLESS))
 
 
 def _between(lower: float, upper: float) -> float:
@@ -179,3 +175,11 @@ def _least_friction_not_separated(twist: Array, arms: Array, normals: Array) -> 
     velocities = twist[:3] + np.cross(twist[3:], arms)
     along, across = normal_and_tangential(velocities, normals)
     return float(np.min(-along / np.maximum(across, np.finfo(np.float64).tiny)))
+
+
+def _slope(answer: Answer, arms: Array, normals: Array) -> float:
+    """By how much the margin over mu grows with the logarithm of mu."""
+    velocities = answer.twist[:3] + np.cross(answer.twist[3:], arms)
+    along = np.einsum("ki,ki->k", answer.forces, normals)
+    slides = answer.forces - along[:, None] * normals
+    return float(np.einsum("ki,ki->", velocities, slides))

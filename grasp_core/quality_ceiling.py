@@ -8,9 +8,9 @@ parts of the faces it is therefore largest at corners, and contacts at all corne
 quality no smaller than any four contacts in the parts. The support of all corners in a single
 direction, any one, is an upper bound already.
 
-Branch and bound: the part with the highest bound is cut through its longest face, until all are near
-the target. Directions that bound one part well often bound its neighbours, so all found so far are
-tried before another is searched.
+Branch and bound: the part with the highest bound is cut through its longest face, until all are
+near the target. Directions that bound one part well often bound its neighbours, so all found so far
+are tried before another is searched.
 
 Every part left carries its direction, so the bound can be checked again in plain arithmetic.
 """

@@ -130,7 +130,7 @@ def validate(  # noqa: PLR0913 - the circumstances of a trial
         InputError: The contacts are not on the body's faces, or not closed at this friction.
     """
     check_on_faces(body, grasp)
-    critical = critical_friction(grasp, balanced=grasp.witness.forces)
+    critical = critical_friction(grasp)
     if not (friction > critical and force_closure(grasp, friction=friction).closed):
         raise InputError(
             f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got {friction}"

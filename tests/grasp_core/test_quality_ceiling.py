@@ -21,7 +21,7 @@ def bounded(request):
 
 def test_no_contacts_are_better_than_the_ceiling(bounded):
     """Random contacts on the faces, clear of the edges, and the best that a search has found."""
-    body, found, ceiling = bounded
+    _, found, ceiling = bounded
     assert ceiling.upper >= found.after.lower
     rng, closed = np.random.default_rng(0), 0
     for _ in range(150):
