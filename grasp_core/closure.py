@@ -26,13 +26,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen
+from grasp_core.arrays import Array
 from grasp_core.closure_margin import decide, proves_closure, refutes_closure
-from grasp_core.errors import InputError, UndecidedError
-from grasp_core.values import Grasp, contact_arrays
+from grasp_core.errors import UndecidedError
+from grasp_core.values import Grasp, contact_arrays, contact_frictions
 
-LARGEST_FRICTION = 1e3
-"""Coefficients above this are reported as infinite; no material comes near it."""
+UNSAFE = 1e-6
+"""A margin larger than this is not itself why nothing can be proved."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,9 +107,18 @@ def force_closure(
         verdict = ClosureCertificate(False, answer.margin, points, units, mu, None, wrench)
         if verdict.verify():
             return verdict
-    raise UndecidedError(
-        f"the closure margin is {answer.margin:.2g}, too close to zero to decide; change the "
-        "friction or the contacts slightly"
+    raise UndecidedError(_why_undecided(answer.margin))
+
+
+def _why_undecided(margin: float) -> str:
+    if abs(margin) < UNSAFE:
+        return (
+            f"the closure margin is {margin:.2g}, too close to zero to decide; change the "
+            "friction or the contacts slightly"
+        )
+    return (
+        f"the closure margin is {margin:.2g}, but neither answer can be proved: contacts or "
+        "normals nearly coincide, or lie nearly on a line; move them apart or leave some out"
     )
 
 
@@ -125,16 +134,3 @@ def unit_size(points: Array) -> tuple[Array, Array, float]:
 def _about_origin(twist: Array, center: Array, size: float) -> Array:
     turning = twist[3:] / size
     return np.concatenate([twist[:3] - np.cross(turning, center), turning])
-
-
-def contact_frictions(friction: ArrayLike, count: int) -> Array:
-    """One checked Coulomb coefficient per contact, (count,), from one for all or one each."""
-    values = np.asarray(friction, dtype=np.float64)
-    mu = frozen(np.full(count, values) if values.ndim == 0 else values, (count,), "friction")
-    if (mu < 0.0).any():
-        raise InputError(f"friction must not be negative, got {float(mu.min()):.6g}")
-    if (mu > LARGEST_FRICTION).any():
-        raise InputError(
-            f"friction must be at most {LARGEST_FRICTION:g}, got {float(mu.max()):.6g}"
-        )
-    return mu

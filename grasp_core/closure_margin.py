@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.conic import ConicProgram, minimize
+from grasp_core.errors import SolverError
+from grasp_core.nearest_wrench import nearest_wrench
+from grasp_core.wrench_sets import WrenchSet
 from grasp_core.wrenches import (
     WRENCH,
     contact_frames,
@@ -62,7 +65,11 @@ class Answer:
 
 def decide(arms: Array, normals: Array, friction: Array) -> Answer:
     """Decide closure of contacts at unit size."""
-    margin, forces, twist = _margin_program(grasp_map(arms), normals, friction)
+    try:
+        margin, forces, twist = _margin_program(grasp_map(arms), normals, friction)
+    except SolverError:
+        # nearly parallel normals: the program has no solution, or none to within rounding
+        return _apart(arms, normals, friction)
     if proves_closure(forces, arms, normals, friction):
         return Answer(margin, forces, twist, closed=True)
     if margin < 0.0 and refutes_closure(twist, arms, normals, friction):
@@ -73,11 +80,19 @@ def decide(arms: Array, normals: Array, friction: Array) -> Answer:
     return Answer(margin, forces, twist, closed=None)
 
 
+def _apart(arms: Array, normals: Array, friction: Array) -> Answer:
+    """Refuted by the wrench nearest to zero, or undecided."""
+    wrenches = WrenchSet(in_frames(grasp_map(arms), contact_frames(normals)), friction, "l1")
+    _, facing = nearest_wrench(wrenches)
+    refuted = refutes_closure(facing, arms, normals, friction)
+    return Answer(-math.inf, np.zeros_like(arms), facing, closed=False if refuted else None)
+
+
 def refutes_closure(twist: Array, arms: Array, normals: Array, friction: Array) -> bool:
     """Whether no contact force within its cone works along a twist."""
     length = float(np.linalg.norm(twist))
-    worst = float(supports(twist, arms, normals, friction).max())
-    return length > 0.0 and worst <= ROUNDING * length
+    excess = supports(twist, arms, normals, friction) / np.sqrt(1.0 + friction**2)
+    return length > 0.0 and float(excess.max()) <= ROUNDING * length
 
 
 def proves_closure(forces: Array, arms: Array, normals: Array, friction: Array) -> bool:

@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
-from grasp_core.closure import LARGEST_FRICTION, unit_size
+from grasp_core.closure import unit_size
 from grasp_core.closure_margin import RANK, Answer, decide, proves_closure
 from grasp_core.errors import UndecidedError
-from grasp_core.values import Grasp, contact_arrays
+from grasp_core.values import LARGEST_FRICTION, Grasp, contact_arrays
 from grasp_core.wrenches import normal_and_tangential
 
 FRICTION_ACCURACY = 5e-8
@@ -34,7 +34,8 @@ FRICTIONLESS = 1e-6
 not placed better."""
 FIRST_TRIAL = 0.5
 GROWTH = 8.0
-"""How much farther from an undecided friction the next trial is."""
+"""How much farther from an undecided friction the next trial is; twice as far once that is a tenth
+of `FRICTIONLESS`."""
 NUDGE = 0.4
 OVERSHOOT = 1.0
 """Trials pass the expected threshold, to close in from both sides: by this share of the accuracy,
@@ -109,7 +110,7 @@ class _Bracket:
         if math.isnan(self.center):
             self.center, self.spread = friction, NUDGE * FRICTION_ACCURACY * friction
         else:
-            self.spread *= GROWTH
+            self.spread *= GROWTH if self.spread < 0.1 * FRICTIONLESS else 2.0
         if self.spread > LARGEST_FRICTION:
             raise UndecidedError(
                 "neither closure nor its opposite can be proved at any friction; move the contacts "

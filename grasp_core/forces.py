@@ -1,4 +1,4 @@
-"""Contact forces that balance a wrench, by strictly convex programs; the door to ProxQP.
+"""Contact forces that balance wrenches, by strictly convex programs; the door to ProxQP.
 
 Forces are sought in pyramids inscribed in the friction cones, so that every answer lies in
 the true cones. Two objectives for balanced forces: the least norm, and the least friction,
@@ -8,29 +8,28 @@ tangential part minus r times the normal part have a smaller one, until they do 
 2 % that pyramids give away come from `least_friction`. Where nothing balances,
 `closest_forces` leaves the least imbalance.
 
-Forces are scaled by the largest normal force and lengths by the longest arm inside. ProxQP
-calls some of these feasible programs infeasible, so it is asked for the closest feasible
-point, and its status is not read: an answer counts when its own residuals are small.
+Both objectives ask for the nearest point of a polyhedron (`least_distance`), once the balance
+is solved (`balance`). Where that point is not found, ProxQP decides. It calls some of these
+feasible programs infeasible, so it is asked for the closest feasible point, and its status is
+not read: an answer counts when its own residuals are small.
 """
 
 import importlib
 import math
+from collections.abc import Callable
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
+from grasp_core.balance import RESIDUAL, Balance, needed_friction
 from grasp_core.errors import InputError, NoForcesError, SolverError
+from grasp_core.least_distance import least_distance
 from grasp_core.least_friction import lower_friction
-from grasp_core.values import Grasp, contact_arrays
-from grasp_core.wrenches import contact_frames, grasp_map
+from grasp_core.values import Grasp, contact_arrays, contact_frictions
 
-PYRAMID_SIDES = 16
-"""An inscribed 16-sided pyramid gives away 1.9 % of the friction coefficient."""
-RESIDUAL = 1e-6
-"""Largest imbalance and cone violation accepted, in units of the largest normal force: a
-hundred times the accuracy asked of the solver."""
 REQUESTED = 1e-8
 MAX_ITERATIONS = 300
 """Feasible programs of this size take about twenty; infeasible ones would go on for minutes."""
@@ -48,40 +47,49 @@ LEAST_CHARGE = 1e-3
 def contact_forces(  # noqa: PLR0913 - the contract's arguments
     positions: ArrayLike | Grasp,
     normals: ArrayLike | None,
-    friction: float,
+    friction: ArrayLike,
     wrench: ArrayLike,
     *,
     objective: Literal["least_norm", "least_friction"] = "least_norm",
     normal_force: tuple[float, float] = (0.0, math.inf),
     center: ArrayLike = (0.0, 0.0, 0.0),
 ) -> Array:
-    """Forces at the contacts that balance an external wrench.
+    """Forces at the contacts that balance an external wrench, or each of many.
 
     Args:
         positions: Contact points, (k, 3) [m]; or a Grasp, with `normals` None.
         normals: Unit vectors into the object, (k, 3).
-        friction: Coulomb coefficient that the forces must respect.
-        wrench: External (force, torque), (6,) [N, N m], torque about `center`.
-        objective: What to make least.
+        friction: Coulomb coefficient that the forces must respect, one for all contacts or one
+            each, (k,).
+        wrench: External (force, torque), (6,), or n of them, (n, 6) [N, N m], torque about
+            `center`.
+        objective: What to make least: the norm of all forces, or the largest share that a
+            contact needs of its friction.
         normal_force: Least and largest normal force of each contact [N].
         center: (3,) [m]
 
     Returns:
-        Forces on the object, (k, 3) [N], in the frame of `positions`.
+        Forces on the object, (k, 3), or (n, k, 3) [N], in the frame of `positions`. Those for one
+        of many wrenches are the same as for that wrench alone, but for rounding.
 
     Raises:
-        InputError: Shapes or limits are wrong.
-        NoForcesError: No forces found that meet the limits and the friction.
+        InputError: Shapes, limits or coefficients are wrong.
+        NoForcesError: No forces found that meet the limits and the friction; the text gives the
+            index of the first of many wrenches for which there are none.
     """
-    problem = _Problem.of(positions, normals, wrench, normal_force, center)
-    least_norm = objective == "least_norm"
-    local = problem.least_norm(friction) if least_norm else problem.least_friction(friction)
-    if local is None or problem.required_friction(local) > friction * (1.0 + RESIDUAL):
+    loads, single = _rows(wrench)
+    balance = _balance(positions, normals, loads, normal_force, center)
+    mu = contact_frictions(friction, len(balance.frames))
+    F = _objective(objective)(balance, mu)
+    missing = np.flatnonzero(~(needed_friction(F, mu) <= 1.0 + RESIDUAL))
+    if missing.size:
+        which = "this wrench" if single else f"wrench {missing[0]}, counting from 0"
         raise NoForcesError(
-            f"no forces found with friction {friction:.6g} and normal forces in "
-            f"{normal_force} N that balance this wrench; lower the load or raise the limits"
+            f"no forces found with friction {_text(mu)} and normal forces in "
+            f"{normal_force} N that balance {which}; lower the load or raise the limits"
         )
-    return problem.in_space(local)
+    forces = balance.in_space(F)
+    return forces[0] if single else forces
 
 
 def least_friction_forces(
@@ -94,9 +102,13 @@ def least_friction_forces(
 
     None when the limits on the normal forces leave no balance.
     """
-    problem = _Problem.of(positions, normals, wrench, normal_force, center)
-    local = problem.least_friction(friction)
-    return None if local is None else (problem.in_space(local), problem.required_friction(local))
+    load = frozen(wrench, (6,), "wrench")[None]
+    balance = _balance(positions, normals, load, normal_force, center)
+    alike = np.ones(len(balance.frames))
+    f = _least_friction(balance, friction, alike)
+    if f is None:
+        return None
+    return balance.in_space(f[None])[0], float(needed_friction(f[None], alike)[0])
 
 
 def closest_forces(
@@ -104,128 +116,130 @@ def closest_forces(
     normal_force: tuple[float, float], center: Array,
 ) -> Array:  # fmt: skip
     """Forces in the friction cones that leave the least imbalance, (k, 3)."""
-    problem = _Problem.of(positions, normals, wrench, normal_force, center)
-    return problem.in_space(problem.closest(friction))
+    load = frozen(wrench, (6,), "wrench")[None]
+    balance = _balance(positions, normals, load, normal_force, center)
+    rows = balance.pyramids(np.full(len(balance.frames), friction))
+    P = balance.G.T @ balance.G + LEAST_CHARGE * np.eye(balance.G.shape[1])
+    f = _solve(P, balance.G.T @ balance.W[0], rows, balance, balanced=False)
+    if f is None:
+        raise SolverError("no forces in the cones were found, though a pure push is one")
+    return balance.in_space(balance.into_cones(f[None], friction))[0]
 
 
-class _Problem:
-    """One wrench on one set of contacts, scaled; forces are (normal, tangent, tangent)."""
-
-    def __init__(
-        self, arms: Array, normals: Array, wrench: Array, normal_force: tuple[float, float]
-    ) -> None:
-        least, largest = normal_force
-        scale = largest if math.isfinite(largest) else float(np.linalg.norm(wrench))
-        self.scale = scale if scale > 0.0 else 1.0
-        self.frames = contact_frames(normals)
-        size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
-        rows = grasp_map(arms / size)
-        self.G = np.hstack([rows[:, 3 * i : 3 * i + 3] @ R for i, R in enumerate(self.frames)])
-        self.w = wrench / self.scale
-        self.w[3:] /= size
-        self.count = len(arms)
-        self.lower = np.tile([least / self.scale, -np.inf, -np.inf], self.count)
-        self.upper = np.tile([largest / self.scale, np.inf, np.inf], self.count)
-
-    @classmethod
-    def of(
-        cls, positions: ArrayLike | Grasp, normals: ArrayLike | None, wrench: ArrayLike,
-        normal_force: tuple[float, float], center: ArrayLike,
-    ) -> "_Problem":  # fmt: skip
-        points, units = contact_arrays(positions, normals)
-        if not 0.0 <= normal_force[0] < normal_force[1]:
-            raise InputError(f"normal_force must be (least, largest), got {normal_force}")
-        about = frozen(center, (3,), "center")
-        return cls(points - about, units, np.array(frozen(wrench, (6,), "wrench")), normal_force)
-
-    def in_space(self, local: Array) -> Array:
-        """Scaled local forces as forces in the object's frame, (k, 3) [N]."""
-        forces = np.einsum("kij,kj->ki", self.frames, local.reshape(-1, 3))
-        return self.scale * np.asarray(forces, dtype=np.float64)
-
-    def required_friction(self, local: Array) -> float:
-        """The coefficient that these forces need, not counting contacts without force."""
-        along, across = local[0::3], np.hypot(local[1::3], local[2::3])
-        ratios = across / np.maximum(along, np.finfo(np.float64).tiny)
-        return float(np.where(across > RESIDUAL, ratios, 0.0).max())
-
-    def pyramid(self, friction: float) -> Array:
-        """Rows R with R f <= 0 inside pyramids inscribed in the cones, (16 k, 3 k)."""
-        turns = 2.0 * np.pi * (np.arange(PYRAMID_SIDES) + 0.5) / PYRAMID_SIDES
-        slope = -friction * math.cos(np.pi / PYRAMID_SIDES)
-        side = np.column_stack([np.full(PYRAMID_SIDES, slope), np.cos(turns), np.sin(turns)])
-        return np.asarray(np.kron(np.eye(self.count), side), dtype=np.float64)
-
-    def least_norm(self, friction: float) -> Array | None:
-        """Balanced forces of least norm."""
-        rows = self.pyramid(friction)
-        P = np.eye(self.G.shape[1])
-        return self._balanced(_solve(P, 0.0 * P[0], rows, self, balanced=True))
-
-    def least_friction(self, start: float) -> Array | None:
-        """Balanced forces of least friction, iterating from a coefficient on the way there."""
-        best, friction = None, start
-        for _ in range(MAX_ROUNDS):
-            better = self._toward_less_friction(friction)
-            if better is None:
-                break
-            needed = self.required_friction(better)
-            if best is not None and needed > friction * (1.0 - IMPROVEMENT):
-                break
-            best, friction = better, needed
-        if best is None:
-            return None
-        limits = float(self.lower[0]), float(self.upper[0])
-        return lower_friction(self.G, self.w, limits, best)
-
-    def _toward_less_friction(self, friction: float) -> Array | None:
-        """Balanced forces whose largest excess over `friction`, a further variable, is least."""
-        rows = self.pyramid(friction)
-        n = self.G.shape[1]
-        P, q = np.diag([REGULAR] * n + [1.0]), np.array([0.0] * n + [1.0])
-        excess = np.hstack([rows, -np.ones((len(rows), 1))])
-        x = _solve(P, q, excess, self, balanced=True)
-        return None if x is None else self._balanced(x[:n])
-
-    def closest(self, friction: float) -> Array:
-        """Forces in the cones with the least imbalance."""
-        rows = self.pyramid(friction)
-        P = self.G.T @ self.G + LEAST_CHARGE * np.eye(self.G.shape[1])
-        x = _solve(P, self.G.T @ self.w, rows, self, balanced=False)
-        if x is None:
-            raise SolverError("no forces in the cones were found, though a pure push is one")
-        return self._into_cones(x, friction)
-
-    def _into_cones(self, local: Array, friction: float) -> Array:
-        """Forces near these that meet the limits and the cones exactly."""
-        along = np.clip(local[0::3], self.lower[0::3], self.upper[0::3])
-        across = np.hypot(local[1::3], local[2::3])
-        shrink = np.minimum(1.0, friction * along / np.maximum(across, np.finfo(np.float64).tiny))
-        return np.column_stack([along, shrink * local[1::3], shrink * local[2::3]]).ravel()
-
-    def _balanced(self, local: Array | None) -> Array | None:
-        """The forces if they balance the wrench within the limits, corrected to rounding."""
-        if local is None:
-            return None
-        correction = np.linalg.lstsq(self.G, self.G @ local + self.w, rcond=None)[0]
-        exact = local - np.asarray(correction, dtype=np.float64)
-        imbalance = float(np.abs(self.G @ exact + self.w).max())
-        outside = max((self.lower - exact).max(), (exact - self.upper).max())
-        return exact if max(imbalance, float(outside)) <= RESIDUAL else None
+def _objective(name: str) -> Callable[[Balance, Array], Array]:
+    known = {"least_norm": _least_norm, "least_friction": _least_friction_each}
+    if name not in known:
+        raise InputError(f"objective must be one of {', '.join(known)}, got {name!r}")
+    return known[name]
 
 
-def _solve(P: Array, q: Array, rows: Array, problem: _Problem, *, balanced: bool) -> Array | None:
-    """Minimise x'Px/2 + q'x with rows @ x <= 0; a last variable beyond the forces is free."""
+def _least_norm(balance: Balance, friction: Array) -> Array:
+    """Balanced forces of least norm, (n, 3k); NaN from the first wrench on that has none."""
+    rows = balance.pyramids(friction)
+    Z = least_distance(*balance.polyhedra(rows))
+    F = balance.checked(balance.F0 + Z @ balance.null.T)
+    P = np.eye(F.shape[1])
+    for i in np.flatnonzero(np.isnan(F[:, 0])):
+        one = balance.one(int(i))
+        f = _solve(P, 0.0 * P[0], rows, one, balanced=True)
+        if f is not None:
+            F[i] = one.checked(f[None])[0]
+        if np.isnan(F[i, 0]):
+            break
+    return F
+
+
+def _least_friction_each(balance: Balance, friction: Array) -> Array:
+    """Balanced forces of least friction, (n, 3k); NaN from the first wrench on that has none."""
+    largest = float(friction.max())
+    weights = friction / largest if largest > 0.0 else np.ones(len(friction))
+    F = np.full(balance.F0.shape, np.nan)
+    for i in range(len(F)):
+        f = _least_friction(balance.one(i), largest, weights)
+        if f is None:
+            break
+        F[i] = f
+    return F
+
+
+def _least_friction(balance: Balance, start: float, weights: Array) -> Array | None:
+    """Forces (3k,) that need the least r, where the friction of each contact is r times its weight.
+
+    The iteration starts from a coefficient on the way there.
+    """
+    best, friction = None, start
+    for _ in range(MAX_ROUNDS):
+        better = _toward_less_friction(balance, friction, weights)
+        if np.isnan(better[0]):
+            break
+        needed = float(needed_friction(better[None], weights)[0])
+        if best is not None and needed > friction * (1.0 - IMPROVEMENT):
+            break
+        best, friction = better, needed
+    if best is None:
+        return None
+    return lower_friction(balance, weights, best)
+
+
+def _toward_less_friction(balance: Balance, friction: float, weights: Array) -> Array:
+    """Balanced forces whose largest excess over `friction`, a further variable, is least.
+
+    With the forces F0 + null @ z and the excess t, what is minimised is, but for a constant,
+    half the square of (sqrt(REGULAR) z, t + 1).
+    """
+    rows = balance.pyramids(friction * weights)
+    allowance = np.repeat(weights, len(rows) // len(weights))
+    C, D = balance.polyhedra(rows)
+    excess = np.zeros((len(C), 1))
+    excess[: len(rows), 0] = -allowance
+    D[:, : len(rows)] -= allowance
+    root = math.sqrt(REGULAR)
+    z = least_distance(np.hstack([C / root, excess]), D)[:, :-1] / root
+    f = balance.checked(balance.F0 + z @ balance.null.T)[0]
+    if not np.isnan(f[0]):
+        return f
+    n = balance.G.shape[1]
+    P, q = np.diag([REGULAR] * n + [1.0]), np.array([0.0] * n + [1.0])
+    x = _solve(P, q, np.hstack([rows, -allowance[:, None]]), balance, balanced=True)
+    return f if x is None else balance.checked(x[None, :n])[0]
+
+
+def _balance(
+    positions: ArrayLike | Grasp, normals: ArrayLike | None, wrenches: Array,
+    normal_force: tuple[float, float], center: ArrayLike,
+) -> Balance:  # fmt: skip
+    points, units = contact_arrays(positions, normals)
+    if not 0.0 <= normal_force[0] < normal_force[1]:
+        raise InputError(f"normal_force must be (least, largest), got {normal_force}")
+    return Balance.of(points - frozen(center, (3,), "center"), units, wrenches, normal_force)
+
+
+def _rows(wrench: ArrayLike) -> tuple[Array, bool]:
+    """Wrenches as rows, and whether there is but one that is no row."""
+    try:
+        single = np.ndim(wrench) != 2  # noqa: PLR2004 - rows and columns
+    except ValueError:  # ragged, which `frozen` explains
+        single = True
+    loads = frozen(wrench, (6,) if single else (None, 6), "wrench")
+    return np.atleast_2d(loads), single
+
+
+def _text(friction: Array) -> str:
+    return f"{friction[0]:.6g}" if np.ptp(friction) == 0.0 else str(friction)
+
+
+def _solve(P: Array, q: Array, rows: Array, balance: Balance, *, balanced: bool) -> Array | None:
+    """Minimise x'Px/2 + q'x with rows @ x <= 0 by ProxQP, for the first wrench.
+
+    The variables are its forces, and perhaps a last one that is free.
+    """
     solver = _qpsolvers()
-    extra = len(q) - problem.G.shape[1]
-    balance = (
-        (np.hstack([problem.G, np.zeros((6, extra))]), -problem.w) if balanced else (None,) * 2
-    )
-    program = solver.Problem(
-        P, q, rows, np.zeros(len(rows)), *balance,
-        lb=np.append(problem.lower, [-np.inf] * extra),
-        ub=np.append(problem.upper, [np.inf] * extra),
-    )  # fmt: skip
+    forces = balance.G.shape[1]
+    lower, upper = np.full(len(q), -np.inf), np.full(len(q), np.inf)
+    lower[0:forces:3], upper[0:forces:3] = balance.least, balance.largest
+    map_of_all = np.hstack([balance.G, np.zeros((6, len(q) - forces))])
+    equations = (map_of_all, -balance.W[0]) if balanced else (None, None)
+    program = solver.Problem(P, q, rows, np.zeros(len(rows)), *equations, lb=lower, ub=upper)
     answer = solver.solve_problem(
         program, solver="proxqp", eps_abs=REQUESTED, max_iter=MAX_ITERATIONS,
         primal_infeasibility_solving=balanced,
@@ -235,6 +249,7 @@ def _solve(P: Array, q: Array, rows: Array, problem: _Problem, *, balanced: bool
     return _polished(program, np.asarray(answer.x, dtype=np.float64))
 
 
+@cache
 def _qpsolvers() -> Any:
     module: Any = importlib.import_module("qpsolvers")
     if "proxqp" not in module.available_solvers:

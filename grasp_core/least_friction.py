@@ -5,13 +5,17 @@ within limits on the normal parts. With mu the coefficient that the forces at ha
 
     minimise t  subject to  G f = -w,  l <= f_n <= u,  |f_t| <= mu f_n + t   for all contacts
 
-gives forces that need less, unless t = 0 (Dinkelbach). Forces planned with pyramids, where the
+gives forces that need less, unless t = 0 (Dinkelbach). Contacts whose frictions differ have
+weights a, and |f_t| <= a (mu f_n + t). Forces planned with pyramids, where the
 search starts, need up to 2 % more than these.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.balance import NO_FORCE, Balance
 from grasp_core.conic import ConicProgram, minimize
 from grasp_core.errors import SolverError
 
@@ -25,32 +29,29 @@ FRICTIONLESS = 1e-6
 """Coefficients below this are not lowered further."""
 
 
-def lower_friction(G: Array, w: Array, limits: tuple[float, float], forces: Array) -> Array:
-    """Forces that balance as the given ones do and need the least friction.
+def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:
+    """Forces that balance the first wrench as the given ones do and need the least friction.
 
     Args:
-        G: Map from contact forces (normal, tangent, tangent) to their wrench, (6, 3k).
-        w: External wrench, (6,).
-        limits: Least and largest normal part.
-        forces: Balanced forces to start from, (3k,).
+        balance: The wrench and the limits.
+        weights: What the friction of each contact is in units of the coefficient, (k,).
+        forces: Balanced local forces to start from, (3k,).
 
     Returns:
         (3k,); the given forces where the solver finds none that need less.
     """
-    best, friction = forces, needed_friction(forces)
+    best, friction = forces, _needed_friction(forces, weights)
+    program = _without_friction(balance, weights)
     for _ in range(MAX_ROUNDS):
         if friction <= FRICTIONLESS:
             break
         try:
-            better = _with_least_excess(G, w, limits, friction)
+            better = _with_least_excess(program, friction * weights)
         except SolverError:
             break
-        correction = np.linalg.lstsq(G, G @ better + w, rcond=None)[0]
-        better = better - np.asarray(correction, dtype=np.float64)
-        needed = needed_friction(better)
-        outside = max(limits[0] - better[0::3].min(), better[0::3].max() - limits[1])
-        imbalance = float(np.abs(G @ better + w).max())
-        if max(outside, imbalance) > ROUNDING or needed >= friction:
+        better = balance.checked(better[None], ROUNDING)[0]
+        needed = _needed_friction(better, weights)
+        if not needed < friction:
             break
         improved = needed < friction * (1.0 - IMPROVEMENT)
         best, friction = better, needed
@@ -59,23 +60,29 @@ def lower_friction(G: Array, w: Array, limits: tuple[float, float], forces: Arra
     return best
 
 
-def needed_friction(forces: Array) -> float:
-    """The largest ratio of tangential to normal part, (3k,) as (normal, tangent, tangent)."""
+def _needed_friction(forces: Array, weights: Array) -> float:
+    """The largest ratio of tangential to weighted normal part, where there are weights."""
     along, across = forces[0::3], np.hypot(forces[1::3], forces[2::3])
-    return float((across / np.maximum(along, np.finfo(np.float64).tiny)).max())
+    ratios = across / np.maximum(weights * along, NO_FORCE)
+    return float(ratios[weights > 0.0].max())
 
 
-def _with_least_excess(G: Array, w: Array, limits: tuple[float, float], friction: float) -> Array:
-    n = G.shape[1]
-    normal, excess = np.eye(n + 1)[0:n:3], np.eye(n + 1)[n]
-    bounded = [(-normal, np.full(len(normal), -limits[0]))]
-    if np.isfinite(limits[1]):
-        bounded.append((normal, np.full(len(normal), limits[1])))
-    cones = [
-        -np.vstack([friction * normal[i] + excess, np.eye(n + 1)[3 * i + 1 : 3 * i + 3]])
-        for i in range(len(normal))
-    ]
-    A = np.vstack([np.hstack([G, np.zeros((len(G), 1))]), *(rows for rows, _ in bounded), *cones])
-    b = np.concatenate([-w, *(limit for _, limit in bounded), np.zeros(n)])
-    nonnegatives = len(normal) * len(bounded)
-    return minimize(ConicProgram(excess, A, b, len(G), nonnegatives, (3,) * len(normal))).x[:n]
+def _without_friction(balance: Balance, weights: Array) -> ConicProgram:
+    """The program of the module's text with mu = 0; its last 3k rows are the cones."""
+    n, count = balance.G.shape[1], len(weights)
+    normal, excess = np.eye(n, n + 1)[0::3], np.eye(n + 1)[n]
+    balanced, cones = np.hstack([balance.G, np.zeros((6, 1))]), -np.eye(n, n + 1)
+    cones[0::3] = -weights[:, None] * excess
+    bounded = [(-normal, np.full(count, -balance.least[0]))]
+    if np.isfinite(balance.largest[0]):
+        bounded.append((normal, np.full(count, balance.largest[0])))
+    A = np.vstack([balanced, *(rows for rows, _ in bounded), cones])
+    b = np.concatenate([-balance.W[0], *(limit for _, limit in bounded), np.zeros(n)])
+    return ConicProgram(excess, A, b, 6, count * len(bounded), (3,) * count)
+
+
+def _with_least_excess(program: ConicProgram, friction: Array) -> Array:
+    A, n = program.A.copy(), program.A.shape[1] - 1
+    cones = A[len(A) - n :]
+    np.fill_diagonal(cones[0::3, 0::3], -friction)
+    return minimize(replace(program, A=A)).x[:n]

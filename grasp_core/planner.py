@@ -14,13 +14,12 @@ from typing import TypeAlias, get_args
 
 from grasp_core.arrays import UNIT_SLACK
 from grasp_core.certified import Certified, to_grasp
-from grasp_core.closure import LARGEST_FRICTION
 from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS
 from grasp_core.errors import InputError
 from grasp_core.plans import Plan, PlanCounts
 from grasp_core.ranking import Ranking, candidate_quadruples, pieces_by_face
 from grasp_core.search import Search, search_construction, search_free
-from grasp_core.values import FINGERS, Family, Grasp, Method, Polyhedron
+from grasp_core.values import FINGERS, LARGEST_FRICTION, Family, Grasp, Method, Polyhedron
 
 FAMILIES: tuple[Family, ...] = get_args(Family)
 """The families of the paper, each with its construction."""

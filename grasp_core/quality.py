@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, positive
-from grasp_core.conic import ConicProgram, minimize
 from grasp_core.growing_hull import MOST_POINTS, GrowingHull, spread_simplex
+from grasp_core.nearest_wrench import nearest_wrench
 from grasp_core.values import Grasp
 from grasp_core.wrench_sets import Norm, WrenchSet
 
@@ -193,7 +193,7 @@ def _grown(wrenches: WrenchSet, gap: float) -> tuple[Array | None, InnerPolytope
 def _outside(wrenches: WrenchSet, direction: Array | None) -> FerrariCanny:
     """Bounds where zero is not inside the set, or that cannot be told."""
     unit = replace(wrenches, norm="l1")
-    forces, facing = _nearest(unit)
+    forces, facing = nearest_wrench(unit)
     wrench = unit.G @ forces
     length = float(np.linalg.norm(wrench))
     trials = [] if direction is None else [direction]
@@ -206,32 +206,5 @@ def _outside(wrenches: WrenchSet, direction: Array | None) -> FerrariCanny:
     return FerrariCanny(-length, max(upper, -length), wrenches, weakest, None, forces)
 
 
-def _nearest(wrenches: WrenchSet) -> tuple[Array, Array]:
-    """Local forces, normal parts summing to one, of the wrench nearest to zero; the way there."""
-    m, n = wrenches.G.shape
-    k = n // 3
-    q = np.append(np.zeros(n), 1.0)
-    share = np.append(np.tile([1.0, 0.0, 0.0], k), 0.0)
-    distance = np.vstack([-q, np.hstack([-wrenches.G / wrenches.size, np.zeros((m, 1))])])
-    steepness = np.kron(np.diag(wrenches.friction), [1.0, 0.0, 0.0])
-    cones = [-np.vstack([steepness[i], np.eye(n)[3 * i + 1 : 3 * i + 3]]) for i in range(k)]
-    sides = np.hstack([np.vstack(cones), np.zeros((n, 1))])
-    A = np.vstack([share, distance, sides])
-    b = np.append(1.0, np.zeros(len(A) - 1))
-    answer = minimize(ConicProgram(q, A, b, 1, 0, (m + 1, *(3,) * k)))
-    facing = answer.z[2 : m + 2]
-    return _into_cones(answer.x[:n], wrenches.friction), facing
-
-
 def _unit(direction: Array) -> Array:
     return direction / float(np.linalg.norm(direction))
-
-
-def _into_cones(forces: Array, friction: Array) -> Array:
-    """Forces near these, in the cones and with normal parts that sum to one exactly."""
-    each = forces.reshape(-1, 3).copy()
-    each[:, 0] = np.maximum(each[:, 0], 0.0)
-    across = np.hypot(each[:, 1], each[:, 2])
-    least = np.finfo(np.float64).tiny
-    each[:, 1:] *= np.minimum(1.0, friction * each[:, 0] / np.maximum(across, least))[:, None]
-    return each.ravel() / each[:, 0].sum()

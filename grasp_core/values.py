@@ -25,6 +25,8 @@ FaceQuadruple: TypeAlias = tuple[int, int, int, int]
 Item = TypeVar("Item")
 
 FINGERS = 4
+LARGEST_FRICTION = 1e3
+"""Coefficients above this are reported as infinite; no material comes near it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -251,3 +253,16 @@ def contact_arrays(positions: ArrayLike | Grasp, normals: ArrayLike | None) -> t
     if len(points) < 2:  # noqa: PLR2004 - one contact alone can balance nothing
         raise InputError(f"at least two contacts are needed, got {len(points)}")
     return points, units
+
+
+def contact_frictions(friction: ArrayLike, count: int) -> Array:
+    """One checked Coulomb coefficient per contact, (count,), from one for all or one each."""
+    values = np.asarray(friction, dtype=np.float64)
+    mu = frozen(np.full(count, values) if values.ndim == 0 else values, (count,), "friction")
+    if (mu < 0.0).any():
+        raise InputError(f"friction must not be negative, got {float(mu.min()):.6g}")
+    if (mu > LARGEST_FRICTION).any():
+        raise InputError(
+            f"friction must be at most {LARGEST_FRICTION:g}, got {float(mu.max()):.6g}"
+        )
+    return mu

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
-from grasp_core.closure import contact_frictions, force_closure
+from grasp_core.closure import force_closure
+from grasp_core.values import contact_frictions
 from grasp_core.critical import critical_friction
 from grasp_core.errors import InputError
 from grasp_core.forces import closest_forces, least_friction_forces

@@ -8,25 +8,42 @@ TETRA_NORMALS = TETRAHEDRON / np.sqrt(3.0)
 TETRA_CENTERS = -TETRAHEDRON / 3.0
 
 
+def pyramid_wrenches(positions, normals, friction, sides, *, outer):
+    """Wrenches of the edges of pyramids inside (or, with `outer`, around) the friction cones.
+
+    About the contacts' mean point and at unit size; normal parts are one.
+
+    Args:
+        positions: (k, 3)
+        normals: (k, 3)
+        friction: One for all contacts or one each.
+        sides: Of each pyramid.
+        outer: Whether the cones lie in the pyramids or the pyramids in the cones.
+
+    Returns:
+        (k * sides, 6)
+    """
+    center = positions.mean(axis=0)
+    size = np.linalg.norm(positions - center, axis=1).max()
+    slopes = np.full(len(positions), friction) / (np.cos(np.pi / sides) if outer else 1.0)
+    turns = 2.0 * np.pi * np.arange(sides) / sides
+    rows = []
+    for point, normal, slope in zip(positions, normals, slopes, strict=True):
+        tangent = np.linalg.svd(normal[None])[2][1:]
+        edges = normal + slope * (
+            np.cos(turns)[:, None] * tangent[0] + np.sin(turns)[:, None] * tangent[1]
+        )
+        rows.append(np.hstack([edges, np.cross((point - center) / size, edges)]))
+    return np.vstack(rows)
+
+
 def pyramid_margin(positions, normals, friction, sides, *, outer):
     """Closure margin with pyramids inside (or, with `outer`, around) the friction cones.
 
     Maximises the smallest weight of the pyramids' edges over combinations that balance;
     positive means closure of the pyramids when their wrenches have rank 6.
     """
-    center = positions.mean(axis=0)
-    size = np.linalg.norm(positions - center, axis=1).max()
-    columns = []
-    slope = friction / np.cos(np.pi / sides) if outer else friction
-    for point, normal in zip(positions, normals, strict=True):
-        tangent = np.linalg.svd(normal[None])[2][1:]
-        turns = 2.0 * np.pi * np.arange(sides) / sides
-        edges = normal + slope * (
-            np.cos(turns)[:, None] * tangent[0] + np.sin(turns)[:, None] * tangent[1]
-        )
-        arm = (point - center) / size
-        columns.append(np.hstack([edges, np.cross(arm, edges)]))
-    W = np.vstack(columns).T
+    W = pyramid_wrenches(positions, normals, friction, sides, outer=outer).T
     count = W.shape[1]
     rows = np.hstack([-np.eye(count), np.ones((count, 1))])
     equalities = np.vstack([np.append(W, np.zeros((6, 1)), axis=1), np.append(np.ones(count), 0.0)])
@@ -38,6 +55,52 @@ def pyramid_margin(positions, normals, friction, sides, *, outer):
     )  # fmt: skip
     assert answer.status in (0, 2), answer.message
     return answer.x[-1] if answer.status == 0 else -np.inf
+
+
+def pyramids_say(positions, normals, friction, sides):
+    """Whether the friction cones are in closure, where pyramids prove it; None between them.
+
+    Pyramids inside the cones that are closed prove closure, pyramids around them that are not
+    prove the opposite. Either proof is an inequality re-checked on the wrenches themselves.
+    """
+    inside = pyramid_wrenches(positions, normals, friction, sides, outer=False)
+    weights, _ = least_weight_program(inside)
+    weights = weights - np.linalg.lstsq(inside.T, inside.T @ weights, rcond=None)[0]
+    full = np.linalg.svd(inside, compute_uv=False)[-1] > PROVED
+    if full and weights.min() > PROVED:
+        return True
+    around = pyramid_wrenches(positions, normals, friction, sides, outer=True)
+    _, twist = least_weight_program(around)
+    return False if (around @ twist).min() > PROVED * np.abs(twist).max() else None
+
+
+PROVED = 1e-10
+"""What must be positive is this large at least: wrenches of unit size and weights that sum to one
+carry rounding errors of some 1e-15."""
+
+
+def least_weight_program(W):
+    """The dual of the program of `pyramid_margin`, with seven variables only.
+
+    Minimises z over twists y with w.y + z >= 0 for all wrenches w, where these slacks sum to
+    one. The multipliers are what the weights exceed their least by, which is z; where z is
+    negative, y separates.
+
+    Returns:
+        Weights (n,), and the twist (6,).
+    """
+    count = len(W)
+    leaving = np.linalg.lstsq(W, np.ones(count), rcond=None)[0]
+    if (W @ leaving).min() > PROVED:
+        return np.zeros(count), leaving
+    answer = linprog(
+        np.append(np.zeros(6), 1.0),
+        A_ub=-np.hstack([W, np.ones((count, 1))]), b_ub=np.zeros(count),
+        A_eq=[np.append(W.sum(axis=0), count)], b_eq=[1.0],
+        bounds=[(None, None)] * 7, method="highs",
+    )  # fmt: skip
+    assert answer.status == 0, answer.message
+    return answer.fun - answer.ineqlin.marginals, answer.x[:6]
 
 
 def picks_positively_span(axes, half_angle, sides):

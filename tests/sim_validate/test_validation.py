@@ -7,9 +7,9 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.closure import contact_frictions
 from grasp_core.forces import least_friction_forces
 from grasp_core.resisted_wrenches import WrenchBody
+from grasp_core.values import contact_frictions
 from scenes.physics import PhysicsSettings
 from sim_validate.controls import negative_controls
 from sim_validate.protocol import HoldProtocol

@@ -1,0 +1,113 @@
+"""Contacts on bodies, moved about at random, and certificates judged without the package."""
+
+import math
+
+import numpy as np
+
+from tests.judges import TETRA_NORMALS, TETRAHEDRON, random_rotation
+
+ROUNDING = 1e-9
+"""Imbalance of forces whose normal parts sum to one, and work along a twist of unit size: a
+million rounding errors, as contacts may lie a thousand times their distance from the origin."""
+
+
+def box_faces(low, high):
+    """Faces of a box as (corner, edge, edge), with edge x edge into the body."""
+    low, high = np.array(low, dtype=float), np.array(high, dtype=float)
+    x, y, z = np.diag(high - low)
+    pairs = ((x, y), (y, z), (z, x))
+    return [(low, one, two) for one, two in pairs] + [(high, -two, -one) for one, two in pairs]
+
+
+def bracket_faces():
+    """An L of two arms one thick and one wide, along x to 3 and along z to 2, with a reflex edge.
+
+    Each of its two ends, themselves an L, is two rectangles.
+    """
+    x, y, z = np.eye(3)
+    return [
+        ((0, 0, 0), 3 * x, y), ((3, 0, 0), z, y), ((3, 0, 1), -2 * x, y),
+        ((1, 0, 1), z, y), ((1, 0, 2), -x, y), ((0, 0, 2), -2 * z, y),
+        ((0, 0, 0), z, 3 * x), ((0, 0, 1), z, x), ((0, 1, 0), 3 * x, z), ((0, 1, 1), x, z),
+    ]  # fmt: skip
+
+
+def tetrahedron_faces():
+    """Of each triangle a corner and two edges."""
+    for vertex in range(4):
+        a, b, c = np.delete(TETRAHEDRON, vertex, axis=0)
+        inward = np.cross(b - a, c - a) @ TETRAHEDRON[vertex] > 0.0
+        yield (a, b - a, c - a) if inward else (a, c - a, b - a)
+
+
+def on_faces(faces, *, triangles=False):
+    """Sampler of contacts on flat faces: half of the time on as many different ones as it can."""
+    corner, one, two = (np.array(part, dtype=float) for part in zip(*faces, strict=True))
+    into = np.cross(one, two)
+    areas = np.linalg.norm(into, axis=1)
+
+    def contacts(rng, count):
+        drawn = rng.choice(len(areas), count, p=areas / areas.sum())
+        apart = rng.permutation(np.resize(rng.permutation(len(areas)), count))
+        chosen = apart if rng.uniform() < 0.5 else drawn
+        share = rng.uniform(size=(2, count, 1))
+        if triangles:
+            share = np.where(share.sum(axis=0) > 1.0, 1.0 - share, share)
+        points = corner[chosen] + share[0] * one[chosen] + share[1] * two[chosen]
+        return points, (into / areas[:, None])[chosen]
+
+    return contacts
+
+
+def on_a_sphere(rng, count):
+    points = rng.normal(size=(count, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    return points, -points
+
+
+def in_a_box(points, low, high):
+    return ((points > low) & (points < high)).all(axis=1)
+
+
+BODIES = {
+    "box": (
+        on_faces(box_faces((-1.0, -0.7, -0.5), (1.0, 0.7, 0.5))),
+        lambda x: in_a_box(x, (-1.0, -0.7, -0.5), (1.0, 0.7, 0.5)),
+    ),
+    "tetrahedron": (
+        on_faces(tetrahedron_faces(), triangles=True),
+        lambda x: (x @ TETRA_NORMALS.T > -1.0 / math.sqrt(3.0)).all(axis=1),
+    ),
+    "sphere": (on_a_sphere, lambda x: np.linalg.norm(x, axis=1) < 1.0),
+    "bracket": (
+        on_faces(bracket_faces()),
+        lambda x: in_a_box(x, (0, 0, 0), (3, 1, 1)) | in_a_box(x, (0, 0, 0), (1, 1, 2)),
+    ),
+}
+"""Samplers of contacts, and whether points are inside the body."""
+
+
+def moved(rng, positions, normals, size):
+    turn = random_rotation(rng)
+    turned = normals @ turn.T
+    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    return size * (positions @ turn.T + rng.normal(size=3)), turned
+
+
+def holds(certificate):
+    """The certificate re-checked here: balanced forces in the cones, or a twist against them."""
+    x, n, mu = certificate.positions, certificate.normals, certificate.friction
+    if certificate.closed:
+        f = certificate.forces
+        across = np.linalg.norm(np.cross(n, f), axis=1)
+        along = np.einsum("ki,ki->k", f, n)
+        inside = np.where(mu > 0.0, mu * along - across, along) > 0.0
+        torque = np.cross(x - x.mean(axis=0), f).sum(axis=0) / np.ptp(x, axis=0).max()
+        slack = across[mu == 0.0].max(initial=0.0)
+        return inside.all() and max(slack, *np.abs(f.sum(axis=0)), *np.abs(torque)) < ROUNDING
+    a, b = np.split(certificate.separating_wrench, 2)
+    velocities = a + np.cross(b, x)
+    away = -np.einsum("ki,ki->k", velocities, n)
+    work = mu * np.linalg.norm(np.cross(n, velocities), axis=1) - away
+    speed = np.linalg.norm(a) + np.linalg.norm(b) * np.linalg.norm(x, axis=1).max()
+    return (a.any() or b.any()) and work.max() <= ROUNDING * speed
