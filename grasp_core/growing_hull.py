@@ -19,23 +19,25 @@ FLAT = 1e-9
 """Points closer than this to a common plane, relative to their extent, span nothing more."""
 ABOVE = 1e-12
 """A point sees a simplex from this height on, relative to the extent: some thousand roundings."""
+DEAD = 1e300
+"""Offset of a simplex that is no longer there: no point sees it, and it is never the lowest."""
 MARKS = np.random.default_rng(1995).integers(1, 2**63, 4096, dtype=np.uint64)
 """A random number per point; a ridge is recognised by the sum of its points' numbers."""
 MOST_POINTS = len(MARKS)
 
 
 class GrowingHull:
-    """Simplices that bound the hull; dead ones have an infinite offset."""
+    """Simplices that bound the hull."""
 
     def __init__(self, simplex: Array) -> None:
         """Start from d + 1 points in general position, (d + 1, d)."""
         count, d = simplex.shape
         self.points: list[Array] = list(simplex)
-        self.extent = float(np.ptp(simplex, axis=0).max())
+        self.slack = ABOVE * float(np.ptp(simplex, axis=0).max())
         weights = np.linalg.inv(np.vstack([simplex.T, np.ones(count)]))
-        lengths = np.linalg.norm(weights[:, :d], axis=1)
-        self.normals: Array = -weights[:, :d] / lengths[:, None]
-        self.offsets: Array = weights[:, d] / lengths
+        lengths = np.linalg.norm(weights[:, :d], axis=1, keepdims=True)
+        self.planes: Array = weights * np.append(-np.ones(d), 1.0) / lengths
+        """Outward unit normal and offset of each simplex, (n, d + 1)."""
         others = [[i for i in range(count) if i != j] for j in range(count)]
         self.corners: Indices = np.array(others)
         """Points of each simplex, (n, d)."""
@@ -43,6 +45,7 @@ class GrowingHull:
         """Neighbour across the ridge without each corner, (n, d)."""
         self._used = count
         self._ridges = np.array([[i for i in range(d) if i != j] for j in range(d)])
+        self._dead = np.append(np.zeros(d), DEAD)
 
     @property
     def size(self) -> int:
@@ -51,31 +54,30 @@ class GrowingHull:
 
     def lowest(self) -> tuple[Array, float]:
         """The plane of least signed distance from the origin: outward normal and distance."""
-        nearest = int(self.offsets[: self._used].argmin())
-        return self.normals[nearest], float(self.offsets[nearest])
+        nearest = self.planes[self.planes[: self._used, -1].argmin()]
+        return nearest[:-1], float(nearest[-1])
 
     def add(self, point: Array) -> bool:
         """Extend the hull to a point; False if it sees no simplex, being inside."""
-        used = self._used
-        heights = self.normals[:used] @ point - self.offsets[:used]
-        seen = np.flatnonzero(heights > ABOVE * self.extent)
+        heights = self.planes[: self._used] @ np.append(point, -1.0)
+        hidden = heights <= self.slack
+        seen = (~hidden).nonzero()[0]
         if not seen.size:
             return False
         around = self.neighbors[seen]
-        row, corner = np.nonzero(heights[around] <= ABOVE * self.extent)
+        row, corner = hidden[around].nonzero()
         inner, outer = seen[row], around[row, corner]
         fresh = self._places(seen, len(row))
-        up, down = heights[inner][:, None], heights[outer][:, None]
-        normals = up * self.normals[outer] - down * self.normals[inner]
-        offsets = up[:, 0] * self.offsets[outer] - down[:, 0] * self.offsets[inner]
-        lengths = np.sqrt(np.einsum("ij,ij->i", normals, normals))
+        planes = heights[inner, None] * self.planes[outer]
+        planes -= heights[outer, None] * self.planes[inner]
+        planes /= np.sqrt(np.einsum("ij,ij->i", planes[:, :-1], planes[:, :-1]))[:, None]
         ridges = self.corners[inner[:, None], self._ridges[corner]]
-        new, back = np.nonzero(self.neighbors[outer] == inner[:, None])
+        new, back = (self.neighbors[outer] == inner[:, None]).nonzero()
         self.neighbors[outer[new], back] = fresh[new]
-        self.offsets[seen] = np.inf
-        self.normals[fresh] = normals / lengths[:, None]
-        self.offsets[fresh] = offsets / lengths
-        self.corners[fresh, :-1], self.corners[fresh, -1] = ridges, len(self.points)
+        self.planes[seen] = self._dead
+        self.planes[fresh] = planes
+        self.corners[fresh, :-1] = ridges
+        self.corners[fresh, -1] = len(self.points)
         self.neighbors[fresh, -1] = outer
         self._join(fresh, ridges)
         self.points.append(point)
@@ -83,32 +85,31 @@ class GrowingHull:
 
     def simplices(self) -> tuple[Array, Indices]:
         """Outward normals (n, d) and corners (n, d) of the hull's simplices."""
-        alive = np.flatnonzero(np.isfinite(self.offsets[: self._used]))
-        return self.normals[alive], self.corners[alive]
+        alive = np.flatnonzero(self.planes[: self._used, -1] < DEAD)
+        return self.planes[alive, :-1], self.corners[alive]
 
     def _places(self, free: Indices, count: int) -> Indices:
         """Where to keep new simplices: in place of the dead, then at the end."""
-        more = max(count - len(free), 0)
-        end = self._used + more
-        if end > len(self.offsets):
-            room = end  # doubles the store
-            self.normals = np.vstack([self.normals, np.zeros((room, self.normals.shape[1]))])
-            self.offsets = np.append(self.offsets, np.full(room, np.inf))
-            spare = np.zeros((room, self.corners.shape[1]), dtype=np.int64)
+        if count <= len(free):
+            return free[:count]
+        end = self._used + count - len(free)
+        if end > len(self.planes):
+            d = self.corners.shape[1]
+            spare = np.zeros((2 * end, d), dtype=np.int64)
+            self.planes = np.vstack([self.planes, np.tile(self._dead, (2 * end, 1))])
             self.corners = np.vstack([self.corners, spare])
             self.neighbors = np.vstack([self.neighbors, spare])
         added = np.arange(self._used, end, dtype=np.int64)
-        places: Indices = np.concatenate([free, added])[:count]
         self._used = end
-        return places
+        return np.concatenate([free, added])
 
     def _join(self, fresh: Indices, ridges: Indices) -> None:
         """Make new simplices neighbours that share the new point and all but one other."""
         marks = MARKS[ridges]
         keys = (marks.sum(axis=1)[:, None] - marks).ravel()
-        pairs = keys.argsort(kind="stable").reshape(-1, 2)
-        owner, corner = np.divmod(pairs, ridges.shape[1])
-        self.neighbors[fresh[owner], corner] = fresh[owner[:, ::-1]]
+        pairs = keys.argsort().reshape(-1, 2)
+        owner = fresh[pairs // ridges.shape[1]]
+        self.neighbors[owner, pairs % ridges.shape[1]] = owner[:, ::-1]
 
 
 def spread_simplex(points: Array) -> Indices | None:
