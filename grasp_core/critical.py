@@ -175,7 +175,8 @@ def _least_friction_not_separated(twist: Array, arms: Array, normals: Array) -> 
     """Up to which common friction a twist keeps separating."""
     velocities = twist[:3] + np.cross(twist[3:], arms)
     along, across = normal_and_tangential(velocities, normals)
-    return float(np.min(-along / np.maximum(across, np.finfo(np.float64).tiny)))
+    with np.errstate(over="ignore"):  # contacts that hardly slide are separated at any friction
+        return float(np.min(-along / np.maximum(across, np.finfo(np.float64).tiny)))
 
 
 def _slope(answer: Answer, arms: Array, normals: Array) -> float:

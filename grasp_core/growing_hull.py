@@ -12,6 +12,7 @@ averaged, not amplified, however flat the simplices become.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 
@@ -72,14 +73,17 @@ class GrowingHull:
         planes -= heights[outer, None] * self.planes[inner]
         planes /= np.sqrt(np.einsum("ij,ij->i", planes[:, :-1], planes[:, :-1]))[:, None]
         ridges = self.corners[inner[:, None], self._ridges[corner]]
-        new, back = (self.neighbors[outer] == inner[:, None]).nonzero()
-        self.neighbors[outer[new], back] = fresh[new]
+        marks = MARKS[ridges]
+        keys = marks.sum(axis=1)
+        across = MARKS[self.corners[outer]]
+        beyond = across == (across.sum(axis=1) - keys)[:, None]  # the corner not on the ridge
+        self.neighbors[outer, beyond.argmax(axis=1)] = fresh
         self.planes[seen] = self._dead
         self.planes[fresh] = planes
         self.corners[fresh, :-1] = ridges
         self.corners[fresh, -1] = len(self.points)
         self.neighbors[fresh, -1] = outer
-        self._join(fresh, ridges)
+        self._join(fresh, keys[:, None] - marks)
         self.points.append(point)
         return True
 
@@ -103,13 +107,16 @@ class GrowingHull:
         self._used = end
         return np.concatenate([free, added])
 
-    def _join(self, fresh: Indices, ridges: Indices) -> None:
-        """Make new simplices neighbours that share the new point and all but one other."""
-        marks = MARKS[ridges]
-        keys = (marks.sum(axis=1)[:, None] - marks).ravel()
-        pairs = keys.argsort().reshape(-1, 2)
-        owner = fresh[pairs // ridges.shape[1]]
-        self.neighbors[owner, pairs % ridges.shape[1]] = owner[:, ::-1]
+    def _join(self, fresh: Indices, keys: NDArray[np.uint64]) -> None:
+        """Make new simplices neighbours that share the new point and all but one other.
+
+        Args:
+            fresh: (m,)
+            keys: Of the points shared besides the new one, without each corner, (m, d - 1).
+        """
+        pairs = keys.ravel().argsort().reshape(-1, 2)
+        owner = fresh[pairs // keys.shape[1]]
+        self.neighbors[owner, pairs % keys.shape[1]] = owner[:, ::-1]
 
 
 def spread_simplex(points: Array) -> Indices | None:

@@ -22,10 +22,11 @@ def nearest_wrench(wrenches: WrenchSet) -> tuple[Array, Array]:
     steepness = np.kron(np.diag(wrenches.friction), [1.0, 0.0, 0.0])
     cones = [-np.vstack([steepness[i], np.eye(n)[3 * i + 1 : 3 * i + 3]]) for i in range(k)]
     sides = np.hstack([np.vstack(cones), np.zeros((n, 1))])
-    A = np.vstack([share, distance, sides])
+    pushes = np.hstack([-np.eye(n)[::3], np.zeros((k, 1))])
+    A = np.vstack([share, pushes, distance, sides])
     b = np.append(1.0, np.zeros(len(A) - 1))
-    answer = minimize(ConicProgram(q, A, b, 1, 0, (m + 1, *(3,) * k)))
-    facing = answer.z[2 : m + 2]
+    answer = minimize(ConicProgram(q, A, b, 1, k, (m + 1, *(3,) * k)))
+    facing = answer.z[k + 2 : k + m + 2]
     return _into_cones(answer.x[:n], wrenches.friction), facing
 
 
@@ -33,7 +34,7 @@ def _into_cones(forces: Array, friction: Array) -> Array:
     """Forces near these, in the cones and with normal parts that sum to one exactly."""
     each = forces.reshape(-1, 3).copy()
     each[:, 0] = np.maximum(each[:, 0], 0.0)
-    across = np.hypot(each[:, 1], each[:, 2])
-    least = np.finfo(np.float64).tiny
-    each[:, 1:] *= np.minimum(1.0, friction * each[:, 0] / np.maximum(across, least))[:, None]
+    across, allowed = np.hypot(each[:, 1], each[:, 2]), friction * each[:, 0]
+    outside = across > allowed
+    each[outside, 1:] *= (allowed[outside] / across[outside])[:, None]
     return each.ravel() / each[:, 0].sum()

@@ -73,8 +73,9 @@ class InnerPolytope:
         points: Array = self.forces @ wrenches.G.T
         cells = points[self.corners].transpose(0, 2, 1)
         ray = np.cos(np.arange(1, d + 1, dtype=np.float64))
-        inverses = np.asarray(np.linalg.pinv(cells), dtype=np.float64)
-        shares = inverses @ ray
+        solid = np.abs(np.linalg.det(cells)) > np.finfo(np.float64).tiny
+        cells = cells[solid]  # no generic ray crosses a flat one
+        shares = np.asarray(np.linalg.solve(cells, ray[:, None])[:, :, 0], dtype=np.float64)
         reached = np.asarray(np.einsum("mjc,mc->mj", cells, shares), dtype=np.float64)
         hit = np.linalg.norm(reached - ray, axis=1) < SAME_RAY
         return int((hit & (shares > 0.0).all(axis=1)).sum()) % 2 == 1

@@ -5,7 +5,7 @@ The file holds the object's mesh, so that grasps can be validated from it alone.
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Annotated, Any, Literal
 
@@ -107,6 +107,16 @@ class GraspRecord(_Record):
     witness: WitnessRecord
 
 
+class MovedRecord(_Record):
+    """How a grasp was moved on its faces, with bounds of its quality."""
+
+    id: str
+    moved_from: str
+    ferrari_canny_before: tuple[Finite, Finite]
+    ferrari_canny_after: tuple[Finite, Finite]
+    ferrari_canny_ceiling: Finite | None
+
+
 class GraspsRecord(_Record):
     """A whole `grasps.json`."""
 
@@ -118,6 +128,7 @@ class GraspsRecord(_Record):
     versions: dict[str, str]
     counts: dict[str, Any]
     absence: str | None
+    optimization: list[MovedRecord] = []
     grasps: list[GraspRecord]
 
 
@@ -131,7 +142,25 @@ class SavedGrasps:
     grasps: tuple[Grasp, ...]
 
 
-def plan_to_json(body: Polyhedron, plan: Plan) -> str:
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """How optimisation changed the quality of a grasp."""
+
+    id: str
+    moved_from: str
+    """Id of the planned grasp; the same where it stayed."""
+    before: tuple[float, float]
+    after: tuple[float, float]
+    ceiling: float | None
+    """No contacts on the same faces are better; None where that was not asked."""
+
+    @property
+    def gain(self) -> float:
+        """Ratio of the proved lower bounds."""
+        return self.after[0] / self.before[0]
+
+
+def plan_to_json(body: Polyhedron, plan: Plan, moves: Sequence[Moved] = ()) -> str:
     """The text of `grasps.json`: the same for the same plan."""
     document: dict[str, object] = {
         "schema": SCHEMA,
@@ -151,6 +180,16 @@ def plan_to_json(body: Polyhedron, plan: Plan) -> str:
         "versions": versions(),
         "counts": asdict(plan.counts),
         "absence": plan.absence,
+        "optimization": [
+            {
+                "id": move.id,
+                "moved_from": move.moved_from,
+                "ferrari_canny_before": list(move.before),
+                "ferrari_canny_after": list(move.after),
+                "ferrari_canny_ceiling": move.ceiling,
+            }
+            for move in moves
+        ],
         "grasps": [_grasp_to_record(grasp) for grasp in plan.grasps],
     }
     return json.dumps(document, allow_nan=False, indent=1) + "\n"

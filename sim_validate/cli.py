@@ -13,16 +13,29 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
 import tyro
-from pydantic import Field
+from pydantic import AfterValidator, Field
 from pydantic.dataclasses import dataclass
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError
 from sim_validate.engines import available_cores
 
+
+def _not_zero(values: tuple[float, ...]) -> tuple[float, ...]:
+    if not any(values):
+        raise ValueError("must not be zero: every multiple of that is resisted")
+    return values
+
+
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1)]
 Seed = Annotated[int, Field(ge=0, lt=2**64)]
+Edges = Annotated[int, Field(ge=3)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Wrench = Annotated[
+    tuple[Finite, Finite, Finite, Finite, Finite, Finite],
+    AfterValidator(_not_zero),
+]
 RUN_LIMIT = 100
 """How many grasps `run` tests unless told otherwise: some ten seconds."""
 
@@ -71,6 +84,13 @@ class Planning:
     """Keep at most this many grasps, the best of each family in turn; None for all."""
     cells: Count = 1
     """Into how many parts the free method may cut the four faces where it is undecided."""
+    optimize: bool = False
+    """Move the contacts of each grasp on their faces to raise its Ferrari-Canny quality."""
+    finger_radius_m: Positive | None = None
+    """How far optimised contacts stay from edges; a tenth of the object's radius if not given."""
+    ceiling: Count | None = None
+    """With --optimize: also prove an upper bound of the quality on the same faces, cut into so many
+    parts at most."""
     seed: Seed = 0
     """For everything random."""
     unit: Literal["m", "cm", "mm", "in"] = "m"
@@ -148,6 +168,29 @@ class Scene:
 
 
 @dataclass(frozen=True)
+class Analyze:
+    """Judge contacts from elsewhere: closure with its certificate, quality, wrench limits."""
+
+    contacts: Positional[Path]
+    """A contacts file (see README), or a grasps.json."""
+    friction: Positive | None = None
+    """Coulomb coefficient of contacts without their own; the file's if not given."""
+    torque_scale_m: Positive | None = None
+    """Length that makes a torque comparable with a force [m]; the file's if not given."""
+    max_normal_force: Positive = 10.0
+    """Limit of each contact's push [N]."""
+    wrench: Annotated[UseAppendAction[tuple[Wrench, ...]], arg(metavar="FX FY FZ TX TY TZ")] = ()
+    """An external wrench [N, N m], torque about the center; may be repeated."""
+    outward: bool = False
+    """The file's normals point out of the object."""
+    edges: Edges = 8
+    """Of the pyramids that stand for friction cones in min-weight and hull volume."""
+    jobs: Count = field(default_factory=available_cores)
+    """Largest number of processes; results do not depend on it."""
+    speech: OmitArgPrefixes[Speech] = Speech()
+
+
+@dataclass(frozen=True)
 class Inspect:
     """Show what a mesh is as a polyhedron: faces, mass properties, spanning quadruples."""
 
@@ -172,7 +215,7 @@ class Doctor:
     speech: OmitArgPrefixes[Speech] = Speech()
 
 
-Command = Run | Plan | Validate | Scene | Inspect | Objects | Doctor
+Command = Run | Plan | Validate | Scene | Analyze | Inspect | Objects | Doctor
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -261,8 +304,11 @@ def _as_flags(name: str, value: Any) -> list[str]:
     flag = "--" + name.replace("_", "-")
     if isinstance(value, bool):
         return [flag] if value else []
-    items = cast("list[Any]", value) if isinstance(value, list) else [value]
-    return [word for item in items for word in (flag, str(item))]
+    return [word for item in _items(value) for word in (flag, *map(str, _items(item)))]
+
+
+def _items(value: Any) -> list[Any]:
+    return cast("list[Any]", value) if isinstance(value, list) else [value]
 
 
 def run_and_exit() -> None:

@@ -11,9 +11,7 @@ from grasp_core.closure import force_closure
 from grasp_core.concurrent_grasps import PYRAMID_SIDES
 from grasp_core.critical import critical_friction
 from grasp_core.errors import InputError
-from grasp_core.mesh import FORMATS, load_polyhedron
-from grasp_core.planner import FAMILIES, MAX_FACES, plan
-from grasp_core.plans import Plan
+from grasp_core.planner import MAX_FACES, plan
 from grasp_core.ranking import LEAST_SPAN_ANGLE
 from grasp_core.records import SavedGrasps, grasps_from_json, plan_to_json
 from grasp_core.spanning import spanning_quadruples
@@ -22,14 +20,20 @@ from grasp_core.versions import versions
 from scenes.mjcf import build_scene
 from scenes.objects import example_names, example_object
 from sim_validate import cli
-from sim_validate.console import Reporter
+from sim_validate.analyze_command import analyze_file
+from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.engines import each
 from sim_validate.files import read_text, remove_results, write_text
+from sim_validate.improving import show_gains
+from sim_validate.plan_command import (
+    load_object,
+    plan_file,
+    plan_object,
+    say_counts,
+    say_cut,
+)
 from sim_validate.validation import Verdict, validate
 from sim_validate.verdict_records import summary, verdicts_to_json
-
-TABLE_ROWS = 20
-"""Longer tables are cut; the files have everything."""
 
 
 def execute(command: cli.Command) -> int:
@@ -39,45 +43,19 @@ def execute(command: cli.Command) -> int:
     return ACTIONS[type(command)](command, reporter)
 
 
-def _load(name: str, unit: str) -> Polyhedron:
-    """A mesh file, or a built-in object when the name has no mesh ending."""
-    path = Path(name)
-    if path.suffix.lower().lstrip(".") in FORMATS or path.is_file():
-        return load_polyhedron(path, unit=unit)
-    if path.suffix or len(path.parts) > 1:
-        raise InputError(f"{name}: no such file, and the ending is none of {', '.join(FORMATS)}")
-    return example_object(name)
-
-
-def _planned(name: str, planning: cli.Planning, reporter: Reporter) -> tuple[Polyhedron, Plan]:
-    body = _load(name, planning.unit)
-    for note in body.notes:
-        reporter.warn(f"{body.name}: {note}")
-    reporter.detail(f"{body.name}: mesh {body.content_sha256}, {len(body.triangles)} triangles")
-    with reporter.progress("planning") as steps:
-        found = plan(
-            body,
-            planning.friction,
-            families=planning.family or FAMILIES,
-            theta_deg=planning.theta_deg,
-            limit=planning.limit,
-            seed=planning.seed,
-            cells=planning.cells,
-            progress=lambda done, total, grasps: steps.update(done, total, f"({grasps} grasps)"),
-        )
-    return body, found
-
-
 def _run(command: cli.Run, reporter: Reporter) -> int:
-    body, found = _planned(command.object, command.planning, reporter)
+    jobs = command.testing.jobs
+    body, found, moves = plan_object(command.object, command.planning, jobs, reporter)
     folder = command.out or Path("graspproof-out") / _folder_name(body.name)
     remove_results(folder)
-    write_text(folder / "grasps.json", plan_to_json(body, found))
-    _say_counts(body, found, reporter)
+    write_text(folder / "grasps.json", plan_to_json(body, found, moves))
+    say_counts(body, found, reporter)
     if found.absence:
         reporter.say(found.absence)
         reporter.document({"absence": found.absence, "out": str(folder)})
         return cli.Exit.NONE
+    if moves:
+        show_gains(moves, reporter)
     for grasp in found.grasps:
         scene = build_scene(
             body, grasp, found.friction, max_normal_force=command.testing.max_normal_force
@@ -92,55 +70,6 @@ def _run(command: cli.Run, reporter: Reporter) -> int:
 def _folder_name(name: str) -> str:
     """A file name that is one plain part of a path."""
     return re.sub(r"[^\w-]+", "_", name) or "object"
-
-
-def _plan(command: cli.Plan, reporter: Reporter) -> int:
-    body, found = _planned(command.object, command.planning, reporter)
-    text = plan_to_json(body, found)
-    if command.out:
-        path = write_text(command.out / "grasps.json", text)
-        reporter.say(f"wrote {path}")
-    if reporter.json_only:
-        print(text, end="")  # noqa: T201 - the document itself
-    _say_counts(body, found, reporter)
-    if found.absence:
-        reporter.say(found.absence)
-        return cli.Exit.NONE
-    rows = [
-        (g.id, g.family, f"{1e3 * g.radius:.3g}", f"{g.critical_friction:.4f}",
-         f"{math.degrees(g.span_angle):.2f}", f"{g.closure_margin:.4f}")
-        for g in found.grasps[:TABLE_ROWS]
-    ]  # fmt: skip
-    columns = ("grasp", "family", "radius mm", "mu*", "theta* deg", "margin")
-    reporter.table(f"{len(found.grasps)} grasps of {body.name}", columns, rows)
-    _say_cut(len(found.grasps), reporter)
-    return cli.Exit.GOOD
-
-
-def _say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
-    counts = found.counts
-    reporter.say(
-        f"{body.name}: {counts.faces} faces, {counts.quadruples} face quadruples, "
-        f"{counts.spanning} spanning (P3), friction {found.friction:g}, "
-        f"theta {math.degrees(found.theta):.4g} deg"
-    )
-    for method, tally in counts.families.items():
-        undecided = f"{tally.undecided} undecided, " if method == "free" else ""
-        reporter.say(
-            f"{method}: {tally.tried} tried, {tally.pruned} pruned, {tally.infeasible} "
-            f"infeasible, {undecided}{tally.duplicates} duplicates, {tally.found} found, "
-            f"{tally.rejected} rejected, {found.seconds[method]:.2f} s"
-        )
-
-    if found.undecided:
-        named = ["-".join(str(face) for face in faces) for faces in found.undecided]
-        reporter.say(f"undecided faces: {', '.join(named[:TABLE_ROWS])}")
-        _say_cut(len(named), reporter)
-
-
-def _say_cut(count: int, reporter: Reporter) -> None:
-    if count > TABLE_ROWS:
-        reporter.say(f"... and {count - TABLE_ROWS} more")
 
 
 def _validate(command: cli.Validate, reporter: Reporter) -> int:
@@ -214,7 +143,7 @@ def _show(grasps: Sequence[Grasp], verdicts: Sequence[Verdict], reporter: Report
         )  # fmt: skip
     columns = ("grasp", "family", "radius mm", "mu*", "simulated", "moved um", "controls")
     reporter.table("verdicts", columns, rows)
-    _say_cut(len(verdicts), reporter)
+    say_cut(len(verdicts), reporter)
     totals = summary(verdicts)
     reporter.say(
         f"{totals['grasps_held']} of {totals['grasps']} grasps held all wrenches; "
@@ -249,7 +178,7 @@ def _scene(command: cli.Scene, reporter: Reporter) -> int:
 
 
 def _inspect(command: cli.Inspect, reporter: Reporter) -> int:
-    body = _load(command.object, command.unit)
+    body = load_object(command.object, command.unit)
     spanning = (
         len(spanning_quadruples(body.normals, LEAST_SPAN_ANGLE).indices)
         if len(body.faces) <= MAX_FACES
@@ -314,9 +243,10 @@ def _doctor(_: cli.Doctor, reporter: Reporter) -> int:
 
 ACTIONS: dict[type[Any], Callable[[Any, Reporter], int]] = {
     cli.Run: _run,
-    cli.Plan: _plan,
+    cli.Plan: plan_file,
     cli.Validate: _validate,
     cli.Scene: _scene,
+    cli.Analyze: analyze_file,
     cli.Inspect: _inspect,
     cli.Objects: _objects,
     cli.Doctor: _doctor,

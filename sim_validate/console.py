@@ -29,6 +29,10 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in text)
 
 
+TABLE_ROWS = 20
+"""Longer tables are cut; files and documents have everything."""
+
+
 @dataclass(slots=True)
 class Reporter:
     """Where a command writes; `json_only` keeps standard output for one JSON document."""

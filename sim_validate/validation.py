@@ -12,13 +12,12 @@ import numpy as np
 
 from grasp_core.arrays import Array, to_digits
 from grasp_core.closure import force_closure
-from grasp_core.values import contact_frictions
 from grasp_core.critical import critical_friction
 from grasp_core.errors import InputError
 from grasp_core.forces import closest_forces, least_friction_forces
 from grasp_core.on_faces import check_on_faces
 from grasp_core.resisted_wrenches import WrenchBody, axis_wrenches
-from grasp_core.values import Contact, Grasp, Polyhedron
+from grasp_core.values import Contact, Grasp, Polyhedron, contact_frictions
 from scenes.mjcf import Scene, build_scene
 from scenes.physics import PhysicsSettings
 from sim_validate.controls import Control, negative_controls

@@ -45,3 +45,23 @@ def test_a_point_inside_changes_nothing():
 def test_points_of_a_plane_hold_no_simplex():
     points = np.random.default_rng(1).normal(size=(20, 2)) @ np.ones((2, 3))
     assert spread_simplex(points) is None
+
+
+def test_lattices_with_ties_everywhere_are_closed_and_convex():
+    """Corners and middles of cubes: every ridge keeps two sides, and no point is left out."""
+    rng, tested = np.random.default_rng(2), 0
+    for dimension in (3, 4, 5, 6):
+        for _ in range(20):
+            points = rng.integers(-1, 2, size=(40, dimension)).astype(float)
+            hull = grown(points)
+            normals, corners = hull.simplices()
+            offsets = np.einsum("mj,mj->m", normals, np.array(hull.points)[corners[:, 0]])
+            assert (normals @ points.T <= offsets[:, None] + 1e-9).all()
+            ordered = np.sort(corners, axis=1)
+            ridges = np.concatenate([np.delete(ordered, j, axis=1) for j in range(dimension)])
+            _, counts = np.unique(ridges, axis=0, return_counts=True)
+            assert (counts % 2 == 0).all()
+            expected = ConvexHull(points, qhull_options="QJ Pp").equations[:, -1]
+            assert hull.lowest()[1] == pytest.approx(-expected.max(), abs=1e-6)
+            tested += 1
+    assert tested == 80

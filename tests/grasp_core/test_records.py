@@ -35,7 +35,7 @@ def test_the_file_has_the_fields_that_users_rely_on(text):
     document = json.loads(text)
     assert set(document) == {
         "schema", "object", "friction", "theta_deg", "seed", "versions", "counts", "absence",
-        "grasps",
+        "optimization", "grasps",
     }  # fmt: skip
     assert {"name", "source_sha256", "mesh", "center_of_mass_m"} <= set(document["object"])
     grasp = document["grasps"][0]

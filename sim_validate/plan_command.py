@@ -1,0 +1,116 @@
+"""The command that plans: from an object to certified grasps, a file and tables."""
+
+import math
+from pathlib import Path
+
+from grasp_core.errors import InputError
+from grasp_core.mesh import FORMATS, load_polyhedron
+from grasp_core.planner import FAMILIES, plan
+from grasp_core.plans import Plan
+from grasp_core.records import Moved, plan_to_json
+from grasp_core.values import Polyhedron
+from scenes.objects import example_object
+from sim_validate import cli
+from sim_validate.console import TABLE_ROWS, Reporter
+from sim_validate.engines import available_cores
+from sim_validate.files import write_text
+from sim_validate.improving import improved, show_gains
+
+
+def load_object(name: str, unit: str) -> Polyhedron:
+    """A mesh file, or a built-in object when the name has no mesh ending."""
+    path = Path(name)
+    if path.suffix.lower().lstrip(".") in FORMATS or path.is_file():
+        return load_polyhedron(path, unit=unit)
+    if path.suffix or len(path.parts) > 1:
+        raise InputError(f"{name}: no such file, and the ending is none of {', '.join(FORMATS)}")
+    return example_object(name)
+
+
+def plan_object(
+    name: str, planning: cli.Planning, jobs: int, reporter: Reporter
+) -> tuple[Polyhedron, Plan, tuple[Moved, ...]]:
+    """The object, its grasps, moved if that is asked for, and how they were moved.
+
+    Raises:
+        InputError: The object or a setting is refused.
+    """
+    if planning.ceiling is not None and not planning.optimize:
+        raise InputError("--ceiling bounds what --optimize may reach; give both or neither")
+    body = load_object(name, planning.unit)
+    for note in body.notes:
+        reporter.warn(f"{body.name}: {note}")
+    reporter.detail(f"{body.name}: mesh {body.content_sha256}, {len(body.triangles)} triangles")
+    with reporter.progress("planning") as steps:
+        found = plan(
+            body,
+            planning.friction,
+            families=planning.family or FAMILIES,
+            theta_deg=planning.theta_deg,
+            limit=planning.limit,
+            seed=planning.seed,
+            cells=planning.cells,
+            progress=lambda done, total, grasps: steps.update(done, total, f"({grasps} grasps)"),
+        )
+    if not (planning.optimize and found.grasps):
+        return body, found, ()
+    found, moves = improved(
+        body, found, finger_radius=planning.finger_radius_m, parts=planning.ceiling, jobs=jobs,
+        reporter=reporter,
+    )  # fmt: skip
+    return body, found, moves
+
+
+def plan_file(command: cli.Plan, reporter: Reporter) -> int:
+    """Plan, write the grasps, and show the best."""
+    body, found, moves = plan_object(command.object, command.planning, available_cores(), reporter)
+    text = plan_to_json(body, found, moves)
+    if command.out:
+        path = write_text(command.out / "grasps.json", text)
+        reporter.say(f"wrote {path}")
+    if reporter.json_only:
+        print(text, end="")  # noqa: T201 - the document itself
+    say_counts(body, found, reporter)
+    if found.absence:
+        reporter.say(found.absence)
+        return cli.Exit.NONE
+    rows = [
+        (g.id, g.family, f"{1e3 * g.radius:.3g}", f"{g.critical_friction:.4f}",
+         f"{math.degrees(g.span_angle):.2f}", f"{g.closure_margin:.4f}",
+         f"{g.ferrari_canny[0]:.4f}")
+        for g in found.grasps[:TABLE_ROWS]
+    ]  # fmt: skip
+    columns = ("grasp", "family", "radius mm", "mu*", "theta* deg", "margin", "quality N")
+    reporter.table(f"{len(found.grasps)} grasps of {body.name}", columns, rows)
+    say_cut(len(found.grasps), reporter)
+    if moves:
+        show_gains(moves, reporter)
+    return cli.Exit.GOOD
+
+
+def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
+    """What was tried, and how it ended."""
+    counts = found.counts
+    reporter.say(
+        f"{body.name}: {counts.faces} faces, {counts.quadruples} face quadruples, "
+        f"{counts.spanning} spanning (P3), friction {found.friction:g}, "
+        f"theta {math.degrees(found.theta):.4g} deg"
+    )
+    for method, tally in counts.families.items():
+        undecided = f"{tally.undecided} undecided, " if method == "free" else ""
+        reporter.say(
+            f"{method}: {tally.tried} tried, {tally.pruned} pruned, {tally.infeasible} "
+            f"infeasible, {undecided}{tally.duplicates} duplicates, {tally.found} found, "
+            f"{tally.rejected} rejected, {found.seconds[method]:.2f} s"
+        )
+
+    if found.undecided:
+        named = ["-".join(str(face) for face in faces) for faces in found.undecided]
+        reporter.say(f"undecided faces: {', '.join(named[:TABLE_ROWS])}")
+        say_cut(len(named), reporter)
+
+
+def say_cut(count: int, reporter: Reporter) -> None:
+    """Say how many rows a table has not shown."""
+    if count > TABLE_ROWS:
+        reporter.say(f"... and {count - TABLE_ROWS} more")
