@@ -1,4 +1,4 @@
-"""The README's example prints what the README says it prints."""
+"""The README's examples print what the README says they print."""
 
 import math
 import re
@@ -15,9 +15,12 @@ ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
 
 
-def test_the_example_prints_what_it_says():
-    code = re.search(r"```python\n(.*?)```", README, re.DOTALL)[1]
-    said = re.search(r"```text\n(.*?)```", README, re.DOTALL)[1]
+EXAMPLES = re.findall(r"```python\n(.*?)```.*?```text\n(.*?)```", README, re.DOTALL)
+
+
+@pytest.mark.parametrize("example", range(2))
+def test_the_examples_print_what_they_say(example):
+    code, said = EXAMPLES[example]
     answer = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -26,9 +29,9 @@ def test_the_example_prints_what_it_says():
 
 
 def test_every_command_is_described():
-    from sim_validate.cli import Doctor, Inspect, Objects, Plan, Run, Scene, Validate
+    from sim_validate.cli import Analyze, Doctor, Inspect, Objects, Plan, Run, Scene, Validate
 
-    for command in (Run, Plan, Validate, Scene, Inspect, Objects, Doctor):
+    for command in (Run, Plan, Validate, Scene, Analyze, Inspect, Objects, Doctor):
         assert f"`graspproof {command.__name__.lower()}" in README
 
 
