@@ -48,8 +48,9 @@ class Balance:
 
     @classmethod
     def of(
-        cls, arms: Array, normals: Array, wrenches: Array, normal_force: tuple[float, float]
-    ) -> "Balance":
+        cls, arms: Array, normals: Array, wrenches: Array, normal_force: tuple[float, float], *,
+        by_load: bool,
+    ) -> "Balance":  # fmt: skip
         """Scale contacts and wrenches, (n, 6) [N, N m], whose torques are about the arms' origin.
 
         Args:
@@ -57,12 +58,15 @@ class Balance:
             normals: (k, 3)
             wrenches: (n, 6) [N, N m]
             normal_force: Least and largest normal force of each contact [N].
+            by_load: Whether the unit of force is the load, so that a small one counts, or the
+                largest normal force.
         """
         least, largest = normal_force
         size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
         scales = np.full(len(wrenches), largest)
-        if not math.isfinite(largest):
-            scales = np.maximum(np.linalg.norm(wrenches, axis=1), least)
+        if by_load or not math.isfinite(largest):
+            loads = np.linalg.norm(wrenches / np.repeat([1.0, size], 3), axis=1)
+            scales = np.minimum(np.maximum(loads, least), largest)
             scales[scales == 0.0] = 1.0
         W = wrenches / scales[:, None]
         W[:, 3:] /= size

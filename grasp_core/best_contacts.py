@@ -1,11 +1,14 @@
 """A grasp moved on its four faces to where its Ferrari-Canny quality is larger.
 
+Contacts stay on the convex pieces of the faces that they are on.
+
 The climb of `quality_ascent` has many local optima, so it starts from the grasp's own contacts and
 from random ones. The best end is certified like any grasp, and replaces the given one only if its
 proved lower bound is larger.
 
-Contacts stay a finger's radius from the edges of their faces, or half the radius of the largest
-disc in the face if that is less; a contact that starts nearer to an edge may stay, not approach it.
+Moved contacts keep a finger's radius from the edges of their faces, or half the radius of the
+largest disc in the face where that is less. A grasp whose own contacts are nearer to an edge starts
+from where they come clear of it, and stays as it is if no contacts that are clear are better.
 """
 
 import math
@@ -67,8 +70,8 @@ def optimize_contacts(
         body: The object.
         grasp: A grasp of it in force closure at this friction.
         friction: Coulomb coefficient at every contact.
-        finger_radius: How far contacts stay from edges [m]; a tenth of the object's radius if
-            None.
+        finger_radius: How far moved contacts stay from edges [m], or half the radius of the
+            largest disc in a face if that is less; a tenth of the object's radius if None.
         seed: For the random starting points.
 
     Returns:
@@ -88,11 +91,10 @@ def optimize_contacts(
     pieces = pieces_under(body, grasp)
     inset = positive(radius, "finger_radius") / body.radius
     rooms = [inset_piece(piece, inset) for piece in pieces]
-    here = np.array([_in_plane(*on) for on in zip(pieces, _unit_points(body, grasp), strict=True)])
-    limits = [np.maximum(room.b, room.E @ at) for room, at in zip(rooms, here, strict=True)]
-    faces = ContactFaces(pieces, tuple(limits), friction)
+    faces = ContactFaces(pieces, tuple(room.b for room in rooms), friction)
+    here = [_clear_of_edges(*on) for on in zip(rooms, _unit_points(body, grasp), strict=True)]
     rng = np.random.default_rng([seed, *grasp.faces])
-    starts = [here, *_random_starts(faces, rooms, rng)]
+    starts = [np.array(here), *_random_starts(faces, rooms, rng)]
     ends = sorted((faces.climbed(y) for y in starts), key=lambda end: -end[1].lower)
     for y, found in ends:
         if found.lower <= before.lower:
@@ -127,6 +129,15 @@ def _unit_points(body: Polyhedron, grasp: Grasp) -> Array:
 
 def _in_plane(piece: FacePiece, point: Array) -> Array:
     return piece.frame.T @ (point - piece.origin)
+
+
+def _clear_of_edges(room: FacePiece, point: Array) -> Array:
+    """A point in the plane of a face, moved towards the middle of its room until inside, (2,)."""
+    y, middle = _in_plane(room, point), room.corners.mean(axis=0)
+    beyond = room.E @ y - room.b
+    inward = room.E @ (y - middle)
+    share = float((beyond[beyond > 0.0] / inward[beyond > 0.0]).max(initial=0.0))
+    return y + min(share, 1.0) * (middle - y)
 
 
 def _random_starts(

@@ -106,7 +106,7 @@ def _check(program: ConicProgram, solution: ConicSolution, status: str) -> None:
         "primal and dual values differ": abs(program.q @ x + program.b @ z),
     }
     for failure, size in failures.items():
-        if size > allowed:
+        if not size <= allowed:  # nor is it when a number is missing
             raise SolverError(f"{failure} by {size:.3g}, allowed {allowed:.3g} ({status})")
 
 

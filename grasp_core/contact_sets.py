@@ -18,8 +18,8 @@ from grasp_core.records import grasps_from_json
 from grasp_core.values import LARGEST_FRICTION, contact_frictions
 
 FEWEST_CONTACTS = 2
-MOST_CONTACTS = 1000
-"""Of one grasp: the hull's volume then takes ten seconds, forces for a wrench three minutes."""
+MOST_CONTACTS = 100
+"""Of one grasp: it takes some seconds then, most of it for the hull's volume."""
 MOST_GRASPS = 100_000
 """Of one file: two hours' work for one processor."""
 LARGEST_LENGTH_M = 1e6

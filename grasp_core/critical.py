@@ -56,8 +56,9 @@ def critical_friction(
 
     Returns:
         The upper end of the bracket: every larger coefficient suffices, by balanced forces
-        inside the cones. The bracket is as narrow as `FRICTION_ACCURACY` or, where the margin
-        grows with the square of the coefficient, as proofs allow: some 1e-6 wide. 0.0 below
+        inside the cones. The bracket is as narrow as `FRICTION_ACCURACY` or as proofs allow:
+        some 1e-6 where the margin grows with the square of the coefficient, and some per cent
+        where contacts lie within a millionth of their size of a line. 0.0 below
         `FRICTIONLESS`; `math.inf` when `LARGEST_FRICTION` does not suffice.
 
     Raises:
@@ -73,7 +74,7 @@ def critical_friction(
     while bracket.upper > FRICTIONLESS and not bracket.settled:
         answer = decide(arms, units, np.full(len(points), trial))
         if answer.closed:
-            bracket.closed_at(trial, _steepest(answer.forces, units))
+            bracket.closed_at(trial, _least_friction_proved(trial, answer.forces, arms, units))
         elif answer.closed is False:
             bracket.open_at(trial, _least_friction_not_separated(answer.twist, arms, units))
         else:
@@ -166,9 +167,13 @@ def _between(lower: float, upper: float) -> float:
     return math.tan(0.5 * (math.atan(lower) + math.atan(min(upper, 4.0 * LARGEST_FRICTION))))
 
 
-def _steepest(forces: Array, normals: Array) -> float:
+def _least_friction_proved(friction: float, forces: Array, arms: Array, normals: Array) -> float:
+    """Just above the friction that closing forces need, if they prove closure there."""
     along, across = normal_and_tangential(forces, normals)
-    return float((across / along).max())
+    needed = float((across / along).max()) * (1.0 + 0.1 * FRICTION_ACCURACY)
+    if needed < friction and proves_closure(forces, arms, normals, np.full(len(arms), needed)):
+        return needed
+    return friction
 
 
 def _least_friction_not_separated(twist: Array, arms: Array, normals: Array) -> float:

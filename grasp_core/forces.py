@@ -63,8 +63,9 @@ def contact_forces(  # noqa: PLR0913 - the contract's arguments
             each, (k,).
         wrench: External (force, torque), (6,), or n of them, (n, 6) [N, N m], torque about
             `center`.
-        objective: What to make least: the norm of all forces, or the largest share that a
-            contact needs of its friction.
+        objective: What to make least: the norm of all forces, in pyramids of 16 sides inside the
+            cones, or the largest share that a contact needs of its friction. The latter is found
+            by iteration: where limits on the forces are far above the load it may stop early.
         normal_force: Least and largest normal force of each contact [N].
         center: (3,) [m]
 
@@ -78,7 +79,7 @@ def contact_forces(  # noqa: PLR0913 - the contract's arguments
             index of the first of many wrenches for which there are none.
     """
     loads, single = _rows(wrench)
-    balance = _balance(positions, normals, loads, normal_force, center)
+    balance = _balance(positions, normals, loads, normal_force, center, by_load=True)
     mu = contact_frictions(friction, len(balance.frames))
     F = _objective(objective)(balance, mu)
     missing = np.flatnonzero(~(needed_friction(F, mu) <= 1.0 + RESIDUAL))
@@ -206,12 +207,13 @@ def _toward_less_friction(balance: Balance, friction: float, weights: Array) -> 
 
 def _balance(
     positions: ArrayLike | Grasp, normals: ArrayLike | None, wrenches: Array,
-    normal_force: tuple[float, float], center: ArrayLike,
+    normal_force: tuple[float, float], center: ArrayLike, *, by_load: bool = False,
 ) -> Balance:  # fmt: skip
     points, units = contact_arrays(positions, normals)
     if not 0.0 <= normal_force[0] < normal_force[1]:
         raise InputError(f"normal_force must be (least, largest), got {normal_force}")
-    return Balance.of(points - frozen(center, (3,), "center"), units, wrenches, normal_force)
+    arms = points - frozen(center, (3,), "center")
+    return Balance.of(arms, units, wrenches, normal_force, by_load=by_load)
 
 
 def _rows(wrench: ArrayLike) -> tuple[Array, bool]:

@@ -7,8 +7,8 @@ the two planes that met there, and the one through the point p is
 
     (a, b) = e (a_u, b_u) - u (a_s, b_s),   e = a_s.p - b_s > 0,   u = a_u.p - b_u <= 0,
 
-with s seen and u unseen: both weights are positive, so normals stay outward and errors are
-averaged, not amplified, however flat the simplices become.
+with s seen and u unseen: both weights are positive (to rounding), so normals stay outward and
+errors are averaged, not amplified, however flat the simplices become.
 """
 
 import numpy as np

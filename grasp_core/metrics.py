@@ -63,8 +63,9 @@ def min_weight(
         edges: Of each pyramid.
 
     Returns:
-        Positive exactly when the pyramids are in force closure, and at most 1/N; -inf when no
-        weights of whatever sign balance.
+        At most 1/N; -inf when no weights of whatever sign balance. Positive exactly when the
+        pyramids are in force closure, provided that their wrenches span all six dimensions: two
+        opposite contacts have a positive weight too.
 
     Raises:
         InputError: Shapes, lengths or signs are wrong.

@@ -19,9 +19,9 @@ def nearest_wrench(wrenches: WrenchSet) -> tuple[Array, Array]:
     q = np.append(np.zeros(n), 1.0)
     share = np.append(np.tile([1.0, 0.0, 0.0], k), 0.0)
     distance = np.vstack([-q, np.hstack([-wrenches.G / wrenches.size, np.zeros((m, 1))])])
-    steepness = np.kron(np.diag(wrenches.friction), [1.0, 0.0, 0.0])
-    cones = [-np.vstack([steepness[i], np.eye(n)[3 * i + 1 : 3 * i + 3]]) for i in range(k)]
-    sides = np.hstack([np.vstack(cones), np.zeros((n, 1))])
+    sides = np.zeros((n, n + 1))
+    sides[np.arange(n), np.arange(n)] = -1.0
+    sides[::3, :n:3] = -np.diag(wrenches.friction)
     pushes = np.hstack([-np.eye(n)[::3], np.zeros((k, 1))])
     A = np.vstack([share, pushes, distance, sides])
     b = np.append(1.0, np.zeros(len(A) - 1))

@@ -26,7 +26,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices, positive
+from grasp_core.arrays import Array, Indices
+from grasp_core.errors import InputError
 from grasp_core.growing_hull import MOST_POINTS, GrowingHull, spread_simplex
 from grasp_core.nearest_wrench import nearest_wrench
 from grasp_core.values import Grasp
@@ -34,10 +35,14 @@ from grasp_core.wrench_sets import Norm, WrenchSet
 
 GAP = 1e-4
 """Default of the largest (upper - lower) / upper."""
+FINEST_GAP = 1e-7
+"""Below this, simplices become so small that rounding of their planes costs more than they gain."""
 MOST_SIMPLICES = 60_000
 """The polytope stops growing here; its bounds hold all the same, a little farther apart."""
 ROUNDING = 1e-12
 """Slack of the plain-arithmetic checks, relative to the longest wrench."""
+ON_RIDGE = 1e-9
+"""A ray that passes a ridge at less than this share of the simplex is no proof."""
 SAME_RAY = 1e-6
 """A flat simplex, which no generic ray crosses, misses the ray by more than this."""
 
@@ -76,6 +81,10 @@ class InnerPolytope:
         solid = np.abs(np.linalg.det(cells)) > np.finfo(np.float64).tiny
         cells = cells[solid]  # no generic ray crosses a flat one
         shares = np.asarray(np.linalg.solve(cells, ray[:, None])[:, :, 0], dtype=np.float64)
+        doubtful = ON_RIDGE * np.abs(shares).max(axis=1)
+        lowest = shares.min(axis=1)
+        if (np.abs(lowest) <= doubtful).any():
+            return False  # the ray is not generic: it may meet a ridge
         reached = np.asarray(np.einsum("mjc,mc->mj", cells, shares), dtype=np.float64)
         hit = np.linalg.norm(reached - ray, axis=1) < SAME_RAY
         return int((hit & (shares > 0.0).all(axis=1)).sum()) % 2 == 1
@@ -137,8 +146,8 @@ def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
         torque_scale: Length that makes a torque comparable with a force [m], such as the
             object's radius. Values with different scales cannot be compared.
         norm: `l1`, normal forces sum to 1 N, or `linf`, each is at most 1 N.
-        gap: Wanted (upper - lower) / upper. Where more points would be needed than are kept, the
-            bounds are farther apart.
+        gap: Wanted (upper - lower) / upper, from 1e-7. Where more simplices would be needed than
+            are kept, for very symmetric or many contacts, the bounds are some per cent apart.
 
     Returns:
         Bounds in newtons. Without closure: of `l1`, minus the distance of the zero wrench from the
@@ -148,10 +157,12 @@ def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
         InputError: Shapes, lengths or signs are wrong.
         SolverError: The cone program's answer failed its check.
     """
+    if not FINEST_GAP <= gap < 1.0:
+        raise InputError(f"gap must be at least {FINEST_GAP:g} and below 1, got {gap}")
     wrenches = WrenchSet.of(
         positions, normals, friction, center=center, torque_scale=torque_scale, norm=norm
     )
-    return wrench_set_quality(wrenches, positive(gap, "gap"))
+    return wrench_set_quality(wrenches, gap)
 
 
 def wrench_set_quality(wrenches: WrenchSet, gap: float = GAP) -> FerrariCanny:
@@ -198,7 +209,7 @@ def _outside(wrenches: WrenchSet, direction: Array | None) -> FerrariCanny:
     wrench = unit.G @ forces
     length = float(np.linalg.norm(wrench))
     trials = [] if direction is None else [direction]
-    _, _, right = np.linalg.svd(wrenches.edges() @ wrenches.G.T)
+    _, _, right = np.linalg.svd(wrenches.edges() @ wrenches.G.T, full_matrices=False)
     trials += [_unit(y) for y in (-wrench, facing, right[-1], -right[-1]) if y.any()]
     weakest = min(trials, key=lambda y: wrenches.support(y)[0])
     upper = wrenches.support(weakest)[0]

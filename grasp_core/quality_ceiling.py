@@ -12,6 +12,9 @@ Branch and bound: the part with the highest bound is cut through its longest fac
 near the target. Directions that bound one part well often bound its neighbours, so all found so far
 are tried before another is searched.
 
+Contacts count that keep clear of the edges as `best_contacts` keeps them; a grasp nearer to an edge
+may have a larger quality. Faces that are not convex count as a whole, up to their borders.
+
 Every part left carries its direction, so the bound can be checked again in plain arithmetic.
 """
 
@@ -62,7 +65,7 @@ class QualityCeiling:
 
     def verify(self) -> bool:
         """Re-check in plain arithmetic that the parts cover the faces and are all bounded."""
-        covered = all(
+        covered = bool(self.choices) and all(
             cover_everything([leaf.path for leaf in self.leaves if leaf.choice == index])
             for index in range(len(self.choices))
         )
@@ -109,7 +112,6 @@ def quality_ceiling(
         raise InputError(f"parts must be at least {len(choices)}, one per choice of pieces")
     directions: list[Array] = []
     waiting: list[tuple[float, int, Path, Array]] = []
-    leaves: list[Leaf] = []
     fresh: list[tuple[int, Path]] = [(index, ()) for index in range(len(choices))]
     examined = 0
     target = known * (1.0 + ENOUGH)
@@ -132,8 +134,12 @@ def _choices(
     if len(faces) != FINGERS or not all(0 <= face < len(body.faces) for face in faces):
         raise InputError(f"faces must be {FINGERS} of 0..{len(body.faces) - 1}, got {faces}")
     pieces = unit_pieces(body)
-    by_face = [[inset_piece(p, inset) for p in pieces if p.face == face] for face in faces]
-    return tuple(product(*by_face))
+    by_face = [[piece for piece in pieces if piece.face == face] for face in faces]
+    if not all(by_face):
+        raise InputError(f"one of the faces {tuple(faces)} is too narrow for a contact")
+    # edges between the pieces of a face are no borders: contacts may lie on them
+    rooms = [[inset_piece(one[0], inset)] if len(one) == 1 else one for one in by_face]
+    return tuple(product(*rooms))
 
 
 def _bounded(
@@ -142,6 +148,7 @@ def _bounded(
 ) -> tuple[float, Array]:  # fmt: skip
     """An upper bound on a part with its direction; a new one joins those to try."""
     corners = _corner_wrenches(choice, path, friction)
+    best, bounds = None, np.empty(0)
     if directions:
         bounds = corners.supports(np.array(directions))
         best = int(bounds.argmin())
@@ -149,6 +156,8 @@ def _bounded(
             return float(bounds[best]), directions[best]
     found = wrench_set_quality(corners, PART_GAP)
     directions.append(found.direction)
+    if best is not None and bounds[best] < found.upper:
+        return float(bounds[best]), directions[best]
     return found.upper, found.direction
 
 

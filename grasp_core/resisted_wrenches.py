@@ -38,7 +38,7 @@ class WrenchLimit:
     wrench: Array
     """(6,) [N, N m], torque about the stated centre."""
     limit: float
-    """Largest multiple of `wrench` that is resisted: `forces` balance it, to rounding."""
+    """Largest multiple of `wrench` that is resisted: `forces` balance it, to some 1e-8."""
     upper: float
     """No multiple above this is resisted: the support of `facet`, in plain arithmetic."""
     forces: Array
@@ -127,6 +127,8 @@ class WrenchBody:
         """
         self.max_normal_force = positive(max_normal_force, "max_normal_force")
         self.count = k = len(arms)
+        self.middle = arms.mean(axis=0)  # a far centre would swamp the levers
+        arms = arms - self.middle
         self.size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
         self.scale = np.array([1.0] * 3 + [self.size] * 3)
         self.frames = contact_frames(normals)
@@ -142,7 +144,8 @@ class WrenchBody:
 
     def limit(self, wrench: Array) -> WrenchLimit:
         """Largest multiple of an external wrench that is resisted, with its proof."""
-        unit = wrench / self.scale
+        moved = np.append(wrench[:3], wrench[3:] - np.cross(self.middle, wrench[:3]))
+        unit = moved / self.scale
         length = float(np.linalg.norm(unit))
         A = self.A.copy()
         A[:6, -1] = unit / length
@@ -159,8 +162,12 @@ class WrenchBody:
             limit=limit,
             upper=max(limit, self.max_normal_force * self.bounded.support(facet)[0]),
             forces=self.max_normal_force * np.einsum("kij,kj->ki", self.frames, local),
-            facet=facet / self.scale,
+            facet=self._about_center(facet / self.scale),
         )
+
+    def _about_center(self, facet: Array) -> Array:
+        slides = np.asarray(np.cross(facet[3:], self.middle), dtype=np.float64)
+        return np.concatenate([facet[:3] - slides, facet[3:]])
 
     def weakest(self, wrenches: Array, torque_scale: float) -> WrenchLimit:
         """A wrench of unit size that is locally the hardest to resist.

@@ -28,6 +28,9 @@ from grasp_core.wrenches import contact_frames, grasp_map, in_frames
 Norm: TypeAlias = Literal["l1", "linf"]
 """How contact forces are bounded."""
 
+LARGEST_RATIO = 1e6
+"""Between the torque scale and the contacts' extent: beyond it, rounding decides."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WrenchSet:
@@ -62,13 +65,19 @@ class WrenchSet:
         if norm not in {"l1", "linf"}:
             raise InputError(f"norm must be l1 or linf, got {norm!r}")
         scale = positive(torque_scale, "torque_scale")
+        extent = float(np.linalg.norm(points - points.mean(axis=0), axis=1).max()) or scale
+        if not 1.0 / LARGEST_RATIO <= scale / extent <= LARGEST_RATIO:
+            raise InputError(
+                f"torque_scale must be within a factor {LARGEST_RATIO:g} of the extent of the "
+                f"contacts, {extent:.3g}; got {torque_scale}"
+            )
         arms = (points - frozen(center, (3,), "center")) / scale
         G = in_frames(grasp_map(arms), contact_frames(units))
         return cls(G, contact_frictions(friction, len(points)), norm)
 
     @property
     def size(self) -> float:
-        """No wrench of a unit normal force at one contact is longer [N]."""
+        """Length of the longest wrench of a unit normal force, to within a factor 1.5 [N]."""
         longest = np.linalg.norm(self.G, axis=0).max()
         return float(longest * np.sqrt(1.0 + self.friction.max() ** 2))
 

@@ -97,7 +97,8 @@ def _facts(found: Analysis) -> list[tuple[str, str]]:
     certificate = found.certificate
     rows = [("contacts", str(len(found.contacts.positions))), ("closed", _closed(found))]
     if certificate is not None:
-        rows.append(("closure margin, certificate checked", f"{certificate.margin:.6g}"))
+        rows.append(("certificate", "checked"))
+        rows.append(("closure margin", f"{certificate.margin:.6g}"))
         if certificate.forces is not None:
             rows.append(("balanced forces", _forces(certificate.forces)))
         if found.separating_wrench is not None:

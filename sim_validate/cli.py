@@ -87,10 +87,11 @@ class Planning:
     optimize: bool = False
     """Move the contacts of each grasp on their faces to raise its Ferrari-Canny quality."""
     finger_radius_m: Positive | None = None
-    """How far optimised contacts stay from edges; a tenth of the object's radius if not given."""
+    """How far optimised contacts stay from edges [m], or half the radius of the largest disc in a
+    face if that is less; a tenth of the object's radius if not given."""
     ceiling: Count | None = None
-    """With --optimize: also prove an upper bound of the quality on the same faces, cut into so many
-    parts at most."""
+    """With --optimize: also prove an upper bound of the quality of all contacts on the same faces
+    that are as clear of edges, cut into so many parts at most."""
     seed: Seed = 0
     """For everything random."""
     unit: Literal["m", "cm", "mm", "in"] = "m"
@@ -127,6 +128,8 @@ class Plan:
     object: Positional[str]
     """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
     planning: OmitArgPrefixes[Planning] = Planning()
+    jobs: Count = field(default_factory=available_cores)
+    """Largest number of processes for --optimize; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = Speech()
     out: Path | None = None
     """Folder for grasps.json; nothing is written if not given."""

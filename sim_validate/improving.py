@@ -54,6 +54,10 @@ def improved(
     for grasp, _ in done:
         if not any(_same_contacts(grasp, other, SAME_CONTACTS * body.radius) for other in kept):
             kept.append(grasp)
+    if len(kept) < len(done):
+        reporter.say(
+            f"{len(done) - len(kept)} optimised grasps are left out: others have the same contacts"
+        )
     return replace(found, grasps=tuple(kept)), tuple(moved for _, moved in done)
 
 

@@ -12,7 +12,6 @@ from grasp_core.values import Polyhedron
 from scenes.objects import example_object
 from sim_validate import cli
 from sim_validate.console import TABLE_ROWS, Reporter
-from sim_validate.engines import available_cores
 from sim_validate.files import write_text
 from sim_validate.improving import improved, show_gains
 
@@ -37,6 +36,8 @@ def plan_object(
     """
     if planning.ceiling is not None and not planning.optimize:
         raise InputError("--ceiling bounds what --optimize may reach; give both or neither")
+    if planning.finger_radius_m is not None and not planning.optimize:
+        raise InputError("--finger-radius-m is where --optimize keeps contacts; give both or none")
     body = load_object(name, planning.unit)
     for note in body.notes:
         reporter.warn(f"{body.name}: {note}")
@@ -63,7 +64,7 @@ def plan_object(
 
 def plan_file(command: cli.Plan, reporter: Reporter) -> int:
     """Plan, write the grasps, and show the best."""
-    body, found, moves = plan_object(command.object, command.planning, available_cores(), reporter)
+    body, found, moves = plan_object(command.object, command.planning, command.jobs, reporter)
     text = plan_to_json(body, found, moves)
     if command.out:
         path = write_text(command.out / "grasps.json", text)

@@ -412,3 +412,19 @@ def test_bad_frictions_are_refused(friction):
 def test_an_unknown_objective_is_refused():
     with pytest.raises(gc.InputError, match="objective must be one of least_norm, least_friction"):
         contact_forces(TETRA_CENTERS, TETRA_NORMALS, 0.5, np.ones(6), objective="least_norms")
+
+
+def test_loads_far_below_the_limit_are_balanced_all_the_same():
+    """A hundred-millionth of the limit: to no fewer digits than a large load."""
+    rng = np.random.default_rng(31)
+    wrenches = 1e-7 * rng.normal(size=(20, 6))
+    forces = gc.contact_forces(
+        TETRA_CENTERS, TETRA_NORMALS, 0.5, wrenches, normal_force=(0.0, 10.0)
+    )
+    total = forces.reshape(20, -1) @ grasp_map(TETRA_CENTERS).T + wrenches
+    assert np.abs(total).max() < 1e-13
+    pair = np.array([[1.0, 0, 0], [-1, 0, 0]])
+    with pytest.raises(gc.NoForcesError):
+        gc.contact_forces(pair, -pair, 0.5, [0, 0, 0, 9e-6, 0, 0], normal_force=(0.0, 10.0))
+    with pytest.raises(gc.NoForcesError):
+        gc.contact_forces(TETRA_CENTERS, TETRA_NORMALS, 0.0, [0, 0, 0, 9e-6, 0, 0])

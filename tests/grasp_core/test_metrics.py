@@ -47,8 +47,11 @@ def test_min_weight_is_what_its_definition_says(edges):
     assert min(signs.values()) >= 20
 
 
-def test_min_weight_is_positive_only_with_closure_and_bounds_the_quality():
-    """A ball of the least weight times the shortest edge sum fits; here only the sign is used."""
+def test_min_weight_of_generic_contacts_is_positive_only_with_closure():
+    """Of generic ones: two opposite contacts have a positive weight, but no closure."""
+    pair = np.array([[1.0, 0, 0], [-1, 0, 0]])
+    assert gc.min_weight(pair, -pair, 0.5) == pytest.approx(1.0 / 16.0)
+    assert not gc.force_closure(pair, -pair, 0.5).closed
     rng = np.random.default_rng(1)
     positive = 0
     for _ in range(100):

@@ -10,6 +10,7 @@ from grasp_core import quality as module
 from grasp_core.resisted_wrenches import WrenchBody
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
 
+TETRA = TETRA_CENTERS, TETRA_NORMALS, 0.5
 ALL_NORMS = ("l1", "linf")
 
 
@@ -221,12 +222,25 @@ def test_proofs_do_not_survive_tampering():
     assert not replace(apart, upper=1.01 * apart.upper).verify()
 
 
+def test_a_ray_through_a_corner_proves_nothing():
+    """A simplex beside zero, one corner on the ray: rounding would decide what is crossed."""
+    ray = np.cos(np.arange(1.0, 7.0))
+    rng = np.random.default_rng(8)
+    wrenches = replace(gc.ferrari_canny(*TETRA, torque_scale=1.0).wrenches, G=np.eye(6))
+    corners = np.array([[i for i in range(7) if i != j] for j in range(7)])
+    for _ in range(50):
+        points = np.vstack([ray, ray + 0.3 * rng.normal(size=(6, 6))])
+        polytope = module.InnerPolytope(points, corners, np.tile(ray, (7, 1)))
+        assert not polytope.surrounds_zero(wrenches)
+
+
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
         ({"torque_scale": 0.0}, "torque_scale must be positive"),
         ({"norm": "l2"}, "norm must be l1 or linf"),
-        ({"gap": -1.0}, "gap must be positive"),
+        ({"gap": -1.0}, "gap must be at least 1e-07"),
+        ({"gap": 2.0}, "below 1, got 2"),
         ({"center": [0.0, 1.0]}, "center must have shape"),
     ],
 )

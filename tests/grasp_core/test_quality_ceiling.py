@@ -43,6 +43,21 @@ def test_the_bound_can_be_checked_again_and_does_not_survive_tampering(bounded):
     turned = replace(first, direction=-first.direction)
     assert not replace(ceiling, leaves=(turned, *ceiling.leaves[1:])).verify()
     assert not replace(ceiling, leaves=()).verify()
+    assert not replace(ceiling, leaves=(), choices=()).verify()
+
+
+def test_grasps_that_start_near_edges_do_not_end_above_the_ceiling():
+    """Bounded without knowing what the search has found."""
+    body = example_object("double-wedge-bar")
+    tested = 0
+    for grasp in gc.plan(body, 0.5, families="free", limit=4).grasps:
+        found = gc.optimize_contacts(body, grasp, 0.5)
+        ceiling = gc.quality_ceiling(body, grasp.faces, 0.5, parts=60)
+        assert ceiling.verify()
+        if found.grasp is not grasp:
+            assert found.after.lower <= ceiling.upper
+            tested += 1
+    assert tested >= 2
 
 
 def test_more_parts_bring_the_ceiling_down():

@@ -103,6 +103,20 @@ def test_friction_may_differ_between_contacts():
         assert found.limit == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.parametrize("far", [1e2, 1e4, 1e6])
+def test_the_centre_of_torques_may_be_far_away(far):
+    """The same force and turn, with its torque about another point."""
+    wrench = np.array([0.3, -0.2, 0.5, 0.1, 0.2, -0.1])
+    here = max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, wrench, max_normal_force=2.0)
+    center = far * np.array([0.6, 0.0, 0.8])
+    moved = np.append(wrench[:3], wrench[3:] - np.cross(center, wrench[:3]))
+    there = gc.wrench_limits(
+        TETRA_CENTERS, TETRA_NORMALS, 0.5, [moved], max_normal_force=2.0, center=center
+    )[0]
+    assert there.limit == pytest.approx(here, rel=1e-12 * far + 1e-7)
+    assert there.facet @ moved == pytest.approx(-1.0, rel=1e-12 * far + 1e-7)
+
+
 def test_a_zero_wrench_and_a_bad_force_are_refused():
     with pytest.raises(gc.InputError, match="must not be zero"):
         max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, np.zeros(6), max_normal_force=1.0)

@@ -286,7 +286,7 @@ ONE = TETRAHEDRON["contacts"][0]
         (changed(["torque_scale_m"], 0), "torque_scale_m: Input should be greater than 0, got 0"),
         (changed(["center_m"], [0, 0]), "center_m[2]: missing"),
         (changed(["contacts"], [ONE]), "contacts: expected at least 2 items, got 1"),
-        (changed(["contacts"], [ONE] * 1001), "contacts: expected at most 1000 items, got 1001"),
+        (changed(["contacts"], [ONE] * 101), "contacts: expected at most 100 items, got 101"),
         (changed(["contacts"], [ONE] * 3), "contacts: all lie within"),
         (changed(["contacts", 1, "normal"], ...), "contacts[1].normal: missing"),
         (changed(["contacts", 2, "normal"], [0, 0, 1.01]), "contacts[2].normal: its length must"),
