@@ -7,8 +7,9 @@ from random ones. The best end is certified like any grasp, and replaces the giv
 proved lower bound is larger.
 
 Moved contacts keep a finger's radius from the edges of their faces, or half the radius of the
-largest disc in the face where that is less. A grasp whose own contacts are nearer to an edge starts
-from where they come clear of it, and stays as it is if no contacts that are clear are better.
+largest disc in the face where that is less. Where no radius is asked for, they may also come as
+near to an edge as the given contact on that face is. With a radius, a grasp nearer to an edge
+starts from where it comes clear of it, and stays as it is if no contacts that are clear are better.
 """
 
 import math
@@ -30,8 +31,8 @@ from grasp_core.quality import FerrariCanny, ferrari_canny
 from grasp_core.quality_ascent import ContactFaces
 from grasp_core.values import FINGERS, ForceCone, Grasp, Polyhedron
 
-FINGER_RADIUS = 0.1
-"""In object radii, where none is given."""
+FINGER_RADIUS = 0.05
+"""In object radii, where none is given: half the radius of a fingertip in the scenes."""
 RANDOM_STARTS = 3
 """Followed besides the grasp itself: the best of `RANDOM_TRIALS`."""
 RANDOM_TRIALS = 24
@@ -47,6 +48,8 @@ class Improvement:
     """The moved grasp; the given one where no better one was found."""
     before: FerrariCanny
     after: FerrariCanny
+    clearances: tuple[float, ...]
+    """How far the contacts, if moved, had to stay from the edges of their faces [m]."""
 
     @property
     def gain(self) -> float:
@@ -71,7 +74,8 @@ def optimize_contacts(
         grasp: A grasp of it in force closure at this friction.
         friction: Coulomb coefficient at every contact.
         finger_radius: How far moved contacts stay from edges [m], or half the radius of the
-            largest disc in a face if that is less; a tenth of the object's radius if None.
+            largest disc in a face if that is less. If None a twentieth of the object's radius or,
+            where that is less, as far as the given contact on that face.
         seed: For the random starting points.
 
     Returns:
@@ -84,13 +88,13 @@ def optimize_contacts(
         SolverError: A program's answer failed its check.
     """
     check_on_faces(body, grasp)
-    radius = FINGER_RADIUS * body.radius if finger_radius is None else finger_radius
     before = _quality(body, grasp, friction)
     if before.lower <= 0.0:
         raise InputError(f"grasp {grasp.id} is not in force closure at friction {friction}")
     pieces = pieces_under(body, grasp)
-    inset = positive(radius, "finger_radius") / body.radius
-    rooms = [inset_piece(piece, inset) for piece in pieces]
+    insets = _insets(body, grasp, pieces, finger_radius)
+    clearances = tuple(float(body.radius * inset) for inset in insets)
+    rooms = [inset_piece(*chosen) for chosen in zip(pieces, insets, strict=True)]
     faces = ContactFaces(pieces, tuple(room.b for room in rooms), friction)
     here = [_clear_of_edges(*on) for on in zip(rooms, _unit_points(body, grasp), strict=True)]
     rng = np.random.default_rng([seed, *grasp.faces])
@@ -101,8 +105,20 @@ def optimize_contacts(
             break
         moved = _certified(body, grasp, faces, y, rng)
         if moved is not None and (after := _quality(body, moved, friction)).lower > before.lower:
-            return Improvement(moved, before, after)
-    return Improvement(grasp, before, before)
+            return Improvement(moved, before, after, clearances)
+    return Improvement(grasp, before, before, clearances)
+
+
+def _insets(
+    body: Polyhedron, grasp: Grasp, pieces: Sequence[FacePiece], finger_radius: float | None
+) -> list[float]:
+    """How far contacts stay from the edges of each piece, at unit size."""
+    if finger_radius is not None:
+        return [positive(finger_radius, "finger_radius") / body.radius] * FINGERS
+    return [
+        min(FINGER_RADIUS, max(float((piece.b - piece.E @ _in_plane(piece, at)).min()), 0.0))
+        for piece, at in zip(pieces, _unit_points(body, grasp), strict=True)
+    ]
 
 
 def _quality(body: Polyhedron, grasp: Grasp, friction: float) -> FerrariCanny:

@@ -24,8 +24,9 @@ from heapq import heappop, heappush
 from itertools import product
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, positive
+from grasp_core.arrays import Array, frozen
 from grasp_core.best_contacts import FINGER_RADIUS
 from grasp_core.errors import InputError
 from grasp_core.face_parts import Path, corner_contacts, cover_everything, part_at
@@ -85,7 +86,7 @@ def quality_ceiling(
     friction: float = 0.5,
     *,
     known: float = 0.0,
-    finger_radius: float | None = None,
+    finger_radius: ArrayLike | None = None,
     parts: int = 200,
 ) -> QualityCeiling:
     """Bound the `l1` quality of all contacts on four faces.
@@ -98,15 +99,18 @@ def quality_ceiling(
         faces: Indices of four faces.
         friction: Coulomb coefficient at every contact.
         known: A quality that is attained, where bounding may stop.
-        finger_radius: As in `optimize_contacts`: contacts nearer to an edge are not bounded.
+        finger_radius: How far contacts stay from the edges of their faces [m], one for all faces
+            or one each, such as an improvement's `clearances`; contacts nearer to an edge are not
+            bounded. A twentieth of the object's radius if None.
         parts: How many parts of the faces to examine at most.
 
     Raises:
         InputError: An argument is out of range.
         SolverError: A program's answer failed its check.
     """
-    radius = FINGER_RADIUS * body.radius if finger_radius is None else finger_radius
-    choices = _choices(body, faces, positive(radius, "finger_radius") / body.radius)
+    given = FINGER_RADIUS * body.radius if finger_radius is None else finger_radius
+    radii = frozen(np.broadcast_to(np.asarray(given), (FINGERS,)), (FINGERS,), "finger_radius")
+    choices = _choices(body, faces, radii / body.radius)
     friction = float(contact_frictions(friction, 1)[0])
     if parts < len(choices):
         raise InputError(f"parts must be at least {len(choices)}, one per choice of pieces")
@@ -129,7 +133,7 @@ def quality_ceiling(
 
 
 def _choices(
-    body: Polyhedron, faces: Sequence[int], inset: float
+    body: Polyhedron, faces: Sequence[int], insets: Array
 ) -> tuple[tuple[FacePiece, ...], ...]:
     if len(faces) != FINGERS or not all(0 <= face < len(body.faces) for face in faces):
         raise InputError(f"faces must be {FINGERS} of 0..{len(body.faces) - 1}, got {faces}")
@@ -138,7 +142,10 @@ def _choices(
     if not all(by_face):
         raise InputError(f"one of the faces {tuple(faces)} is too narrow for a contact")
     # edges between the pieces of a face are no borders: contacts may lie on them
-    rooms = [[inset_piece(one[0], inset)] if len(one) == 1 else one for one in by_face]
+    rooms = [
+        [inset_piece(one[0], inset)] if len(one) == 1 else one
+        for one, inset in zip(by_face, insets.tolist(), strict=True)
+    ]
     return tuple(product(*rooms))
 
 

@@ -88,7 +88,8 @@ class Planning:
     """Move the contacts of each grasp on their faces to raise its Ferrari-Canny quality."""
     finger_radius_m: Positive | None = None
     """How far optimised contacts stay from edges [m], or half the radius of the largest disc in a
-    face if that is less; a tenth of the object's radius if not given."""
+    face if that is less. If not given, a twentieth of the object's radius, or as far as the planned
+    contact on that face."""
     ceiling: Count | None = None
     """With --optimize: also prove an upper bound of the quality of all contacts on the same faces
     that are as clear of edges, cut into so many parts at most."""

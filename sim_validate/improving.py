@@ -76,7 +76,7 @@ def _improve(task: _Task) -> tuple[Grasp, Moved]:
     if task.parts is not None:
         ceiling = quality_ceiling(
             task.body, task.grasp.faces, task.friction, known=found.after.lower,
-            finger_radius=task.finger_radius, parts=task.parts,
+            finger_radius=found.clearances, parts=task.parts,
         ).upper  # fmt: skip
     before, after = found.before, found.after
     moved = Moved(
