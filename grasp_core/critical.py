@@ -33,7 +33,9 @@ FRICTIONLESS = 1e-6
 """Critical frictions below this are reported as zero: a contact in a file with six digits is
 not placed better."""
 FIRST_TRIAL = 0.5
-GROWTH = 8.0
+PROOF_SHARES = (0.0, 1e-3, 0.03)
+"""Where closure is proved between the friction that forces need and that of the trial."""
+GROWTH = 3.0
 """How much farther from an undecided friction the next trial is; twice as far once that is a tenth
 of `FRICTIONLESS`."""
 NUDGE = 0.4
@@ -171,8 +173,10 @@ def _least_friction_proved(friction: float, forces: Array, arms: Array, normals:
     """Just above the friction that closing forces need, if they prove closure there."""
     along, across = normal_and_tangential(forces, normals)
     needed = float((across / along).max()) * (1.0 + 0.1 * FRICTION_ACCURACY)
-    if needed < friction and proves_closure(forces, arms, normals, np.full(len(arms), needed)):
-        return needed
+    for share in PROOF_SHARES:
+        enough = needed + share * (friction - needed)
+        if enough < friction and proves_closure(forces, arms, normals, np.full(len(arms), enough)):
+            return enough
     return friction
 
 
