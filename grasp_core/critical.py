@@ -120,8 +120,8 @@ class _Bracket:
                 "slightly"
             )
 
-    def closed_at(self, friction: float, steepest: float) -> None:
-        self.upper = min(friction, steepest, self.upper)
+    def closed_at(self, friction: float, proved: float) -> None:
+        self.upper = min(proved, self.upper)
         if friction < self.center:
             self._forget_center()
 

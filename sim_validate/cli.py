@@ -4,13 +4,12 @@ Nothing heavy is imported here, so that help and usage errors answer at once.
 """
 
 import sys
-import tomllib
 import traceback
 from collections.abc import Sequence
 from dataclasses import field
 from enum import IntEnum
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Literal
 
 import tyro
 from pydantic import AfterValidator, Field
@@ -18,6 +17,7 @@ from pydantic.dataclasses import dataclass
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError
+from sim_validate.config_file import with_config
 from sim_validate.engines import available_cores
 
 
@@ -240,7 +240,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 "Four-finger force-closure grasps, proved and simulated. Every command also takes "
                 "--config FILE.toml, whose keys are flags; flags given override it."
             ),
-            args=_with_config(arguments),
+            args=with_config(arguments),
         )
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else Exit.USAGE
@@ -279,40 +279,6 @@ def _complain(message: str, code: Exit) -> int:
 
     sys.stderr.write(f"graspproof: {printable(message)}\n")
     return int(code)
-
-
-def _with_config(arguments: list[str]) -> list[str]:
-    """Put the settings of `--config FILE.toml` before the flags, which then override them."""
-    words = [part for word in arguments for part in _split_config(word)]
-    if "--config" not in words:
-        return arguments
-    place = words.index("--config")
-    if place + 1 >= len(words):
-        raise InputError("--config needs the name of a TOML file")
-    path = Path(words[place + 1])
-    rest = words[:place] + words[place + 2 :]
-    try:
-        settings = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"--config {path}: {error}") from error
-    flags = [word for name, value in settings.items() for word in _as_flags(name, value)]
-    return [*rest[:1], *flags, *rest[1:]]
-
-
-def _split_config(word: str) -> list[str]:
-    """`--config=FILE` as two words."""
-    return word.split("=", 1) if word.startswith("--config=") else [word]
-
-
-def _as_flags(name: str, value: Any) -> list[str]:
-    flag = "--" + name.replace("_", "-")
-    if isinstance(value, bool):
-        return [flag] if value else []
-    return [word for item in _items(value) for word in (flag, *map(str, _items(item)))]
-
-
-def _items(value: Any) -> list[Any]:
-    return cast("list[Any]", value) if isinstance(value, list) else [value]
 
 
 def run_and_exit() -> None:

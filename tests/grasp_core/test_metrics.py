@@ -92,6 +92,18 @@ def test_hull_volume_is_that_of_qhull_on_the_edges():
         assert volume == pytest.approx(ConvexHull(W, qhull_options="QJ Pp").volume, rel=1e-6)
 
 
+def test_the_volume_of_seven_pushes_is_that_of_their_simplex():
+    rng = np.random.default_rng(4)
+    for _ in range(10):
+        positions, normals = random_contacts(rng, 7)
+        W = np.hstack([normals, np.cross(positions, normals)])
+        exact = abs(np.linalg.det(W[1:] - W[0])) / math.factorial(6)
+        volume = gc.hull_volume(positions, normals, 0.0, torque_scale=1.0)
+        assert volume == pytest.approx(exact, rel=1e-6)
+        longer = gc.hull_volume(positions, normals, 0.0, torque_scale=2.0)
+        assert longer == pytest.approx(exact / 2.0**3, rel=1e-6)
+
+
 def test_without_friction_four_contacts_span_no_volume():
     assert gc.hull_volume(TETRA_CENTERS, TETRA_NORMALS, 0.0, torque_scale=1.0) == 0.0
 

@@ -1,0 +1,45 @@
+"""Settings of a TOML file as flags on the command line."""
+
+import tomllib
+from pathlib import Path
+from typing import Any, cast
+
+from grasp_core.errors import InputError
+
+
+def with_config(arguments: list[str]) -> list[str]:
+    """Put the settings of `--config FILE.toml` before the flags, which then override them.
+
+    Raises:
+        InputError: There is no such file, or it is not TOML.
+    """
+    words = [part for word in arguments for part in _split_config(word)]
+    if "--config" not in words:
+        return arguments
+    place = words.index("--config")
+    if place + 1 >= len(words):
+        raise InputError("--config needs the name of a TOML file")
+    path = Path(words[place + 1])
+    rest = words[:place] + words[place + 2 :]
+    try:
+        settings = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"--config {path}: {error}") from error
+    flags = [word for name, value in settings.items() for word in _as_flags(name, value)]
+    return [*rest[:1], *flags, *rest[1:]]
+
+
+def _split_config(word: str) -> list[str]:
+    """`--config=FILE` as two words."""
+    return word.split("=", 1) if word.startswith("--config=") else [word]
+
+
+def _as_flags(name: str, value: Any) -> list[str]:
+    flag = "--" + name.replace("_", "-")
+    if isinstance(value, bool):
+        return [flag] if value else []
+    return [word for item in _items(value) for word in (flag, *map(str, _items(item)))]
+
+
+def _items(value: Any) -> list[Any]:
+    return cast("list[Any]", value) if isinstance(value, list) else [value]
