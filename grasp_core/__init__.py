@@ -12,6 +12,7 @@ from grasp_core.errors import MeshRefusal as MeshRefusal
 from grasp_core.errors import NoForcesError as NoForcesError
 from grasp_core.errors import SolverError as SolverError
 from grasp_core.errors import UndecidedError as UndecidedError
+from grasp_core.errors import UnfaithfulError as UnfaithfulError
 from grasp_core.forces import contact_forces as contact_forces
 from grasp_core.lines import classify_lines as classify_lines
 from grasp_core.mesh import load_polyhedron as load_polyhedron

@@ -23,6 +23,10 @@ class NoForcesError(GraspError):
     """No forces within the limits and the friction balance the wrench."""
 
 
+class UnfaithfulError(GraspError):
+    """The simulator's settings do not reproduce statics, so nothing may be certified with them."""
+
+
 class MeshRefusal(StrEnum):
     """Why a mesh is not accepted; the value is the stable code shown to users."""
 

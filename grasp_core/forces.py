@@ -121,10 +121,27 @@ def closest_forces(
     balance = _balance(positions, normals, load, normal_force, center)
     rows = balance.pyramids(np.full(len(balance.frames), friction))
     P = balance.G.T @ balance.G + LEAST_CHARGE * np.eye(balance.G.shape[1])
-    f = _solve(P, balance.G.T @ balance.W[0], rows, balance, balanced=False)
+    q = balance.G.T @ balance.W[0]
+    f = _least_imbalance(P, q, rows, balance)
+    if np.isnan(f[0]):
+        f = _solve(P, q, rows, balance, balanced=False)
     if f is None:
         raise SolverError("no forces in the cones were found, though a pure push is one")
     return balance.in_space(balance.into_cones(f[None], friction))[0]
+
+
+def _least_imbalance(P: Array, q: Array, rows: Array, balance: Balance) -> Array:
+    """Minimise f'Pf/2 + q'f in the cones and limits: with P = L L', the least |L'f + inv(L) q|."""
+    L = np.linalg.cholesky(P)
+    back, shift = np.linalg.inv(L).T, np.linalg.solve(L, q)
+    along = np.eye(len(q))[0::3]
+    C, d = [rows, -along], [np.zeros(len(rows)), -np.broadcast_to(balance.least, len(along))]
+    if np.isfinite(balance.largest).all():
+        C.append(along)
+        d.append(np.broadcast_to(balance.largest, len(along)))
+    turned = np.vstack(C) @ back
+    z = least_distance(turned, (np.concatenate(d) + turned @ shift)[None])[0]
+    return back @ (z - shift)
 
 
 def _objective(name: str) -> Callable[[Balance, Array], Array]:

@@ -305,3 +305,20 @@ def _content_hash(points: Array, corners: Indices) -> str:
     digest = hashlib.sha256(np.ascontiguousarray(points[order] + 0.0, dtype="<f8").tobytes())
     digest.update(np.ascontiguousarray(turned, dtype="<i8").tobytes())
     return digest.hexdigest()
+
+
+def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Array:
+    """The surface point nearest to each of several points, (n, 3).
+
+    Args:
+        vertices: (v, 3) [m]
+        triangles: (t, 3)
+        points: (n, 3) [m]
+    """
+    corners = vertices[triangles]
+    closest_point: Any = _trimesh("triangles").closest_point
+    nearest = np.empty((len(points), 3))
+    for place, point in enumerate(points):
+        candidates = closest_point(corners, np.broadcast_to(point, (len(corners), 3)))
+        nearest[place] = candidates[int(np.argmin(np.linalg.norm(candidates - point, axis=1)))]
+    return nearest

@@ -12,6 +12,7 @@ quality of the contacts (see `quality`), which is the bound over all directions.
 Torques are compared with forces through a stated length.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -169,23 +170,19 @@ class WrenchBody:
         slides = np.asarray(np.cross(facet[3:], self.middle), dtype=np.float64)
         return np.concatenate([facet[:3] - slides, facet[3:]])
 
-    def weakest(self, wrenches: Array, torque_scale: float) -> WrenchLimit:
+    def weakest_from(self, limits: Iterable[WrenchLimit], torque_scale: float) -> WrenchLimit:
         """A wrench of unit size that is locally the hardest to resist.
 
         Args:
-            wrenches: Where to start, (n, 6); the weakest of them are followed.
+            limits: Of wrenches of unit size; the weakest of them are followed.
             torque_scale: Length that makes a torque comparable with a force [m].
 
         Returns:
             The weakest found: a wrench with |(force, torque / torque_scale)| = 1.
         """
         scale = np.array([1.0] * 3 + [torque_scale] * 3)
-        starts = sorted(
-            (self.limit(_unit(w, scale)) for w in wrenches), key=lambda found: found.limit
-        )
-        return min(
-            (self._descend(start, scale) for start in starts[:STARTS]), key=lambda w: w.limit
-        )
+        starts = sorted(limits, key=lambda found: found.limit)[:STARTS]
+        return min((self._descend(start, scale) for start in starts), key=lambda w: w.limit)
 
     def _descend(self, start: WrenchLimit, scale: Array) -> WrenchLimit:
         best = start

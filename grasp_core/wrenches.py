@@ -49,7 +49,7 @@ def contact_frames(normals: Array) -> Array:
 
 
 def normal_and_tangential(forces: Array, normals: Array) -> tuple[Array, Array]:
-    """Normal components (k,) and lengths of the tangential parts (k,) of forces (k, 3)."""
-    along = np.einsum("ki,ki->k", forces, normals)
-    across = forces - along[:, None] * normals
-    return along, np.sqrt(np.einsum("ki,ki->k", across, across))
+    """Normal components (..., k) and lengths of the tangential parts (..., k) of (..., k, 3)."""
+    along = np.einsum("...i,...i->...", forces, normals)
+    across = forces - along[..., None] * normals
+    return along, np.sqrt(np.einsum("...i,...i->...", across, across))

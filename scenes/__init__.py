@@ -1,5 +1,6 @@
 """A grasp becomes a MuJoCo scene; the built-in example objects."""
 
+from scenes.fingertips import FingerSettings as FingerSettings
 from scenes.layout import Layout as Layout
 from scenes.mjcf import Scene as Scene
 from scenes.mjcf import build_scene as build_scene

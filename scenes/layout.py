@@ -15,11 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, to_digits
+from grasp_core.arrays import Array, Indices, positive, to_digits
 from grasp_core.closure import force_closure
-from grasp_core.errors import InputError, UndecidedError
+from grasp_core.errors import UndecidedError
+from grasp_core.on_faces import face_under
 from grasp_core.values import Contact, Grasp, Polyhedron
 from grasp_core.wrenches import contact_frames
+from scenes.fingertips import FingerSettings, fitting_radius
 
 RESPONSE_TIME_S = 0.07
 """Square root of mass x grasp size / largest normal force: 1 kg for 10 N and 5 cm, where the
@@ -31,10 +33,9 @@ LEAST_SIZE = 0.01
 """Smallest grasp size in object radii, for contacts that are nearly on one line."""
 SQUEEZE = 0.6
 """Largest normal force of the gentle grasp, in largest normal forces."""
-TIP_RADIUS = 0.1
 PAD_HALF_WIDTH = 0.2
 PAD_DEPTH = 0.1
-"""Fingertip radius and pad size, in object radii."""
+"""Pad size, in object radii."""
 FLAT = 1e-6
 """Share added to all moments of inertia: those of coplanar contacts are the limit of what a
 body can have, and rounding must not pass it."""
@@ -51,6 +52,10 @@ class FingerDrive:
     stiffness_n_per_m: float
     damping_n_s_per_m: float
     max_normal_force_n: float
+    rigid: bool
+    """Whether fingertips stay where they are put, whatever the numbers of the servos."""
+    indentation_m: float
+    """How far a rigid fingertip is put into its face."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,24 +80,27 @@ class Layout:
     """(k, 3) [m]"""
     frames: Array
     """Columns (inward normal, tangent, tangent) of each contact, (k, 3, 3)."""
+    borders: tuple[tuple[Array, ...], ...]
+    """Convex pieces of the face of each contact, (n, 3) each [m]; none if it is on no face."""
     friction: float
     drive: FingerDrive
     squeeze: Array
     """Forces of a gentle grasp, balanced where possible, in the contact frames, (k, 3) [N]."""
+    approach: Array
+    """Where fingers come from, relative to their contacts, (k, 3) [m]."""
 
     @property
     def tip_centers(self) -> Array:
-        """Centres of the fingertips touching the object, (k, 3) [m]."""
-        return self.contacts - self.drive.radius_m * self.frames[:, :, 0]
+        """Centres of the fingertips at their contacts, (k, 3) [m]."""
+        height = self.drive.radius_m - self.drive.indentation_m
+        return self.contacts - height * self.frames[:, :, 0]
 
 
 def arrange(
     body: Polyhedron,
     grasp: Grasp | Sequence[Contact],
     friction: float,
-    *,
-    max_normal_force: float = 10.0,
-    fingertip_radius: float | None = None,
+    fingers: FingerSettings | None = None,
 ) -> Layout:
     """Place object, fingertips and drives for a grasp.
 
@@ -100,45 +108,68 @@ def arrange(
         body: The object.
         grasp: A grasp, or contacts from elsewhere.
         friction: Coulomb coefficient at every contact.
-        max_normal_force: Limit of each finger's push [N].
-        fingertip_radius: [m]; a tenth of the object's radius when None.
+        fingers: How fingertips are built and driven.
 
     Raises:
-        InputError: A number is not positive.
+        InputError: The friction is not positive.
     """
+    fingers = fingers or FingerSettings()
     contacts = grasp.contacts if isinstance(grasp, Grasp) else tuple(grasp)
-    radius = body.radius
-    tip = TIP_RADIUS * radius if fingertip_radius is None else fingertip_radius
-    positive = {"friction": friction, "max_normal_force": max_normal_force, "fingertip_radius": tip}
-    for name, value in positive.items():
-        if not (np.isfinite(value) and value > 0.0):
-            raise InputError(f"{name} must be a positive number, got {value}")
+    positive(friction, "friction")
     normals = np.array([contact.normal for contact in contacts])
     positions = np.array([contact.position for contact in contacts])
-    size = max(grasp_size(positions), LEAST_SIZE * radius)
-    mass = max_normal_force * RESPONSE_TIME_S**2 / size
-    stiffness = STIFFNESS * max_normal_force / size
+    size = max(grasp_size(positions), LEAST_SIZE * body.radius)
+    largest = fingers.max_normal_force_n
+    mass = largest * RESPONSE_TIME_S**2 / size
     return Layout(
         name=body.name,
         vertices=body.vertices - body.center_of_mass,
         triangles=body.triangles,
-        radius_m=radius,
+        radius_m=body.radius,
         center=positions.mean(axis=0) - body.center_of_mass,
         grasp_size_m=size,
         mass_kg=mass,
         inertia_kg_m2=_inertia(mass, positions, size),
         contacts=positions - body.center_of_mass,
         frames=contact_frames(normals),
+        borders=tuple(_border(body, contact) for contact in contacts),
         friction=friction,
-        drive=FingerDrive(
-            radius_m=tip,
-            mass_kg=mass,
-            stiffness_n_per_m=stiffness,
-            damping_n_s_per_m=2.0 * float(np.sqrt(stiffness * mass)),
-            max_normal_force_n=max_normal_force,
-        ),
-        squeeze=SQUEEZE * max_normal_force * _pushes(positions, normals, friction),
+        drive=_drive(body, positions, normals, fingers, size),
+        squeeze=SQUEEZE * largest * _pushes(positions, normals, friction),
+        approach=-RETREAT * size * _ways_in(normals, fingers),
     )
+
+
+def _border(body: Polyhedron, contact: Contact) -> tuple[Array, ...]:
+    face = face_under(body, contact)
+    return () if face is None else tuple(piece - body.center_of_mass for piece in face.pieces)
+
+
+def _drive(
+    body: Polyhedron, positions: Array, normals: Array, fingers: FingerSettings, size: float
+) -> FingerDrive:
+    mass = fingers.mass_kg or fingers.max_normal_force_n * RESPONSE_TIME_S**2 / size
+    stiffness = fingers.stiffness_n_per_m or STIFFNESS * fingers.max_normal_force_n / size
+    radius = fingers.radius_m or fitting_radius(
+        positions, normals, body.vertices, body.triangles, body.radius
+    )
+    return FingerDrive(
+        radius_m=radius,
+        mass_kg=mass,
+        stiffness_n_per_m=stiffness,
+        damping_n_s_per_m=2.0 * math.sqrt(stiffness * mass),
+        max_normal_force_n=fingers.max_normal_force_n,
+        rigid=fingers.drive == "rigid",
+        indentation_m=fingers.indentation * size,
+    )
+
+
+def _ways_in(normals: Array, fingers: FingerSettings) -> Array:
+    """Unit directions in which the fingers arrive, (k, 3)."""
+    if fingers.approach is None:
+        return normals
+    way = np.asarray(fingers.approach, dtype=np.float64)
+    return np.broadcast_to(way / np.linalg.norm(way), normals.shape)
 
 
 def grasp_size(positions: Array) -> float:

@@ -4,26 +4,34 @@ The text is written here rather than by MuJoCo's own writer, which leaves out wh
 default (defaults move between releases) and rounds numbers. The object's mesh is for the
 eye. Contact happens between each fingertip and its own pad: a box on the object whose top
 is flush with the face at the contact, visible to that one finger only, so that normals are
-exact on any object, convex or not.
+exact on any object, convex or not. A convex object's own mesh can stand in for the pads, as a
+check that they are where its surface is.
 
 Fingers are spheres on three slides along (normal, tangent, tangent), each with a position
 servo: `ctrl = f / kp` makes it push with force f at its zero position, and the servo on the
-normal is limited to the largest normal force.
+normal is limited to the largest normal force. Rigid fingers have neither slides nor servos.
 """
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 from xml.etree import ElementTree
 
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.errors import InputError
 from grasp_core.values import Contact, Grasp, Polyhedron
-from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, RETREAT, Layout, arrange
-from scenes.physics import PhysicsSettings, flags
+from scenes.fingertips import FingerSettings
+from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, Layout, arrange
+from scenes.physics import PhysicsSettings
 
+Surface = Literal["pads", "mesh"]
+"""What fingertips touch: a pad each, or the convex hull of the object's mesh."""
 AXES = ("normal", "tangent1", "tangent2")
+FLUSH = 1e-6
+"""How far a vertex of a convex object may be in front of a face, in object radii."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +41,7 @@ class Scene:
     xml: str
     layout: Layout
     physics: PhysicsSettings
+    surface: Surface
 
 
 def build_scene(
@@ -40,9 +49,9 @@ def build_scene(
     grasp: Grasp | Iterable[Contact],
     friction: float = 0.5,
     *,
-    max_normal_force: float = 10.0,
-    fingertip_radius: float | None = None,
+    fingers: FingerSettings | None = None,
     physics: PhysicsSettings | None = None,
+    surface: Surface = "pads",
 ) -> Scene:
     """Turn a grasp into a MuJoCo scene.
 
@@ -50,20 +59,27 @@ def build_scene(
         body: The object.
         grasp: A grasp, or contacts from elsewhere.
         friction: Coulomb coefficient at every contact.
-        max_normal_force: Limit of each finger's push [N].
-        fingertip_radius: [m]; a tenth of the object's radius when None.
+        fingers: How fingertips are built and driven.
         physics: Simulation settings.
+        surface: What fingertips touch; `mesh` is for convex objects.
 
     Raises:
-        InputError: A number is out of range.
+        InputError: A number is out of range, or the mesh of an object that is not convex is to be
+            touched.
     """
+    if surface == "mesh" and not _is_convex(body):
+        raise InputError(f"{body.name} is not convex: fingertips would touch its hull; use pads")
     contacts = grasp if isinstance(grasp, Grasp) else tuple(grasp)
-    layout = arrange(
-        body, contacts, friction,
-        max_normal_force=max_normal_force, fingertip_radius=fingertip_radius,
-    )  # fmt: skip
+    layout = arrange(body, contacts, friction, fingers)
     physics = physics or PhysicsSettings()
-    return Scene(to_text(layout, physics), layout, physics)
+    return Scene(to_text(layout, physics, surface), layout, physics, surface)
+
+
+def _is_convex(body: Polyhedron) -> bool:
+    """Whether no vertex is in front of a face's plane."""
+    points = np.array([face.centroid for face in body.faces])
+    heights = np.einsum("fi,fvi->fv", body.normals, body.vertices - points[:, None, :])
+    return bool((heights >= -FLUSH * body.radius).all())
 
 
 def write_scene(scene: Scene, path: str | Path) -> Path:
@@ -73,12 +89,12 @@ def write_scene(scene: Scene, path: str | Path) -> Path:
     return path
 
 
-def to_text(layout: Layout, physics: PhysicsSettings) -> str:
+def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads") -> str:
     """The MJCF text of a layout: the same text for the same layout."""
     root = ElementTree.Element("mujoco", model=_plain(layout.name))
     _add(root, "compiler", {"angle": "radian", "autolimits": "false", "inertiafromgeom": "false"})
     option = _add(root, "option", physics.options())
-    _add(option, "flag", flags())
+    _add(option, "flag", physics.flags())
     _add(root, "statistic", {"extent": 3.0 * layout.radius_m, "center": (0.0, 0.0, 0.0)})
     assets = _add(root, "asset", {})
     mesh = {"name": "object", "inertia": "shell"}
@@ -88,18 +104,21 @@ def to_text(layout: Layout, physics: PhysicsSettings) -> str:
     world = _add(root, "worldbody", {})
     light = {"pos": (0.0, 0.0, 8.0 * layout.radius_m), "dir": (0.0, 0.0, -1.0)}
     _add(world, "light", light | {"type": "directional"})
-    _object(world, layout, physics)
+    _object(world, layout, physics, surface)
     for finger in range(len(layout.contacts)):
         _finger(world, layout, physics, finger)
-    actuators = _add(root, "actuator", {})
-    for finger in range(len(layout.contacts)):
-        _servos(actuators, layout, finger)
-    _keyframes(root, layout)
+    if not layout.drive.rigid:
+        actuators = _add(root, "actuator", {})
+        for finger in range(len(layout.contacts)):
+            _servos(actuators, layout, finger)
+        _keyframes(root, layout)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _object(world: ElementTree.Element, layout: Layout, physics: PhysicsSettings) -> None:
+def _object(
+    world: ElementTree.Element, layout: Layout, physics: PhysicsSettings, surface: Surface
+) -> None:
     body = _add(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)})
     _add(body, "freejoint", {"name": "object"})
     inertia = layout.inertia_kg_m2[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
@@ -108,12 +127,14 @@ def _object(world: ElementTree.Element, layout: Layout, physics: PhysicsSettings
         "inertial",
         {"pos": layout.center, "mass": layout.mass_kg, "fullinertia": inertia},
     )
-    _add(
-        body,
-        "geom",
-        {"name": "object", "type": "mesh", "mesh": "object", "contype": 0, "conaffinity": 0,
-         "group": 1, "rgba": (0.55, 0.62, 0.70, 0.6), "mass": 0.0},
-    )  # fmt: skip
+    hull = {"name": "object", "type": "mesh", "mesh": "object", "conaffinity": 0,
+            "group": 1, "rgba": (0.55, 0.62, 0.70, 0.6), "mass": 0.0}  # fmt: skip
+    if surface == "mesh":
+        touched = {"contype": (1 << len(layout.contacts)) - 1}
+        friction = {"friction": (layout.friction, 0.0, 0.0)}
+        _add(body, "geom", hull | touched | friction | physics.contact())
+        return
+    _add(body, "geom", hull | {"contype": 0})
     width, depth = PAD_HALF_WIDTH * layout.radius_m, PAD_DEPTH * layout.radius_m
     for finger, (point, frame) in enumerate(zip(layout.contacts, layout.frames, strict=True)):
         outward = np.column_stack([frame[:, 2], frame[:, 1], -frame[:, 0]])
@@ -139,7 +160,8 @@ def _finger(
     drive = layout.drive
     pose = {"pos": layout.tip_centers[finger], "quat": quaternion(layout.frames[finger])}
     body = _add(world, "body", {"name": f"finger{finger}", "gravcomp": 1.0} | pose)
-    for axis, direction in zip(AXES, np.eye(3), strict=True):
+    slides = () if drive.rigid else tuple(zip(AXES, np.eye(3), strict=True))
+    for axis, direction in slides:
         _add(
             body,
             "joint",
@@ -189,7 +211,7 @@ def _keyframes(root: ElementTree.Element, layout: Layout) -> None:
     fingers = len(layout.contacts)
     home = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], np.zeros(3 * fingers)])
     away = home.copy()
-    away[7::3] = -RETREAT * layout.grasp_size_m
+    away[7:] = np.einsum("kij,ki->kj", layout.frames, layout.approach).ravel()
     push = layout.squeeze / layout.drive.stiffness_n_per_m
     keys = _add(root, "keyframe", {})
     _add(keys, "key", {"name": "approach", "qpos": away, "ctrl": push.ravel()})

@@ -7,12 +7,20 @@ friction to normal impedance (resting contacts otherwise creep), hard and consta
 impedance, and a dense Jacobian (the sparse Newton solver of MuJoCo 4.0.0 has a bug).
 """
 
+import math
 from dataclasses import asdict, dataclass
+
+from grasp_core.arrays import positive
+from grasp_core.errors import InputError
 
 
 @dataclass(frozen=True, slots=True)
 class PhysicsSettings:
-    """Options of the simulation, named as in MJCF."""
+    """Options of the simulation, named as in MJCF.
+
+    Raises:
+        InputError: A number is not finite, or one that must be positive is not.
+    """
 
     timestep: float = 0.002
     """[s]"""
@@ -44,11 +52,29 @@ class PhysicsSettings:
     """Three: a hard fingertip transmits no torsion."""
     margin: float = 0.0
     gap: float = 0.0
+    autoreset: bool = False
+    """After a blow-up MuJoCo would silently return to the start, which looks perfectly stable."""
+    diagexact: bool = False
+    """Contact impedances from the exact inertia that each contact sees."""
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            numbers = value if isinstance(value, tuple) else (value,)
+            if not all(isinstance(number, str) or math.isfinite(number) for number in numbers):
+                raise InputError(f"{name} must be finite, got {value}")
+        for name in ("timestep", "impratio", "iterations"):
+            positive(getattr(self, name), name)
 
     def options(self) -> dict[str, float | int | str | tuple[float, ...]]:
         """What goes into MJCF's `option` element."""
-        contact = ("solref", "solimp", "condim", "margin", "gap")
-        return {name: value for name, value in asdict(self).items() if name not in contact}
+        elsewhere = (*CONTACT_SETTINGS, *CHOSEN_FLAGS)
+        return {name: value for name, value in asdict(self).items() if name not in elsewhere}
+
+    def flags(self) -> dict[str, str]:
+        """All flags of MJCF's `flag` element, so that no default matters."""
+        on = {*ENABLED_FLAGS, *(name for name in CHOSEN_FLAGS if getattr(self, name))}
+        names = (*ENABLED_FLAGS, *CHOSEN_FLAGS, *UNUSED_FLAGS)
+        return {name: "enable" if name in on else "disable" for name in names}
 
     def contact(self) -> dict[str, float | int | str | tuple[float, ...]]:
         """What goes onto each geom that makes contact."""
@@ -61,24 +87,14 @@ class PhysicsSettings:
         }
 
 
-DISABLED_FLAGS = ("autoreset",)
-"""After a blow-up MuJoCo would silently return to the start, which looks perfectly stable."""
+CONTACT_SETTINGS = ("solref", "solimp", "condim", "margin", "gap")
+CHOSEN_FLAGS = ("autoreset", "diagexact")
 ENABLED_FLAGS = (
     "constraint", "equality", "frictionloss", "limit", "contact", "spring", "damper", "gravity",
     "clampctrl", "warmstart", "filterparent", "actuation", "refsafe", "sensor", "midphase",
     "nativeccd", "island", "eulerdamp", "multiccd",
 )  # fmt: skip
 UNUSED_FLAGS = (
-    "override", "energy", "fwdinv", "invdiscrete", "sleep", "diagexact", "ipc", "speculative",
+    "override", "energy", "fwdinv", "invdiscrete", "sleep", "ipc", "speculative",
 )  # fmt: skip
 """Off by default and kept off; a sleeping body would hide drift."""
-
-
-def flags() -> dict[str, str]:
-    """All flags of MJCF's `flag` element, so that no default matters."""
-    states = dict[str, str]()
-    for name in ENABLED_FLAGS:
-        states[name] = "enable"
-    for name in (*DISABLED_FLAGS, *UNUSED_FLAGS):
-        states[name] = "disable"
-    return states

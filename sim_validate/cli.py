@@ -12,30 +12,24 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
-from pydantic import AfterValidator, Field
 from pydantic.dataclasses import dataclass
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, UseAppendAction, arg
 
-from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError
+from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError, UnfaithfulError
 from sim_validate.config_file import with_config
 from sim_validate.engines import available_cores
+from sim_validate.flags import (
+    Count,
+    Edges,
+    Fingers,
+    Planning,
+    Positive,
+    Seed,
+    Speech,
+    Testing,
+    Wrench,
+)
 
-
-def _not_zero(values: tuple[float, ...]) -> tuple[float, ...]:
-    if not any(values):
-        raise ValueError("must not be zero: every multiple of that is resisted")
-    return values
-
-
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=1)]
-Seed = Annotated[int, Field(ge=0, lt=2**64)]
-Edges = Annotated[int, Field(ge=3)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Wrench = Annotated[
-    tuple[Finite, Finite, Finite, Finite, Finite, Finite],
-    AfterValidator(_not_zero),
-]
 RUN_LIMIT = 100
 """How many grasps `run` tests unless told otherwise: some ten seconds."""
 
@@ -54,59 +48,6 @@ class Exit(IntEnum):
     """No grasp exists."""
     PARTIAL = 6
     INTERRUPTED = 130
-
-
-@dataclass(frozen=True)
-class Speech:
-    """How much to say, and in which form."""
-
-    json: bool = False
-    """Print one JSON document on standard output, everything else on standard error."""
-    quiet: Annotated[bool, arg(aliases=["-q"])] = False
-    """Say nothing but errors."""
-    verbose: Annotated[bool, arg(aliases=["-v"])] = False
-    """Say more."""
-
-
-@dataclass(frozen=True)
-class Planning:
-    """What to plan."""
-
-    friction: Positive = 0.5
-    """Coulomb coefficient at every contact."""
-    theta_deg: Positive | None = None
-    """Half-angle of the friction cones to plan with [deg]; the friction angle if not given."""
-    family: UseAppendAction[tuple[Literal["concurrent", "pencil", "regulus", "free"], ...]] = ()
-    """Construction to try, may be repeated; the first three if not given. `free` looks for grasps
-    of any type on any four faces; for the others it proves that there is none, or says that it
-    is undecided."""
-    limit: Count | None = None
-    """Keep at most this many grasps, the best of each family in turn; None for all."""
-    cells: Count = 1
-    """Into how many parts the free method may cut the four faces where it is undecided."""
-    optimize: bool = False
-    """Move the contacts of each grasp on their faces to raise its Ferrari-Canny quality."""
-    finger_radius_m: Positive | None = None
-    """How far optimised contacts stay from edges [m], or half the radius of the largest disc in a
-    face if that is less. If not given, a twentieth of the object's radius, or as far as the planned
-    contact on that face."""
-    ceiling: Count | None = None
-    """With --optimize: also prove an upper bound of the quality of all contacts on the same faces
-    that are as clear of edges, cut into so many parts at most."""
-    seed: Seed = 0
-    """For everything random."""
-    unit: Literal["m", "cm", "mm", "in"] = "m"
-    """What one unit in a mesh file is."""
-
-
-@dataclass(frozen=True)
-class Testing:
-    """How to simulate."""
-
-    max_normal_force: Positive = 10.0
-    """Limit of each finger's push [N]."""
-    jobs: Count = field(default_factory=available_cores)
-    """Largest number of processes; results do not depend on it."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +88,7 @@ class Validate:
     limit: Count | None = None
     """Test only the first so many."""
     seed: Seed | None = None
-    """For moving contacts in controls; the plan's if not given."""
+    """For random wrenches and moved contacts; the plan's if not given."""
     testing: OmitArgPrefixes[Testing] = field(default_factory=Testing)
     speech: OmitArgPrefixes[Speech] = Speech()
     out: Path | None = None
@@ -164,8 +105,9 @@ class Scene:
     """Id of one grasp; all of them if not given."""
     friction: Positive | None = None
     """Coulomb coefficient; the one planned for if not given."""
-    max_normal_force: Positive = 10.0
-    """Limit of each finger's push [N]."""
+    fingers: OmitArgPrefixes[Fingers] = Fingers()
+    surface: Literal["pads", "mesh"] = "pads"
+    """What fingertips touch: a pad each, exact on any object, or a convex object's own mesh."""
     speech: OmitArgPrefixes[Speech] = Speech()
     out: Path | None = None
     """Folder for the scenes; a single scene is printed if not given."""
@@ -271,7 +213,8 @@ def _reason(error: GraspError | OSError) -> str:
 
 
 def _code(error: GraspError | OSError) -> Exit:
-    return Exit.INTERNAL if isinstance(error, (SolverError, UndecidedError)) else Exit.INPUT
+    ours = (SolverError, UndecidedError, UnfaithfulError)
+    return Exit.INTERNAL if isinstance(error, ours) else Exit.INPUT
 
 
 def _complain(message: str, code: Exit) -> int:

@@ -2,8 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, cast
 
@@ -15,25 +14,24 @@ from grasp_core.planner import MAX_FACES, plan
 from grasp_core.ranking import LEAST_SPAN_ANGLE
 from grasp_core.records import SavedGrasps, grasps_from_json, plan_to_json
 from grasp_core.spanning import spanning_quadruples
-from grasp_core.values import Grasp, Polyhedron
 from grasp_core.versions import versions
 from scenes.mjcf import build_scene
 from scenes.objects import example_names, example_object
 from sim_validate import cli
 from sim_validate.analyze_command import analyze_file
-from sim_validate.console import TABLE_ROWS, Reporter
-from sim_validate.engines import each
+from sim_validate.console import Reporter
 from sim_validate.files import read_text, remove_results, write_text
+from sim_validate.gate import measured_gate
 from sim_validate.improving import show_gains
 from sim_validate.plan_command import (
     load_object,
     plan_file,
     plan_object,
     say_counts,
-    say_cut,
 )
-from sim_validate.validation import Verdict, validate
-from sim_validate.verdict_records import summary, verdicts_to_json
+from sim_validate.setup import Setup
+from sim_validate.validate_command import finger_settings, simulate_grasps, validate_file
+from sim_validate.validation import validate
 
 
 def execute(command: cli.Command) -> int:
@@ -56,13 +54,12 @@ def _run(command: cli.Run, reporter: Reporter) -> int:
         return cli.Exit.NONE
     if moves:
         show_gains(moves, reporter)
+    fingers, surface = finger_settings(command.testing.fingers), command.testing.surface
     for grasp in found.grasps:
-        scene = build_scene(
-            body, grasp, found.friction, max_normal_force=command.testing.max_normal_force
-        )
+        scene = build_scene(body, grasp, found.friction, fingers=fingers, surface=surface)
         write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
     saved = SavedGrasps(body, found.friction, found.seed, found.grasps)
-    code = _test(saved, command.testing, folder, reporter)
+    code = simulate_grasps(saved, command.testing, folder, reporter)
     reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
     return code
 
@@ -70,87 +67,6 @@ def _run(command: cli.Run, reporter: Reporter) -> int:
 def _folder_name(name: str) -> str:
     """A file name that is one plain part of a path."""
     return re.sub(r"[^\w-]+", "_", name) or "object"
-
-
-def _validate(command: cli.Validate, reporter: Reporter) -> int:
-    saved = grasps_from_json(read_text(command.grasps))
-    if not saved.grasps:
-        absence = f"{command.grasps} holds no grasp"
-        reporter.say(absence)
-        reporter.document({"absence": absence})
-        return cli.Exit.NONE
-    chosen = SavedGrasps(
-        saved.body,
-        saved.friction if command.friction is None else command.friction,
-        saved.seed if command.seed is None else command.seed,
-        saved.grasps[: command.limit],
-    )
-    return _test(chosen, command.testing, command.out, reporter)
-
-
-@dataclass(frozen=True, slots=True)
-class _Trial:
-    """One grasp to validate, as it travels to a worker."""
-
-    body: Polyhedron
-    grasp: Grasp
-    friction: float
-    max_normal_force: float
-    seed: int
-
-
-def _try(trial: _Trial) -> Verdict:
-    return validate(
-        trial.body, trial.grasp, trial.friction,
-        max_normal_force=trial.max_normal_force, seed=trial.seed,
-    )  # fmt: skip
-
-
-def _test(saved: SavedGrasps, testing: cli.Testing, folder: Path | None, reporter: Reporter) -> int:
-    """Validate grasps, write what is done even when interrupted, and show the verdicts."""
-    trials = [
-        _Trial(saved.body, grasp, saved.friction, testing.max_normal_force, saved.seed)
-        for grasp in saved.grasps
-    ]
-    verdicts: list[Verdict] = []
-    try:
-        with reporter.progress("simulating") as steps:
-            for verdict in each(_try, trials, jobs=testing.jobs):
-                verdicts.append(verdict)
-                held = sum(verdict.held for verdict in verdicts)
-                steps.update(len(verdicts), len(trials), f"({held} held)")
-    finally:
-        complete = len(verdicts) == len(trials)
-        text = verdicts_to_json(saved.body, saved.friction, verdicts, complete=complete)
-        if folder and verdicts:
-            write_text(folder / "verdicts.json", text)
-    if reporter.json_only:
-        print(text, end="")  # noqa: T201 - the document itself
-    _show(saved.grasps, verdicts, reporter)
-    good = all(verdict.held and verdict.controls_failed for verdict in verdicts)
-    return cli.Exit.GOOD if good else cli.Exit.NEGATIVE
-
-
-def _show(grasps: Sequence[Grasp], verdicts: Sequence[Verdict], reporter: Reporter) -> None:
-    rows: list[tuple[str, ...]] = []
-    for grasp, verdict in zip(grasps[:TABLE_ROWS], verdicts, strict=False):
-        worst = max(trial.hold.displacement_m for trial in verdict.wrenches)
-        held = sum(control.held for control in verdict.controls)
-        rows.append(
-            (grasp.id, grasp.family, f"{1e3 * grasp.radius:.3g}",
-             f"{verdict.critical_friction.predicted:.4f}", verdict.outcome.value,
-             f"{1e6 * worst:.2g}", f"{held}/{len(verdict.controls)} held")
-        )  # fmt: skip
-    columns = ("grasp", "family", "radius mm", "mu*", "simulated", "moved um", "controls")
-    reporter.table("verdicts", columns, rows)
-    say_cut(len(verdicts), reporter)
-    totals = summary(verdicts)
-    reporter.say(
-        f"{totals['grasps_held']} of {totals['grasps']} grasps held all wrenches; "
-        f"{totals['controls_held']} of {totals['controls']} negative controls held (none should)"
-    )
-    if not totals["controls"]:
-        reporter.warn("there were no negative controls: nothing shows that this test can fail")
 
 
 def _scene(command: cli.Scene, reporter: Reporter) -> int:
@@ -164,7 +80,10 @@ def _scene(command: cli.Scene, reporter: Reporter) -> int:
     friction = saved.friction if command.friction is None else command.friction
     written: list[str] = []
     for grasp in chosen:
-        scene = build_scene(saved.body, grasp, friction, max_normal_force=command.max_normal_force)
+        scene = build_scene(
+            saved.body, grasp, friction,
+            fingers=finger_settings(command.fingers), surface=command.surface,
+        )  # fmt: skip
         if command.out is not None:
             written.append(str(write_text(command.out / f"{grasp.id}.xml", scene.xml)))
             reporter.say(f"wrote {written[-1]}")
@@ -224,12 +143,14 @@ def _doctor(_: cli.Doctor, reporter: Reporter) -> int:
     """Plan and validate the tetrahedron, whose answers are known in closed form."""
     body = example_object("tetrahedron")
     grasp = plan(body).grasps[0]
+    gate = measured_gate(Setup())
     verdict = validate(body, grasp)
     cone = math.tan(grasp.force_cones[0].half_angle) * math.cos(math.pi / PYRAMID_SIDES)
     checks = {
         "linear programs": math.isclose(3.0 * grasp.radius / body.radius, cone, rel_tol=1e-6),
         "conic programs": force_closure(grasp).verify(),
         "critical friction": critical_friction(grasp) == 0.0,
+        **{f"gate: {check.name}": check.passed for check in gate.checks},
         "simulated grasp holds": verdict.held,
         "simulated controls do not": verdict.controls_failed and bool(verdict.controls),
     }
@@ -244,7 +165,7 @@ def _doctor(_: cli.Doctor, reporter: Reporter) -> int:
 ACTIONS: dict[type[Any], Callable[[Any, Reporter], int]] = {
     cli.Run: _run,
     cli.Plan: plan_file,
-    cli.Validate: _validate,
+    cli.Validate: validate_file,
     cli.Scene: _scene,
     cli.Analyze: analyze_file,
     cli.Inspect: _inspect,

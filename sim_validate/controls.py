@@ -6,15 +6,16 @@ within the cones can oppose that wrench, whatever the fingers do.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure import ClosureCertificate, force_closure
-from grasp_core.errors import UndecidedError
+from grasp_core.errors import SolverError, UndecidedError
 from grasp_core.values import Contact, Grasp, Polyhedron
+from sim_validate.uncorrected import uncorrected_contacts
 
 FRICTION_SHARE = 0.9
 """Share of the critical friction that the low-friction control gets."""
@@ -45,12 +46,19 @@ class Control:
 def negative_controls(
     body: Polyhedron, grasp: Grasp, friction: float, seed: int
 ) -> tuple[Control, ...]:
-    """The controls that exist for a grasp: low friction, fingers removed, contacts moved."""
+    """The controls that exist for a grasp, one of each kind at most.
+
+    Friction below the critical one, fingers removed, a normal flipped, contacts moved on their
+    faces, which takes them out of the grasp's region, and the paper's uncorrected constructions on
+    the same faces.
+    """
     rng = np.random.default_rng(seed)
     candidates = (
         _low_friction(grasp),
         _fingers_removed(grasp, friction),
+        _normal_flipped(grasp, friction),
         _contacts_moved(body, grasp, friction, rng),
+        _uncorrected(body, grasp, friction),
     )
     return tuple(found for tries in candidates if (found := next(tries, None)) is not None)
 
@@ -66,6 +74,23 @@ def _fingers_removed(grasp: Grasp, friction: float) -> Iterator[Control]:
     for count in (3, 2):
         for rest in combinations(grasp.contacts, count):
             yield from _refuted("fingers_removed", rest, friction)
+
+
+def _normal_flipped(grasp: Grasp, friction: float) -> Iterator[Control]:
+    """A finger that pulls where it should push, as with a normal of the wrong sign in a file."""
+    for finger, contact in enumerate(grasp.contacts):
+        contacts = list(grasp.contacts)
+        contacts[finger] = replace(contact, normal=-contact.normal)
+        yield from _refuted("normal_flipped", contacts, friction)
+
+
+def _uncorrected(body: Polyhedron, grasp: Grasp, friction: float) -> Iterator[Control]:
+    """Contacts that the paper's programs as printed call a grasp, though they are none."""
+    try:
+        for supposed, contacts in uncorrected_contacts(body, grasp, friction):
+            yield from _refuted("uncorrected", contacts, supposed)
+    except SolverError:
+        return
 
 
 def _contacts_moved(

@@ -21,6 +21,11 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def processes(units: int, jobs: int) -> int:
+    """How many processes so many units are worth, at least one."""
+    return max(1, min(jobs, units // UNITS_PER_PROCESS))
+
+
 def each(
     function: Callable[[Unit], Result], units: Sequence[Unit], *, jobs: int
 ) -> Iterator[Result]:
@@ -31,13 +36,13 @@ def each(
         units: What to do.
         jobs: Largest number of processes.
     """
-    processes = min(jobs, len(units) // UNITS_PER_PROCESS)
-    if processes <= 1:
+    workers = processes(len(units), jobs)
+    if workers <= 1:
         yield from map(function, units)
         return
     pebble: Any = importlib.import_module("pebble")
     context = importlib.import_module("multiprocessing").get_context("spawn")
-    with pebble.ProcessPool(max_workers=processes, context=context) as pool:
+    with pebble.ProcessPool(max_workers=workers, context=context) as pool:
         future = pool.map(function, units)
         try:
             yield from future.result()

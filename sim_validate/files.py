@@ -1,9 +1,15 @@
-"""Text files in and out: whole or not at all."""
+"""Files in and out: whole or not at all."""
 
+import io
 import os
 import tempfile
+import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
+from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 
 MAX_TEXT_BYTES = 256 * 2**20
@@ -27,12 +33,29 @@ def read_text(path: Path) -> str:
 
 def write_text(path: Path, text: str) -> Path:
     """Write a file by renaming a complete one into place; folders are made as needed."""
+    return _write(path, text.encode())
+
+
+def write_arrays(path: Path, arrays: Mapping[str, Array]) -> Path:
+    """Write arrays by name, compressed, as `numpy.load` reads them."""
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, array in arrays.items():
+            member = zipfile.ZipInfo(
+                f"{name}.npy"
+            )  # of no date, so that equal arrays give equal files
+            with archive.open(member, "w") as stream:
+                np.lib.format.write_array(stream, array, allow_pickle=False)
+    return _write(path, held.getvalue())
+
+
+def _write(path: Path, data: bytes) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     temporary = Path(name)
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
             stream.flush()
             os.fsync(stream.fileno())
         temporary.chmod(0o644)
@@ -45,6 +68,7 @@ def write_text(path: Path, text: str) -> Path:
 
 def remove_results(folder: Path) -> None:
     """Remove the verdicts and scenes of an earlier run, which would contradict the new grasps."""
-    old = [folder / "verdicts.json", *folder.glob("scenes/[cprf]-*-*-*-*.xml")]
+    old = [folder / "verdicts.json", *folder.glob("scenes/[cprf]-*-*-*-*.xml"),
+           *folder.glob("traces/[cprf]-*-*-*-*.npz")]  # fmt: skip
     for path in old:
         path.unlink(missing_ok=True)

@@ -10,7 +10,7 @@ from grasp_core.plans import Plan
 from grasp_core.records import Moved, plan_to_json
 from grasp_core.values import Polyhedron
 from scenes.objects import example_object
-from sim_validate import cli
+from sim_validate import cli, flags
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.files import write_text
 from sim_validate.improving import improved, show_gains
@@ -27,7 +27,7 @@ def load_object(name: str, unit: str) -> Polyhedron:
 
 
 def plan_object(
-    name: str, planning: cli.Planning, jobs: int, reporter: Reporter
+    name: str, planning: flags.Planning, jobs: int, reporter: Reporter
 ) -> tuple[Polyhedron, Plan, tuple[Moved, ...]]:
     """The object, its grasps, moved if that is asked for, and how they were moved.
 

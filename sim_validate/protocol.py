@@ -4,9 +4,18 @@ Wrench hold. The fingers squeeze with planned forces while friction is raised, s
 transients of loading cannot slip a contact that would hold at rest. Then the wrench and the
 forces planned for it are applied together, things settle, friction is lowered to the value
 under test, and the object must stay where it is.
+
+Largest wrench. Either holds at several shares of the predicted limit (bisection), or one slow
+rise through it (ramp): the object lets go where it has moved by a threshold. The mass must first
+be accelerated, so a ramp finds the limit late, never early.
+
+Critical friction. Fingers squeeze the unloaded object with the forces that balance at the
+predicted critical friction, friction is lowered to a trial value, and the object must stay;
+the trial value is bisected.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
 from grasp_core.errors import InputError
@@ -51,9 +60,63 @@ class HoldProtocol:
     """A fingertip farther than this from its face has lost contact, in grasp sizes."""
 
     def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
-            if not (math.isfinite(value) and value > 0.0):
-                raise InputError(f"{name} must be a positive number, got {value}")
+        _check_positive(asdict(self))
         for name in ("load_share", "least_normal_share"):
             if getattr(self, name) >= 1.0:
                 raise InputError(f"{name} must be below 1, got {getattr(self, name)}")
+
+
+@dataclass(frozen=True, slots=True)
+class LimitProtocol:
+    """How the largest resisted wrench is found, relative to the predicted one.
+
+    Raises:
+        InputError: A number is not positive and finite.
+    """
+
+    spans: tuple[float, ...] = (0.02, 0.1, 0.5)
+    """The limit is sought this far around the predicted one, farther while it is not there."""
+    ramp_s: float = 0.5
+    """Duration of one rise through the span."""
+    ramp_threshold: float = 2e-5
+    """Displacement that ends a ramp, in grasp sizes: less than in a hold, as nothing else moves
+    the object meanwhile."""
+    rounds: int = 4
+    """Halvings of the span by bisection."""
+
+    def __post_init__(self) -> None:
+        _check_positive(asdict(self))
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionProtocol:
+    """How the critical friction is found, relative to the predicted one.
+
+    Raises:
+        InputError: A number is not positive and finite.
+    """
+
+    spans: tuple[float, ...] = (0.01, 0.1, 0.5)
+    """The critical friction is sought this far around the predicted one, farther while it is not
+    there."""
+    rounds: int = 4
+    """Halvings of the span by bisection."""
+    settling_friction: float = 5.0
+    """Friction while squeezing, relative to the predicted critical friction."""
+    least_friction: float = 1e-3
+    """Where the prediction is smaller, it is only tried whether this holds."""
+    settle_s: float = 0.10
+    hold_s: float = 0.40
+    threshold: float = 1e-5
+    """Largest displacement while holding, in grasp sizes: the servos hide an imbalance of five
+    hundred-thousandths of the largest normal force."""
+
+    def __post_init__(self) -> None:
+        _check_positive(asdict(self))
+
+
+def _check_positive(numbers: Mapping[str, float | tuple[float, ...]]) -> None:
+    for name, value in numbers.items():
+        each = value if isinstance(value, tuple) else (value,)
+        if not all(math.isfinite(number) and number > 0.0 for number in each):
+            raise InputError(f"{name} must be a positive number, got {value}")

@@ -1,80 +1,60 @@
 """A grasp and its negative controls, from analysis through simulation to a verdict.
 
 For each test wrench the analysis predicts the largest multiple that is resisted; a share of
-it is applied in simulation, with forces planned to need the least friction. The grasp is
-confirmed when all wrenches hold, and the run can be trusted when no control does.
+it is applied in simulation, with forces between those at rest and those at the limit. The
+critical friction is found in simulation too, and on request the limits. The grasp is confirmed
+when all wrenches hold, and the run can be trusted when the simulator is faithful (`gate`) and no
+control holds.
 """
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grasp_core.arrays import Array, to_digits
+from grasp_core.arrays import Array
 from grasp_core.closure import force_closure
 from grasp_core.critical import critical_friction
 from grasp_core.errors import InputError
-from grasp_core.forces import closest_forces, least_friction_forces
 from grasp_core.on_faces import check_on_faces
-from grasp_core.resisted_wrenches import WrenchBody, axis_wrenches
-from grasp_core.values import Contact, Grasp, Polyhedron, contact_frictions
+from grasp_core.values import Grasp, Polyhedron
+from scenes.fingertips import clashes
 from scenes.mjcf import Scene, build_scene
-from scenes.physics import PhysicsSettings
-from sim_validate.controls import Control, negative_controls
-from sim_validate.protocol import HoldProtocol
-from sim_validate.simulate import Bench, Load
-from sim_validate.verdict import HoldVerdict, Outcome, judge
-
-AXIS_NAMES = tuple(
-    f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"
-)
-WEAKEST = "weakest"
-SEPARATING = "separating"
-"""The wrench that a control's certificate says is not resisted."""
-UNLOADED = "unloaded"
+from sim_validate.control_trials import ControlVerdict, try_control
+from sim_validate.controls import negative_controls
+from sim_validate.gate import Gate, require_faithful
+from sim_validate.independent import Bounds, independent_bounds
+from sim_validate.limits import SimulatedLimit, bisected_limits, ramped_limits
+from sim_validate.loads import PlannedLoad, planned_loads
+from sim_validate.released import CriticalFriction, released_friction
+from sim_validate.rig import Rig, squeezed
+from sim_validate.rules import FORCE_AXES, accepted, rules_named
+from sim_validate.setup import Agenda, Setup
+from sim_validate.simulate import Bench
+from sim_validate.traces import Trace
+from sim_validate.verdict import HoldVerdict, Outcome, invalid_start, judge
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WrenchVerdict:
-    """One wrench hold, predicted and simulated."""
+    """One wrench, predicted and simulated."""
 
     name: str
     wrench: Array
     """Applied external wrench, (6,) [N, N m], torque about the centre of mass."""
     predicted_limit: float
     """Largest multiple of the applied wrench that the analysis says is resisted."""
-    required_friction: float | None
-    """What the planned forces need; None where no forces balance the wrench."""
+    required_friction: float
+    """What the planned forces need."""
     hold: HoldVerdict
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ControlVerdict:
-    """A contact set proved not to be force-closed, and what the simulator made of it."""
-
-    control: Control
-    tried: tuple[WrenchVerdict, ...]
-    """Loads that no contact forces can balance."""
+    simulated_limit: SimulatedLimit | None = None
+    """Where the object lets go, in predicted limits; None if not measured, or not found."""
+    trace: Trace | None = None
 
     @property
-    def held(self) -> bool:
-        """Whether any of them held: none must."""
-        return any(trial.hold.outcome is Outcome.HELD for trial in self.tried)
-
-    @property
-    def failed(self) -> bool:
-        """Whether all of them ended as they must, by the object moving."""
-        moved = (Outcome.SLIPPED, Outcome.LOST_CONTACT, Outcome.INVALID_START)
-        return all(trial.hold.outcome in moved for trial in self.tried)
-
-
-@dataclass(frozen=True, slots=True)
-class CriticalFriction:
-    """Where the analysis puts the least friction, and where simulation finds it."""
-
-    predicted: float
-    simulated: float | None = None
-    """None where it was not measured."""
+    def as_predicted(self) -> bool:
+        """Whether it held just if the analysis says so."""
+        return (self.hold.outcome is Outcome.HELD) == (self.predicted_limit > 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,11 +62,18 @@ class Verdict:
     """What simulation says about a grasp."""
 
     id: str
+    friction: float
     critical_friction: CriticalFriction
     wrenches: tuple[WrenchVerdict, ...]
     controls: tuple[ControlVerdict, ...]
+    bounds: Bounds | None
+    """What was found without planned forces, if asked for."""
+    accepted_by: dict[str, bool]
+    """What rules of other tools say, by name."""
+    gate: Gate
     scene: Scene
-    protocol: HoldProtocol
+    setup: Setup
+    agenda: Agenda
 
     @property
     def outcome(self) -> Outcome:
@@ -104,16 +91,34 @@ class Verdict:
         """Whether the simulator let go of every control."""
         return all(control.failed for control in self.controls)
 
+    @property
+    def mismatches(self) -> tuple[str, ...]:
+        """Where simulation contradicts the analysis, in words."""
+        found = [f"{trial.name}: {trial.hold.outcome.value}, though the predicted limit is "
+                 f"{trial.predicted_limit:.4g} times the wrench"
+                 for trial in self.wrenches if not trial.as_predicted]  # fmt: skip
+        if self.agenda.critical_friction and self.critical_friction.simulated is None:
+            found.append("critical friction: not found near the predicted one")
+        if self.agenda.limits != "none":
+            found += [f"{trial.name}: the limit was not found near the predicted one"
+                      for trial in self.wrenches if trial.simulated_limit is None]  # fmt: skip
+        if self.bounds is not None and not self.bounds.agree(self.critical_friction.predicted):
+            found.append("bounds found without planned forces are on the wrong side")
+        return tuple(found)
 
-def validate(  # noqa: PLR0913 - the circumstances of a trial
+    @property
+    def good(self) -> bool:
+        """Whether every wrench held, every control was let go, and nothing was contradicted."""
+        return self.held and self.controls_failed and not self.mismatches
+
+
+def validate(
     body: Polyhedron,
     grasp: Grasp,
     friction: float = 0.5,
     *,
-    max_normal_force: float = 10.0,
-    protocol: HoldProtocol | None = None,
-    physics: PhysicsSettings | None = None,
-    seed: int = 0,
+    agenda: Agenda | None = None,
+    setup: Setup | None = None,
 ) -> Verdict:
     """Test a grasp and its negative controls in simulation.
 
@@ -121,101 +126,115 @@ def validate(  # noqa: PLR0913 - the circumstances of a trial
         body: The object.
         grasp: A grasp in force closure at this friction.
         friction: Coulomb coefficient at every contact.
-        max_normal_force: Limit of each finger's push [N].
-        protocol: Durations, loads and thresholds.
-        physics: Simulation settings.
-        seed: Chooses how contacts are moved for a negative control.
+        agenda: Which trials.
+        setup: How they are simulated.
 
     Raises:
         InputError: The contacts are not on the body's faces, or not closed at this friction.
+        UnfaithfulError: The simulator fails the gate with these settings.
     """
+    agenda, setup = agenda or Agenda(), setup or Setup()
     check_on_faces(body, grasp)
     critical = critical_friction(grasp)
     if not (friction > critical and force_closure(grasp, friction=friction).closed):
         raise InputError(
             f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got {friction}"
         )
-    protocol = protocol or HoldProtocol()
-    physics = physics or PhysicsSettings()
-    rig = _Rig(body, grasp.contacts, friction, max_normal_force, protocol, physics)
-    wrenches = tuple(rig.hold(*test) for test in rig.loads())
-    controls = tuple(
-        _control(body, control, max_normal_force, protocol, physics)
-        for control in negative_controls(
-            body, replace(grasp, critical_friction=critical), friction, seed
-        )
+    gate = require_faithful(setup)
+    scene = build_scene(
+        body, grasp, friction, fingers=setup.fingers, physics=setup.physics, surface=setup.surface
     )
-    limits = CriticalFriction(predicted=critical)
-    return Verdict(grasp.id, limits, wrenches, controls, rig.scene, protocol)
+    trial = _Trial(body, replace(grasp, critical_friction=critical), friction, scene, agenda, setup)
+    wrenches = trial.wrenches()
+    return Verdict(
+        id=grasp.id,
+        friction=friction,
+        critical_friction=trial.critical(),
+        wrenches=wrenches,
+        controls=trial.controls(),
+        bounds=trial.bounds(),
+        accepted_by=trial.accepted_by(),
+        gate=gate,
+        scene=scene,
+        setup=setup,
+        agenda=agenda,
+    )
 
 
-def _control(
-    body: Polyhedron, control: Control, max_normal_force: float, protocol: HoldProtocol,
-    physics: PhysicsSettings,
-) -> ControlVerdict:  # fmt: skip
-    rig = _Rig(body, control.contacts, control.friction, max_normal_force, protocol, physics)
-    return ControlVerdict(control, tuple(rig.hold(*load) for load in rig.hopeless_loads(control)))
-
-
-class _Rig:
-    """Contacts on an object, in analysis and on the simulated bench."""
+class _Trial:
+    """A grasp on the bench, and the trials of an agenda."""
 
     def __init__(
-        self, body: Polyhedron, contacts: tuple[Contact, ...], friction: float,
-        max_normal_force: float, protocol: HoldProtocol, physics: PhysicsSettings,
+        self, body: Polyhedron, grasp: Grasp, friction: float, scene: Scene,
+        agenda: Agenda, setup: Setup,
     ) -> None:  # fmt: skip
-        self.body, self.friction, self.protocol = body, friction, protocol
-        self.positions = np.array([contact.position for contact in contacts])
-        self.normals = np.array([contact.normal for contact in contacts])
-        self.max_normal_force = max_normal_force
-        self.resisted = WrenchBody(
-            self.positions - body.center_of_mass,
-            self.normals,
-            contact_frictions(friction, len(contacts)),
-            max_normal_force,
+        self.body, self.grasp, self.friction = body, grasp, friction
+        self.agenda, self.setup, self.layout = agenda, setup, scene.layout
+        self.bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+        forces = np.einsum("kij,kj->ki", scene.layout.frames, scene.layout.squeeze)
+        self.rig: Rig = squeezed(self.bench, setup, forces, friction)
+        self.loads = planned_loads(body, grasp, friction, self.rig.idle, agenda, setup)
+        self.traces = self.rig.hold([planned.load for planned in self.loads])
+
+    def wrenches(self) -> tuple[WrenchVerdict, ...]:
+        """Every load, held and, if asked for, raised to its limit."""
+        overlap = clashes(
+            self.grasp.positions, self.grasp.normals, self.body.vertices, self.body.triangles,
+            self.layout.drive.radius_m,
+        )  # fmt: skip
+        return tuple(
+            self._wrench(planned, trace, limit, overlap)
+            for planned, trace, limit in zip(self.loads, self.traces, self._limits(), strict=True)
         )
-        self.scene = build_scene(
-            body, contacts, friction, max_normal_force=max_normal_force, physics=physics
+
+    def _wrench(
+        self, planned: PlannedLoad, trace: Trace, limit: SimulatedLimit | None,
+        overlap: Sequence[str],
+    ) -> WrenchVerdict:  # fmt: skip
+        verdict = judge(trace, self.layout, self.setup.hold)
+        return WrenchVerdict(
+            name=planned.name,
+            wrench=planned.load.wrench,
+            predicted_limit=planned.predicted_limit,
+            required_friction=planned.required_friction,
+            hold=invalid_start(verdict, overlap) if overlap else verdict,
+            simulated_limit=limit,
+            trace=trace if self.agenda.keep_traces else None,
         )
-        self.bench = Bench(self.scene, protocol)
-        forces, needed = self._planned(np.zeros(6))
-        self.bench.squeeze(forces, self._settling(needed))
 
-    def loads(self) -> Iterator[tuple[str, Array, float]]:
-        """The twelve axis wrenches and the weakest one, at their share of the limit."""
-        axes = axis_wrenches(self.body.radius)
-        weakest = self.resisted.weakest(axes, self.body.radius).wrench
-        for name, wrench in zip((*AXIS_NAMES, WEAKEST), (*axes, weakest), strict=True):
-            limit = self.resisted.limit(wrench).limit
-            share = self.protocol.load_share
-            yield name, to_digits(share * limit * wrench), 1.0 / share
+    def _limits(self) -> tuple[SimulatedLimit | None, ...]:
+        limits = [planned.limit for planned in self.loads]
+        if self.agenda.limits == "ramp":
+            return ramped_limits(self.rig, limits)
+        if self.agenda.limits == "bisection":
+            return bisected_limits(self.rig, limits)
+        return (None,) * len(limits)
 
-    def hopeless_loads(self, control: Control) -> Iterator[tuple[str, Array, float]]:
-        """The separating wrench, and no wrench at all where not even that can be balanced."""
-        scale = np.array([1.0] * 3 + [self.body.radius] * 3)
-        facing = -control.separating_wrench(self.body.center_of_mass) * scale**2
-        size = self.protocol.control_load * self.max_normal_force
-        yield SEPARATING, to_digits(size * facing / float(np.linalg.norm(facing / scale))), 0.0
-        if control.certificate.margin < -self.protocol.least_excess:
-            yield UNLOADED, np.zeros(6), 0.0
+    def critical(self) -> CriticalFriction:
+        """Critical friction, predicted and, if asked for, simulated."""
+        predicted = self.grasp.critical_friction
+        if not self.agenda.critical_friction:
+            return CriticalFriction(predicted)
+        return released_friction(self.bench, self.grasp, predicted, self.setup)
 
-    def hold(self, name: str, wrench: Array, predicted_limit: float) -> WrenchVerdict:
-        """Apply one wrench in simulation and judge what happens."""
-        forces, needed = self._planned(wrench)
-        trace = self.bench.hold(Load(wrench, forces), self._settling(needed), self.friction)
-        verdict = judge(trace, self.scene.layout.grasp_size_m, self.protocol)
-        return WrenchVerdict(name, wrench, predicted_limit, needed, verdict)
+    def controls(self) -> tuple[ControlVerdict, ...]:
+        """What must not hold."""
+        if not self.agenda.controls:
+            return ()
+        found = negative_controls(self.body, self.grasp, self.friction, self.agenda.seed)
+        return tuple(try_control(self.body, each, self.agenda, self.setup) for each in found)
 
-    def _planned(self, wrench: Array) -> tuple[Array, float | None]:
-        """Forces of least friction that balance a wrench, or the closest ones."""
-        least = self.protocol.least_normal_share * self.max_normal_force
-        contacts = self.positions, self.normals, self.friction
-        limits, center = (least, self.max_normal_force), self.body.center_of_mass
-        balanced = least_friction_forces(*contacts, wrench, normal_force=limits, center=center)
-        if balanced is not None:
-            return to_digits(balanced[0]), float(to_digits(np.array(balanced[1])))
-        forces = closest_forces(*contacts, wrench, normal_force=limits, center=center)
-        return to_digits(forces), None
+    def bounds(self) -> Bounds | None:
+        """What is found without planned forces, if asked for."""
+        if not self.agenda.independent:
+            return None
+        limits = [planned.limit for planned in self.loads]
+        critical = self.grasp.critical_friction
+        return independent_bounds(self.body, self.grasp, critical, self.rig, limits)
 
-    def _settling(self, needed: float | None) -> float:
-        return self.protocol.settling_friction * max(self.friction, needed or 0.0)
+    def accepted_by(self) -> dict[str, bool]:
+        """What rules of other tools make of the same traces."""
+        pulled = [trace for planned, trace in zip(self.loads, self.traces, strict=True)
+                  if planned.name in FORCE_AXES]  # fmt: skip
+        rules = rules_named(self.agenda.rules)
+        return {rule.name: accepted(rule, pulled, self.layout) for rule in rules}

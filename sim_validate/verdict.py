@@ -1,13 +1,19 @@
-"""Trace -> outcome: held, or what went wrong and when. Pure, so old traces can be re-judged."""
+"""Trace -> outcome: held, or what went wrong, where and when.
 
-from dataclasses import dataclass
+Pure, so that old traces can be judged again.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Indices
+from grasp_core.on_faces import within
+from scenes.layout import Layout
 from sim_validate.protocol import HoldProtocol
-from sim_validate.simulate import HoldTrace
+from sim_validate.traces import Trace
 
 CLOCK_SLACK_S = 1e-9
 """Simulated time is a sum of equal steps; a reset would put it off by milliseconds."""
@@ -30,6 +36,8 @@ class HoldVerdict:
     """What a trace amounts to."""
 
     outcome: Outcome
+    reason: str
+    """What happened, in words; empty if it held."""
     displacement_m: float
     """Largest while holding: motion between the contacts plus grasp size times rotation."""
     rotation_rad: float
@@ -39,33 +47,91 @@ class HoldVerdict:
     """When a threshold was first crossed."""
 
 
-def judge(trace: HoldTrace, grasp_size_m: float, protocol: HoldProtocol) -> HoldVerdict:
+def judge(trace: Trace, layout: Layout, protocol: HoldProtocol) -> HoldVerdict:
     """Apply the thresholds of a protocol to a trace.
 
     Args:
         trace: Motion from the moment friction was lowered.
-        grasp_size_m: The lever of the contacts; thresholds are relative to it.
+        layout: What was simulated; thresholds are relative to its grasp size.
         protocol: Where the thresholds come from.
     """
-    sound = trace.finite and trace.warnings == 0 and abs(trace.clock_error_s) < CLOCK_SLACK_S
-    limit = protocol.total_threshold * grasp_size_m
-    moved = trace.displacements_m >= protocol.hold_threshold * grasp_size_m
-    strayed = trace.start_m + trace.displacements_m >= limit
-    apart = trace.gaps_m.max(axis=1) > protocol.gap_threshold * grasp_size_m
-    failing = np.flatnonzero(moved | strayed | apart)
+    failing = _failing(trace, layout.grasp_size_m, protocol)
     first = int(failing[0]) if failing.size else None
-    if not sound:
-        outcome = Outcome.DIVERGED
-    elif trace.start_m >= limit:
-        outcome = Outcome.INVALID_START
-    elif first is None:
-        outcome = Outcome.HELD
-    else:
-        outcome = Outcome.LOST_CONTACT if apart[first] else Outcome.SLIPPED
+    outcome, reason = _outcome(trace, layout, protocol, first)
     return HoldVerdict(
         outcome=outcome,
-        displacement_m=float(trace.displacements_m.max()),
-        rotation_rad=float(trace.rotations_rad.max()),
-        slip_m=trace.slips_m.max(axis=0),
+        reason=reason,
+        displacement_m=float(trace.displacements_m.max(initial=0.0)),
+        rotation_rad=float(trace.rotations_rad.max(initial=0.0)),
+        slip_m=trace.slips_m.max(axis=0, initial=0.0),
         failed_after_s=None if first is None else float(trace.times_s[first]),
     )
+
+
+def invalid_start(verdict: HoldVerdict, reasons: Sequence[str]) -> HoldVerdict:
+    """The same verdict for fingertips that cannot be where they were put."""
+    return replace(verdict, outcome=Outcome.INVALID_START, reason="; ".join(reasons))
+
+
+def _failing(trace: Trace, size: float, protocol: HoldProtocol) -> Indices:
+    """Samples in which a threshold is crossed."""
+    moved = trace.displacements_m >= protocol.hold_threshold * size
+    strayed = trace.start_m + trace.displacements_m >= protocol.total_threshold * size
+    apart = (trace.gaps_m > protocol.gap_threshold * size).any(axis=1)
+    return np.flatnonzero(moved | strayed | apart)
+
+
+def _outcome(
+    trace: Trace, layout: Layout, protocol: HoldProtocol, first: int | None
+) -> tuple[Outcome, str]:
+    if trace.error:
+        return Outcome.ERROR, trace.error
+    if trace.timed_out:
+        return Outcome.TIMEOUT, "stopped before its end"
+    if unsound := _unsound(trace):
+        return Outcome.DIVERGED, unsound
+    if trace.start_m >= protocol.total_threshold * layout.grasp_size_m:
+        moved = f"the object moved by {_um(trace.start_m)} while it was loaded at high friction"
+        return Outcome.SLIPPED, moved
+    if first is None:
+        return Outcome.HELD, ""
+    return _how_it_let_go(trace, layout, protocol, first)
+
+
+def _unsound(trace: Trace) -> str:
+    """Why a trace says nothing about the object, if it does not."""
+    if not trace.finite:
+        return "a number of the state is not finite"
+    if trace.warnings:
+        return f"the simulator raised {trace.warnings} warnings"
+    if abs(trace.clock_error_s) > CLOCK_SLACK_S:
+        return f"the simulator's clock is off by {trace.clock_error_s:.3g} s: it was reset"
+    return ""
+
+
+def _how_it_let_go(
+    trace: Trace, layout: Layout, protocol: HoldProtocol, first: int
+) -> tuple[Outcome, str]:
+    """Which finger lost its face, or slid the farthest, when the first threshold was crossed."""
+    gaps, slips = trace.gaps_m[first], trace.slips_m[first]
+    rolled = np.flatnonzero([not on for on in _on_faces(trace.touched_m[first], layout)])
+    if rolled.size:
+        return Outcome.LOST_CONTACT, f"finger {rolled[0]} rolled off its face"
+    finger = int(np.argmax(gaps))
+    if gaps[finger] > protocol.gap_threshold * layout.grasp_size_m:
+        return Outcome.LOST_CONTACT, f"finger {finger} is {_um(gaps[finger])} off its face"
+    finger = int(np.argmax(slips))
+    turned = f"the object turned by {1e3 * trace.rotations_rad[first]:.3g} mrad"
+    return Outcome.SLIPPED, f"finger {finger} slid {_um(slips[finger])} over its face, {turned}"
+
+
+def _on_faces(touched: Array, layout: Layout) -> list[bool]:
+    """Whether each point is on the face of its contact; so are contacts whose face is not known."""
+    return [
+        not border or any(within(point, piece, frame[:, 0], 0.0) for piece in border)
+        for point, border, frame in zip(touched, layout.borders, layout.frames, strict=True)
+    ]
+
+
+def _um(length_m: float) -> str:
+    return f"{1e6 * length_m:.3g} um"

@@ -1,19 +1,24 @@
 """Verdicts -> JSON text, with units in the keys and every setting that was in force."""
 
 import json
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
+from typing import Any
 
+from grasp_core.arrays import Array
 from grasp_core.values import Polyhedron
 from grasp_core.versions import versions
-from scenes.physics import flags
-from sim_validate.validation import ControlVerdict, Verdict, WrenchVerdict
+from sim_validate.control_trials import ControlVerdict
+from sim_validate.gate import Gate
+from sim_validate.validation import Verdict, WrenchVerdict
+from sim_validate.verdict import HoldVerdict
 
 SCHEMA = 1
 
 
 def verdicts_to_json(
-    body: Polyhedron, friction: float, verdicts: Iterable[Verdict], *, complete: bool
+    body: Polyhedron, friction: float, verdicts: Iterable[Verdict], gate: Gate, *, complete: bool
 ) -> str:
     """The text of `verdicts.json`: the same for the same verdicts.
 
@@ -21,6 +26,7 @@ def verdicts_to_json(
         body: The object.
         friction: Coulomb coefficient tested.
         verdicts: One per grasp.
+        gate: What the simulator made of known cases.
         complete: Whether every grasp of the plan was tested.
     """
     listed = list(verdicts)
@@ -33,14 +39,27 @@ def verdicts_to_json(
         },
         "friction": friction,
         "complete": complete,
+        "gate": gate_record(gate),
         "summary": summary(listed),
         "verdicts": [_verdict_record(body, verdict) for verdict in listed],
     }
     return json.dumps(document, allow_nan=False, indent=1) + "\n"
 
 
+def gate_record(gate: Gate) -> dict[str, object]:
+    """The gate's figures; null for one that could not be measured."""
+    return {
+        "passed": gate.passed,
+        "mujoco": gate.mujoco,
+        "checks": [
+            asdict(check) | {"value": None if math.isnan(check.value) else check.value}
+            for check in gate.checks
+        ],
+    }
+
+
 def summary(verdicts: Iterable[Verdict]) -> dict[str, int]:
-    """How many grasps and controls there were, and how many of each held."""
+    """How many grasps and controls there were, how many of each held, and what was contradicted."""
     listed = list(verdicts)
     controls = [control for verdict in listed for control in verdict.controls]
     return {
@@ -48,33 +67,48 @@ def summary(verdicts: Iterable[Verdict]) -> dict[str, int]:
         "grasps_held": sum(verdict.held for verdict in listed),
         "controls": len(controls),
         "controls_held": sum(control.held for control in controls),
+        "mismatches": sum(len(verdict.mismatches) for verdict in listed),
     }
 
 
 def _verdict_record(body: Polyhedron, verdict: Verdict) -> dict[str, object]:
+    bounds = verdict.bounds
     return {
         "id": verdict.id,
         "outcome": verdict.outcome.value,
         "held": verdict.held,
+        "mismatches": list(verdict.mismatches),
         "critical_friction": asdict(verdict.critical_friction),
         "wrenches": [_wrench_record(trial) for trial in verdict.wrenches],
         "controls": {
             control.control.name: _control_record(body, control) for control in verdict.controls
         },
+        "bounds": None if bounds is None else asdict(bounds),
+        "accepted_by": verdict.accepted_by,
         "settings": _settings(verdict),
         "versions": versions(),
     }
 
 
 def _wrench_record(trial: WrenchVerdict) -> dict[str, object]:
-    hold = trial.hold
+    found, predicted = trial.simulated_limit, trial.predicted_limit
     return {
         "name": trial.name,
         "wrench": trial.wrench.tolist(),
-        "predicted_limit": trial.predicted_limit,
-        "simulated_limit": None,
+        "predicted_limit": predicted,
+        "simulated_limit": None if found is None else found.share * predicted,
+        "simulated_limit_bracket": (
+            None if found is None else [found.lower * predicted, found.upper * predicted]
+        ),
         "required_friction": trial.required_friction,
+        **_hold_record(trial.hold),
+    }
+
+
+def _hold_record(hold: HoldVerdict) -> dict[str, object]:
+    return {
         "outcome": hold.outcome.value,
+        "reason": hold.reason,
         "displacement_m": hold.displacement_m,
         "rotation_rad": hold.rotation_rad,
         "slip_m": hold.slip_m.tolist(),
@@ -93,18 +127,44 @@ def _control_record(body: Polyhedron, verdict: ControlVerdict) -> dict[str, obje
         ],
         "closure_margin": control.certificate.margin,
         "separating_wrench": control.separating_wrench(body.center_of_mass).tolist(),
-        "wrenches": [_wrench_record(trial) for trial in verdict.tried],
+        "wrenches": [
+            {
+                "name": trial.name,
+                "wrench": trial.wrench.tolist(),
+                "required_friction": trial.required_friction,
+                **_hold_record(trial.hold),
+            }
+            for trial in verdict.tried
+        ],
+        "accepted_by": verdict.accepted_by,
     }
 
 
 def _settings(verdict: Verdict) -> dict[str, object]:
-    layout = verdict.scene.layout
-    physics = verdict.scene.physics
+    layout, setup = verdict.scene.layout, verdict.setup
+    physics = setup.physics
     return {
-        "protocol": asdict(verdict.protocol),
-        "physics": physics.options() | physics.contact() | {"flags": flags()},
+        "protocol": asdict(setup.hold),
+        "limit_protocol": asdict(setup.limit),
+        "friction_protocol": asdict(setup.friction),
+        "physics": physics.options() | physics.contact() | {"flags": physics.flags()},
+        "surface": setup.surface,
         "fingers": asdict(layout.drive),
         "grasp_size_m": layout.grasp_size_m,
         "object_mass_kg": layout.mass_kg,
         "object_inertia_kg_m2": layout.inertia_kg_m2.tolist(),
+        "random_wrenches": verdict.agenda.random_wrenches,
+        "limits": verdict.agenda.limits,
+        "seed": verdict.agenda.seed,
     }
+
+
+def trace_arrays(verdict: Verdict) -> dict[str, Array]:
+    """How every contact moved over time in the trials of a grasp: arrays by trial and quantity."""
+    fields = ("times_s", "displacements_m", "shifts_m", "rotations_rad", "slips_m", "gaps_m")
+    kept: Sequence[tuple[str, Any]] = [
+        *((trial.name, trial.trace) for trial in verdict.wrenches if trial.trace is not None),
+        *((f"{control.control.name}.{trial.name}", trial.trace)
+          for control in verdict.controls for trial in control.tried),
+    ]  # fmt: skip
+    return {f"{name}.{field}": getattr(trace, field) for name, trace in kept for field in fields}

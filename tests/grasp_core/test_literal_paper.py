@@ -7,92 +7,40 @@ the constructions back.
 """
 
 import math
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 
 import grasp_core as gc
-from grasp_core.concurrent_grasps import inscribed_facets
 from grasp_core.lines import plucker_vectors
 from grasp_core.pencil_grasps import CELL_A, place_pencil
 from grasp_core.placements import Placement
 from grasp_core.regulus_grasps import LEAST_DEPTH, place_regulus
 from grasp_core.spanning import balancing_weights
+from sim_validate.uncorrected import (
+    LEAST,
+    PAIR,
+    Discs,
+    focus_gap,
+    focus_line,
+    printed_pencil,
+    printed_regulus,
+    unit,
+)
 from tests.grasp_core.quadruples import paired_quadruples
 
 TOLERANCE = 1e-7
 """Ten times the residual at which a program's answer is accepted, in object radii."""
 BORDER = 1e-6
 """Friction above that of the force cones: contacts on the borders use their very edge."""
-LEAST = 1e-3
-"""Smallest disc and smallest distance of the foci that count, in object radii."""
 DEPENDENT = 1e-12
 """Singular values below this are rounding: some thousand rounding errors at unit size."""
-PAIR = (0, 0, 1, 1)
-"""Pair i of each finger, from zero."""
-
-
-def linear_program(c, A, b, A_eq=None, b_eq=None):
-    """Minimiser of c.v, all variables free in sign; None where there is no feasible point."""
-    free = [(None, None)] * len(c)
-    answer = linprog(c, A, b, A_eq, b_eq, bounds=free, method="highs")
-    assert answer.status in (0, 2), answer.message
-    return answer.x if answer.status == 0 else None
-
-
-def focus_line(quad):
-    """N_1, N_2 and u = N_1 x N_2; the paper leaves the sign of u open, as k is free."""
-    n = [piece.normal for piece in quad]
-    N = [unit(np.cross(n[0], n[1])), unit(np.cross(n[2], n[3]))]
-    return N, unit(np.cross(*N))
-
-
-def unit(vector):
-    return vector / np.linalg.norm(vector)
-
-
-@dataclass(frozen=True)
-class Discs:
-    """One disc per face, of one common radius in the printed program."""
-
-    centers: np.ndarray
-    radii: np.ndarray
-    foci: np.ndarray
-
-
-def printed_pencil(quad, theta):
-    """Section 3.2 with R = r, over (x0, k, r): None without a disc of radius `LEAST`."""
-    _, u = focus_line(quad)
-    foci = [np.column_stack([np.eye(3), sign * u]) for sign in (1.0, -1.0)]
-    rows, limits = [[[0.0] * 4 + [-1.0]]], [[-LEAST]]
-    for i, piece in zip(PAIR, quad, strict=True):
-        T, n = piece.frame, piece.normal
-        edges = piece.E @ T.T @ foci[i]
-        rows += [
-            np.column_stack([edges, np.ones(len(edges))]),
-            [[*(-math.sin(theta) * n @ foci[i]), 1.0 + math.cos(theta)]],
-        ]
-        limits += [piece.b + piece.E @ T.T @ piece.origin, [-math.sin(theta) * n @ piece.origin]]
-    v = linear_program([0.0] * 4 + [-1.0], np.vstack(rows), np.hstack(limits))
-    if v is None:
-        return None
-    c = np.array([C @ v[:4] for C in foci])
-    depths = [p.normal @ (c[i] - p.origin) for i, p in zip(PAIR, quad, strict=True)]
-    centers = [c[i] - d * p.normal for i, d, p in zip(PAIR, depths, quad, strict=True)]
-    return Discs(np.array(centers), np.full(4, v[4]), c)
 
 
 def push(normals):
     """w: what pair 1 contributes to a combination of the normals that vanishes."""
     return balancing_weights(normals)[:2] @ normals[:2]
-
-
-def focus_gap(quad, foci):
-    """(c_2 - c_1).w / |w|: not negative in cell A."""
-    return (foci[1] - foci[0]) @ unit(push(np.array([piece.normal for piece in quad])))
 
 
 def in_a_safe_cell(quad, discs):
@@ -272,40 +220,6 @@ def test_an_adversary_breaks_printed_pencils_but_no_corrected_one():
     assert printed >= 40
     assert broken >= 2
     assert corrected >= 60
-
-
-@dataclass(frozen=True)
-class Lines:
-    """Contacts and forces of the printed regulus program, and the largest offset t."""
-
-    positions: np.ndarray
-    forces: np.ndarray
-    offset: float
-
-
-def printed_regulus(quad, cones, least_depth):
-    """Section 3.3 over (x0, k, l_1, l_2, (x_i, y_i, z_i), t), and n.f >= least_depth."""
-    v = np.eye(13)
-    N, u = focus_line(quad)
-    rows, limits, A_eq, b_eq, D, F = [], [], [], [], [], []
-    for finger, (piece, cone) in enumerate(zip(quad, cones, strict=True)):
-        i, sign = PAIR[finger], 1.0 if finger % 2 == 0 else -1.0
-        n, T, middle = piece.normal, piece.frame, piece.frame.T @ piece.origin
-        c = np.eye(3, 13) + (1.0 - 2.0 * i) * np.outer(u, v[3])
-        D.append(c + sign * np.outer(N[i], v[4 + i]))
-        x, y, z = v[6 + 3 * i : 9 + 3 * i]
-        F.append(np.outer(u, x) + sign * (np.outer(np.cross(N[i], u), y) + np.outer(N[i], z)))
-        contact = D[-1] - F[-1]
-        flat, G = T.T @ contact, inscribed_facets(cone, T[:, 0])
-        rows += [piece.E @ flat, flat - v[12], -flat - v[12], -G @ F[-1], -n @ F[-1]]
-        limits += [piece.b + piece.E @ middle, middle, -middle, np.zeros(len(G)), -least_depth]
-        A_eq.append(n @ contact)
-        b_eq.append(n @ piece.origin)
-    best = linear_program(v[12], np.vstack(rows), np.hstack(limits), np.array(A_eq), b_eq)
-    if best is None:
-        return None
-    forces = np.array(F) @ best
-    return Lines(np.array(D) @ best - forces, forces, best[12])
 
 
 def fourth_singular_value(points, directions):

@@ -62,7 +62,7 @@ def test_the_weakest_wrench_is_weaker_than_axes_and_random_wrenches():
                 grasp.positions - body.center_of_mass, grasp.normals, np.full(4, 0.5), 10.0
             )
             axes = axis_wrenches(body.radius)
-            weakest = resisted.weakest(axes, body.radius)
+            weakest = resisted.weakest_from(map(resisted.limit, axes), body.radius)
             assert np.linalg.norm(weakest.wrench / scale) == pytest.approx(1.0)
             others = rng.normal(size=(30, 6))
             others = others / np.linalg.norm(others, axis=1, keepdims=True) * scale

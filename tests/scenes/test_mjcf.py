@@ -8,7 +8,7 @@ import grasp_core as gc
 import scenes
 from scenes.layout import arrange, grasp_size
 from scenes.mjcf import quaternion
-from scenes.physics import DISABLED_FLAGS, ENABLED_FLAGS, UNUSED_FLAGS
+from scenes.physics import CHOSEN_FLAGS, ENABLED_FLAGS, UNUSED_FLAGS
 from tests.judges import random_rotation
 
 OBJECTS = ("wedge", "icosahedron", "screwdriver")
@@ -51,7 +51,7 @@ def test_every_setting_reaches_the_compiled_model(held):
 
 def test_all_flags_are_written_and_only_autoreset_is_off(held):
     _, _, scene, model = held
-    for name in (*ENABLED_FLAGS, *DISABLED_FLAGS, *UNUSED_FLAGS):
+    for name in (*ENABLED_FLAGS, *CHOSEN_FLAGS, *UNUSED_FLAGS):
         assert f'{name}="' in scene.xml
     assert model.opt.disableflags == int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     assert model.opt.enableflags == 0
@@ -61,7 +61,7 @@ def test_the_flags_are_all_that_mujoco_has():
     bits = [
         name for kind in (mujoco.mjtDisableBit, mujoco.mjtEnableBit) for name in kind.__members__
     ]
-    ours = {name.upper() for name in (*ENABLED_FLAGS, *DISABLED_FLAGS, *UNUSED_FLAGS)}
+    ours = {name.upper() for name in (*ENABLED_FLAGS, *CHOSEN_FLAGS, *UNUSED_FLAGS)}
     theirs = {name.split("_")[1] for name in bits if not name.startswith("mjN")}
     assert ours == theirs
 
@@ -161,13 +161,43 @@ def test_quaternions_turn_like_their_matrices():
         np.testing.assert_allclose(turned, R @ x, atol=1e-13)
 
 
-@pytest.mark.parametrize(
-    "bad", [{"friction": 0.0}, {"max_normal_force": -1.0}, {"fingertip_radius": float("nan")}]
-)
-def test_bad_numbers_are_refused(bad):
+def test_a_friction_that_is_not_positive_is_refused():
     body = scenes.example_object("tetrahedron")
-    with pytest.raises(gc.InputError, match=f"{next(iter(bad))} must be a positive number"):
-        scenes.build_scene(body, gc.plan(body).grasps[0], **bad)
+    with pytest.raises(gc.InputError, match="friction must be positive"):
+        scenes.build_scene(body, gc.plan(body).grasps[0], 0.0)
+
+
+def test_the_mesh_of_a_convex_object_can_stand_in_for_the_pads(held):
+    """Each fingertip then touches the mesh where it would touch its pad, and along the normal."""
+    body, grasp, scene, _ = held
+    if body.name == "screwdriver":
+        with pytest.raises(gc.InputError, match="not convex"):
+            scenes.build_scene(body, grasp, 0.5, surface="mesh")
+        return
+    model = mujoco.MjModel.from_xml_string(scenes.build_scene(body, grasp, 0.5, surface="mesh").xml)
+    data = mujoco.MjData(model)
+    data.qpos[7::3] += 1e-5
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 4
+    normals = np.array([contact.normal for contact in grasp.contacts])
+    for contact in data.contact:
+        assert {model.geom(int(g)).name for g in contact.geom} & {"object"}
+        assert contact.dist == pytest.approx(-1e-5, abs=2e-8)
+        assert np.abs(normals @ contact.frame[:3]).max() == pytest.approx(1.0, abs=1e-9)
+    assert scene.surface == "pads"
+
+
+def test_rigid_fingertips_have_no_joints_and_stand_where_they_are_put(held):
+    body, grasp, scene, _ = held
+    fingers = scenes.FingerSettings(drive="rigid", indentation=1e-4)
+    rigid = scenes.build_scene(body, grasp, 0.5, fingers=fingers)
+    model = mujoco.MjModel.from_xml_string(rigid.xml)
+    assert (model.nv, model.nu, model.nkey) == (6, 0, 0)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    depth = 1e-4 * scene.layout.grasp_size_m
+    assert data.ncon == 4
+    assert all(c.dist == pytest.approx(-depth, rel=1e-6) for c in data.contact)
 
 
 def test_coplanar_and_symmetric_contacts_make_scenes_that_load():

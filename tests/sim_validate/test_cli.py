@@ -26,7 +26,7 @@ def test_run_writes_grasps_verdicts_and_scenes_and_tells(here, capsys):
     names = sorted(p.name for p in (here / "results").rglob("*") if p.is_file())
     assert names == ["c-0-1-2-3.xml", "grasps.json", "verdicts.json"]
     shown = capsys.readouterr().out
-    for word in ("concurrent", "radius mm", "mu*", "held", "moved um", "results"):
+    for word in ("concurrent", "in sim", "mu*", "held", "um moved", "results"):
         assert word in shown
     verdicts = json.loads((here / "results" / "verdicts.json").read_text())
     assert verdicts["complete"] is True
@@ -50,10 +50,15 @@ def test_a_verdict_has_the_fields_that_users_rely_on(here, capsys):
     document = json.loads(capsys.readouterr().out)
     (verdict,) = document["verdicts"]
     assert {
-        "id", "outcome", "held", "critical_friction", "wrenches", "controls", "settings",
-        "versions",
+        "id", "outcome", "held", "mismatches", "critical_friction", "wrenches", "controls",
+        "bounds", "accepted_by", "settings", "versions",
     } == set(verdict)  # fmt: skip
-    assert set(verdict["critical_friction"]) == {"predicted", "simulated"}
+    assert verdict["mismatches"] == []
+    friction = verdict["critical_friction"]
+    assert friction["bracket"][0] < friction["simulated"] < friction["bracket"][1]
+    assert friction["simulated"] == pytest.approx(friction["predicted"], rel=0.01)
+    assert document["gate"]["passed"] is True
+    assert all(c["least"] <= c["value"] <= c["largest"] for c in document["gate"]["checks"])
     assert {"wrench", "predicted_limit", "simulated_limit", "outcome"} <= set(
         verdict["wrenches"][0]
     )
@@ -79,16 +84,13 @@ def test_plan_validate_and_scene_work_on_the_same_file(here, capsys):
 
 
 def test_one_and_two_processes_give_the_same_verdicts(here):
-    """Everything is equal; numbers to 1e-5, since ProxQP's answers move with memory alignment in
-    digits beyond its tolerance, and are not always polished.
-    """
+    """To the last digit: whatever is simulated was planned with digits that solvers agree on."""
     assert main(["plan", "icosahedron", "--limit", "16", "--out", "p", "-q"]) == Exit.GOOD
     for jobs in ("1", "2"):
         command = ["validate", "p/grasps.json", "--jobs", jobs, "--out", jobs, "-q"]
         assert main(command) == Exit.GOOD
-    one, two = (json.loads((here / jobs / "verdicts.json").read_text()) for jobs in ("1", "2"))
-    assert _alike(one, two)
-    assert not _alike(one, two | {"friction": 0.6})
+    one, two = ((here / jobs / "verdicts.json").read_text() for jobs in ("1", "2"))
+    assert one == two
 
 
 @pytest.mark.usefixtures("here")
@@ -168,7 +170,7 @@ def test_a_config_file_sets_flags_and_flags_override_it(here, capsys):
 
 @pytest.mark.usefixtures("here")
 def test_a_control_that_holds_makes_the_run_fail(monkeypatch, capsys):
-    monkeypatch.setattr("sim_validate.validation.judge", _always_held)
+    monkeypatch.setattr("sim_validate.control_trials.judge", _always_held)
     assert main(["run", "wedge", "--limit", "1", "--jobs", "1"]) == Exit.NEGATIVE
     assert "3 of 3 negative controls held" in capsys.readouterr().out
 
@@ -216,7 +218,7 @@ def test_an_interrupted_run_keeps_what_is_done(here):
     process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
     folder = here / "graspproof-out" / "icosahedron"
     deadline = time.monotonic() + 120
-    while not (folder / "scenes").exists() and time.monotonic() < deadline:
+    while len(list(folder.glob("scenes/*.xml"))) < 420 and time.monotonic() < deadline:
         time.sleep(0.1)
     time.sleep(4.0)
     process.send_signal(signal.SIGINT)
@@ -241,17 +243,7 @@ def test_help_answers_without_loading_a_simulator():
     assert "validate" in answer.stdout
 
 
-def _alike(one, two):
-    if isinstance(one, dict):
-        return one.keys() == two.keys() and all(_alike(one[k], two[k]) for k in one)
-    if isinstance(one, list):
-        return len(one) == len(two) and all(map(_alike, one, two))
-    if isinstance(one, float):
-        return one == pytest.approx(two, rel=1e-5, abs=1e-9)
-    return one == two
-
-
 def _always_held(trace, *_):
     from sim_validate.verdict import HoldVerdict, Outcome
 
-    return HoldVerdict(Outcome.HELD, 0.0, 0.0, trace.slips_m.max(axis=0), None)
+    return HoldVerdict(Outcome.HELD, "", 0.0, 0.0, trace.slips_m.max(axis=0), None)

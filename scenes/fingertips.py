@@ -1,0 +1,152 @@
+"""How fingertips are built and driven, and whether four of them find room at their contacts.
+
+A fingertip is a sphere that touches its face at the contact, so its centre is p - r n. Two of
+them overlap from the radius on at which their centres are 2 r apart, a quadratic equation. One
+meets the object elsewhere from the radius on at which a further surface point q is as near to
+its centre as p is: r = |q - p|^2 / (2 (p - q).n). The nearest q is found by shrinking: the point
+nearest to the centre of too large a sphere gives a smaller one, until no point is inside.
+"""
+
+import math
+from dataclasses import asdict, dataclass
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.errors import InputError
+from grasp_core.mesh import nearest_on_surface
+
+TIP_RADIUS = 0.1
+"""Fingertip radius that is used where it fits, in object radii."""
+LEAST_TIP_RADIUS = 1e-3
+"""Smaller fingertips are not tried, in object radii."""
+ROOM = 0.95
+"""Radius relative to the largest that fits, where the usual one does not."""
+TOUCHING = 1e-6
+"""Overlap that does not count, in fingertip radii: rounding of positions in files."""
+MAX_SHRINKING = 100
+FACING = 1e-9
+"""4 - |m|^2 below this is rounding: the normals are opposite."""
+
+
+@dataclass(frozen=True, slots=True)
+class FingerSettings:
+    """How fingertips are built and driven; what is None is chosen to suit the grasp.
+
+    Raises:
+        InputError: A number is not positive and finite.
+    """
+
+    max_normal_force_n: float = 10.0
+    """Limit of each finger's push."""
+    radius_m: float | None = None
+    """A tenth of the object's radius, or what fits, if None."""
+    mass_kg: float | None = None
+    stiffness_n_per_m: float | None = None
+    """Of the servos."""
+    approach: tuple[float, float, float] | None = None
+    """Direction in which all fingers move in from their start, along each normal if None."""
+    drive: Literal["servo", "rigid"] = "servo"
+    """Rigid fingertips stay where they are put."""
+    indentation: float = 0.0
+    """How far a rigid fingertip is put into its face, in grasp sizes."""
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if name in ("approach", "drive", "indentation") or value is None:
+                continue
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"{name} must be a positive number, got {value}")
+        if self.approach is not None and not _has_direction(self.approach):
+            raise InputError(f"approach must be a direction, got {self.approach}")
+
+
+def _has_direction(vector: tuple[float, ...]) -> bool:
+    return any(vector) and all(math.isfinite(part) for part in vector)
+
+
+def fitting_radius(
+    positions: Array, normals: Array, vertices: Array, triangles: Indices, object_radius: float
+) -> float:
+    """A fingertip radius at which nothing overlaps, if one that is large enough exists.
+
+    Args:
+        positions: Contacts, (k, 3) [m].
+        normals: Unit vectors into the object, (k, 3).
+        vertices: Of the object, (v, 3) [m].
+        triangles: (t, 3)
+        object_radius: [m]
+    """
+    usual = TIP_RADIUS * object_radius
+    largest = min(
+        _largest_apart(positions, normals),
+        float(_largest_clear(positions, normals, vertices, triangles, usual).min()),
+    )
+    if largest >= usual:
+        return usual
+    return max(ROOM * largest, LEAST_TIP_RADIUS * object_radius)
+
+
+def clashes(
+    positions: Array, normals: Array, vertices: Array, triangles: Indices, radius: float
+) -> tuple[str, ...]:
+    """What fingertips of a radius overlap: each other, or the object beside their contact.
+
+    Args:
+        positions: Contacts, (k, 3) [m].
+        normals: Unit vectors into the object, (k, 3).
+        vertices: Of the object, (v, 3) [m].
+        triangles: (t, 3)
+        radius: [m]
+
+    Returns:
+        A sentence for each overlap.
+    """
+    least = radius * (1.0 - TOUCHING)
+    found = [
+        f"fingertips {i} and {j} of radius {radius:.3g} m overlap"
+        for i, j in combinations(range(len(positions)), 2)
+        if _largest_apart(positions[[i, j]], normals[[i, j]]) < least
+    ]
+    clear = _largest_clear(positions, normals, vertices, triangles, radius)
+    found += [
+        f"fingertip {i} of radius {radius:.3g} m meets the object beside its contact"
+        for i in np.flatnonzero(clear < least)
+    ]
+    return tuple(found)
+
+
+def _largest_apart(positions: Array, normals: Array) -> float:
+    """Radius up to which no two fingertips overlap: |d - r m| = 2 r for the closest pair.
+
+    The positive root of (4 - m.m) r^2 + 2 (d.m) r = d.d; none for fingers that face each other.
+    """
+    largest = math.inf
+    for i, j in combinations(range(len(positions)), 2):
+        d, m = positions[i] - positions[j], normals[i] - normals[j]
+        a, b, c = 4.0 - float(m @ m), float(d @ m), float(d @ d)
+        root = math.sqrt(b * b + a * c)
+        if a > FACING:
+            largest = min(largest, (root - b) / a)
+        elif b > 0.0:
+            largest = min(largest, c / (root + b))
+    return largest
+
+
+def _largest_clear(
+    positions: Array, normals: Array, vertices: Array, triangles: Indices, start: float
+) -> Array:
+    """Radius of each fingertip, up to `start`, up to which it meets no other part, (k,)."""
+    radii = np.full(len(positions), start)
+    for _ in range(MAX_SHRINKING):
+        centers = positions - radii[:, None] * normals
+        nearest = nearest_on_surface(vertices, triangles, centers)
+        inside = np.linalg.norm(nearest - centers, axis=1) < radii * (1.0 - TOUCHING)
+        if not inside.any():
+            break
+        away = nearest[inside] - positions[inside]
+        height = -np.einsum("ki,ki->k", away, normals[inside])
+        radii[inside] = np.einsum("ki,ki->k", away, away) / (2.0 * height)
+    return radii

@@ -1,0 +1,124 @@
+"""Groups of flags that several commands share.
+
+Nothing heavy is imported here, so that help and usage errors answer at once.
+"""
+
+from dataclasses import field
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+from pydantic.dataclasses import dataclass
+from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
+
+from sim_validate.engines import available_cores
+
+
+def _not_zero(values: tuple[float, ...]) -> tuple[float, ...]:
+    if not any(values):
+        raise ValueError("must not be zero")
+    return values
+
+
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Count = Annotated[int, Field(ge=1)]
+Seed = Annotated[int, Field(ge=0, lt=2**64)]
+Edges = Annotated[int, Field(ge=3)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Wrench = Annotated[
+    tuple[Finite, Finite, Finite, Finite, Finite, Finite],
+    AfterValidator(_not_zero),
+]
+Direction = Annotated[tuple[Finite, Finite, Finite], AfterValidator(_not_zero)]
+RuleName = Literal["5cm-15deg", "contact-remains", "2cm", "3cm", "six-forces"]
+
+
+@dataclass(frozen=True)
+class Speech:
+    """How much to say, and in which form."""
+
+    json: bool = False
+    """Print one JSON document on standard output, everything else on standard error."""
+    quiet: Annotated[bool, arg(aliases=["-q"])] = False
+    """Say nothing but errors."""
+    verbose: Annotated[bool, arg(aliases=["-v"])] = False
+    """Say more."""
+
+
+@dataclass(frozen=True)
+class Planning:
+    """What to plan."""
+
+    friction: Positive = 0.5
+    """Coulomb coefficient at every contact."""
+    theta_deg: Positive | None = None
+    """Half-angle of the friction cones to plan with [deg]; the friction angle if not given."""
+    family: UseAppendAction[tuple[Literal["concurrent", "pencil", "regulus", "free"], ...]] = ()
+    """Construction to try, may be repeated; the first three if not given. `free` looks for grasps
+    of any type on any four faces; for the others it proves that there is none, or says that it
+    is undecided."""
+    limit: Count | None = None
+    """Keep at most this many grasps, the best of each family in turn; None for all."""
+    cells: Count = 1
+    """Into how many parts the free method may cut the four faces where it is undecided."""
+    optimize: bool = False
+    """Move the contacts of each grasp on their faces to raise its Ferrari-Canny quality."""
+    finger_radius_m: Positive | None = None
+    """How far optimised contacts stay from edges [m], or half the radius of the largest disc in a
+    face if that is less. If not given, a twentieth of the object's radius, or as far as the planned
+    contact on that face."""
+    ceiling: Count | None = None
+    """With --optimize: also prove an upper bound of the quality of all contacts on the same faces
+    that are as clear of edges, cut into so many parts at most."""
+    seed: Seed = 0
+    """For everything random."""
+    unit: Literal["m", "cm", "mm", "in"] = "m"
+    """What one unit in a mesh file is."""
+
+
+@dataclass(frozen=True)
+class Fingers:
+    """How fingertips are built; what is not given suits the grasp."""
+
+    max_normal_force: Positive = 10.0
+    """Limit of each finger's push [N]."""
+    fingertip_radius_m: Positive | None = None
+    """A tenth of the object's radius, or what fits, if not given."""
+    fingertip_mass_kg: Positive | None = None
+    """So that similar grasps behave alike if not given, as the stiffness."""
+    stiffness_n_per_m: Positive | None = None
+    """Of the servos that drive a fingertip."""
+    approach: Annotated[Direction | None, arg(metavar="X Y Z")] = None
+    """Direction in which fingers arrive in the scene's keyframe; along the normals if not given."""
+
+
+@dataclass(frozen=True)
+class Testing:
+    """What to simulate, and how."""
+
+    fingers: OmitArgPrefixes[Fingers] = Fingers()
+    random_wrenches: Annotated[int, Field(ge=0, le=10_000)] = 0
+    """Also hold so many random wrenches, each at a share of what the analysis says is resisted."""
+    wrenches: Path | None = None
+    """A file of wrenches to hold as they are (see README)."""
+    weight_n: Positive | None = None
+    """Also hold the object's weight [N], along and against each axis or in the directions given."""
+    down: Annotated[UseAppendAction[tuple[Direction, ...]], arg(metavar="X Y Z")] = ()
+    """With --weight-n: a direction of gravity; may be repeated."""
+    limits: Literal["none", "ramp", "bisection"] = "none"
+    """Also find the largest multiple of each wrench in simulation."""
+    independent: bool = False
+    """Also try rigid fingertips, a fixed squeeze and the first instant, which know nothing of the
+    planned forces."""
+    also_judge_by: UseAppendAction[tuple[RuleName, ...]] = ()
+    """Show what the acceptance rule of another tool makes of the same trials; may be repeated."""
+    traces: bool = False
+    """With --out: also write how each contact moved over time."""
+    surface: Literal["pads", "mesh"] = "pads"
+    """What fingertips touch: a pad each, exact on any object, or a convex object's own mesh."""
+    setup: Path | None = None
+    """A TOML file with settings of the simulation (see README)."""
+    timeout_s: Positive = 600.0
+    """Stop trials of one contact set that take longer."""
+    jobs: Count = field(default_factory=available_cores)
+    """Largest number of processes; results do not depend on it."""

@@ -1,0 +1,98 @@
+"""Which wrenches a grasp is tested with, how far each is resisted, and the planned forces."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array, to_digits
+from grasp_core.resisted_wrenches import WrenchBody, WrenchLimit, axis_wrenches
+from grasp_core.values import Grasp, Polyhedron, contact_frictions
+from grasp_core.wrenches import normal_and_tangential
+from sim_validate.limits import part
+from sim_validate.schedules import Load
+from sim_validate.setup import Agenda, Setup
+
+AXIS_NAMES = tuple(
+    f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"
+)
+WEAKEST = "weakest"
+RANDOM = "random_{}"
+NO_PUSH = 1e-9
+"""Normal forces below this, in largest ones, are none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlannedLoad:
+    """One wrench to hold, and what the analysis says about it."""
+
+    name: str
+    load: Load
+    """What is applied, and the forces planned for it."""
+    predicted_limit: float
+    """Largest multiple of the wrench that the analysis says is resisted."""
+    limit: Load
+    """The wrench at that multiple, and the forces that balance it."""
+    required_friction: float
+    """What the planned forces need."""
+
+
+def planned_loads(
+    body: Polyhedron, grasp: Grasp, friction: float, idle: Load, agenda: Agenda, setup: Setup
+) -> tuple[PlannedLoad, ...]:
+    """The loads of an agenda, in its order: axes, weakest, random, a user's own.
+
+    Args:
+        body: The object.
+        grasp: In force closure at this friction.
+        friction: Coulomb coefficient at every contact.
+        idle: No wrench, and the forces of the gentle grasp.
+        agenda: Which wrenches.
+        setup: The largest normal force, and the share of the limit that is applied.
+    """
+    resisted = WrenchBody(
+        grasp.positions - body.center_of_mass,
+        grasp.normals,
+        contact_frictions(friction, len(grasp.contacts)),
+        setup.fingers.max_normal_force_n,
+    )
+    share = setup.hold.load_share
+    relative = [
+        _load(name, found, share * found.limit, idle, grasp)
+        for name, found in _relative(resisted, body.radius, agenda)
+    ]
+    own = [
+        _load(named.name, resisted.limit(named.wrench), 1.0, idle, grasp)
+        for named in agenda.wrenches
+    ]
+    return (*relative, *own)
+
+
+def _relative(
+    resisted: WrenchBody, torque_scale: float, agenda: Agenda
+) -> list[tuple[str, WrenchLimit]]:
+    """Wrenches that are applied at a share of what is resisted, with that limit."""
+    axes = [resisted.limit(wrench) for wrench in axis_wrenches(torque_scale)]
+    weakest = resisted.weakest_from(axes, torque_scale)
+    rng = np.random.default_rng(agenda.seed)
+    scale = np.array([1.0] * 3 + [torque_scale] * 3)
+    drawn = rng.normal(size=(agenda.random_wrenches, 6))
+    units = scale * drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
+    others = [(RANDOM.format(place), resisted.limit(unit)) for place, unit in enumerate(units)]
+    return [*zip(AXIS_NAMES, axes, strict=True), (WEAKEST, weakest), *others]
+
+
+def _load(name: str, found: WrenchLimit, multiple: float, idle: Load, grasp: Grasp) -> PlannedLoad:
+    """A multiple of a wrench with forces between those at rest and those at the limit."""
+    wrench = to_digits(multiple * found.wrench)
+    predicted = found.limit / multiple
+    limit = Load(predicted * wrench, to_digits(found.forces))
+    planned = part(idle, limit, 1.0 / predicted) if predicted > 0.0 else Load(wrench, idle.forces)
+    load = Load(wrench, planned.forces)
+    return PlannedLoad(name, load, predicted, limit, _needed(load.forces, grasp.normals))
+
+
+def _needed(forces: Array, normals: Array) -> float:
+    """Friction that forces (k, 3) need."""
+    along, across = normal_and_tangential(forces, normals)
+    pushing = along > NO_PUSH * along.max()
+    return float(to_digits((across[pushing] / along[pushing]).max()))

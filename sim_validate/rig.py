@@ -1,0 +1,95 @@
+"""An object squeezed on the bench: from there the wrench holds, ramps and releases start."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from sim_validate import schedules
+from sim_validate.schedules import Load, Schedule
+from sim_validate.setup import Setup
+from sim_validate.simulate import Bench
+from sim_validate.traces import Trace, trace
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rig:
+    """An object in the grip of its fingers, unloaded."""
+
+    bench: Bench
+    setup: Setup
+    friction: float
+    """At which it is to be held."""
+    idle: Load
+    """No wrench, and the forces that squeeze it."""
+    start: Array | None
+    """The state reached; None for rigid fingers, which are put where they are."""
+
+    def hold(
+        self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None
+    ) -> tuple[Trace, ...]:
+        """Motion under each load, from the moment friction is lowered.
+
+        Args:
+            loads: What to hold.
+            settling_frictions: Friction until then, one for each load; a multiple of that to hold
+                at if None.
+        """
+        protocol, clock = self.setup.hold, self.bench.clock
+        usual = protocol.settling_friction * self.friction
+        return self._traces(
+            [
+                schedules.hold(self.idle, load, (high, self.friction), clock, protocol)
+                for load, high in zip(
+                    loads, settling_frictions or [usual] * len(loads), strict=True
+                )
+            ]
+        )
+
+    def ramp(
+        self, limits: Sequence[Load], shares: tuple[float, float]
+    ) -> tuple[tuple[Trace, ...], Array]:
+        """Motion while each load rises between two shares of itself, and the shares (n,)."""
+        clock, protocols = self.bench.clock, (self.setup.hold, self.setup.limit)
+        rises = [
+            schedules.ramp(self.idle, load, shares, self.friction, clock, protocols)
+            for load in limits
+        ]
+        return self._traces([schedule for schedule, _ in rises]), rises[0][1]
+
+    def release(self, settling_friction: float, frictions: Sequence[float]) -> tuple[Trace, ...]:
+        """Motion of the unloaded object after friction is lowered to each of several values."""
+        clock, protocol = self.bench.clock, self.setup.friction
+        return self._traces(
+            [
+                schedules.release(self.idle.forces, settling_friction, friction, clock, protocol)
+                for friction in frictions
+            ]
+        )
+
+    def _traces(self, trials: Sequence[Schedule]) -> tuple[Trace, ...]:
+        motions = self.bench.run(trials, self.start)
+        layout = self.bench.scene.layout
+        return tuple(
+            trace(motion, layout, trial.watched)
+            for motion, trial in zip(motions, trials, strict=True)
+        )
+
+
+def squeezed(
+    bench: Bench, setup: Setup, forces: Array, friction: float,
+    settling_friction: float | None = None,
+) -> Rig:  # fmt: skip
+    """Close the fingers of a bench on the unloaded object.
+
+    Args:
+        bench: With a scene whose fingers are driven by servos.
+        setup: How trials are simulated.
+        forces: Planned forces, (k, 3) [N].
+        friction: At which the object is to be held.
+        settling_friction: While closing; a multiple of `friction` if None.
+    """
+    high = settling_friction or setup.hold.settling_friction * friction
+    (closed,) = bench.run([schedules.squeeze(forces, high, bench.clock, setup.hold)])
+    return Rig(bench, setup, friction, Load(np.zeros(6), forces), closed.state)

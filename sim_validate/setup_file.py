@@ -1,0 +1,56 @@
+"""A setup in TOML: tables `physics`, `fingers`, `hold`, `limit`, `friction`, any part of each."""
+
+import tomllib
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any, cast
+
+from pydantic import TypeAdapter, ValidationError
+
+from grasp_core.errors import InputError
+from sim_validate.files import read_text
+from sim_validate.setup import Setup
+
+TABLES = ("physics", "fingers", "hold", "limit", "friction")
+
+
+def setup_from_file(path: Path, setup: Setup) -> Setup:
+    """The setup, with the numbers of a file in place of its own.
+
+    Args:
+        path: A TOML file.
+        setup: What holds where the file says nothing.
+
+    Raises:
+        InputError: It is not such a file; the message names the field.
+    """
+    try:
+        tables = tomllib.loads(read_text(path))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not TOML ({error})") from error
+    for name, given in tables.items():
+        if name not in TABLES or not isinstance(given, dict):
+            raise InputError(f"{path}: tables are {', '.join(TABLES)}; got {name!r}")
+        table = cast("dict[str, Any]", given)
+        setup = replace(setup, **{name: _filled(path, name, getattr(setup, name), table)})
+    return setup
+
+
+def _filled(path: Path, table: str, values: Any, given: dict[str, Any]) -> Any:
+    """A frozen value with some of its fields replaced, each checked against its type."""
+    kinds = {field.name: field.type for field in fields(values)}
+    for name in given:
+        if name not in kinds:
+            raise InputError(f"{path}: [{table}] has {', '.join(kinds)}; got {name!r}")
+    kind = cast("type[Any]", type(values))
+    try:
+        checked: Any = TypeAdapter(kind).validate_python({**_as_dict(values), **given})
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise InputError(f"{path}: [{table}] {where}: {first['msg']}") from error
+    return checked
+
+
+def _as_dict(values: Any) -> dict[str, Any]:
+    return {field.name: getattr(values, field.name) for field in fields(values)}

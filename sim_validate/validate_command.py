@@ -1,0 +1,222 @@
+"""The commands that simulate: grasps on the bench, verdicts to files and tables."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from grasp_core.errors import InputError
+from grasp_core.records import SavedGrasps, grasps_from_json
+from grasp_core.values import Grasp, Polyhedron
+from scenes.fingertips import FingerSettings
+from sim_validate import cli, flags
+from sim_validate.console import TABLE_ROWS, Reporter
+from sim_validate.engines import each, processes
+from sim_validate.files import read_text, write_arrays, write_text
+from sim_validate.gate import require_faithful
+from sim_validate.plan_command import say_cut
+from sim_validate.rules import RULES
+from sim_validate.setup import Agenda, Setup
+from sim_validate.setup_file import setup_from_file
+from sim_validate.validation import Verdict, validate
+from sim_validate.verdict import Outcome
+from sim_validate.verdict_records import summary, trace_arrays, verdicts_to_json
+from sim_validate.wrench_file import weights, wrenches_from_file
+
+
+def validate_file(command: cli.Validate, reporter: Reporter) -> int:
+    """Simulate the grasps of a file."""
+    saved = grasps_from_json(read_text(command.grasps))
+    if not saved.grasps:
+        absence = f"{command.grasps} holds no grasp"
+        reporter.say(absence)
+        reporter.document({"absence": absence})
+        return cli.Exit.NONE
+    chosen = SavedGrasps(
+        saved.body,
+        saved.friction if command.friction is None else command.friction,
+        saved.seed if command.seed is None else command.seed,
+        saved.grasps[: command.limit],
+    )
+    return simulate_grasps(chosen, command.testing, command.out, reporter)
+
+
+def finger_settings(given: flags.Fingers) -> FingerSettings:
+    """What the flags say about fingertips."""
+    return FingerSettings(
+        max_normal_force_n=given.max_normal_force,
+        radius_m=given.fingertip_radius_m,
+        mass_kg=given.fingertip_mass_kg,
+        stiffness_n_per_m=given.stiffness_n_per_m,
+        approach=given.approach,
+    )
+
+
+def _setup(testing: flags.Testing) -> Setup:
+    """How the flags, and then a file, say trials are simulated."""
+    setup = Setup(
+        fingers=finger_settings(testing.fingers),
+        surface=testing.surface,
+        timeout_s=testing.timeout_s,
+    )
+    return setup if testing.setup is None else setup_from_file(testing.setup, setup)
+
+
+def _agenda(testing: flags.Testing, seed: int, folder: Path | None) -> Agenda:
+    """Which trials the flags ask for.
+
+    Raises:
+        InputError: Flags contradict each other, or the file of wrenches is refused.
+    """
+    if testing.down and testing.weight_n is None:
+        raise InputError("--down is a direction of the weight: give --weight-n too")
+    if testing.traces and folder is None:
+        raise InputError("--traces are written to files: give --out DIR too")
+    own = () if testing.wrenches is None else wrenches_from_file(testing.wrenches)
+    weight = () if testing.weight_n is None else weights(testing.weight_n, testing.down)
+    return Agenda(
+        random_wrenches=testing.random_wrenches,
+        wrenches=(*own, *weight),
+        limits=testing.limits,
+        independent=testing.independent,
+        rules=testing.also_judge_by,
+        keep_traces=testing.traces,
+        seed=seed,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Trial:
+    """One grasp to validate, as it travels to a worker."""
+
+    body: Polyhedron
+    grasp: Grasp
+    friction: float
+    agenda: Agenda
+    setup: Setup
+
+
+def _try(trial: _Trial) -> Verdict:
+    return validate(trial.body, trial.grasp, trial.friction, agenda=trial.agenda, setup=trial.setup)
+
+
+def simulate_grasps(
+    saved: SavedGrasps, testing: flags.Testing, folder: Path | None, reporter: Reporter
+) -> int:
+    """Validate grasps, write what is done even when interrupted, and show the verdicts.
+
+    Raises:
+        InputError: A flag, a file or a grasp is refused.
+        UnfaithfulError: The simulator fails the gate; nothing is simulated or written then.
+    """
+    setup, agenda = _setup(testing), _agenda(testing, saved.seed, folder)
+    gate = require_faithful(setup)
+    for check in gate.checks:
+        reporter.detail(str(check))
+    threads = max(1, testing.jobs // processes(len(saved.grasps), testing.jobs))
+    setup = replace(setup, threads=threads)
+    trials = [_Trial(saved.body, g, saved.friction, agenda, setup) for g in saved.grasps]
+    verdicts: list[Verdict] = []
+    try:
+        with reporter.progress("simulating") as steps:
+            for verdict in each(_try, trials, jobs=testing.jobs):
+                verdicts.append(verdict)
+                if folder and agenda.keep_traces:
+                    write_arrays(folder / "traces" / f"{verdict.id}.npz", trace_arrays(verdict))
+                held = sum(verdict.held for verdict in verdicts)
+                steps.update(len(verdicts), len(trials), f"({held} held)")
+    finally:
+        complete = len(verdicts) == len(trials)
+        text = verdicts_to_json(saved.body, saved.friction, verdicts, gate, complete=complete)
+        if folder and verdicts:
+            write_text(folder / "verdicts.json", text)
+    if reporter.json_only:
+        print(text, end="")  # noqa: T201 - the document itself
+    _show(saved.grasps, verdicts, reporter)
+    return cli.Exit.GOOD if all(verdict.good for verdict in verdicts) else cli.Exit.NEGATIVE
+
+
+def _show(grasps: Sequence[Grasp], verdicts: Sequence[Verdict], reporter: Reporter) -> None:
+    rows: list[tuple[str, ...]] = []
+    for grasp, verdict in zip(grasps[:TABLE_ROWS], verdicts, strict=False):
+        worst = max(trial.hold.displacement_m for trial in verdict.wrenches)
+        held = sum(control.held for control in verdict.controls)
+        friction = verdict.critical_friction
+        rows.append(
+            (grasp.id, grasp.family, f"{friction.predicted:.4f}",
+             "-" if friction.simulated is None else f"{friction.simulated:.4f}",
+             *([_limit_range(verdict)] if verdict.agenda.limits != "none" else []),
+             verdict.outcome.value, f"{1e6 * worst:.2g}", f"{held} of {len(verdict.controls)}")
+        )  # fmt: skip
+    limits = ("limits",) if verdicts and verdicts[0].agenda.limits != "none" else ()
+    columns = ("grasp", "family", "mu*", "in sim", *limits, "outcome", "um moved", "controls held")
+    reporter.table("verdicts", columns, rows)
+    say_cut(len(verdicts), reporter)
+    _show_bounds(verdicts, reporter)
+    _show_rules(verdicts, reporter)
+    totals = summary(verdicts)
+    reporter.say(
+        f"{totals['grasps_held']} of {totals['grasps']} grasps held all wrenches; "
+        f"{totals['controls_held']} of {totals['controls']} negative controls held (none should)"
+    )
+    for line in _surprises(verdicts):
+        reporter.warn(line)
+    if not totals["controls"]:
+        reporter.warn("there were no negative controls: nothing shows that this test can fail")
+
+
+def _limit_range(verdict: Verdict) -> str:
+    """Simulated over predicted limits: the least and the largest."""
+    shares = [trial.simulated_limit.share for trial in verdict.wrenches if trial.simulated_limit]
+    return f"{min(shares):.3f}-{max(shares):.3f}" if shares else "-"
+
+
+def _show_bounds(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
+    """What was found without planned forces, if asked for."""
+    rows: list[tuple[str, ...]] = []
+    for verdict in verdicts[:TABLE_ROWS]:
+        if (found := verdict.bounds) is None:
+            return
+        held = found.friction_at_most
+        rows.append(
+            (verdict.id, f"{verdict.critical_friction.predicted:.4f}",
+             "-" if held is None else f"{held:.4f}",
+             f"{min(found.limit_shares):.1f}-{max(found.limit_shares):.1f}",
+             f"{found.residual:.3f}")
+        )  # fmt: skip
+    columns = ("grasp", "mu*", "rigid tips", "fixed squeeze", "residual")
+    reporter.table("without planned forces (bounds)", columns, rows)
+
+
+def _show_rules(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
+    """How many grasps and controls the rules of other tools accept, if asked for."""
+    names = verdicts[0].agenda.rules if verdicts else ()
+    controls = [control for verdict in verdicts for control in verdict.controls]
+    rows = [
+        (name, RULES[name].source,
+         f"{sum(verdict.accepted_by[name] for verdict in verdicts)} of {len(verdicts)}",
+         f"{sum(control.accepted_by[name] for control in controls)} of {len(controls)}")
+        for name in names
+    ]  # fmt: skip
+    if rows:
+        columns = ("rule", "of", "grasps accepted", "controls accepted")
+        reporter.table("rules of other tools", columns, rows)
+
+
+def _surprises(verdicts: Sequence[Verdict]) -> Iterable[str]:
+    """What did not end as it should, a line each."""
+    lines = [
+        f"{verdict.id}: {trial.name}: {trial.hold.outcome.value}: {trial.hold.reason}"
+        for verdict in verdicts
+        for trial in verdict.wrenches
+        if trial.hold.outcome is not Outcome.HELD
+    ]
+    lines += [f"{verdict.id}: {what}" for verdict in verdicts for what in verdict.mismatches]
+    lines += [
+        f"{verdict.id}: control {control.control.name}: {trial.name}: {trial.hold.outcome.value}"
+        for verdict in verdicts
+        for control in verdict.controls
+        for trial in control.tried
+        if not control.failed
+    ]
+    more = [f"and {len(lines) - TABLE_ROWS} more lines"] if len(lines) > TABLE_ROWS else []
+    return lines[:TABLE_ROWS] + more

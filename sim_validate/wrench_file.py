@@ -1,0 +1,81 @@
+"""A task's wrenches in JSON: what a grasp must hold, as they are.
+
+    {"wrenches": [{"name": "lift", "force_n": [0, 0, -3], "torque_n_m": [0, 0, 0]}, ...]}
+
+Torques are about the centre of mass; forces and torques in the object's frame. A torque may be
+left out.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from grasp_core.errors import InputError
+from sim_validate.files import read_text
+from sim_validate.setup import NamedWrench
+
+MOST_WRENCHES = 10_000
+LARGEST = 1e9
+"""Larger forces and torques are mistakes."""
+
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+Vector = tuple[Number, Number, Number]
+Name = Annotated[str, Field(min_length=1, max_length=100)]
+
+
+class _Given(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    name: Name
+    force_n: Vector
+    torque_n_m: Vector = (0.0, 0.0, 0.0)
+
+
+class _WrenchFile(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    wrenches: Annotated[list[_Given], Field(min_length=1, max_length=MOST_WRENCHES)]
+
+
+def wrenches_from_file(path: Path) -> tuple[NamedWrench, ...]:
+    """The wrenches of a file.
+
+    Raises:
+        InputError: It is not such a file, two wrenches share a name, or one is zero.
+    """
+    try:
+        given = _WrenchFile.model_validate_json(read_text(path)).wrenches
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise InputError(f"{path}: {where}: {first['msg']}") from error
+    names = [each.name for each in given]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"{path}: two wrenches are named {twice!r}")
+    found = [NamedWrench(each.name, np.array([*each.force_n, *each.torque_n_m])) for each in given]
+    for each in found:
+        if not each.wrench.any():
+            raise InputError(f"{path}: wrench {each.name!r} is zero: nothing would be tested")
+    return tuple(found)
+
+
+def weights(
+    weight_n: float, downs: tuple[tuple[float, float, float], ...]
+) -> tuple[NamedWrench, ...]:
+    """The object's weight at its centre of mass, for each direction of gravity.
+
+    Args:
+        weight_n: [N]
+        downs: Directions, of any length; along and against each axis if there are none.
+    """
+    ways = [np.array(down) for down in downs] or [*np.eye(3), *-np.eye(3)]
+    return tuple(
+        NamedWrench(
+            f"weight_{place}",
+            np.concatenate([weight_n * way / np.linalg.norm(way), np.zeros(3)]),
+        )
+        for place, way in enumerate(ways)
+    )

@@ -1,0 +1,236 @@
+"""Predicted against simulated, with teeth: `python -m tests.benchmarks.fidelity [--quick]`.
+
+Grasps of all families on several objects, friction 0.2 to 0.8: critical friction, largest wrench in
+random directions, holds inside and outside the predicted limit, negative controls with what other
+tools' rules make of them, bounds that do not know the planned forces, and speed.
+"""
+
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+import grasp_core as gc
+import scenes
+from grasp_core.resisted_wrenches import WrenchBody
+from grasp_core.values import contact_frictions
+from scenes.mjcf import build_scene
+from sim_validate.control_trials import try_control
+from sim_validate.controls import negative_controls
+from sim_validate.engines import available_cores, each
+from sim_validate.gate import require_faithful
+from sim_validate.independent import independent_bounds
+from sim_validate.limits import part, ramped_limits
+from sim_validate.released import released_friction
+from sim_validate.rig import squeezed
+from sim_validate.rules import RULES
+from sim_validate.schedules import Load
+from sim_validate.setup import Agenda, Setup
+from sim_validate.simulate import Bench
+from sim_validate.validation import validate
+from sim_validate.verdict import Outcome, judge
+from sim_validate.verdict_records import verdicts_to_json
+
+OBJECTS = (
+    "tetrahedron", "octahedron", "wedge", "chamfered-box", "double-wedge-bar", "box", "prism",
+    "l-bracket", "cross", "screwdriver", "hexagonal-pyramid", "random-8-3", "random-12-1",
+    "random-16-1", "random-20-7",
+)  # fmt: skip
+FRICTIONS = (0.2, 0.35, 0.5, 0.8)
+FAMILIES = ("concurrent", "pencil", "regulus", "free")
+QUICK = (("wedge", "chamfered-box", "l-bracket", "random-12-1"), (0.3, 0.6))
+EACH = 3
+"""Grasps of one family on one object at one friction."""
+DIRECTIONS = 24
+INSIDE, OUTSIDE = 0.9, 1.1
+HELD_DIRECTIONS = 10
+BOUNDED = 8
+"""Of every so many grasps one is tried without planned forces."""
+
+
+@dataclass(frozen=True)
+class Case:
+    body: gc.Polyhedron
+    grasp: gc.Grasp
+    friction: float
+    place: int
+
+
+@dataclass(frozen=True)
+class Found:
+    """What one grasp gave."""
+
+    family: str
+    name: str
+    critical: object
+    shares: list
+    inside: list
+    outside: list
+    controls: list
+    accepted: Counter
+    bounds: object
+
+
+def cases(objects, frictions, each_family):
+    found = []
+    for name, friction, family in product(objects, frictions, FAMILIES):
+        body = scenes.example_object(name)
+        for grasp in gc.plan(body, friction, families=(family,), limit=each_family).grasps:
+            found.append(Case(body, grasp, friction, len(found)))
+    return found
+
+
+def limiting_loads(case, setup, count, seed):
+    """Random wrenches at their predicted limits, with the forces that balance them."""
+    body, grasp = case.body, case.grasp
+    resisted = WrenchBody(
+        grasp.positions - body.center_of_mass, grasp.normals,
+        contact_frictions(case.friction, 4), setup.fingers.max_normal_force_n,
+    )  # fmt: skip
+    scale = np.array([1.0] * 3 + [body.radius] * 3)
+    drawn = np.random.default_rng(seed).normal(size=(count, 6)) * scale
+    limits = [resisted.limit(wrench) for wrench in drawn]
+    return [Load(limit.limit * limit.wrench, limit.forces) for limit in limits]
+
+
+def examine(case):
+    """All figures of one grasp."""
+    setup = Setup()
+    scene = build_scene(case.body, case.grasp, case.friction)
+    bench, layout = Bench(scene), scene.layout
+    squeeze = np.einsum("kij,kj->ki", layout.frames, layout.squeeze)
+    rig = squeezed(bench, setup, squeeze, case.friction)
+    limits = limiting_loads(case, setup, DIRECTIONS, case.place)
+    near = limits[:HELD_DIRECTIONS]
+    tried = [part(rig.idle, limit, share) for share in (INSIDE, OUTSIDE) for limit in near]
+    ends = [judge(trace, layout, setup.hold).outcome for trace in rig.hold(tried)]
+    critical = gc.critical_friction(case.grasp)
+    known = replace(case.grasp, critical_friction=critical)
+    agenda = Agenda(rules=tuple(RULES))
+    verdicts = [
+        try_control(case.body, control, agenda, setup)
+        for control in negative_controls(case.body, known, case.friction, case.place)
+    ]
+    accepted = Counter(name for each in verdicts for name, yes in each.accepted_by.items() if yes)
+    bounds = None
+    if case.place % BOUNDED == 0:
+        bounds = independent_bounds(case.body, case.grasp, critical, rig, near)
+    return Found(
+        family=case.grasp.family,
+        name=case.body.name,
+        critical=released_friction(bench, known, critical, setup),
+        shares=[limit.share if limit else float("nan") for limit in ramped_limits(rig, limits)],
+        inside=ends[: len(near)],
+        outside=ends[len(near) :],
+        controls=[(each.control.name, each.held, each.failed) for each in verdicts],
+        accepted=accepted,
+        bounds=bounds,
+    )
+
+
+def report(found):
+    """The figures of all grasps, and lines that say them."""
+    positive = [f.critical for f in found if f.critical.predicted >= 1e-3]
+    ratios = np.array([c.simulated / c.predicted if c.simulated else np.nan for c in positive])
+    shares = np.concatenate([f.shares for f in found])
+    inside = Counter(end for f in found for end in f.inside)
+    outside = Counter(end for f in found for end in f.outside)
+    controls = [control for f in found for control in f.controls]
+    kinds = Counter(kind for kind, _, _ in controls)
+    bounds = [(f.bounds, f.critical.predicted) for f in found if f.bounds]
+    accepted = sum((f.accepted for f in found), Counter())
+    off, wide = np.abs(ratios - 1.0), np.abs(shares - 1.0)
+    tiny = [f.critical for f in found if f.critical.predicted < 1e-3]
+    figures = {
+        "grasps": len(found),
+        "families": dict(Counter(f.family for f in found)),
+        "objects": len({f.name for f in found}),
+        "critical_frictions": len(ratios),
+        "critical_not_found": int(np.isnan(ratios).sum()),
+        "critical_within_half_percent": float((off < 0.005).mean()),
+        "critical_worst": float(np.nanmax(off)),
+        "tiny_critical_frictions": len(tiny),
+        "tiny_that_held": sum(c.simulated == 0.0 for c in tiny),
+        "limits": len(shares),
+        "limits_not_found": int(np.isnan(shares).sum()),
+        "limit_median_error": float(np.nanmedian(wide)),
+        "limit_within_3_percent": float((wide < 0.03).mean()),
+        "limit_range": [float(np.nanmin(shares)), float(np.nanmax(shares))],
+        "inside": sum(inside.values()),
+        "false_unstable": sum(inside.values()) - inside[Outcome.HELD],
+        "outside": sum(outside.values()),
+        "false_stable": outside[Outcome.HELD],
+        "outside_outcomes": {end.value: count for end, count in outside.items()},
+        "controls": len(controls),
+        "control_kinds": dict(kinds),
+        "controls_held": sum(held for _, held, _ in controls),
+        "controls_not_let_go": sum(not failed for _, _, failed in controls),
+        "controls_accepted_by": {name: accepted[name] for name in RULES},
+        "bounded": len(bounds),
+        "bounds_on_the_wrong_side": sum(not b.agree(critical) for b, critical in bounds),
+    }
+    for name, value in figures.items():
+        print(f"{name.replace('_', ' '):34s} {value}")
+    return figures
+
+
+def throughput():
+    """Full validations per second on a body of twenty faces, and what each phase takes."""
+    body = scenes.example_object("random-20-7")
+    grasps = gc.plan(body, 0.5, limit=24).grasps
+    agenda = Agenda(random_wrenches=13, controls=False)
+    print(f"{len(body.faces)} faces, 26 wrenches and the critical friction:")
+    for jobs, threads in ((1, 1), (1, 2), (available_cores(), 1)):
+        trials = [(body, grasp, agenda, threads) for grasp in grasps]
+        run = iter(each(_validated, trials * 2, jobs=jobs))
+        next(run)  # starting the processes is not what is measured
+        begun = time.perf_counter()
+        count = sum(1 for _ in run)
+        rate = count / (time.perf_counter() - begun)
+        print(f"  {jobs} processes, {threads} threads each: {rate:.1f} validations per second")
+    for wrenches in (0, 13, 39, 91):
+        begun = time.perf_counter()
+        for grasp in grasps[:8]:
+            _validated((body, grasp, replace(agenda, random_wrenches=wrenches), 1))
+        spent = (time.perf_counter() - begun) / 8
+        print(f"  {13 + wrenches:3d} wrenches: {1e3 * spent:.0f} ms, "
+              f"{1e3 * spent / (13 + wrenches):.2f} ms each")  # fmt: skip
+
+
+def _validated(trial):
+    body, grasp, agenda, threads = trial
+    return validate(body, grasp, 0.5, agenda=agenda, setup=Setup(threads=threads)).held
+
+
+def repeats():
+    """Whether results are the same at one and two threads, and again; and no file appears."""
+    body = scenes.example_object("random-12-1")
+    grasps = gc.plan(body, 0.5, limit=4, families=FAMILIES).grasps
+    before, texts = set(Path().iterdir()), set()
+    for threads in (1, 2, 2):
+        setup = Setup(threads=threads)
+        agenda = Agenda(random_wrenches=3, limits="ramp", independent=True, rules=tuple(RULES))
+        verdicts = [validate(body, grasp, 0.5, agenda=agenda, setup=setup) for grasp in grasps]
+        texts.add(verdicts_to_json(body, 0.5, verdicts, require_faithful(setup), complete=True))
+    print(f"different texts of three runs at 1, 2 and 2 threads: {len(texts)}")
+    print(f"files that appeared meanwhile: {sorted(set(Path().iterdir()) - before)}")
+
+
+def main():
+    quick = "--quick" in sys.argv[1:]
+    chosen = cases(*QUICK, 2) if quick else cases(OBJECTS, FRICTIONS, EACH)
+    begun = time.perf_counter()
+    found = list(each(examine, chosen, jobs=available_cores()))
+    print(f"examined in {time.perf_counter() - begun:.0f} s")
+    report(found)
+    if not quick:
+        throughput()
+        repeats()
+
+
+if __name__ == "__main__":
+    main()

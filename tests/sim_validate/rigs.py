@@ -1,0 +1,50 @@
+"""Grasps on the bench, as several tests need them."""
+
+import numpy as np
+
+import grasp_core as gc
+import scenes
+from grasp_core.resisted_wrenches import WrenchBody
+from grasp_core.values import contact_frictions
+from scenes.mjcf import build_scene
+from sim_validate.rig import squeezed
+from sim_validate.schedules import Load
+from sim_validate.setup import Setup
+from sim_validate.simulate import Bench
+
+MAX_FORCE = 10.0
+
+
+def grasps(name, friction, limit, families=("concurrent",)):
+    body = scenes.example_object(name)
+    return body, gc.plan(body, friction, limit=limit, families=families).grasps
+
+
+def rig_of(body, grasp, friction, setup=None, surface="pads"):
+    """The object in the gentle grasp of its scene."""
+    setup = setup or Setup()
+    scene = build_scene(
+        body, grasp, friction, fingers=setup.fingers, physics=setup.physics, surface=surface
+    )
+    forces = np.einsum("kij,kj->ki", scene.layout.frames, scene.layout.squeeze)
+    return squeezed(Bench(scene, threads=setup.threads), setup, forces, friction)
+
+
+def limiting_loads(body, grasp, friction, count, seed=0):
+    """Random wrenches with torques at their predicted limits, and the forces that balance them."""
+    arms = grasp.positions - body.center_of_mass
+    resisted = WrenchBody(
+        arms, grasp.normals, contact_frictions(friction, len(grasp.contacts)), MAX_FORCE
+    )
+    scale = np.array([1.0] * 3 + [body.radius] * 3)
+    drawn = np.random.default_rng(seed).normal(size=(count, 6)) * scale
+    found = [resisted.limit(wrench) for wrench in drawn]
+    return [Load(limit.limit * limit.wrench, limit.forces) for limit in found]
+
+
+def imbalance(load, body, grasp):
+    """What is left of a wrench and the forces planned for it, in largest normal forces."""
+    arms = grasp.positions - body.center_of_mass
+    force = load.forces.sum(axis=0) + load.wrench[:3]
+    torque = np.cross(arms, load.forces).sum(axis=0) + load.wrench[3:]
+    return max(np.abs(force).max(), np.abs(torque).max() / body.radius) / MAX_FORCE

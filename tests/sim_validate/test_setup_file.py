@@ -1,0 +1,89 @@
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from sim_validate.setup import Setup
+from sim_validate.setup_file import setup_from_file
+from sim_validate.wrench_file import weights, wrenches_from_file
+
+
+def test_a_file_changes_what_it_names_and_nothing_else(tmp_path):
+    path = tmp_path / "setup.toml"
+    path.write_text(
+        "[physics]\ntimestep = 0.001\nsolref = [0.002, 1.0]\n[hold]\nload_share = 0.5\n"
+        "[fingers]\nradius_m = 0.003\n[limit]\nspans = [0.05]\n"
+    )
+    setup = setup_from_file(path, Setup(threads=2))
+    assert setup.physics.timestep == 0.001
+    assert setup.physics.solref == (0.002, 1.0)
+    assert setup.hold.load_share == 0.5
+    assert setup.fingers.radius_m == 0.003
+    assert setup.limit.spans == (0.05,)
+    assert setup.friction == Setup().friction
+    assert setup.physics.cone == "elliptic"
+    assert setup.threads == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[physics]\ntimestp = 0.001\n", r"\[physics\] has .*timestep.* got 'timestp'"),
+        ("[physic]\ntimestep = 0.001\n", "tables are physics.* got 'physic'"),
+        ("timestep = 0.001\n", "tables are physics.* got 'timestep'"),
+        ('[physics]\ntimestep = "slow"\n', r"\[physics\] timestep: .*number"),
+        ("[physics]\ntimestep = -0.001\n", "timestep must be positive"),
+        ("[physics]\ntolerance = nan\n", "tolerance must be finite"),
+        ("[hold]\nload_share = 2.0\n", "load_share must be below 1"),
+        ("[physics\n", "not TOML"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said(tmp_path, text, words):
+    path = tmp_path / "setup.toml"
+    path.write_text(text)
+    with pytest.raises(gc.InputError, match=words):
+        setup_from_file(path, Setup())
+
+
+def test_wrenches_of_a_task_are_read_as_they_are(tmp_path):
+    path = tmp_path / "task.json"
+    path.write_text(
+        '{"wrenches": [{"name": "lift", "force_n": [0, 0, -3]},'
+        ' {"name": "turn", "force_n": [0, 1.5, 0], "torque_n_m": [0.1, 0, 0]}]}'
+    )
+    lift, turn = wrenches_from_file(path)
+    assert (lift.name, turn.name) == ("lift", "turn")
+    np.testing.assert_array_equal(lift.wrench, [0, 0, -3, 0, 0, 0])
+    np.testing.assert_array_equal(turn.wrench, [0, 1.5, 0, 0.1, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('{"wrenches": []}', "wrenches: "),
+        ('{"wrenches": [{"name": "a", "force_n": [0, 0]}]}', "wrenches.0.force_n"),
+        ('{"wrenches": [{"name": "a", "force_n": [0, 0, 0]}]}', "'a' is zero"),
+        ('{"wrenches": [{"name": "a", "force_n": [1, 0, 0], "mass": 1}]}', "wrenches.0.mass"),
+        ('{"wrenches": [{"name": "a", "force_n": [1, 0, 1e999]}]}', "wrenches.0.force_n"),
+        (
+            '{"wrenches": [{"name": "a", "force_n": [1, 0, 0]}, '
+            '{"name": "a", "force_n": [1, 1, 0]}]}',
+            "two wrenches are named 'a'",
+        ),
+        ("[", "Invalid JSON"),
+    ],
+)
+def test_what_is_wrong_with_wrenches_is_said(tmp_path, text, words):
+    path = tmp_path / "task.json"
+    path.write_text(text)
+    with pytest.raises(gc.InputError, match=words):
+        wrenches_from_file(path)
+
+
+def test_weight_acts_at_the_centre_of_mass_along_each_direction_of_gravity():
+    six = weights(2.0, ())
+    assert len({each.name for each in six}) == 6
+    forces = np.array([each.wrench[:3] for each in six])
+    np.testing.assert_allclose(np.linalg.norm(forces, axis=1), 2.0)
+    assert not forces.sum(axis=0).any()
+    (down,) = weights(3.0, ((0.0, 0.0, -10.0),))
+    np.testing.assert_array_equal(down.wrench, [0, 0, -3.0, 0, 0, 0])
