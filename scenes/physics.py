@@ -7,8 +7,9 @@ friction to normal impedance (resting contacts otherwise creep), hard and consta
 impedance, and a dense Jacobian (the sparse Newton solver of MuJoCo 4.0.0 has a bug).
 """
 
-import math
 from dataclasses import asdict, dataclass
+
+import numpy as np
 
 from grasp_core.arrays import positive
 from grasp_core.errors import InputError
@@ -59,8 +60,7 @@ class PhysicsSettings:
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
-            numbers = value if isinstance(value, tuple) else (value,)
-            if not all(isinstance(number, str) or math.isfinite(number) for number in numbers):
+            if not isinstance(value, str) and not np.isfinite(value).all():
                 raise InputError(f"{name} must be finite, got {value}")
         for name in ("timestep", "impratio", "iterations"):
             positive(getattr(self, name), name)
