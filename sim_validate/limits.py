@@ -12,10 +12,12 @@ large is reached when twice as much time has passed since the limit; where
 the two lead back to is a bound from below.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from sim_validate.rig import Rig
@@ -46,16 +48,28 @@ def ramped_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | No
         rig: The squeezed object.
         limits: The wrench at each predicted limit, and the forces that balance it.
     """
+    threshold = rig.setup.limit.ramp_threshold * rig.bench.scene.layout.grasp_size_m
+
+    def search(chosen: Sequence[Load], span: float) -> list[SimulatedLimit | None]:
+        traces, shares = rig.ramp(chosen, (1.0 - span, 1.0 + span))
+        return [_onset(trace, shares, threshold) for trace in traces]
+
+    return _in_some_span(rig, limits, search)
+
+
+def _in_some_span(
+    rig: Rig,
+    limits: Sequence[Load],
+    search: Callable[[Sequence[Load], float], Sequence[SimulatedLimit | None]],
+) -> tuple[SimulatedLimit | None, ...]:
+    """What a search finds near each predicted limit, or farther away."""
     found: dict[int, SimulatedLimit] = {}
     for span in rig.setup.limit.spans:
         rest = [place for place in range(len(limits)) if place not in found]
         if not rest:
             break
-        traces, shares = rig.ramp([limits[place] for place in rest], (1.0 - span, 1.0 + span))
-        threshold = rig.setup.limit.ramp_threshold * rig.bench.scene.layout.grasp_size_m
-        for place, trace in zip(rest, traces, strict=True):
-            if (onset := _onset(trace, shares, threshold)) is not None:
-                found[place] = onset
+        answers = search([limits[place] for place in rest], span)
+        found |= {place: at for place, at in zip(rest, answers, strict=True) if at is not None}
     return tuple(found.get(place) for place in range(len(limits)))
 
 
@@ -84,40 +98,27 @@ def bisected_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | 
         rig: The squeezed object.
         limits: The wrench at each predicted limit, and the forces that balance it.
     """
-    found: dict[int, SimulatedLimit] = {}
-    for span in rig.setup.limit.spans:
-        rest = [place for place in range(len(limits)) if place not in found]
-        if not rest:
-            break
-        chosen = [limits[place] for place in rest]
-        below = _held(rig, chosen, np.full(len(rest), 1.0 - span))
-        above = _held(rig, chosen, np.full(len(rest), 1.0 + span))
-        bracketed = [place for place, low, high in zip(rest, below, above, strict=True)
-                     if low and not high]  # fmt: skip
-        found |= _halved(rig, limits, bracketed, span)
-    return tuple(found.get(place) for place in range(len(limits)))
+
+    def search(chosen: Sequence[Load], span: float) -> list[SimulatedLimit | None]:
+        lower, upper = np.full(len(chosen), 1.0 - span), np.full(len(chosen), 1.0 + span)
+        inside = _held(rig, chosen, lower) & ~_held(rig, chosen, upper)
+        lower, upper, near = lower[inside], upper[inside], list(compress(chosen, inside))
+        for _ in range(rig.setup.limit.rounds if near else 0):
+            middle = 0.5 * (lower + upper)
+            held = _held(rig, near, middle)
+            lower, upper = np.where(held, middle, lower), np.where(held, upper, middle)
+        ends = zip(lower.tolist(), upper.tolist(), strict=True)
+        brackets = (SimulatedLimit(low, high, 0.5 * (low + high)) for low, high in ends)
+        return [next(brackets) if found else None for found in inside]
+
+    return _in_some_span(rig, limits, search)
 
 
-def _halved(
-    rig: Rig, limits: Sequence[Load], places: Sequence[int], span: float
-) -> dict[int, SimulatedLimit]:
-    """Brackets around the limits at some places, halved together."""
-    if not places:
-        return {}
-    chosen = [limits[place] for place in places]
-    lower, upper = np.full(len(places), 1.0 - span), np.full(len(places), 1.0 + span)
-    for _ in range(rig.setup.limit.rounds):
-        middle = 0.5 * (lower + upper)
-        held = np.array(_held(rig, chosen, middle))
-        lower, upper = np.where(held, middle, lower), np.where(held, upper, middle)
-    ends = zip(places, lower.tolist(), upper.tolist(), strict=True)
-    return {place: SimulatedLimit(low, high, 0.5 * (low + high)) for place, low, high in ends}
-
-
-def _held(rig: Rig, limits: Sequence[Load], shares: Array) -> list[bool]:
+def _held(rig: Rig, limits: Sequence[Load], shares: Array) -> NDArray[np.bool_]:
     loads = [part(rig.idle, limit, share) for limit, share in zip(limits, shares, strict=True)]
     layout, protocol = rig.bench.scene.layout, rig.setup.hold
-    return [judge(trace, layout, protocol).outcome is Outcome.HELD for trace in rig.hold(loads)]
+    ends = [judge(trace, layout, protocol).outcome for trace in rig.hold(loads)]
+    return np.array([end is Outcome.HELD for end in ends])
 
 
 def part(idle: Load, limit: Load, share: float) -> Load:
