@@ -11,6 +11,7 @@ import scenes
 from sim_validate import schedules
 from sim_validate.control_trials import try_control
 from sim_validate.controls import negative_controls
+from sim_validate.protocol import HoldProtocol
 from sim_validate.rules import RULES
 from sim_validate.setup import Agenda, Setup
 from sim_validate.uncorrected import uncorrected_contacts
@@ -141,8 +142,6 @@ def test_a_simulator_with_too_much_friction_is_caught(monkeypatch, factor):
 
 def test_a_threshold_of_millimetres_would_let_a_control_pass():
     """Judged loosely, a grasp that slips 'holds'; the thresholds are what they are for a reason."""
-    from sim_validate.protocol import HoldProtocol
-
     loose = Setup(hold=HoldProtocol(hold_threshold=0.1, total_threshold=0.2, gap_threshold=0.1))
     body = scenes.example_object("chamfered-box")
     held = 0

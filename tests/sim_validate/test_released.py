@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,6 @@ from scenes.mjcf import build_scene
 from sim_validate import schedules
 from sim_validate.protocol import FrictionProtocol
 from sim_validate.released import bisected, forces_just_above, released_friction
-from sim_validate.rig import Rig
 from sim_validate.setup import Setup
 from sim_validate.simulate import Bench
 from tests.sim_validate.rigs import grasps
@@ -40,6 +40,7 @@ def test_the_simulator_finds_the_critical_friction_of_the_analysis():
 
 def test_the_number_alone_is_one_call():
     body, found = grasps("random-12-1", 0.5, 2, ("regulus",))
+    assert len(found) == 2
     for grasp in found:
         assert sv.simulated_critical_friction(body, grasp) == pytest.approx(
             grasp.critical_friction, rel=0.005
@@ -58,7 +59,9 @@ def test_forces_just_above_the_critical_friction_need_it_and_balance():
     assert np.abs(np.cross(arms, forces).sum(axis=0)).max() < 1e-7 * body.radius
 
 
-@pytest.mark.parametrize(("factor", "found"), [(1.05, True), (0.6, True), (3.0, False)])
+@pytest.mark.parametrize(
+    ("factor", "found"), [(1.05, True), (0.7, True), (0.6, False), (3.0, False)]
+)
 def test_a_simulator_with_another_friction_is_seen_through(monkeypatch, factor, found):
     """Friction in the simulation is so many times what it should be: the critical one is less."""
     release = schedules.release
@@ -69,7 +72,7 @@ def test_a_simulator_with_another_friction_is_seen_through(monkeypatch, factor, 
     monkeypatch.setattr(schedules, "release", with_other_friction)
     body, (grasp, *_) = grasps("random-12-1", 0.5, 1, ("regulus",))
     simulated = sv.simulated_critical_friction(body, grasp)
-    if found and 1.0 / factor < 1.5:
+    if found:
         assert simulated * factor == pytest.approx(grasp.critical_friction, rel=0.03)
     else:
         assert math.isinf(simulated)
@@ -94,8 +97,6 @@ def test_contacts_that_no_friction_closes_are_refused():
     contacts = tuple(
         gc.Contact(at + 0.1 * i * (corner - at), grasp.contacts[0].normal) for i in range(4)
     )
-    from dataclasses import replace
-
     bad = replace(grasp, faces=(face,) * 4, contacts=contacts)
     with pytest.raises(gc.InputError, match="no friction gives force closure"):
         sv.simulated_critical_friction(body, bad)
@@ -105,7 +106,3 @@ def test_a_grasp_of_another_object_is_refused():
     _, (grasp, *_) = grasps("wedge", 0.5, 1)
     with pytest.raises(gc.InputError, match=r"names face|does not lie on face"):
         sv.simulated_critical_friction(scenes.example_object("octahedron"), grasp)
-
-
-def test_release_of_a_rig_uses_the_friction_it_is_given():
-    assert Rig.release.__doc__
