@@ -15,11 +15,10 @@ from grasp_core.resisted_wrenches import axis_wrenches
 from grasp_core.values import Polyhedron
 from scenes.mjcf import build_scene
 from sim_validate.controls import Control
-from sim_validate.loads import AXIS_NAMES
 from sim_validate.rig import squeezed
 from sim_validate.rules import FORCE_AXES, accepted, rules_named
 from sim_validate.schedules import Load
-from sim_validate.setup import Agenda, Setup
+from sim_validate.setup import AXIS_NAMES, Agenda, Setup
 from sim_validate.simulate import Bench
 from sim_validate.traces import Trace
 from sim_validate.verdict import HoldVerdict, Outcome, judge
@@ -98,7 +97,9 @@ def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup
     )
     others = traces[len(names) :]
     return ControlVerdict(
-        control, tried, {rule.name: accepted(rule, others, scene.layout) for rule in rules}
+        control,
+        tried,
+        {rule.name: accepted(rule, others, scene.layout, setup.hold) for rule in rules},
     )
 
 

@@ -10,13 +10,8 @@ from grasp_core.values import Grasp, Polyhedron, contact_frictions
 from grasp_core.wrenches import normal_and_tangential
 from sim_validate.limits import part
 from sim_validate.schedules import Load
-from sim_validate.setup import Agenda, Setup
+from sim_validate.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, Setup
 
-AXIS_NAMES = tuple(
-    f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"
-)
-WEAKEST = "weakest"
-RANDOM = "random_{}"
 NO_PUSH = 1e-9
 """Normal forces below this, in largest ones, are none."""
 

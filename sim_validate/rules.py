@@ -26,29 +26,29 @@ class Rule:
 
     name: str
     source: str
-    accepts: Callable[[Trace, Layout], bool]
+    accepts: Callable[[Trace, Layout, HoldProtocol], bool]
     """Whether one trial passes; all six must."""
 
 
-def accepted(rule: Rule, trials: Sequence[Trace], layout: Layout) -> bool:
+def accepted(rule: Rule, trials: Sequence[Trace], layout: Layout, protocol: HoldProtocol) -> bool:
     """Whether a rule accepts a grasp by the trials of its six forces."""
-    return all(rule.accepts(trace, layout) for trace in trials)
+    return all(rule.accepts(trace, layout, protocol) for trace in trials)
 
 
-def _moved_less(shift_m: float, turn_deg: float = np.inf) -> Callable[[Trace, Layout], bool]:
-    def accepts(trace: Trace, _: Layout) -> bool:
+def _moved_less(shift_m: float, turn_deg: float = np.inf) -> Callable[..., bool]:
+    def accepts(trace: Trace, *_: object) -> bool:
         small_turn = trace.rotations_rad[-1] < np.radians(turn_deg)
         return bool(trace.shifts_m[-1] < shift_m and small_turn)
 
     return accepts
 
 
-def _touched_at_the_end(trace: Trace, _: Layout) -> bool:
+def _touched_at_the_end(trace: Trace, *_: object) -> bool:
     return bool((trace.gaps_m[-1] < 0.0).any())
 
 
-def _held(trace: Trace, layout: Layout) -> bool:
-    return judge(trace, layout, HoldProtocol()).outcome is Outcome.HELD
+def _held(trace: Trace, layout: Layout, protocol: HoldProtocol) -> bool:
+    return judge(trace, layout, protocol).outcome is Outcome.HELD
 
 
 RULES = {

@@ -5,10 +5,17 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from grasp_core.arrays import Array
+from grasp_core.errors import InputError
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Surface
 from scenes.physics import PhysicsSettings
 from sim_validate.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
+
+AXIS_NAMES = tuple(
+    f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"
+)
+WEAKEST = "weakest"
+RANDOM = "random_{}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,3 +66,12 @@ class Agenda:
     keep_traces: bool = False
     seed: int = 0
     """Chooses random wrenches, and how contacts are moved for a negative control."""
+
+    def __post_init__(self) -> None:
+        """Refuse names that two trials would share: records go by name."""
+        drawn = (RANDOM.format(place) for place in range(self.random_wrenches))
+        taken = {*AXIS_NAMES, WEAKEST, *drawn}
+        for each in self.wrenches:
+            if each.name in taken:
+                raise InputError(f"two wrenches are named {each.name!r}: rename yours")
+            taken.add(each.name)

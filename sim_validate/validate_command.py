@@ -192,13 +192,14 @@ def _show_rules(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
     names = verdicts[0].agenda.rules if verdicts else ()
     controls = [control for verdict in verdicts for control in verdict.controls]
     rows = [
-        (name, RULES[name].source,
+        (name,
          f"{sum(verdict.accepted_by[name] for verdict in verdicts)} of {len(verdicts)}",
-         f"{sum(control.accepted_by[name] for control in controls)} of {len(controls)}")
+         f"{sum(control.accepted_by[name] for control in controls)} of {len(controls)}",
+         RULES[name].source)
         for name in names
     ]  # fmt: skip
     if rows:
-        columns = ("rule", "of", "grasps accepted", "controls accepted")
+        columns = ("rule", "grasps accepted", "controls accepted", "rule of")
         reporter.table("rules of other tools", columns, rows)
 
 

@@ -237,4 +237,4 @@ class _Trial:
         pulled = [trace for planned, trace in zip(self.loads, self.traces, strict=True)
                   if planned.name in FORCE_AXES]  # fmt: skip
         rules = rules_named(self.agenda.rules)
-        return {rule.name: accepted(rule, pulled, self.layout) for rule in rules}
+        return {rule.name: accepted(rule, pulled, self.layout, self.setup.hold) for rule in rules}

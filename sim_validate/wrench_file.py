@@ -43,7 +43,7 @@ def wrenches_from_file(path: Path) -> tuple[NamedWrench, ...]:
     """The wrenches of a file.
 
     Raises:
-        InputError: It is not such a file, two wrenches share a name, or one is zero.
+        InputError: It is not such a file, or a wrench is zero.
     """
     try:
         given = _WrenchFile.model_validate_json(read_text(path)).wrenches
@@ -51,10 +51,6 @@ def wrenches_from_file(path: Path) -> tuple[NamedWrench, ...]:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         raise InputError(f"{path}: {where}: {first['msg']}") from error
-    names = [each.name for each in given]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise InputError(f"{path}: two wrenches are named {twice!r}")
     found = [NamedWrench(each.name, np.array([*each.force_n, *each.torque_n_m])) for each in given]
     for each in found:
         if not each.wrench.any():

@@ -3,6 +3,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
+from sim_validate.protocol import HoldProtocol
 from sim_validate.rules import FORCE_AXES, RULES, accepted, rules_named
 from sim_validate.traces import Trace
 from tests.sim_validate.rigs import grasps
@@ -40,7 +41,15 @@ def ending(shift_m=0.0, turn_deg=0.0, touching=4):
 )
 def test_each_rule_accepts_what_its_tool_would(layout, end, by):
     trials = [ending()] * 5 + [ending(**end)]
-    assert {name for name, rule in RULES.items() if accepted(rule, trials, layout)} == by
+    say = {name for name, rule in RULES.items() if accepted(rule, trials, layout, HoldProtocol())}
+    assert say == by
+
+
+def test_our_own_rule_has_the_thresholds_of_the_setup(layout):
+    trials, rule = [ending(shift_m=1e-3 * layout.grasp_size_m)] * 6, RULES["six-forces"]
+    loose = HoldProtocol(hold_threshold=1e-2, total_threshold=1e-2)
+    assert not accepted(rule, trials, layout, HoldProtocol())
+    assert accepted(rule, trials, layout, loose)
 
 
 def test_the_forces_are_six_and_have_no_torque():

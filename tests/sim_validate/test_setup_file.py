@@ -1,8 +1,10 @@
+import re
+
 import numpy as np
 import pytest
 
 import grasp_core as gc
-from sim_validate.setup import Setup
+from sim_validate.setup import Agenda, NamedWrench, Setup
 from sim_validate.setup_file import setup_from_file
 from sim_validate.wrench_file import weights, wrenches_from_file
 
@@ -64,11 +66,6 @@ def test_wrenches_of_a_task_are_read_as_they_are(tmp_path):
         ('{"wrenches": [{"name": "a", "force_n": [0, 0, 0]}]}', "'a' is zero"),
         ('{"wrenches": [{"name": "a", "force_n": [1, 0, 0], "mass": 1}]}', "wrenches.0.mass"),
         ('{"wrenches": [{"name": "a", "force_n": [1, 0, 1e999]}]}', "wrenches.0.force_n"),
-        (
-            '{"wrenches": [{"name": "a", "force_n": [1, 0, 0]}, '
-            '{"name": "a", "force_n": [1, 1, 0]}]}',
-            "two wrenches are named 'a'",
-        ),
         ("[", "Invalid JSON"),
     ],
 )
@@ -87,3 +84,13 @@ def test_weight_acts_at_the_centre_of_mass_along_each_direction_of_gravity():
     assert not forces.sum(axis=0).any()
     (down,) = weights(3.0, ((0.0, 0.0, -10.0),))
     np.testing.assert_array_equal(down.wrench, [0, 0, -3.0, 0, 0, 0])
+
+
+def test_wrenches_of_one_name_are_refused_ours_included():
+    push = np.array([1.0, 0, 0, 0, 0, 0])
+    for name in ("+force_x", "weakest", "random_1"):
+        with pytest.raises(gc.InputError, match=re.escape(f"two wrenches are named {name!r}")):
+            Agenda(random_wrenches=2, wrenches=(NamedWrench(name, push),))
+    with pytest.raises(gc.InputError, match="two wrenches are named 'a'"):
+        Agenda(wrenches=(NamedWrench("a", push), NamedWrench("a", -push)))
+    assert len(Agenda(wrenches=(NamedWrench("random_0", push),)).wrenches) == 1
