@@ -20,11 +20,11 @@ def planned(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def verdict(capsys):
+def verdict(planned, capsys):
     """Validates with flags; answers with the one verdict."""
 
     def validated(*flags, code=Exit.GOOD):
-        assert main(["validate", "grasps.json", *flags, "--json"]) == code
+        assert main(["validate", str(planned / "grasps.json"), *flags, "--json"]) == code
         (found,) = json.loads(capsys.readouterr().out)["verdicts"]
         return found
 
