@@ -14,10 +14,14 @@ from typing import Literal
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.mesh import nearest_on_surface
+from grasp_core.on_faces import ON_FACE
+from grasp_core.values import Polyhedron
 
+SMALLEST, LARGEST = 1e-9, 1e9
+"""Settings outside are mistakes, in SI units."""
 TIP_RADIUS = 0.1
 """Fingertip radius that is used where it fits, in object radii."""
 LEAST_TIP_RADIUS = 1e-3
@@ -25,7 +29,7 @@ LEAST_TIP_RADIUS = 1e-3
 ROOM = 0.95
 """Radius relative to the largest that fits, where the usual one does not."""
 TOUCHING = 1e-6
-"""Overlap that does not count, in fingertip radii: rounding of positions in files."""
+"""Overlap that does not count, in fingertip radii."""
 MAX_SHRINKING = 100
 FACING = 1e-9
 """4 - |m|^2 below this is rounding: the normals are opposite."""
@@ -36,7 +40,7 @@ class FingerSettings:
     """How fingertips are built and driven; what is None is chosen to suit the grasp.
 
     Raises:
-        InputError: A number is not positive and finite.
+        InputError: A number is not positive, or out of any usual range.
     """
 
     max_normal_force_n: float = 10.0
@@ -57,48 +61,37 @@ class FingerSettings:
         for name, value in asdict(self).items():
             if name in ("approach", "drive", "indentation") or value is None:
                 continue
-            if not (math.isfinite(value) and value > 0.0):
-                raise InputError(f"{name} must be a positive number, got {value}")
-        if self.approach is not None and not _has_direction(self.approach):
+            if not SMALLEST <= value <= LARGEST:
+                raise InputError(f"{name} must be from {SMALLEST:g} to {LARGEST:g}, got {value}")
+        if self.approach is not None and not SMALLEST <= math.hypot(*self.approach) <= LARGEST:
             raise InputError(f"approach must be a direction, got {self.approach}")
+        if not 0.0 <= self.indentation < 1.0:
+            raise InputError(f"indentation must be in [0, 1), got {self.indentation}")
 
 
-def _has_direction(vector: tuple[float, ...]) -> bool:
-    return any(vector) and all(math.isfinite(part) for part in vector)
-
-
-def fitting_radius(
-    positions: Array, normals: Array, vertices: Array, triangles: Indices, object_radius: float
-) -> float:
-    """A fingertip radius at which nothing overlaps, if one that is large enough exists.
+def fitting_radius(body: Polyhedron, positions: Array, normals: Array) -> float:
+    """A fingertip radius at which nothing overlaps, if one that is large enough exists [m].
 
     Args:
+        body: The object.
         positions: Contacts, (k, 3) [m].
         normals: Unit vectors into the object, (k, 3).
-        vertices: Of the object, (v, 3) [m].
-        triangles: (t, 3)
-        object_radius: [m]
     """
-    usual = TIP_RADIUS * object_radius
-    largest = min(
-        _largest_apart(positions, normals),
-        float(_largest_clear(positions, normals, vertices, triangles, usual).min()),
-    )
+    usual = TIP_RADIUS * body.radius
+    clear = float(_largest_clear(body, positions, normals, usual).min())
+    largest = min(_largest_apart(positions, normals), clear)
     if largest >= usual:
         return usual
-    return max(ROOM * largest, LEAST_TIP_RADIUS * object_radius)
+    return max(ROOM * largest, LEAST_TIP_RADIUS * body.radius)
 
 
-def clashes(
-    positions: Array, normals: Array, vertices: Array, triangles: Indices, radius: float
-) -> tuple[str, ...]:
+def clashes(body: Polyhedron, positions: Array, normals: Array, radius: float) -> tuple[str, ...]:
     """What fingertips of a radius overlap: each other, or the object beside their contact.
 
     Args:
+        body: The object.
         positions: Contacts, (k, 3) [m].
         normals: Unit vectors into the object, (k, 3).
-        vertices: Of the object, (v, 3) [m].
-        triangles: (t, 3)
         radius: [m]
 
     Returns:
@@ -110,10 +103,9 @@ def clashes(
         for i, j in combinations(range(len(positions)), 2)
         if _largest_apart(positions[[i, j]], normals[[i, j]]) < least
     ]
-    clear = _largest_clear(positions, normals, vertices, triangles, radius)
     found += [
         f"fingertip {i} of radius {radius:.3g} m meets the object beside its contact"
-        for i in np.flatnonzero(clear < least)
+        for i in np.flatnonzero(_largest_clear(body, positions, normals, radius) < least)
     ]
     return tuple(found)
 
@@ -135,15 +127,17 @@ def _largest_apart(positions: Array, normals: Array) -> float:
     return largest
 
 
-def _largest_clear(
-    positions: Array, normals: Array, vertices: Array, triangles: Indices, start: float
-) -> Array:
-    """Radius of each fingertip, up to `start`, up to which it meets no other part, (k,)."""
+def _largest_clear(body: Polyhedron, positions: Array, normals: Array, start: float) -> Array:
+    """Radius of each fingertip, up to `start`, up to which it meets no other part, (k,).
+
+    Contacts may be a little below their own faces: positions in files are rounded.
+    """
+    slack = ON_FACE * body.radius
     radii = np.full(len(positions), start)
     for _ in range(MAX_SHRINKING):
         centers = positions - radii[:, None] * normals
-        nearest = nearest_on_surface(vertices, triangles, centers)
-        inside = np.linalg.norm(nearest - centers, axis=1) < radii * (1.0 - TOUCHING)
+        nearest = nearest_on_surface(body.vertices, body.triangles, centers)
+        inside = np.linalg.norm(nearest - centers, axis=1) < radii * (1.0 - TOUCHING) - slack
         if not inside.any():
             break
         away = nearest[inside] - positions[inside]

@@ -90,6 +90,11 @@ class Layout:
     """Where fingers come from, relative to their contacts, (k, 3) [m]."""
 
     @property
+    def squeeze_forces(self) -> Array:
+        """Forces of a gentle grasp along the world's axes, (k, 3) [N]."""
+        return np.einsum("kij,kj->ki", self.frames, self.squeeze)
+
+    @property
     def tip_centers(self) -> Array:
         """Centres of the fingertips at their contacts, (k, 3) [m]."""
         height = self.drive.radius_m - self.drive.indentation_m
@@ -150,9 +155,7 @@ def _drive(
 ) -> FingerDrive:
     mass = fingers.mass_kg or fingers.max_normal_force_n * RESPONSE_TIME_S**2 / size
     stiffness = fingers.stiffness_n_per_m or STIFFNESS * fingers.max_normal_force_n / size
-    radius = fingers.radius_m or fitting_radius(
-        positions, normals, body.vertices, body.triangles, body.radius
-    )
+    radius = fingers.radius_m or fitting_radius(body, positions, normals)
     return FingerDrive(
         radius_m=radius,
         mass_kg=mass,

@@ -21,7 +21,7 @@ from sim_validate import cli
 from sim_validate.analyze_command import analyze_file
 from sim_validate.console import Reporter
 from sim_validate.files import read_text, remove_results, write_text
-from sim_validate.gate import measured_gate
+from sim_validate.gate import measured_gate, require_faithful
 from sim_validate.improving import show_gains
 from sim_validate.plan_command import (
     load_object,
@@ -30,8 +30,16 @@ from sim_validate.plan_command import (
     say_counts,
 )
 from sim_validate.setup import Setup
-from sim_validate.validate_command import finger_settings, simulate_grasps, validate_file
+from sim_validate.validate_command import (
+    finger_settings,
+    prepared,
+    simulate_grasps,
+    validate_file,
+)
 from sim_validate.validation import validate
+
+RESULTS = Path("graspproof-out")
+"""Where `run` writes, a folder for each object, if not told otherwise."""
 
 
 def execute(command: cli.Command) -> int:
@@ -42,9 +50,11 @@ def execute(command: cli.Command) -> int:
 
 
 def _run(command: cli.Run, reporter: Reporter) -> int:
-    jobs = command.testing.jobs
-    body, found, moves = plan_object(command.object, command.planning, jobs, reporter)
-    folder = command.out or Path("graspproof-out") / _folder_name(body.name)
+    testing, planning = command.testing, command.planning
+    setup, _ = prepared(testing, planning.seed, command.out or RESULTS)
+    body, found, moves = plan_object(command.object, planning, testing.jobs, reporter)
+    folder = command.out or RESULTS / _folder_name(body.name)
+    require_faithful(setup, found.friction, body.radius)
     remove_results(folder)
     write_text(folder / "grasps.json", plan_to_json(body, found, moves))
     say_counts(body, found, reporter)
@@ -54,12 +64,11 @@ def _run(command: cli.Run, reporter: Reporter) -> int:
         return cli.Exit.NONE
     if moves:
         show_gains(moves, reporter)
-    fingers, surface = finger_settings(command.testing.fingers), command.testing.surface
     for grasp in found.grasps:
-        scene = build_scene(body, grasp, found.friction, fingers=fingers, surface=surface)
+        scene = setup.scene(body, grasp, found.friction)
         write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
     saved = SavedGrasps(body, found.friction, found.seed, found.grasps)
-    code = simulate_grasps(saved, command.testing, folder, reporter)
+    code = simulate_grasps(saved, testing, folder, reporter)
     reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
     return code
 
@@ -144,15 +153,17 @@ def _doctor(_: cli.Doctor, reporter: Reporter) -> int:
     body = example_object("tetrahedron")
     grasp = plan(body).grasps[0]
     gate = measured_gate(Setup())
-    verdict = validate(body, grasp)
+    verdict = validate(body, grasp) if gate.passed else None
     cone = math.tan(grasp.force_cones[0].half_angle) * math.cos(math.pi / PYRAMID_SIDES)
     checks = {
         "linear programs": math.isclose(3.0 * grasp.radius / body.radius, cone, rel_tol=1e-6),
         "conic programs": force_closure(grasp).verify(),
         "critical friction": critical_friction(grasp) == 0.0,
         **{f"gate: {check.name}": check.passed for check in gate.checks},
-        "simulated grasp holds": verdict.held,
-        "simulated controls do not": verdict.controls_failed and bool(verdict.controls),
+        "simulated grasp holds": verdict is not None and verdict.held,
+        "simulated controls do not": (
+            verdict is not None and verdict.controls_failed and bool(verdict.controls)
+        ),
     }
     found = versions()
     reporter.document({"versions": found, "checks": checks})

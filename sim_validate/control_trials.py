@@ -13,7 +13,6 @@ from grasp_core.arrays import Array, to_digits
 from grasp_core.forces import closest_forces, least_friction_forces
 from grasp_core.resisted_wrenches import axis_wrenches
 from grasp_core.values import Polyhedron
-from scenes.mjcf import build_scene
 from sim_validate.controls import Control
 from sim_validate.rig import squeezed
 from sim_validate.rules import FORCE_AXES, accepted, rules_named
@@ -21,7 +20,7 @@ from sim_validate.schedules import Load
 from sim_validate.setup import AXIS_NAMES, Agenda, Setup
 from sim_validate.simulate import Bench
 from sim_validate.traces import Trace
-from sim_validate.verdict import HoldVerdict, Outcome, judge
+from sim_validate.verdict import LET_GO, HoldVerdict, Outcome, judge
 
 SEPARATING = "separating"
 """The wrench that a control's certificate says is not resisted."""
@@ -38,7 +37,8 @@ class ControlTrial:
     required_friction: float | None
     """What the planned forces need; None where no forces balance the wrench."""
     hold: HoldVerdict
-    trace: Trace
+    trace: Trace | None
+    """Kept on request."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,8 +59,7 @@ class ControlVerdict:
     @property
     def failed(self) -> bool:
         """Whether all of them ended as they must, by the object moving."""
-        moved = (Outcome.SLIPPED, Outcome.LOST_CONTACT)
-        return all(trial.hold.outcome in moved for trial in self.tried)
+        return all(trial.hold.outcome in LET_GO for trial in self.tried)
 
 
 def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup) -> ControlVerdict:
@@ -73,10 +72,8 @@ def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup
         setup: How trials are simulated.
     """
     fingers = replace(setup.fingers, radius_m=None)
-    scene = build_scene(
-        body, control.contacts, control.friction,
-        fingers=fingers, physics=setup.physics,
-    )  # fmt: skip
+    on_pads = replace(setup, fingers=fingers, surface="pads")
+    scene = on_pads.scene(body, control.contacts, control.friction)
     plan = _Planner(body, control, setup)
     idle, needed = plan.forces(np.zeros(6))
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
@@ -90,11 +87,14 @@ def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup
         [plan.settling(friction) for _, friction in planned],
     )
     tried = tuple(
-        ControlTrial(name, wrench, friction, judge(trace, scene.layout, setup.hold), trace)
+        ControlTrial(
+            name, wrench, friction, judge(trace, scene.layout, setup.hold),
+            trace if agenda.keep_traces else None,
+        )
         for name, wrench, (_, friction), trace in zip(
             names, wrenches, planned[: len(names)], traces[: len(names)], strict=True
         )
-    )
+    )  # fmt: skip
     others = traces[len(names) :]
     return ControlVerdict(
         control,

@@ -13,14 +13,17 @@ from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 
 from sim_validate.engines import available_cores
 
+SMALLEST, LARGEST = 1e-9, 1e9
+
 
 def _not_zero(values: tuple[float, ...]) -> tuple[float, ...]:
-    if not any(values):
-        raise ValueError("must not be zero")
+    if not SMALLEST <= max(abs(value) for value in values) <= LARGEST:
+        raise ValueError(f"the largest part must be from {SMALLEST:g} to {LARGEST:g}, not zero")
     return values
 
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Usual = Annotated[float, Field(ge=SMALLEST, le=LARGEST, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1)]
 Seed = Annotated[int, Field(ge=0, lt=2**64)]
 Edges = Annotated[int, Field(ge=3)]
@@ -80,13 +83,13 @@ class Planning:
 class Fingers:
     """How fingertips are built; what is not given suits the grasp."""
 
-    max_normal_force: Positive = 10.0
+    max_normal_force: Usual = 10.0
     """Limit of each finger's push [N]."""
-    fingertip_radius_m: Positive | None = None
+    fingertip_radius_m: Usual | None = None
     """A tenth of the object's radius, or what fits, if not given."""
-    fingertip_mass_kg: Positive | None = None
+    fingertip_mass_kg: Usual | None = None
     """So that similar grasps behave alike if not given, as the stiffness."""
-    stiffness_n_per_m: Positive | None = None
+    stiffness_n_per_m: Usual | None = None
     """Of the servos that drive a fingertip."""
     approach: Annotated[Direction | None, arg(metavar="X Y Z")] = None
     """Direction in which fingers arrive in the scene's keyframe; along the normals if not given."""
@@ -101,7 +104,7 @@ class Testing:
     """Also hold so many random wrenches, each at a share of what the analysis says is resisted."""
     wrenches: Path | None = None
     """A file of wrenches to hold as they are (see README)."""
-    weight_n: Positive | None = None
+    weight_n: Usual | None = None
     """Also hold the object's weight [N], along and against each axis or in the directions given."""
     down: Annotated[UseAppendAction[tuple[Direction, ...]], arg(metavar="X Y Z")] = ()
     """With --weight-n: a direction of gravity; may be repeated."""

@@ -1,11 +1,11 @@
 """What simulation says about a grasp without knowing the forces that were planned for it.
 
-Planned forces presume the analysis that they are to confirm. These three do not:
+Forces planned for a load presume the analysis that they are to confirm. These three have none:
 
 * rigid fingertips, each put equally deep into its face: what squeezes the object is elasticity
-  alone. The least friction at which the object stays is never below the critical friction: balanced
-  forces in the cones exist wherever it rests. It may be far above, as equal depths need not give
-  the best forces.
+  alone. The least friction at which the object stays is never below the critical friction: where
+  all fingers push and it rests, balanced forces in the cones exist. It may be far above, as equal
+  depths need not give the best forces.
 * a fixed squeeze: the fingers keep the forces of the gentle grasp, whatever the load. The
   largest multiple of a wrench that is resisted is never above the predicted limit, as the forces
   at rest are within the cones and the limit on the push. It may be far below.
@@ -22,7 +22,6 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.resisted_wrenches import axis_wrenches
 from grasp_core.values import Grasp, Polyhedron
-from scenes.mjcf import build_scene
 from sim_validate.rig import Rig, squeezed
 from sim_validate.schedules import Load
 from sim_validate.setup import Setup
@@ -99,25 +98,20 @@ def _rigid_friction(
     high = protocol.settling_friction * max(frictions)
     rig = _rigid(body, grasp, high, setup, INDENTATION)
     size = rig.bench.scene.layout.grasp_size_m
-    stays = [
-        trace.sound and bool((trace.displacements_m < protocol.threshold * size).all())
-        for trace in rig.release(high, frictions)
-    ]
-    first = next((place for place, stay in enumerate(stays) if stay), None)
-    if first is None:
-        return frictions[-1], None
-    return (frictions[first - 1] if first else None), frictions[first]
+    stays = [trace.stayed(protocol.threshold * size) for trace in rig.release(high, frictions)]
+    first = stays.index(True) if True in stays else len(stays)
+    slipped = frictions[first - 1] if first and stays[first - 1] is False else None
+    return slipped, frictions[first] if first < len(stays) else None
 
 
 def _rigid(
     body: Polyhedron, grasp: Grasp, friction: float, setup: Setup, indentation: float
 ) -> Rig:
     fingers = replace(setup.fingers, drive="rigid", indentation=indentation)
-    scene = build_scene(
-        body, grasp, friction, fingers=fingers, physics=setup.physics, surface=setup.surface
-    )
+    scene = replace(setup, fingers=fingers).scene(body, grasp, friction)
     nothing = Load(np.zeros(6), np.zeros((len(grasp.contacts), 3)))
-    return Rig(Bench(scene, threads=setup.threads), setup, friction, nothing, None)
+    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+    return Rig(bench, setup, friction, nothing, None)
 
 
 def _fixed_squeeze(
@@ -131,10 +125,7 @@ def _fixed_squeeze(
     fingers = replace(rig.setup.fingers, stiffness_n_per_m=STIFFER * usual)
     slow = replace(rig.setup.limit, ramp_s=RISE_S)
     setup = replace(rig.setup, fingers=fingers, limit=slow)
-    scene = build_scene(
-        body, grasp, rig.friction,
-        fingers=fingers, physics=setup.physics, surface=setup.surface,
-    )  # fmt: skip
+    scene = setup.scene(body, grasp, rig.friction)
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
     stiff = squeezed(bench, setup, rig.idle.forces, rig.friction)
     kept = [Load(limit.wrench, rig.idle.forces) for limit in limits]

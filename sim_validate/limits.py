@@ -3,8 +3,8 @@
 Both load the object with a share of the predicted limit and the forces planned for it: those of
 the gentle squeeze plus that share of the way to the forces at the limit. They balance the load,
 because both ends do. Below the limit they are inside the cones and the limits on the push, again
-because both ends are. Above it they still balance, on paper: what lets go is friction, or a
-finger that cannot push harder.
+because both ends are. Above it, up to twice the limit, they still balance, on paper: what lets go
+is friction, or a finger that cannot push harder.
 
 A ramp passes the limit slowly. The load left over grows in proportion to the time since, so the
 displacement grows with its third power and the ramp ends late. A displacement eight times as
@@ -14,21 +14,20 @@ the two lead back to is a bound from below.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import compress
 
 import numpy as np
-from numpy.typing import NDArray
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Indices
 from sim_validate.rig import Rig
 from sim_validate.schedules import Load
 from sim_validate.traces import Trace
-from sim_validate.verdict import Outcome, judge
+from sim_validate.verdict import holds
 
 LATER = 8.0
 """Displacement at the second reading of a ramp, in thresholds."""
 OVERLOAD = 2.0
 """Forces are planned for loads up to this share of the limit; for larger ones they stay."""
+HELD, SLID, UNKNOWN = 1, 0, -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +79,7 @@ def _onset(trace: Trace, shares: Array, threshold: float) -> SimulatedLimit | No
     """
     moved = trace.displacements_m
     passed = np.flatnonzero(moved >= threshold)
-    if not passed.size or passed[0] == 0 or not trace.sound:
+    if not passed.size or passed[0] == 0 or trace.fault:
         return None
     first = int(passed[0])
     before, after = shares[first - 1], shares[first]
@@ -100,25 +99,31 @@ def bisected_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | 
     """
 
     def search(chosen: Sequence[Load], span: float) -> list[SimulatedLimit | None]:
-        lower, upper = np.full(len(chosen), 1.0 - span), np.full(len(chosen), 1.0 + span)
-        inside = _held(rig, chosen, lower) & ~_held(rig, chosen, upper)
-        lower, upper, near = lower[inside], upper[inside], list(compress(chosen, inside))
-        for _ in range(rig.setup.limit.rounds if near else 0):
-            middle = 0.5 * (lower + upper)
-            held = _held(rig, near, middle)
-            lower, upper = np.where(held, middle, lower), np.where(held, upper, middle)
-        ends = zip(lower.tolist(), upper.tolist(), strict=True)
-        brackets = (SimulatedLimit(low, high, 0.5 * (low + high)) for low, high in ends)
-        return [next(brackets) if found else None for found in inside]
+        held, let_go = np.full(len(chosen), 1.0 - span), np.full(len(chosen), 1.0 + span)
+        inside = (_ends(rig, chosen, held) == HELD) & (_ends(rig, chosen, let_go) == SLID)
+        for _ in range(rig.setup.limit.rounds):
+            open_places = np.flatnonzero(inside)
+            if not open_places.size:
+                break
+            middle = 0.5 * (held + let_go)[open_places]
+            ends = _ends(rig, [chosen[int(place)] for place in open_places], middle)
+            held[open_places[ends == HELD]] = middle[ends == HELD]
+            let_go[open_places[ends == SLID]] = middle[ends == SLID]
+            inside[open_places[ends == UNKNOWN]] = False
+        return [
+            SimulatedLimit(float(low), float(high), float(0.5 * (low + high))) if found else None
+            for low, high, found in zip(held, let_go, inside, strict=True)
+        ]
 
     return _in_some_span(rig, limits, search)
 
 
-def _held(rig: Rig, limits: Sequence[Load], shares: Array) -> NDArray[np.bool_]:
+def _ends(rig: Rig, limits: Sequence[Load], shares: Array) -> Indices:
+    """Whether shares of loads hold; `UNKNOWN` where a trial says nothing about the object."""
     loads = [part(rig.idle, limit, share) for limit, share in zip(limits, shares, strict=True)]
     layout, protocol = rig.bench.scene.layout, rig.setup.hold
-    ends = [judge(trace, layout, protocol).outcome for trace in rig.hold(loads)]
-    return np.array([end is Outcome.HELD for end in ends])
+    ends = [holds(trace, layout, protocol) for trace in rig.hold(loads)]
+    return np.array([UNKNOWN if end is None else int(end) for end in ends])
 
 
 def part(idle: Load, limit: Load, share: float) -> Load:

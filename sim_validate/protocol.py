@@ -14,11 +14,21 @@ predicted critical friction, friction is lowered to a trial value, and the objec
 the trial value is bisected.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 
 from grasp_core.errors import InputError
+
+MOST_ROUNDS = 40
+SECONDS, POSITIVE = (0.05, 60.0), (1e-9, 1e9)
+RANGES = {
+    "load_share": (0.01, 0.999),
+    "least_normal_share": (1e-9, 0.5),
+    "least_friction": (1e-6, 0.01),
+    "settling_friction": (1.0, 100.0),
+}
+"""Where numbers must lie that are neither just durations nor just positive."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +41,7 @@ class HoldProtocol:
     largest normal force, so looser thresholds would certify the wrong thing.
 
     Raises:
-        InputError: A number is not positive and finite, or a share is not below one.
+        InputError: A number is not positive and finite, or out of its range.
     """
 
     squeeze_s: float = 0.16
@@ -39,8 +49,8 @@ class HoldProtocol:
     settle_s: float = 0.10
     hold_s: float = 0.40
     settling_friction: float = 3.0
-    """Friction while loading, relative to the larger of what is tested and what the planned
-    forces need."""
+    """Friction while loading, relative to what is tested; for negative controls, to the larger of
+    that and what the planned forces need."""
     load_share: float = 0.8
     """Applied wrench relative to the largest one the analysis says is resisted."""
     control_load: float = 0.2
@@ -60,10 +70,7 @@ class HoldProtocol:
     """A fingertip farther than this from its face has lost contact, in grasp sizes."""
 
     def __post_init__(self) -> None:
-        _check_positive(asdict(self))
-        for name in ("load_share", "least_normal_share"):
-            if getattr(self, name) >= 1.0:
-                raise InputError(f"{name} must be below 1, got {getattr(self, name)}")
+        _check(asdict(self))
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +78,7 @@ class LimitProtocol:
     """How the largest resisted wrench is found, relative to the predicted one.
 
     Raises:
-        InputError: A number is not positive and finite.
+        InputError: A number is not positive and finite, or out of its range.
     """
 
     spans: tuple[float, ...] = (0.02, 0.1, 0.5)
@@ -85,7 +92,7 @@ class LimitProtocol:
     """Halvings of the span by bisection."""
 
     def __post_init__(self) -> None:
-        _check_positive(asdict(self))
+        _check(asdict(self))
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +100,7 @@ class FrictionProtocol:
     """How the critical friction is found, relative to the predicted one.
 
     Raises:
-        InputError: A number is not positive and finite.
+        InputError: A number is not positive and finite, or out of its range.
     """
 
     spans: tuple[float, ...] = (0.01, 0.1, 0.5)
@@ -112,11 +119,22 @@ class FrictionProtocol:
     hundred-thousandths of the largest normal force."""
 
     def __post_init__(self) -> None:
-        _check_positive(asdict(self))
+        _check(asdict(self))
 
 
-def _check_positive(numbers: Mapping[str, float | tuple[float, ...]]) -> None:
+def _check(numbers: Mapping[str, float | tuple[float, ...]]) -> None:
     for name, value in numbers.items():
-        each = value if isinstance(value, tuple) else (value,)
-        if not all(math.isfinite(number) and number > 0.0 for number in each):
-            raise InputError(f"{name} must be a positive number, got {value}")
+        if isinstance(value, tuple):
+            if not (value and value[0] > 0.0 and value[-1] < 1.0 and _rising(value)):
+                raise InputError(f"{name} must be rising shares below 1, at least one, got {value}")
+        elif name == "rounds":
+            if value not in range(1, MOST_ROUNDS + 1):
+                raise InputError(f"{name} must be a whole number up to {MOST_ROUNDS}, got {value}")
+        else:
+            least, largest = RANGES.get(name, SECONDS if name.endswith("_s") else POSITIVE)
+            if not least <= value <= largest:
+                raise InputError(f"{name} must be from {least:g} to {largest:g}, got {value}")
+
+
+def _rising(values: tuple[float, ...]) -> bool:
+    return all(one < two for one, two in pairwise(values))

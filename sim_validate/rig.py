@@ -9,7 +9,7 @@ from grasp_core.arrays import Array
 from sim_validate import schedules
 from sim_validate.schedules import Load, Schedule
 from sim_validate.setup import Setup
-from sim_validate.simulate import Bench
+from sim_validate.simulate import Bench, Motion
 from sim_validate.traces import Trace, trace
 
 
@@ -23,8 +23,8 @@ class Rig:
     """At which it is to be held."""
     idle: Load
     """No wrench, and the forces that squeeze it."""
-    start: Array | None
-    """The state reached; None for rigid fingers, which are put where they are."""
+    closed: Motion | None
+    """How the fingers closed; None for rigid ones, which are put where they are."""
 
     def hold(
         self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None
@@ -69,10 +69,10 @@ class Rig:
         )
 
     def _traces(self, trials: Sequence[Schedule]) -> tuple[Trace, ...]:
-        motions = self.bench.run(trials, self.start)
+        motions = self.bench.run(trials, self.closed and self.closed.state)
         layout = self.bench.scene.layout
         return tuple(
-            trace(motion, layout, trial.watched)
+            trace(motion.after(self.closed) if self.closed else motion, layout, trial.watched)
             for motion, trial in zip(motions, trials, strict=True)
         )
 
@@ -92,4 +92,4 @@ def squeezed(
     """
     high = settling_friction or setup.hold.settling_friction * friction
     (closed,) = bench.run([schedules.squeeze(forces, high, bench.clock, setup.hold)])
-    return Rig(bench, setup, friction, Load(np.zeros(6), forces), closed.state)
+    return Rig(bench, setup, friction, Load(np.zeros(6), forces), closed)

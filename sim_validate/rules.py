@@ -31,8 +31,8 @@ class Rule:
 
 
 def accepted(rule: Rule, trials: Sequence[Trace], layout: Layout, protocol: HoldProtocol) -> bool:
-    """Whether a rule accepts a grasp by the trials of its six forces."""
-    return all(rule.accepts(trace, layout, protocol) for trace in trials)
+    """Whether a rule accepts a grasp by the trials of its six forces, all of them to their end."""
+    return all(not trace.fault and rule.accepts(trace, layout, protocol) for trace in trials)
 
 
 def _moved_less(shift_m: float, turn_deg: float = np.inf) -> Callable[..., bool]:

@@ -1,21 +1,33 @@
 """How trials are simulated, and which trials a grasp goes through: the choices of a user."""
 
 import math
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, TypeAlias, get_args
 
-from grasp_core.arrays import Array
+import numpy as np
+
+from grasp_core.arrays import Array, frozen
 from grasp_core.errors import InputError
+from grasp_core.values import Contact, Grasp, Polyhedron
 from scenes.fingertips import FingerSettings
-from scenes.mjcf import Surface
+from scenes.mjcf import Scene, Surface, build_scene
 from scenes.physics import PhysicsSettings
 from sim_validate.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
+from sim_validate.rules import rules_named
 
 AXIS_NAMES = tuple(
     f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"
 )
+NAME = re.compile(r"[\w+\- ]{1,100}")
+SMALLEST, LARGEST = 1e-9, 1e9
+"""Smaller and larger forces and torques are mistakes [N, N m]."""
 WEAKEST = "weakest"
 RANDOM = "random_{}"
+
+
+LimitSearch: TypeAlias = Literal["none", "ramp", "bisection"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +46,12 @@ class Setup:
     timeout_s: float = math.inf
     """Trials of one contact set that run longer are stopped."""
 
+    def scene(self, body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float) -> Scene:
+        """The scene of a grasp with these settings."""
+        return build_scene(
+            body, grasp, friction, fingers=self.fingers, physics=self.physics, surface=self.surface
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NamedWrench:
@@ -42,6 +60,21 @@ class NamedWrench:
     name: str
     wrench: Array
     """(6,) [N, N m], torque about the centre of mass, in the object's frame."""
+
+    def __post_init__(self) -> None:
+        """Refuse what could not be tested, or not be told apart in a file."""
+        object.__setattr__(self, "wrench", frozen(self.wrench, (6,), "wrench"))
+        size = float(np.abs(self.wrench).max())
+        if not SMALLEST <= size <= LARGEST:
+            raise InputError(
+                f"wrench {self.name!r}: the largest part must be from {SMALLEST:g} to {LARGEST:g} "
+                f"(N or N m), got {size:g}"
+            )
+        if not NAME.fullmatch(self.name):
+            raise InputError(
+                f"a wrench's name has up to 100 letters, digits, '_', '+', '-' and spaces; "
+                f"got {self.name!r}"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +89,7 @@ class Agenda:
     wrenches: tuple[NamedWrench, ...] = ()
     critical_friction: bool = True
     """Find the critical friction in simulation."""
-    limits: Literal["none", "ramp", "bisection"] = "none"
+    limits: LimitSearch = "none"
     """Find the largest multiple of each wrench in simulation."""
     independent: bool = False
     """Also try what does not know the planned forces (`independent`)."""
@@ -68,7 +101,12 @@ class Agenda:
     """Chooses random wrenches, and how contacts are moved for a negative control."""
 
     def __post_init__(self) -> None:
-        """Refuse names that two trials would share: records go by name."""
+        """Refuse what no trial can be made of, and names that two would share."""
+        if self.limits not in get_args(LimitSearch):
+            raise InputError(f"limits must be one of {get_args(LimitSearch)}, got {self.limits!r}")
+        if self.random_wrenches < 0 or self.seed < 0:
+            raise InputError("random_wrenches and seed must not be negative")
+        rules_named(self.rules)
         drawn = (RANDOM.format(place) for place in range(self.random_wrenches))
         taken = {*AXIS_NAMES, WEAKEST, *drawn}
         for each in self.wrenches:

@@ -8,10 +8,25 @@ from typing import Any, cast
 from pydantic import TypeAdapter, ValidationError
 
 from grasp_core.errors import InputError
+from scenes.fingertips import FingerSettings
+from scenes.physics import PhysicsSettings
 from sim_validate.files import read_text
+from sim_validate.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.setup import Setup
 
-TABLES = ("physics", "fingers", "hold", "limit", "friction")
+OURS = ("drive", "indentation")
+"""Fields of the fingers that trials set themselves."""
+OF_USERS = {
+    table: tuple(field.name for field in fields(kind) if field.name not in OURS)
+    for table, kind in (
+        ("physics", PhysicsSettings),
+        ("fingers", FingerSettings),
+        ("hold", HoldProtocol),
+        ("limit", LimitProtocol),
+        ("friction", FrictionProtocol),
+    )
+}
+"""What a file may set, by table."""
 
 
 def setup_from_file(path: Path, setup: Setup) -> Setup:
@@ -29,8 +44,8 @@ def setup_from_file(path: Path, setup: Setup) -> Setup:
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not TOML ({error})") from error
     for name, given in tables.items():
-        if name not in TABLES or not isinstance(given, dict):
-            raise InputError(f"{path}: tables are {', '.join(TABLES)}; got {name!r}")
+        if name not in OF_USERS or not isinstance(given, dict):
+            raise InputError(f"{path}: tables are {', '.join(OF_USERS)}; got {name!r}")
         table = cast("dict[str, Any]", given)
         setup = replace(setup, **{name: _filled(path, name, getattr(setup, name), table)})
     return setup
@@ -38,10 +53,9 @@ def setup_from_file(path: Path, setup: Setup) -> Setup:
 
 def _filled(path: Path, table: str, values: Any, given: dict[str, Any]) -> Any:
     """A frozen value with some of its fields replaced, each checked against its type."""
-    kinds = {field.name: field.type for field in fields(values)}
     for name in given:
-        if name not in kinds:
-            raise InputError(f"{path}: [{table}] has {', '.join(kinds)}; got {name!r}")
+        if name not in OF_USERS[table]:
+            raise InputError(f"{path}: [{table}] has {', '.join(OF_USERS[table])}; got {name!r}")
     kind = cast("type[Any]", type(values))
     try:
         checked: Any = TypeAdapter(kind).validate_python({**_as_dict(values), **given})

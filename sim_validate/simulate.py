@@ -12,7 +12,7 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco  # noqa: TID251 - this is the door
 import numpy as np
@@ -48,6 +48,17 @@ class Motion:
     """The simulator's own words, if it gave up."""
     timed_out: bool
     """Whether it was stopped before its end."""
+
+    def after(self, earlier: "Motion") -> "Motion":
+        """The same, with the faults of the motion whose state it started from."""
+        return replace(
+            self,
+            finite=earlier.finite and self.finite,
+            warnings=earlier.warnings + self.warnings,
+            clock_error_s=earlier.clock_error_s + self.clock_error_s,
+            error=earlier.error or self.error,
+            timed_out=earlier.timed_out or self.timed_out,
+        )
 
 
 class Bench:
@@ -126,8 +137,7 @@ class Bench:
                 friction[:, self.touching, 0] = frictions[:, sample, None]
                 _step(trials, errors)
                 done.append(joints.copy())
-        shape = (0, *joints.shape)
-        return np.array(done).reshape(-1, *shape[1:]).transpose(1, 0, 2), errors
+        return np.array(done).reshape(-1, *joints.shape).transpose(1, 0, 2), errors
 
 
 def _compiled(scene: Scene) -> mujoco.MjModel:
@@ -170,7 +180,7 @@ def acceleration(scene: Scene, wrenches: Array) -> Array:
 
     Returns:
         Force and torque that are left over, mass times acceleration, (n, 6), torque about
-        the point between the contacts.
+        the centre of mass.
     """
     model = _compiled(scene)
     data = mujoco.MjData(model)

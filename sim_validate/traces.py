@@ -13,6 +13,9 @@ from grasp_core.wrenches import normal_and_tangential
 from scenes.layout import Layout
 from sim_validate.simulate import Motion
 
+CLOCK_SLACK_S = 1e-9
+"""Simulated time is a sum of equal steps; a reset would put it off by milliseconds."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trace:
@@ -46,9 +49,23 @@ class Trace:
     """Whether it was stopped before its end."""
 
     @property
-    def sound(self) -> bool:
-        """Whether it says something about the object."""
-        return self.finite and not (self.warnings or self.error or self.timed_out)
+    def fault(self) -> str:
+        """Why it says nothing about the object; empty if it does."""
+        if self.error:
+            return self.error
+        if self.timed_out:
+            return "stopped before its end"
+        if not self.finite:
+            return "a number of the state is not finite"
+        if self.warnings:
+            return f"the simulator raised {self.warnings} warnings"
+        if abs(self.clock_error_s) > CLOCK_SLACK_S:
+            return f"the simulator's clock is off by {self.clock_error_s:.3g} s: it was reset"
+        return ""
+
+    def stayed(self, threshold_m: float) -> bool | None:
+        """Whether no displacement reached a threshold; None if the trace says nothing."""
+        return None if self.fault else bool((self.displacements_m < threshold_m).all())
 
 
 def trace(motion: Motion, layout: Layout, watched: int) -> Trace:

@@ -4,6 +4,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from grasp_core.errors import InputError
 from grasp_core.records import SavedGrasps, grasps_from_json
 from grasp_core.values import Grasp, Polyhedron
@@ -17,7 +19,7 @@ from sim_validate.plan_command import say_cut
 from sim_validate.rules import RULES
 from sim_validate.setup import Agenda, Setup
 from sim_validate.setup_file import setup_from_file
-from sim_validate.validation import Verdict, validate
+from sim_validate.validation import Verdict, WrenchVerdict, validate
 from sim_validate.verdict import Outcome
 from sim_validate.verdict_records import summary, trace_arrays, verdicts_to_json
 from sim_validate.wrench_file import weights, wrenches_from_file
@@ -51,6 +53,15 @@ def finger_settings(given: flags.Fingers) -> FingerSettings:
     )
 
 
+def prepared(testing: flags.Testing, seed: int, folder: Path | None) -> tuple[Setup, Agenda]:
+    """What the flags and files say about trials, checked before anything runs.
+
+    Raises:
+        InputError: A flag or a file is refused, or flags contradict each other.
+    """
+    return _setup(testing), _agenda(testing, seed, folder)
+
+
 def _setup(testing: flags.Testing) -> Setup:
     """How the flags, and then a file, say trials are simulated."""
     setup = Setup(
@@ -62,11 +73,7 @@ def _setup(testing: flags.Testing) -> Setup:
 
 
 def _agenda(testing: flags.Testing, seed: int, folder: Path | None) -> Agenda:
-    """Which trials the flags ask for.
-
-    Raises:
-        InputError: Flags contradict each other, or the file of wrenches is refused.
-    """
+    """Which trials the flags ask for."""
     if testing.down and testing.weight_n is None:
         raise InputError("--down is a direction of the weight: give --weight-n too")
     if testing.traces and folder is None:
@@ -85,7 +92,7 @@ def _agenda(testing: flags.Testing, seed: int, folder: Path | None) -> Agenda:
 
 
 @dataclass(frozen=True, slots=True)
-class _Trial:
+class _Job:
     """One grasp to validate, as it travels to a worker."""
 
     body: Polyhedron
@@ -95,8 +102,8 @@ class _Trial:
     setup: Setup
 
 
-def _try(trial: _Trial) -> Verdict:
-    return validate(trial.body, trial.grasp, trial.friction, agenda=trial.agenda, setup=trial.setup)
+def _try(job: _Job) -> Verdict:
+    return validate(job.body, job.grasp, job.friction, agenda=job.agenda, setup=job.setup)
 
 
 def simulate_grasps(
@@ -106,57 +113,71 @@ def simulate_grasps(
 
     Raises:
         InputError: A flag, a file or a grasp is refused.
-        UnfaithfulError: The simulator fails the gate; nothing is simulated or written then.
+        UnfaithfulError: The simulator fails the gate; no grasp is simulated then.
     """
-    setup, agenda = _setup(testing), _agenda(testing, saved.seed, folder)
-    gate = require_faithful(setup)
+    setup, agenda = prepared(testing, saved.seed, folder)
+    gate = require_faithful(setup, saved.friction, saved.body.radius)
     for check in gate.checks:
         reporter.detail(str(check))
     threads = max(1, testing.jobs // processes(len(saved.grasps), testing.jobs))
     setup = replace(setup, threads=threads)
-    trials = [_Trial(saved.body, g, saved.friction, agenda, setup) for g in saved.grasps]
+    tasks = [_Job(saved.body, g, saved.friction, agenda, setup) for g in saved.grasps]
     verdicts: list[Verdict] = []
     try:
         with reporter.progress("simulating") as steps:
-            for verdict in each(_try, trials, jobs=testing.jobs):
+            for verdict in each(_try, tasks, jobs=testing.jobs):
                 verdicts.append(verdict)
                 if folder and agenda.keep_traces:
                     write_arrays(folder / "traces" / f"{verdict.id}.npz", trace_arrays(verdict))
                 held = sum(verdict.held for verdict in verdicts)
-                steps.update(len(verdicts), len(trials), f"({held} held)")
+                steps.update(len(verdicts), len(tasks), f"({held} held)")
     finally:
-        complete = len(verdicts) == len(trials)
+        complete = len(verdicts) == len(tasks)
         text = verdicts_to_json(saved.body, saved.friction, verdicts, gate, complete=complete)
         if folder and verdicts:
-            write_text(folder / "verdicts.json", text)
+            path = write_text(folder / "verdicts.json", text)
+            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
     if reporter.json_only:
         print(text, end="")  # noqa: T201 - the document itself
-    _show(saved.grasps, verdicts, reporter)
+    _show(saved.grasps, verdicts, setup, reporter)
     return cli.Exit.GOOD if all(verdict.good for verdict in verdicts) else cli.Exit.NEGATIVE
 
 
-def _show(grasps: Sequence[Grasp], verdicts: Sequence[Verdict], reporter: Reporter) -> None:
+def _show(
+    grasps: Sequence[Grasp], verdicts: Sequence[Verdict], setup: Setup, reporter: Reporter
+) -> None:
     rows: list[tuple[str, ...]] = []
     for grasp, verdict in zip(grasps[:TABLE_ROWS], verdicts, strict=False):
-        worst = max(trial.hold.displacement_m for trial in verdict.wrenches)
-        held = sum(control.held for control in verdict.controls)
+        worst = np.max([trial.hold.displacement_m for trial in verdict.wrenches])  # NaN if one is
+        let_go = sum(control.failed for control in verdict.controls)
         friction = verdict.critical_friction
         rows.append(
             (grasp.id, grasp.family, f"{friction.predicted:.4f}",
              "-" if friction.simulated is None else f"{friction.simulated:.4f}",
              *([_limit_range(verdict)] if verdict.agenda.limits != "none" else []),
-             verdict.outcome.value, f"{1e6 * worst:.2g}", f"{held} of {len(verdict.controls)}")
+             verdict.outcome.value, f"{1e6 * worst:.2g}", f"{let_go} of {len(verdict.controls)}")
         )  # fmt: skip
     limits = ("limits",) if verdicts and verdicts[0].agenda.limits != "none" else ()
-    columns = ("grasp", "family", "mu*", "in sim", *limits, "outcome", "um moved", "controls held")
+    columns = (
+        "grasp",
+        "family",
+        "mu*",
+        "in sim",
+        *limits,
+        "outcome",
+        "um moved",
+        "controls let go",
+    )
     reporter.table("verdicts", columns, rows)
     say_cut(len(verdicts), reporter)
     _show_bounds(verdicts, reporter)
     _show_rules(verdicts, reporter)
     totals = summary(verdicts)
     reporter.say(
-        f"{totals['grasps_held']} of {totals['grasps']} grasps held all wrenches; "
-        f"{totals['controls_held']} of {totals['controls']} negative controls held (none should)"
+        f"{totals['grasps_held']} of {totals['grasps']} grasps held all wrenches, at "
+        f"{100.0 * setup.hold.load_share:g} % of what they resist; {totals['controls_let_go']} of "
+        f"{totals['controls']} negative controls were let go (all should), "
+        f"{totals['controls_held']} held"
     )
     for line in _surprises(verdicts):
         reporter.warn(line)
@@ -203,10 +224,16 @@ def _show_rules(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
         reporter.table("rules of other tools", columns, rows)
 
 
+def _expected(trial: WrenchVerdict) -> str:
+    over = trial.predicted_limit < 1.0
+    return f" as predicted, the limit is {trial.predicted_limit:.3g} of this" if over else ""
+
+
 def _surprises(verdicts: Sequence[Verdict]) -> Iterable[str]:
     """What did not end as it should, a line each."""
     lines = [
-        f"{verdict.id}: {trial.name}: {trial.hold.outcome.value}: {trial.hold.reason}"
+        f"{verdict.id}: {trial.name}: {trial.hold.outcome.value}{_expected(trial)}: "
+        f"{trial.hold.reason}"
         for verdict in verdicts
         for trial in verdict.wrenches
         if trial.hold.outcome is not Outcome.HELD

@@ -15,9 +15,6 @@ from scenes.layout import Layout
 from sim_validate.protocol import HoldProtocol
 from sim_validate.traces import Trace
 
-CLOCK_SLACK_S = 1e-9
-"""Simulated time is a sum of equal steps; a reset would put it off by milliseconds."""
-
 
 class Outcome(StrEnum):
     """How a trial ended."""
@@ -31,6 +28,10 @@ class Outcome(StrEnum):
     ERROR = "error"
 
 
+LET_GO = (Outcome.SLIPPED, Outcome.LOST_CONTACT)
+"""Endings that say that the object was not held; all others but `held` say nothing about it."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class HoldVerdict:
     """What a trace amounts to."""
@@ -40,6 +41,8 @@ class HoldVerdict:
     """What happened, in words; empty if it held."""
     displacement_m: float
     """Largest while holding: motion between the contacts plus grasp size times rotation."""
+    start_displacement_m: float
+    """Before that, while the object was loaded at high friction."""
     rotation_rad: float
     slip_m: Array
     """Largest tangential motion of each fingertip over its face, (k,)."""
@@ -62,10 +65,17 @@ def judge(trace: Trace, layout: Layout, protocol: HoldProtocol) -> HoldVerdict:
         outcome=outcome,
         reason=reason,
         displacement_m=float(trace.displacements_m.max(initial=0.0)),
+        start_displacement_m=trace.start_m,
         rotation_rad=float(trace.rotations_rad.max(initial=0.0)),
         slip_m=trace.slips_m.max(axis=0, initial=0.0),
         failed_after_s=None if first is None else float(trace.times_s[first]),
     )
+
+
+def holds(trace: Trace, layout: Layout, protocol: HoldProtocol) -> bool | None:
+    """Whether a trace shows that the object is held; None if it says nothing about it."""
+    outcome = judge(trace, layout, protocol).outcome
+    return outcome is Outcome.HELD if outcome in (Outcome.HELD, *LET_GO) else None
 
 
 def invalid_start(verdict: HoldVerdict, reasons: Sequence[str]) -> HoldVerdict:
@@ -87,26 +97,15 @@ def _outcome(
     if trace.error:
         return Outcome.ERROR, trace.error
     if trace.timed_out:
-        return Outcome.TIMEOUT, "stopped before its end"
-    if unsound := _unsound(trace):
-        return Outcome.DIVERGED, unsound
+        return Outcome.TIMEOUT, trace.fault
+    if trace.fault:
+        return Outcome.DIVERGED, trace.fault
     if trace.start_m >= protocol.total_threshold * layout.grasp_size_m:
         moved = f"the object moved by {_um(trace.start_m)} while it was loaded at high friction"
         return Outcome.SLIPPED, moved
     if first is None:
         return Outcome.HELD, ""
     return _how_it_let_go(trace, layout, protocol, first)
-
-
-def _unsound(trace: Trace) -> str:
-    """Why a trace says nothing about the object, if it does not."""
-    if not trace.finite:
-        return "a number of the state is not finite"
-    if trace.warnings:
-        return f"the simulator raised {trace.warnings} warnings"
-    if abs(trace.clock_error_s) > CLOCK_SLACK_S:
-        return f"the simulator's clock is off by {trace.clock_error_s:.3g} s: it was reset"
-    return ""
 
 
 def _how_it_let_go(
@@ -122,6 +121,8 @@ def _how_it_let_go(
         return Outcome.LOST_CONTACT, f"finger {finger} is {_um(gaps[finger])} off its face"
     finger = int(np.argmax(slips))
     turned = f"the object turned by {1e3 * trace.rotations_rad[first]:.3g} mrad"
+    if trace.displacements_m[first] < protocol.hold_threshold * layout.grasp_size_m:
+        turned += f" after {_um(trace.start_m)} of motion while it was loaded"
     return Outcome.SLIPPED, f"finger {finger} slid {_um(slips[finger])} over its face, {turned}"
 
 

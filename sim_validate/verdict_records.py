@@ -4,13 +4,14 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, cast
 
 from grasp_core.arrays import Array
 from grasp_core.values import Polyhedron
 from grasp_core.versions import versions
 from sim_validate.control_trials import ControlVerdict
 from sim_validate.gate import Gate
+from sim_validate.setup_file import OF_USERS
 from sim_validate.validation import Verdict, WrenchVerdict
 from sim_validate.verdict import HoldVerdict
 
@@ -43,19 +44,25 @@ def verdicts_to_json(
         "summary": summary(listed),
         "verdicts": [_verdict_record(body, verdict) for verdict in listed],
     }
-    return json.dumps(document, allow_nan=False, indent=1) + "\n"
+    return json.dumps(finite(document), allow_nan=False, indent=1) + "\n"
 
 
 def gate_record(gate: Gate) -> dict[str, object]:
-    """The gate's figures; null for one that could not be measured."""
+    """The gate's figures."""
     return {
         "passed": gate.passed,
         "mujoco": gate.mujoco,
-        "checks": [
-            asdict(check) | {"value": None if math.isnan(check.value) else check.value}
-            for check in gate.checks
-        ],
+        "checks": [asdict(check) for check in gate.checks],
     }
+
+
+def finite(value: Any) -> Any:
+    """The same tree with null for numbers that JSON does not have: what could not be measured."""
+    if isinstance(value, dict):
+        return {name: finite(part) for name, part in cast("dict[str, Any]", value).items()}
+    if isinstance(value, list | tuple):
+        return [finite(part) for part in cast("list[Any]", value)]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def summary(verdicts: Iterable[Verdict]) -> dict[str, int]:
@@ -67,6 +74,7 @@ def summary(verdicts: Iterable[Verdict]) -> dict[str, int]:
         "grasps_held": sum(verdict.held for verdict in listed),
         "controls": len(controls),
         "controls_held": sum(control.held for control in controls),
+        "controls_let_go": sum(control.failed for control in controls),
         "mismatches": sum(len(verdict.mismatches) for verdict in listed),
     }
 
@@ -110,6 +118,7 @@ def _hold_record(hold: HoldVerdict) -> dict[str, object]:
         "outcome": hold.outcome.value,
         "reason": hold.reason,
         "displacement_m": hold.displacement_m,
+        "start_displacement_m": hold.start_displacement_m,
         "rotation_rad": hold.rotation_rad,
         "slip_m": hold.slip_m.tolist(),
         "failed_after_s": hold.failed_after_s,
@@ -142,14 +151,15 @@ def _control_record(body: Polyhedron, verdict: ControlVerdict) -> dict[str, obje
 
 def _settings(verdict: Verdict) -> dict[str, object]:
     layout, setup = verdict.scene.layout, verdict.setup
-    physics = setup.physics
     return {
-        "protocol": asdict(setup.hold),
-        "limit_protocol": asdict(setup.limit),
-        "friction_protocol": asdict(setup.friction),
-        "physics": physics.options() | physics.contact() | {"flags": physics.flags()},
+        "physics": asdict(setup.physics),
+        "fingers": {name: getattr(setup.fingers, name) for name in OF_USERS["fingers"]},
+        "hold": asdict(setup.hold),
+        "limit": asdict(setup.limit),
+        "friction": asdict(setup.friction),
+        "flags": setup.physics.flags(),
+        "drive": asdict(layout.drive),
         "surface": setup.surface,
-        "fingers": asdict(layout.drive),
         "grasp_size_m": layout.grasp_size_m,
         "object_mass_kg": layout.mass_kg,
         "object_inertia_kg_m2": layout.inertia_kg_m2.tolist(),
@@ -165,6 +175,6 @@ def trace_arrays(verdict: Verdict) -> dict[str, Array]:
     kept: Sequence[tuple[str, Any]] = [
         *((trial.name, trial.trace) for trial in verdict.wrenches if trial.trace is not None),
         *((f"{control.control.name}.{trial.name}", trial.trace)
-          for control in verdict.controls for trial in control.tried),
+          for control in verdict.controls for trial in control.tried if trial.trace is not None),
     ]  # fmt: skip
     return {f"{name}.{field}": getattr(trace, field) for name, trace in kept for field in fields}

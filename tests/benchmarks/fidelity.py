@@ -122,7 +122,7 @@ def examine(case):
     return Found(
         family=case.grasp.family,
         name=case.body.name,
-        critical=released_friction(bench, known, critical, setup),
+        critical=released_friction(bench, known.positions, known.normals, critical, setup),
         shares=[limit.share if limit else float("nan") for limit in ramped_limits(rig, limits)],
         inside=ends[: len(near)],
         outside=ends[len(near) :],

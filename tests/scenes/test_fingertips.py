@@ -24,7 +24,7 @@ def test_fingertips_that_fit_meet_neither_each_other_nor_the_object_elsewhere(na
     rng, tested = np.random.default_rng(0), 0
     for grasp in gc.plan(body, 0.5, families=("free",), limit=6).grasps:
         radius = arrange(body, grasp, 0.5).drive.radius_m
-        found = clashes(grasp.positions, grasp.normals, body.vertices, body.triangles, radius)
+        found = clashes(body, grasp.positions, grasp.normals, radius)
         centers = grasp.positions - radius * grasp.normals
         apart = min(np.linalg.norm(a - b) for i, a in enumerate(centers) for b in centers[:i])
         if found:
@@ -44,7 +44,7 @@ def test_near_an_inner_corner_the_radius_is_the_distance_to_it():
     for share in (0.05, 0.1, 0.2):
         distance = share * body.radius
         at = point + distance * inner
-        radius = fitting_radius(at[None], normal[None], body.vertices, body.triangles, body.radius)
+        radius = fitting_radius(body, at[None], normal[None])
         expected = 0.1 * body.radius if distance >= 0.1 * body.radius else 0.95 * distance
         assert radius == pytest.approx(expected, rel=1e-5)
 
@@ -69,9 +69,9 @@ def test_two_fingertips_at_one_edge_always_overlap():
     length, width, _ = np.ptp(body.vertices, axis=0)
     at = np.array([[length / 2, width / 2, 0.0]] * 2)
     normals = np.array([[-1.0, 0, 0], [0, -1.0, 0]])
-    radius = fitting_radius(at, normals, body.vertices, body.triangles, body.radius)
+    radius = fitting_radius(body, at, normals)
     assert radius == pytest.approx(1e-3 * body.radius)
-    found = clashes(at, normals, body.vertices, body.triangles, radius)
+    found = clashes(body, at, normals, radius)
     assert len(found) == 1
     assert "fingertips 0 and 1 of radius" in found[0]
 
@@ -81,10 +81,9 @@ def test_opposite_fingertips_never_overlap_and_close_ones_do_from_half_their_dis
     length = np.ptp(body.vertices[:, 0])
     at = np.array([[length / 2, 0.0, 0.0], [-length / 2, 0.0, 0.0], [length / 2, 0.004, 0.0]])
     normals = np.array([[-1.0, 0, 0], [1.0, 0, 0], [-1.0, 0, 0]])
-    mesh = body.vertices, body.triangles
-    assert clashes(at[:2], normals[:2], *mesh, 1.0) == ()
-    assert clashes(at[[0, 2]], normals[[0, 2]], *mesh, 0.00199) == ()
-    assert len(clashes(at[[0, 2]], normals[[0, 2]], *mesh, 0.00201)) == 1
+    assert clashes(body, at[:2], normals[:2], 1.0) == ()
+    assert clashes(body, at[[0, 2]], normals[[0, 2]], 0.00199) == ()
+    assert len(clashes(body, at[[0, 2]], normals[[0, 2]], 0.00201)) == 1
 
 
 def test_a_point_of_the_surface_is_nearest_to_itself_and_a_far_one_to_a_vertex():

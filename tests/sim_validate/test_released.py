@@ -25,7 +25,9 @@ def test_the_simulator_finds_the_critical_friction_of_the_analysis():
             body, found = grasps(name, 0.4, 2, (family,))
             for grasp in found:
                 scene = build_scene(body, grasp, 0.4)
-                critical = released_friction(Bench(scene), grasp, grasp.critical_friction, Setup())
+                critical = released_friction(
+                    Bench(scene), grasp.positions, grasp.normals, grasp.critical_friction, Setup()
+                )
                 if critical.predicted < FrictionProtocol().least_friction:
                     assert critical.simulated == 0.0
                     tiny += 1
@@ -49,7 +51,7 @@ def test_the_number_alone_is_one_call():
 
 def test_forces_just_above_the_critical_friction_need_it_and_balance():
     body, (grasp, *_) = grasps("random-12-1", 0.5, 1, ("regulus",))
-    forces = forces_just_above(grasp, grasp.critical_friction)
+    forces = forces_just_above(grasp.positions, grasp.normals, grasp.critical_friction)
     along = np.einsum("ki,ki->k", forces, grasp.normals)
     across = np.linalg.norm(forces - along[:, None] * grasp.normals, axis=1)
     assert along.max() == pytest.approx(1.0)

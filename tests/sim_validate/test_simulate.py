@@ -61,9 +61,9 @@ def test_trials_together_are_those_of_a_plain_loop_to_the_last_bit(held, threads
     _, _, rig = held
     trials = trials_of(held)
     scene = rig.bench.scene
-    motions = Bench(scene, threads=threads).run(trials, rig.start)
+    motions = Bench(scene, threads=threads).run(trials, rig.closed.state)
     for motion, trial in zip(motions, trials, strict=True):
-        np.testing.assert_array_equal(motion.joints, plain_loop(scene, trial, rig.start))
+        np.testing.assert_array_equal(motion.joints, plain_loop(scene, trial, rig.closed.state))
     moved = [np.abs(motion.joints[-1, :3]).max() for motion in motions]
     assert max(moved) > 100.0 * min(moved)
 
@@ -71,7 +71,7 @@ def test_trials_together_are_those_of_a_plain_loop_to_the_last_bit(held, threads
 def test_trials_repeat_to_the_last_bit(held):
     _, _, rig = held
     trials = trials_of(held)
-    one, two = (rig.bench.run(trials, rig.start) for _ in range(2))
+    one, two = (rig.bench.run(trials, rig.closed.state) for _ in range(2))
     for a, b in zip(one, two, strict=True):
         np.testing.assert_array_equal(a.joints, b.joints)
         np.testing.assert_array_equal(a.state, b.state)
@@ -86,7 +86,7 @@ def test_friction_is_that_of_the_schedule_and_not_of_the_scene(held):
     outcomes = []
     for friction in (0.5, 0.4):
         trial = schedules.hold(rig.idle, load, (1.5, friction), rig.bench.clock, HoldProtocol())
-        (motion,) = rig.bench.run([trial], rig.start)
+        (motion,) = rig.bench.run([trial], rig.closed.state)
         outcomes.append(np.abs(motion.joints[-1, :3] - motion.joints[trial.watched - 1, :3]).max())
     assert outcomes[0] < 1e-7
     assert outcomes[1] > 1e-4

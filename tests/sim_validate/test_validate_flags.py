@@ -112,7 +112,7 @@ def test_a_simulator_that_is_unfaithful_is_refused_with_its_figures(planned, cap
 def test_settings_of_a_file_are_in_force_and_in_the_record(planned, verdict):
     (planned / "setup.toml").write_text("[hold]\nload_share = 0.5\n[fingers]\nradius_m = 0.004\n")
     settings = verdict("--setup", "setup.toml")["settings"]
-    assert settings["protocol"]["load_share"] == 0.5
+    assert settings["hold"]["load_share"] == 0.5
     assert settings["fingers"]["radius_m"] == 0.004
 
 

@@ -146,8 +146,7 @@ def test_limits_are_multiples_of_the_applied_wrench():
 def test_overlapping_fingertips_make_a_grasp_invalid():
     body, found = grasps("l-bracket", 0.5, 8, ("free",))
     radius = 0.5 * body.radius
-    mesh = body.vertices, body.triangles
-    grasp = next(g for g in found if clashes(g.positions, g.normals, *mesh, radius))
+    grasp = next(g for g in found if clashes(body, g.positions, g.normals, radius))
     setup = Setup(fingers=FingerSettings(radius_m=radius))
     verdict = sv.validate(body, grasp, 0.5, agenda=WITHOUT_CONTROLS, setup=setup)
     assert verdict.outcome is Outcome.INVALID_START
