@@ -18,7 +18,7 @@ SMALLEST, LARGEST = 1e-9, 1e9
 
 def _not_zero(values: tuple[float, ...]) -> tuple[float, ...]:
     if not SMALLEST <= max(abs(value) for value in values) <= LARGEST:
-        raise ValueError(f"the largest part must be from {SMALLEST:g} to {LARGEST:g}, not zero")
+        raise ValueError(f"must not be zero: the largest part is from {SMALLEST:g} to {LARGEST:g}")
     return values
 
 

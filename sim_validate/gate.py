@@ -9,6 +9,7 @@ With mu the friction, N the normal force of a contact:
 * a grasp under a part of the load that it resists does not creep;
 * fingers that push on two opposite faces a height h apart, from a distance w, hold down to the
   friction h / w;
+* what the thresholds of displacement let pass is, by the stiffness of the servos, a small force;
 * a blow-up is reported, and does not put everything back to the start.
 
 The loads and frictions at which the boxes slip are found and judged exactly as those of grasps are,
@@ -47,6 +48,9 @@ CREEP_LIMIT = 1e-4
 """Fastest creep under load, in grasp sizes per second: good settings show a twentieth, and a hold
 notices five times as much."""
 CREEP_LOAD = 0.8
+HIDDEN_LIMIT = 0.01
+"""Largest force that thresholds may let pass, over the largest normal force: ten times what the
+usual ones do."""
 LEAST_OFFSET, LARGEST_OFFSET = 0.01, 1.0
 """Critical frictions for which the box has room."""
 NEAR = 0.01
@@ -150,7 +154,8 @@ class _Case:
 @lru_cache(maxsize=32)
 def _measured(case: _Case) -> Gate:
     checks = (
-        *_incline(case), *_pulled_box(case), *_offset_fingers(case), _creep(case), _blow_up(case),
+        *_incline(case), *_pulled_box(case), *_offset_fingers(case), _creep(case), _hidden(case),
+        _blow_up(case),
     )  # fmt: skip
     return Gate(checks, versions()["mujoco"])
 
@@ -259,6 +264,20 @@ def _creep(case: _Case) -> Check:
     fastest = np.abs([_speed(trace) for trace in traces]).max()  # NaN if one is
     speed = float(fastest) / rig.bench.scene.layout.grasp_size_m
     return Check("creep under load, in grasp sizes per second", speed, 0.0, CREEP_LIMIT)
+
+
+def _hidden(case: _Case) -> Check:
+    """The force that servos give way by before a threshold notices that something moved."""
+    rig, _ = _tetrahedron(case)
+    layout, setup = rig.bench.scene.layout, case.setup
+    threshold = max(
+        setup.hold.hold_threshold, setup.hold.total_threshold, setup.hold.gap_threshold,
+        setup.limit.ramp_threshold, setup.friction.threshold,
+    )  # fmt: skip
+    hidden = layout.drive.stiffness_n_per_m * threshold * layout.grasp_size_m
+    share = hidden / setup.fingers.max_normal_force_n
+    name = "force hidden below the thresholds, over the largest normal force"
+    return Check(name, share, 0.0, HIDDEN_LIMIT)
 
 
 def _speed(trace: Trace) -> float:

@@ -246,4 +246,4 @@ def test_help_answers_without_loading_a_simulator():
 def _always_held(trace, *_):
     from sim_validate.verdict import HoldVerdict, Outcome
 
-    return HoldVerdict(Outcome.HELD, "", 0.0, 0.0, trace.slips_m.max(axis=0), None)
+    return HoldVerdict(Outcome.HELD, "", 0.0, 0.0, 0.0, trace.slips_m.max(axis=0), None)

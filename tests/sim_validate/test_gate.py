@@ -7,7 +7,7 @@ import scenes
 import sim_validate as sv
 from scenes.physics import PhysicsSettings
 from sim_validate.gate import measured_gate, require_faithful
-from sim_validate.protocol import HoldProtocol
+from sim_validate.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.setup import Setup
 from tests.sim_validate.rigs import grasps
 
@@ -20,14 +20,19 @@ BROKEN = {
     "pyramidal cones": (Setup(physics=replace(GOOD, cone="pyramidal")), "slides.*slips"),
     "autoreset": (Setup(physics=replace(GOOD, autoreset=True)), "blow-up"),
     "implicitfast at the default tolerance": (
-        Setup(physics=replace(GOOD, integrator="implicitfast", tolerance=1e-8)), "slides.*slips",
+        Setup(physics=replace(GOOD, integrator="implicitfast", tolerance=1e-8)), "slips.*let go",
     ),
     "all of MuJoCo's defaults": (Setup(physics=DEFAULTS), "slides.*slips.*creep"),
     "soft friction": (Setup(physics=replace(GOOD, impratio=1.0)), "creep"),
     "few noslip iterations": (
         Setup(physics=replace(GOOD, impratio=1.0, noslip_iterations=5)), "creep"
     ),
-    "conjugate gradients": (Setup(physics=replace(GOOD, solver="CG")), "creep"),
+    "conjugate gradients": (Setup(physics=replace(GOOD, solver="CG")), "let go"),
+    "holds that hide a hundred times more": (
+        Setup(hold=HoldProtocol(hold_threshold=0.02, total_threshold=0.02)), "hidden",
+    ),
+    "loose ramps": (Setup(limit=LimitProtocol(ramp_threshold=1e-2)), "slips.*by ramps"),
+    "loose releases": (Setup(friction=FrictionProtocol(threshold=1e-2)), "let go.*by releases"),
     "thresholds of 5 mm": (
         Setup(hold=HoldProtocol(hold_threshold=0.1, total_threshold=0.2, gap_threshold=0.1)),
         "slides",
@@ -38,9 +43,9 @@ BROKEN = {
 def test_the_usual_settings_are_faithful_and_every_figure_is_measured():
     gate = require_faithful(Setup())
     assert gate.passed
-    assert len(gate.checks) == 10
+    assert len(gate.checks) == 17
     for check in gate.checks:
-        assert check.least < check.value < check.largest
+        assert check.least <= check.value < check.largest
         assert str(check).endswith("ok")
 
 
@@ -78,3 +83,20 @@ def test_the_gate_passes_at_other_forces(force):
 def test_fingers_far_too_heavy_are_noticed():
     """A ton behind each fingertip does not move in half a second."""
     assert not measured_gate(Setup(fingers=scenes.FingerSettings(mass_kg=1e6))).passed
+
+
+@pytest.mark.parametrize("friction", [0.02, 0.2, 2.0])
+@pytest.mark.parametrize("radius_m", [7e-4, 7.0])
+def test_the_gate_passes_at_other_frictions_and_sizes(friction, radius_m):
+    assert measured_gate(Setup(), friction, radius_m).passed
+
+
+def test_frictions_at_which_the_simulator_fails_are_refused():
+    assert not measured_gate(Setup(), 100.0).passed
+
+
+def test_given_masses_and_stiffnesses_are_judged_at_the_size_of_the_object():
+    """What suits an object of 7 cm: 2 kg and 1000 N/m are far too much or too little for others."""
+    fingers = scenes.FingerSettings(mass_kg=1.0, stiffness_n_per_m=1000.0)
+    assert measured_gate(Setup(fingers=fingers), radius_m=0.07).passed
+    assert not measured_gate(Setup(fingers=fingers), radius_m=7e-4).passed

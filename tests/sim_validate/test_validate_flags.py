@@ -1,11 +1,14 @@
 """What the flags of `validate` and `run` put into a verdict."""
 
 import json
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from sim_validate.cli import Exit, main
+from sim_validate.flags import RuleName
+from sim_validate.rules import RULES
 
 TASK = '{"wrenches": [{"name": "lift", "force_n": [0, 0, -3], "torque_n_m": [0, 0.01, 0]}]}'
 
@@ -96,6 +99,7 @@ def test_a_trial_out_of_time_says_so(verdict):
     found = verdict("--timeout-s", "1e-9", code=Exit.NEGATIVE)
     assert found["held"] is False
     assert {trial["outcome"] for trial in found["wrenches"]} == {"timeout"}
+    assert found["mismatches"] == ["critical friction: not found near the predicted one"]
 
 
 def test_a_simulator_that_is_unfaithful_is_refused_with_its_figures(planned, capsys):
@@ -132,3 +136,41 @@ def test_settings_of_a_file_are_in_force_and_in_the_record(planned, verdict):
 def test_flags_that_make_no_sense_are_refused_before_anything_runs(capsys, flags, code, words):
     assert main(["validate", "grasps.json", *flags]) == code
     assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("flags", [["--down", "0", "0", "-1"], ["--setup", "pyramids.toml"]])
+def test_a_run_that_is_refused_leaves_earlier_results(planned, flags):
+    (planned / "pyramids.toml").write_text('[physics]\ncone = "pyramidal"\n')
+    assert main(["run", "tetrahedron", "--out", "r", "-q"]) == Exit.GOOD
+    before = (planned / "r" / "verdicts.json").read_text()
+    assert main(["run", "tetrahedron", "--out", "r", "-q", *flags]) in {Exit.INPUT, Exit.INTERNAL}
+    assert (planned / "r" / "verdicts.json").read_text() == before
+
+
+def test_the_scenes_of_a_run_are_those_that_were_simulated(planned):
+    (planned / "setup.toml").write_text(
+        "[physics]\ntimestep = 0.001\n[fingers]\nradius_m = 0.004\n"
+    )
+    command = ["run", "tetrahedron", "--out", "r", "-q", "--setup", "setup.toml"]
+    assert main(command) == Exit.GOOD
+    for path in (planned / "r" / "scenes").iterdir():
+        text = path.read_text()
+        assert 'timestep="0.001"' in text
+        assert 'size="0.004"' in text
+
+
+def test_what_a_verdict_lists_may_be_given_back(planned, verdict):
+    """The tables of a setup file are those of a verdict's settings."""
+    settings = verdict()["settings"]
+    tables = ("physics", "fingers", "hold", "limit", "friction")
+    lines: list[str] = []
+    for table in tables:
+        lines.append(f"[{table}]")
+        given = {name: value for name, value in settings[table].items() if value is not None}
+        lines += [f"{name} = {json.dumps(value)}" for name, value in given.items()]
+    (planned / "same.toml").write_text("\n".join(lines))
+    assert verdict("--setup", "same.toml")["settings"] == settings
+
+
+def test_rules_on_the_command_line_are_those_that_exist():
+    assert get_args(RuleName) == tuple(RULES)

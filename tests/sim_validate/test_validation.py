@@ -1,3 +1,4 @@
+import json
 import math
 from dataclasses import replace
 
@@ -243,3 +244,75 @@ def test_friction_at_or_below_critical_is_refused():
 def test_a_protocol_that_proves_nothing_is_refused(kind, bad):
     with pytest.raises(gc.InputError, match=next(iter(bad))):
         kind(**bad)
+
+
+def test_a_simulator_that_disagrees_makes_the_verdict_bad(monkeypatch):
+    """Friction that is really 0.7 of what it should be, in releases and then in ramps."""
+    body, found = grasps("random-12-1", 0.5, 20, ("free",))
+    grasp = next(g for g in found if 0.01 < g.critical_friction < 0.3)
+    agenda = replace(WITHOUT_CONTROLS, limits="ramp")
+    assert sv.validate(body, grasp, 0.5, agenda=agenda).good
+    for kind, says in (("release", "critical friction: "), ("ramp", "of the predicted limit")):
+        with monkeypatch.context() as patched:
+            patched.setattr(f"sim_validate.rig.schedules.{kind}", _weaker(kind))
+            verdict = sv.validate(body, grasp, 0.5, agenda=agenda)
+        assert not verdict.good
+        assert any(says in mismatch for mismatch in verdict.mismatches)
+
+
+def _weaker(kind):
+    from sim_validate import schedules
+
+    faithful = getattr(schedules, kind)
+
+    def weakened(*arguments):
+        made = faithful(*arguments)
+        plan, *rest = made if isinstance(made, tuple) else (made,)
+        friction = plan.friction.copy()
+        friction[plan.watched :] *= 0.7
+        weak = replace(plan, friction=friction)
+        return (weak, *rest) if rest else weak
+
+    return weakened
+
+
+def test_trials_that_say_nothing_neither_confirm_nor_contradict():
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
+    tear = NamedWrench("tear", np.array([0, 0, 1e4, 0, 0, 0]))
+    agenda = Agenda(wrenches=(tear,), rules=tuple(RULES), limits="bisection", keep_traces=True)
+    verdict = sv.validate(body, grasp, 0.5, agenda=agenda, setup=Setup(timeout_s=1e-9))
+    assert {trial.hold.outcome for trial in verdict.wrenches} == {Outcome.TIMEOUT}
+    assert not any(trial.contradiction for trial in verdict.wrenches)
+    assert not any(trial.simulated_limit for trial in verdict.wrenches)
+    assert not any(control.failed or control.held for control in verdict.controls)
+    assert not any(verdict.accepted_by.values())
+    assert not verdict.controls_failed
+    assert not verdict.good
+
+
+def test_a_load_that_blows_everything_up_is_recorded_without_numbers():
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
+    tear = NamedWrench("tear", np.array([0, 0, 1e9, 0, 1e9, 0]))
+    verdict = sv.validate(body, grasp, 0.5, agenda=replace(WITHOUT_CONTROLS, wrenches=(tear,)))
+    text = verdicts_to_json(body, 0.5, [verdict], verdict.gate, complete=True)
+    (trial,) = [t for t in json.loads(text)["verdicts"][0]["wrenches"] if t["name"] == "tear"]
+    assert trial["outcome"] == "diverged"
+    assert not verdict.good
+
+
+def test_contacts_rounded_to_six_digits_are_as_good():
+    """What a file with fewer digits does: contacts are a little above or below their faces."""
+    tested = 0
+    for name in ("wedge", "random-12-1"):
+        body, found = grasps(name, 0.5, 2)
+        for grasp in found:
+            rounded = tuple(
+                gc.values.Contact(np.round(c.position, 8), c.normal) for c in grasp.contacts
+            )
+            verdict = sv.validate(
+                body, replace(grasp, contacts=rounded), 0.5, agenda=WITHOUT_CONTROLS
+            )
+            assert verdict.good, verdict.wrenches[0].hold.reason
+            assert verdict.scene.layout.drive.radius_m > 0.01 * body.radius
+            tested += 1
+    assert tested >= 4
