@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from sim_validate.protocol import HoldProtocol as HoldProtocol
     from sim_validate.setup import Agenda as Agenda
+    from sim_validate.setup import NamedWrench as NamedWrench
     from sim_validate.setup import Setup as Setup
     from sim_validate.validation import Verdict as Verdict
     from sim_validate.validation import simulated_critical_friction as simulated_critical_friction
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Agenda": "setup",
+    "NamedWrench": "setup",
     "Setup": "setup",
     "simulated_critical_friction": "validation",
     "HoldProtocol": "protocol",

@@ -18,7 +18,7 @@ README = (ROOT / "README.md").read_text()
 EXAMPLES = re.findall(r"```python\n(.*?)```.*?```text\n(.*?)```", README, re.DOTALL)
 
 
-@pytest.mark.parametrize("example", range(2))
+@pytest.mark.parametrize("example", range(3))
 def test_the_examples_print_what_they_say(example):
     code, said = EXAMPLES[example]
     answer = subprocess.run(

@@ -132,6 +132,12 @@ def examine(case):
     )
 
 
+MUST_BE_ZERO = (
+    "critical_not_found", "limits_not_found", "false_unstable", "false_stable", "controls_held",
+    "controls_not_let_go", "bounds_on_the_wrong_side",
+)  # fmt: skip
+
+
 def report(found):
     """The figures of all grasps, and lines that say them."""
     positive = [f.critical for f in found if f.critical.predicted >= 1e-3]
@@ -226,10 +232,13 @@ def main():
     begun = time.perf_counter()
     found = list(each(examine, chosen, jobs=available_cores()))
     print(f"examined in {time.perf_counter() - begun:.0f} s")
-    report(found)
+    figures = report(found)
     if not quick:
         throughput()
         repeats()
+    wrong = [name for name in MUST_BE_ZERO if figures[name]]
+    if wrong:
+        sys.exit(f"these must be zero: {', '.join(wrong)}")
 
 
 if __name__ == "__main__":
