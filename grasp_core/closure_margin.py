@@ -31,6 +31,9 @@ rounding errors."""
 INTERIOR = 1e-6
 """Depth inside its cone, of forces whose normal parts sum to 1, from which a contact counts
 as carrying an interior force: far above what the solver leaves on a boundary."""
+TOUCHING = 1e-9
+"""Supports of a unit twist above minus this are taken for zero by its solver's tolerance."""
+NEWTON_STEPS = 3
 RANK = 1e-9
 """Smallest singular value of the unit-size grasp map that counts as full rank."""
 
@@ -74,6 +77,9 @@ def decide(arms: Array, normals: Array, friction: Array) -> Answer:
         return Answer(margin, forces, twist, closed=True)
     if margin < 0.0 and refutes_closure(twist, arms, normals, friction):
         return Answer(margin, forces, twist, closed=False)
+    touching = _touching_twist(twist, arms, normals, friction)
+    if abs(margin) < DECIDED and refutes_closure(touching, arms, normals, friction):
+        return Answer(0.0, forces, touching, closed=False)
     sparing = _twist_sparing_interior_forces(arms, normals, friction, forces)
     if sparing is not None and refutes_closure(sparing, arms, normals, friction):
         return Answer(0.0, forces, sparing, closed=False)
@@ -110,6 +116,26 @@ def proves_closure(forces: Array, arms: Array, normals: Array, friction: Array) 
         return False
     reach = np.sqrt(1.0 + friction**2) * (imbalance + ROUNDING) / least
     return bool((depth > reach).all())
+
+
+def _touching_twist(twist: Array, arms: Array, normals: Array, friction: Array) -> Array:
+    """A twist at which the supports that are nearly zero are so to within rounding.
+
+    Where the margin is exactly zero, as with symmetric normals at just their critical friction, the
+    solver's twist passes the cones by its own tolerance; Newton's method takes it onto them.
+    """
+    twist = twist / max(float(np.linalg.norm(twist)), _TINY)
+    for _ in range(NEWTON_STEPS):
+        velocities = twist[:3] + np.cross(twist[3:], arms)
+        along, across = normal_and_tangential(velocities, normals)
+        excess = along + friction * across
+        touched = excess > -TOUCHING
+        sideways = (velocities - along[:, None] * normals) / np.maximum(across, _TINY)[:, None]
+        forces = (normals + friction[:, None] * sideways)[touched]
+        slopes = np.hstack([forces, np.cross(arms[touched], forces)])
+        step, *_ = np.linalg.lstsq(slopes, excess[touched], rcond=RANK)
+        twist = twist - np.asarray(step, dtype=np.float64)
+    return twist
 
 
 def _twist_sparing_interior_forces(

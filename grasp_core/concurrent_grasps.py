@@ -17,12 +17,19 @@ its edges. All of it is linear in (x0, y_1..y_4, r):
 The disc centres stay variables: eliminating them by shrinking the face over-estimates r as
 soon as an edge of the shrunk face vanishes.
 
-With axis = normal and half-angle = theta this is section 3.1 of the paper.
+The lines of force, not the forces, have to meet: fingers may also push away from a focus behind
+them, as from inside a hole. With side = -1 for such a finger, side (x0 - c_i - T_i y) has to be in
+its cone; as P3 makes the weights of the force directions positive, nothing else changes. All four
+on one side and all on the other are tried, mixed sides on request.
 
-Source: Sudsang & Ponce 1995, section 3.1 and Proposition 5.
+With axis = normal, half-angle = theta and all sides +1 this is section 3.1 of the paper.
+
+Source: Sudsang & Ponce 1995, section 3.1 and Proposition 5; the far side is this project's.
 """
 
+import math
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 
@@ -31,6 +38,7 @@ from grasp_core.face_pieces import FacePiece
 from grasp_core.largest_discs import largest_discs
 from grasp_core.placements import NoPlacement, Placement, balanced_forces
 from grasp_core.polygons import clip
+from grasp_core.spanning import balancing_weights
 from grasp_core.values import FINGERS, ForceCone
 
 PYRAMID_SIDES = 16
@@ -39,8 +47,50 @@ RADII, SMALLEST = slice(11, 15), 15
 """Where the radii and their lower bound are among the variables."""
 
 
+Sides: TypeAlias = tuple[float, float, float, float]
+BEFORE, BEHIND = (1.0, 1.0, 1.0, 1.0), (-1.0, -1.0, -1.0, -1.0)
+
+
 def place_concurrent(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone], *, least: float
+) -> Placement | NoPlacement:
+    """Place a focus point and four discs of the largest common radius, on the better side.
+
+    Args:
+        pieces: Four convex pieces, in finger order, in units where the object has size one.
+        cones: The force cones, in the same order; they must satisfy the generalised P3.
+        least: Smaller discs count as none.
+
+    Raises:
+        SolverError: A program's answer failed its check.
+    """
+    best: Placement | None = None
+    bound = -math.inf
+    for sides, reach in zip((BEFORE, BEHIND), _reaches(pieces, cones), strict=True):
+        if reach * math.tan(max(cone.half_angle for cone in cones)) < least:
+            continue
+        found = place_on_sides(pieces, cones, sides, least=least)
+        if isinstance(found, Placement):
+            best, least = found, found.merit
+        else:
+            bound = max(bound, found.bound)
+    return best or NoPlacement(bound)
+
+
+def _reaches(pieces: Sequence[FacePiece], cones: Sequence[ForceCone]) -> tuple[float, float]:
+    """How far a focus before, or behind, all fingers may be in the mean (see `ranking`)."""
+    heights = [
+        cone.axis @ (piece.origin[:, None] + piece.frame @ piece.corners.T)
+        for piece, cone in zip(pieces, cones, strict=True)
+    ]
+    weights = balancing_weights(np.array([cone.axis for cone in cones]))
+    lowest = weights @ np.array([float(each.min()) for each in heights])
+    highest = weights @ np.array([float(each.max()) for each in heights])
+    return -float(lowest), float(highest)
+
+
+def place_on_sides(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], sides: Sides = BEFORE, *, least: float
 ) -> Placement | NoPlacement:
     """Place a focus point and four discs of the largest common radius.
 
@@ -48,28 +98,30 @@ def place_concurrent(
         pieces: Four convex pieces, in finger order, in units where the object has size one.
         cones: The force cones, in the same order; together they must satisfy the
             generalised P3 for the result to mean equilibrium.
+        sides: Of each finger: 1 where it pushes towards the focus, -1 where away from it.
         least: Smaller discs count as none.
 
     Raises:
         SolverError: A program's answer failed its check.
     """
-    A, b = _rows(pieces, cones)
+    A, b = _rows(pieces, cones, sides)
     x = largest_discs(A, b, RADII, SMALLEST, least)
     if isinstance(x, NoPlacement):
         return x
     y = x[3:11].reshape(FINGERS, 2)
     positions = np.array([piece.point(at) for piece, at in zip(pieces, y, strict=True)])
     focus, radii = x[:3], x[RADII]
-    forces = balanced_forces(pieces, focus - positions)
+    forces = balanced_forces(pieces, np.array(sides)[:, None] * (focus - positions))
     return Placement(positions, forces, focus[None], radii, float(radii.min()))
 
 
-def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array) -> Array:
-    """Where on a piece a contact can aim at the focus within its force cone, (k, 3).
+def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array, contact: Array) -> Array:
+    """Where on a piece a line in its force cone meets the focus, on the focus's side, (k, 3).
 
     The inverted cone of section 3.1, inscribed by the same pyramid as in the program.
     """
-    G = inscribed_facets(cone, piece.frame[:, 0])
+    side = 1.0 if float(cone.axis @ (focus - contact)) > 0.0 else -1.0
+    G = side * inscribed_facets(cone, piece.frame[:, 0])
     flat = clip(piece.corners, G @ piece.frame, G @ (focus - piece.origin))
     return piece.origin + flat @ piece.frame.T
 
@@ -94,26 +146,28 @@ def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES)
     return np.sin(psi) * cone.axis - np.cos(psi) * across
 
 
-def concurrent_radius_bounds(depths: Array, half_angles: Array) -> Array:
-    """Upper bounds on the discs of quadruples whose force cones surround the normals.
+def concurrent_radius_bounds(reaches: Array, half_angles: Array) -> Array:
+    """Upper bounds on the discs of quadruples.
 
-    A disc needs r <= d_i tan(half_angle) cos(pi / sides) with d_i = n_i.x0 - h_i. With the
-    positive weights of sum lam_i n_i = 0, sum lam_i d_i = -sum lam_i h_i wherever the focus
-    is, so the least d_i is at most the mean depth.
+    A disc needs r <= s_i tan(half_angle), s_i the distance along the axis between the planes
+    across it through the focus and through the disc's centre: the two points of its border across
+    the axis see the focus at no less than r. The least s_i is at most the weighted mean.
 
     Args:
-        depths: -sum lam h / sum lam of each quadruple, (q,).
-        half_angles: (q,) [rad].
+        reaches: Upper bounds of the mean distance along the axes, of any shape.
+        half_angles: Likewise [rad].
     """
-    return depths * np.tan(half_angles) * np.cos(np.pi / PYRAMID_SIDES)
+    return reaches * np.tan(half_angles)
 
 
-def _rows(pieces: Sequence[FacePiece], cones: Sequence[ForceCone]) -> tuple[Array, Array]:
+def _rows(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], sides: Sides
+) -> tuple[Array, Array]:
     """Rows over (x0 (3), y (4 x 2), radii (4), smallest radius)."""
     rows: list[Array] = []
     limits: list[Array] = []
-    for i, (piece, cone) in enumerate(zip(pieces, cones, strict=True)):
-        G = inscribed_facets(cone, piece.frame[:, 0])
+    for i, (piece, cone, side) in enumerate(zip(pieces, cones, sides, strict=True)):
+        G = side * inscribed_facets(cone, piece.frame[:, 0])
         flat = G @ piece.frame
         aim = np.zeros((len(G), 16))
         aim[:, :3], aim[:, 3 + 2 * i : 5 + 2 * i] = -G, flat

@@ -55,8 +55,10 @@ def _always_admitted(_: Array, half_angles: Array) -> NDArray[np.bool_]:
     return np.ones(len(half_angles), dtype=np.bool_)
 
 
-def _cone_region(piece: FacePiece, cone: ForceCone, placed: Placement, _: int) -> ContactRegion:
-    polygon = cone_footprint(piece, cone, placed.foci[0])
+def _cone_region(
+    piece: FacePiece, cone: ForceCone, placed: Placement, finger: int
+) -> ContactRegion:
+    polygon = cone_footprint(piece, cone, placed.foci[0], placed.positions[finger])
     return ContactRegion("cone", polygon, inscribed_disc_radius(polygon, piece))
 
 

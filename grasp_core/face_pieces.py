@@ -3,13 +3,15 @@
 The programs work on these: their tolerances then mean the same for every object.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.lp import LinearProgram, Optimum, maximize
-from grasp_core.polygons import clip, edge_rows
+from grasp_core.polygons import clip, convex_hull, edge_rows
 from grasp_core.values import Face, Polyhedron
 
 THINNEST = 1e-6
@@ -46,6 +48,60 @@ class FacePiece:
     def point(self, y: Array) -> Array:
         """The point in space of plane coordinates, (3,)."""
         return self.origin + self.frame @ y
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FaceShape:
+    """A face as convex pieces with room for a contact, and as their convex hull."""
+
+    pieces: tuple[FacePiece, ...]
+    hull: FacePiece
+    """What is impossible here is impossible on every piece."""
+
+
+def face_shapes(body: Polyhedron) -> tuple[FaceShape | None, ...]:
+    """The faces of an object as the programs see them; None for those without room."""
+    by_face: list[list[FacePiece]] = [[] for _ in body.faces]
+    for piece in unit_pieces(body):
+        by_face[piece.face].append(piece)
+    return tuple(shape_of(pieces) if pieces else None for pieces in by_face)
+
+
+def shape_of(pieces: Sequence[FacePiece]) -> FaceShape:
+    """Convex pieces of one plane, together."""
+    first = pieces[0]
+    if len(pieces) == 1:
+        return FaceShape((first,), first)
+    points = np.vstack([piece.origin + piece.corners @ piece.frame.T for piece in pieces])
+    corners = convex_hull((points - first.origin) @ first.frame)
+    E, b = edge_rows(corners)
+    inradius = _inscribed_radius(E, b)
+    hull = replace(first, corners=corners, E=E, b=b, inradius=inradius)
+    return FaceShape(tuple(pieces), hull)
+
+
+def choices_near(
+    shapes: Sequence[FaceShape], positions: Array, most: int
+) -> list[tuple[FacePiece, ...]]:
+    """Choices of one piece per face, those nearest to given points of the planes first.
+
+    Args:
+        shapes: Of k faces.
+        positions: A point of each plane, (k, 3).
+        most: At most so many.
+    """
+    ranked = [
+        sorted(shape.pieces, key=lambda piece, at=at: _outside(piece, at))[:most]
+        for shape, at in zip(shapes, positions, strict=True)
+    ]
+    every = product(*(range(len(each)) for each in ranked))
+    ranks = sorted(every, key=lambda rank: (sum(rank), rank))[:most]
+    return [tuple(each[place] for each, place in zip(ranked, rank, strict=True)) for rank in ranks]
+
+
+def _outside(piece: FacePiece, point: Array) -> float:
+    """How far a point of the plane is beyond the farthest edge line of a piece."""
+    return float((piece.E @ (piece.frame.T @ (point - piece.origin)) - piece.b).max())
 
 
 def inset_piece(piece: FacePiece, inset: float) -> FacePiece:

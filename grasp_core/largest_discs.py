@@ -49,7 +49,10 @@ def largest_discs(
         np.vstack([A, -common]),
         np.append(b, -first.value * (1.0 - KEPT)),
     )
-    second = maximize(kept)
+    try:
+        second = maximize(kept)
+    except SolverError:
+        second = first  # within rounding of infeasible where discs are tiny
     x = (second if isinstance(second, Optimum) else first).x.copy()
     x[radii] = np.maximum(x[radii] - RESIDUAL, 0.0)
     return x

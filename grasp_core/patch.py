@@ -55,7 +55,7 @@ from grasp_core.values import FINGERS
 from grasp_core.wrenches import cross_matrix, grasp_map, normal_and_tangential
 
 RESTARTS = 12
-"""Smaller random patches that are tried before giving up or splitting."""
+"""Smaller random patches that are tried, unless told otherwise."""
 LEAST_INSET = 1e-4
 """Least distance of a contact from the edges of its face, in object radii."""
 LEAST_SPREAD = 1e-3
@@ -100,6 +100,7 @@ def place_free(
     *,
     rng: np.random.Generator,
     cells: int = 1,
+    restarts: int = RESTARTS,
 ) -> Placement | Absence | Undecided:
     """Find a grasp of four convex pieces, or prove that there is none.
 
@@ -108,6 +109,7 @@ def place_free(
         friction: Coulomb coefficient at every contact, positive.
         rng: Chooses the restarts.
         cells: How many parts of the pieces to examine at most: with 1 there is no splitting.
+        restarts: How many smaller random patches to try before giving up or splitting.
 
     Raises:
         InputError: The friction is not positive.
@@ -128,7 +130,7 @@ def place_free(
             continue
         found = _grasp(pieces, part, patch, friction) if patch is not None else None
         if found is None and not path:
-            found = _restarted(pieces, friction, rng)
+            found = _restarted(pieces, friction, rng, restarts)
         if found is not None:
             general = of_general_type(pieces, found, friction, rng)
             return general or Undecided(len(waiting) + 1)
@@ -248,9 +250,9 @@ def _on_one_line(positions: Array) -> bool:
 
 
 def _restarted(
-    pieces: Sequence[FacePiece], friction: float, rng: np.random.Generator
+    pieces: Sequence[FacePiece], friction: float, rng: np.random.Generator, restarts: int
 ) -> Placement | None:
-    for part in random_parts(pieces, rng, RESTARTS):
+    for part in random_parts(pieces, rng, restarts):
         patch = close_patch(pieces, part, friction)
         if patch is not None and (found := _grasp(pieces, part, patch, friction)):
             return found

@@ -93,18 +93,18 @@ def place_pencil(
     return best or NoPlacement(bound)
 
 
-def pencil_radius_bounds(depths: Array, half_angles: Array) -> Array:
-    """Upper bounds on the discs of quadruples whose force cones surround the normals.
+def pencil_radius_bounds(reaches: Array, half_angles: Array) -> Array:
+    """Upper bounds on the discs of quadruples.
 
-    With positive weights of sum lam n = 0 and depths d_ij of the foci below their faces,
-    sum lam_ij d_ij = -sum lam_ij h_ij - (c_2 - c_1).w. In cell A the last term only lowers it.
+    With positive weights of sum lam a = 0 and distances s_ij of the foci along the axes,
+    sum lam_ij s_ij = -sum lam_ij a_ij.q_ij - (c_2 - c_1).w. In cell A the last term only lowers it.
     In cell B it is 2 k |w|, at most half of the left side, which can therefore double.
 
     Args:
-        depths: -sum lam h / sum lam of each quadruple, (q,).
-        half_angles: (q,) [rad].
+        reaches: Upper bounds of the mean distance of a focus along the axes, of any shape.
+        half_angles: Likewise [rad].
     """
-    return 2.0 * depths * np.tan(half_angles / 2.0)
+    return 2.0 * reaches * np.tan(half_angles / 2.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

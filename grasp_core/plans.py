@@ -26,8 +26,9 @@ class MethodCounts:
     tried: int = 0
     """Candidates whose programs were set up."""
     pruned: int = 0
-    """Candidates skipped because a bound showed that their discs are too small, their pairs too
-    far from symmetric for a regulus, or that they cannot enter the best `limit`."""
+    """Candidates skipped because a bound showed that their discs are too small, their pairs are too
+    far from symmetric for a regulus, another family holds the same faces, or because they cannot
+    enter the best `limit`."""
     solved: int = 0
     """Choices of one convex piece per face that were considered."""
     infeasible: int = 0
@@ -41,6 +42,18 @@ class MethodCounts:
     """Grasps whose witness is of its family and which exact force closure certified."""
     rejected: int = 0
     """Placements that the witness or the exact closure test did not confirm: a bug if not 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcomes:
+    """What is known of all sets of four faces."""
+
+    held: int
+    """A certified grasp exists."""
+    absent: int
+    """It is proved that there is none, or a face has no room for a contact."""
+    open: int
+    """Neither: undecided by the free method, or not examined."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,14 +79,15 @@ class Plan:
     """Half-angle of the friction cones planned with, before each quadruple's own limit [rad]."""
     seed: int
     counts: PlanCounts
+    outcomes: Outcomes
     absence: str | None = None
     """Why there is no grasp, as a sentence; None when there is one."""
     absences: Mapping[FaceQuadruple, tuple[Proof, ...]] = field(
         default_factory=dict[FaceQuadruple, tuple[Proof, ...]]
     )
     """Face quadruples that the free method proved to hold no grasp with friction tan(theta), with
-    a proof for each choice of one convex piece per face. Pieces too small for a contact, a
-    millionth of the object, are left out."""
+    a proof for their convex hulls, or for each choice of one convex piece per face. Pieces too
+    small for a contact, a millionth of the object, are left out."""
     undecided: tuple[FaceQuadruple, ...] = ()
     """Face quadruples on which the free method found neither."""
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])

@@ -84,6 +84,27 @@ def clip(polygon: Array, rows: Array, limits: Array) -> Array:
     return polygon
 
 
+def convex_hull(points: Array) -> Array:
+    """Corners of the convex hull of points (n, 2), counter-clockwise, (k, 2)."""
+    ordered = points[np.lexsort(points.T[::-1])]
+
+    def lower(run: Array) -> list[Array]:
+        chain: list[Array] = []
+        for point in run:
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0.0:
+                chain.pop()
+            chain.append(point)
+        return chain[:-1]
+
+    return np.array(lower(ordered) + lower(ordered[::-1]))
+
+
+def _turn(one: Array, two: Array, three: Array) -> float:
+    """Twice the area of a triangle, positive if it turns left."""
+    (x, y), (u, v) = two - one, three - one
+    return float(x * v - y * u)
+
+
 def without_straight_corners(polygon: Array, slack: float) -> Array:
     """Drop corners that lie within `slack` of the line through their two neighbours."""
     kept = polygon

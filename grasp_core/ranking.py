@@ -1,13 +1,21 @@
-"""Which face quadruples are worth a program, at which angle, and in which order.
+"""Which face quadruples are worth a program, with which force cones, and in which order.
 
-Each is planned at theta_plan = min(theta, just below its span angle theta*): the smaller
-cones lie inside the real ones, so what holds there holds at the friction asked for.
+Around the normals, as in the paper, each is planned at theta_plan = min(theta, just below its span
+angle theta*): the smaller cones lie inside the real ones, so what holds there holds at the friction
+asked for. Tilted cones are an alternative, and for most quadruples the only one.
+
+Upper bounds on the discs put the most promising first. With positive weights w of sum w_i a_i = 0
+for the axes, and contacts c_i on the faces, sum w_i a_i.(x0 - c_i) = -sum w_i a_i.c_i wherever the
+focus x0 is: the weighted mean of the distances along the axes is at most the *reach*
+-sum w_i min a_i.c_i over the corners of each face, and for a focus behind the fingers at most
+sum w_i max a_i.c_i.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import compress
+from functools import partial
+from itertools import combinations, compress
 from typing import TypeAlias
 
 import numpy as np
@@ -15,9 +23,10 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.constructions import LEAST_RADIUS, Construction, FingerOrder
-from grasp_core.face_pieces import FacePiece, unit_pieces
-from grasp_core.spanning import balancing_weights, spanning_quadruples
-from grasp_core.values import FaceQuadruple, Polyhedron, four
+from grasp_core.face_pieces import FaceShape
+from grasp_core.spanning import balancing_weights, span_sines, spanning_quadruples
+from grasp_core.tilted_cones import tilted_cones
+from grasp_core.values import FINGERS, FaceQuadruple, ForceCone, Polyhedron, four
 
 LEAST_SPAN_ANGLE = math.atan(LEAST_RADIUS)
 """With narrower cones no disc at a depth of one object radius would count."""
@@ -26,45 +35,74 @@ BELOW_SPAN_ANGLE = 0.999
 INSIDE_FRICTION = 1.0 - 1e-6
 """Share of the friction angle to plan with, so that equilibrium is not marginal."""
 
-PiecesByFace: TypeAlias = list[list[FacePiece]]
-"""The convex pieces of each face."""
+Shapes: TypeAlias = Sequence[FaceShape | None]
+"""The faces of an object as the programs see them."""
+
+
+BLOCK = 30
+"""Faces of the first block: 27,405 quadruples, whose cones are tilted in some seconds."""
+NORMAL, TILTED = 0, 1
+"""The two choices of force cones."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConeChoice:
+    """Force cones for four faces, in the order of the faces."""
+
+    cones: tuple[ForceCone, ForceCone, ForceCone, ForceCone]
+    bound: float
+    """No disc can be larger, relative to the object's radius; infinite without discs."""
 
 
 @dataclass(frozen=True, slots=True)
 class Quadruple:
-    """Four faces to try, with the half-angle to plan them at."""
+    """Four faces to try, with force cones for them."""
 
     faces: FaceQuadruple
-    half_angle: float
-    """Of the force cones [rad]."""
-    bound: float
-    """No disc can be larger, relative to the object's radius; infinite without discs."""
+    choices: tuple[ConeChoice, ...]
+    """The larger bound first."""
     orders: tuple[FingerOrder, ...]
     """Finger orders worth a program."""
+    spans: bool
+    """Whether the normals themselves span (P3), so that every family counts."""
+
+    @property
+    def bound(self) -> float:
+        """No disc of any choice can be larger."""
+        return self.choices[0].bound
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ranking:
-    """Quadruples that span, most promising first."""
+    """Quadruples with force cones, most promising first."""
 
-    faces: Indices
-    """(q, 4)"""
-    numbers: Array
-    """Half-angle and bound of each, (q, 2)."""
+    candidates: "Candidates"
+    places: Indices
+    """Which of the candidates, (q,)."""
+    bounds: Array
+    """Of each choice of cones, minus infinity where it is not worth a program, (q, 2)."""
     worth: NDArray[np.bool_]
     """Which finger orders are worth a program, (q, orders)."""
     construction: Construction
     dropped: int
-    """Candidates, quadruples with a finger order, that were left out."""
+    """Quadruples with a finger order that were left out."""
 
     def __len__(self) -> int:
-        return len(self.faces)
+        return len(self.places)
 
     def __iter__(self) -> Iterator[Quadruple]:
-        for faces, numbers, worth in zip(self.faces, self.numbers, self.worth, strict=True):
-            half_angle, bound = (float(x) for x in numbers)
-            orders = tuple(compress(self.construction.orders, worth))
-            yield Quadruple(four(int(face) for face in faces), half_angle, bound, orders)
+        for place, bounds, worth in zip(self.places, self.bounds, self.worth, strict=True):
+            order = [int(kind) for kind in np.argsort(-bounds, kind="stable")]
+            yield Quadruple(
+                faces=four(int(face) for face in self.candidates.faces[place]),
+                choices=tuple(
+                    ConeChoice(self.candidates.cones(int(place), kind), float(bounds[kind]))
+                    for kind in order
+                    if bounds[kind] > -np.inf
+                ),
+                orders=tuple(compress(self.construction.orders, worth)),
+                spans=bool(bounds[NORMAL] > -np.inf),
+            )
 
     def candidates_from(self, place: int) -> int:
         """How many candidates are left from a place in the order on."""
@@ -73,77 +111,144 @@ class Ranking:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidates:
-    """The quadruples of an object that span, with what bounds their grasps."""
+    """Quadruples of faces with two choices of force cones, and what bounds their grasps."""
 
     faces: Indices
     """(q, 4)"""
     normals: Array
     """(q, 4, 3)"""
+    axes: Array
+    """Of both choices, around the normals and tilted, (q, 2, 4, 3)."""
     half_angles: Array
-    """theta_plan of each, (q,) [rad]."""
-    depths: Array
-    """Mean depth of any point below the four planes, weighted by the balancing weights of the
-    normals: it does not depend on the point, (q,), in object radii."""
+    """(q, 2) [rad]; not positive where there is no such choice."""
+    reaches: Array
+    """Upper bounds on the mean distance of a focus from its contacts, (q, 2), in object radii."""
     rooms: Array
     """Radius of the largest disc that fits in each of the four faces, (q,)."""
 
     def __len__(self) -> int:
         return len(self.faces)
 
+    @property
+    def spanning(self) -> int:
+        """How many have normals that span at the least angle (P3)."""
+        return int((self.half_angles[:, NORMAL] > LEAST_SPAN_ANGLE).sum())
+
+    def cones(self, place: int, kind: int) -> tuple[ForceCone, ForceCone, ForceCone, ForceCone]:
+        """One choice of force cones of one quadruple."""
+        half_angle = float(self.half_angles[place, kind])
+        return four(ForceCone(axis, half_angle) for axis in self.axes[place, kind])
+
     def ranked(self, construction: Construction) -> Ranking:
         """In the order of an upper bound on the radius; for reguli, widest force cones first."""
+        usable = self.half_angles > LEAST_SPAN_ANGLE
         if construction.bounds is None:
-            bounds = np.full(len(self), np.inf)
-            order = np.argsort(-self.half_angles, kind="stable")
+            usable[:, TILTED] = False  # no region to gain: the free method finds such grasps
+            bounds = np.where(usable, np.inf, -np.inf)
+            order = np.argsort(-self.half_angles[:, NORMAL], kind="stable")
         else:
-            reach = construction.bounds(self.depths, self.half_angles)
-            bounds = np.minimum(reach, self.rooms)
-            order = np.argsort(-bounds, kind="stable")
-        worth = np.array(
-            [construction.admits(self.normals[:, finger_order], self.half_angles)
-             for finger_order in construction.orders]
-        ).T & (bounds >= LEAST_RADIUS)[:, None]  # fmt: skip
+            reach = construction.bounds(self.reaches, np.maximum(self.half_angles, 0.0))
+            bounds = np.minimum(reach, self.rooms[:, None])
+            bounds = np.where(usable & (bounds >= LEAST_RADIUS), bounds, -np.inf)
+            order = np.argsort(-bounds.max(axis=1, initial=-np.inf), kind="stable")
+        spans = self.half_angles[:, NORMAL] > LEAST_SPAN_ANGLE
+        admitted = np.ones((len(self), len(construction.orders)), dtype=np.bool_)
+        for place, finger_order in enumerate(construction.orders):
+            admitted[spans, place] = construction.admits(
+                self.normals[spans][:, finger_order], self.half_angles[spans, NORMAL]
+            )
+        hopeful: NDArray[np.bool_] = np.any(bounds > -np.inf, axis=1)
+        worth: NDArray[np.bool_] = admitted & hopeful[:, None]
         order = order[worth[order].any(axis=1)]
-        numbers = np.column_stack([self.half_angles, bounds])
-        dropped = int((~worth).sum())
-        return Ranking(self.faces[order], numbers[order], worth[order], construction, dropped)
+        return Ranking(self, order, bounds[order], worth[order], construction, int((~worth).sum()))
 
 
-def candidate_quadruples(body: Polyhedron, pieces: PiecesByFace, theta: float) -> Candidates:
-    """The quadruples of an object that span, with the angle to plan each at.
+def candidate_blocks(
+    body: Polyhedron, shapes: Shapes, theta: float, *, tilted: bool
+) -> Iterator[tuple[float, Callable[[], Candidates]]]:
+    """The quadruples of an object in blocks, those of faces with more room first.
+
+    With each block comes the room of the first face that it adds: no disc of this block or a later
+    one is larger. The block itself is made on request.
 
     Args:
         body: The object.
-        pieces: Its convex pieces.
+        shapes: Its faces.
         theta: Half-angle of the friction cones to plan with [rad].
+        tilted: Whether force cones may lean; else they surround the normals.
     """
-    normals = body.normals
-    found = spanning_quadruples(normals, LEAST_SPAN_ANGLE)
-    quads = found.indices
-    room = np.array([max((p.inradius for p in choices), default=0.0) for choices in pieces])
+    rooms = np.array(
+        [max(piece.inradius for piece in shape.pieces) if shape else 0.0 for shape in shapes]
+    )
+    order = np.argsort(-rooms, kind="stable")
+    order = order[rooms[order] > 0.0]
+    if not tilted:
+        quads = spanning_quadruples(body.normals, LEAST_SPAN_ANGLE).indices
+        yield float(rooms.max()), partial(_candidates, body, quads, rooms, theta, tilted=False)
+        return
+    cuts = _block_ends(len(order))
+    for start, end in zip([0, *cuts], cuts, strict=False):
+        quads = _with_a_new_one(order, start, end)
+        room = float(rooms[order[max(start, FINGERS - 1)]]) if end >= FINGERS else 0.0
+        yield room, partial(_candidates, body, quads, rooms, theta, tilted=tilted)
+
+
+def _block_ends(count: int) -> list[int]:
+    """How many faces each block reaches to: about as many new quadruples in each."""
+    ends, size = [min(BLOCK, count)], math.comb(BLOCK, FINGERS)
+    while ends[-1] < count:
+        before = math.comb(ends[-1], FINGERS)
+        end = ends[-1] + 1
+        while end < count and math.comb(end + 1, FINGERS) - before <= size:
+            end += 1
+        ends.append(end)
+    return ends
+
+
+def _with_a_new_one(order: Indices, start: int, end: int) -> Indices:
+    """Quadruples of the first `end` faces that are not all among the first `start`, (q, 4)."""
+    listed = [
+        np.array([(*rest, new) for rest in combinations(range(new), FINGERS - 1)])
+        for new in range(max(start, FINGERS - 1), end)
+    ]
+    if not listed:
+        return np.empty((0, FINGERS), dtype=np.int64)
+    quads = np.sort(order[np.concatenate(listed)], axis=1)
+    return quads[np.lexsort(quads.T[::-1])]
+
+
+def _candidates(
+    body: Polyhedron, quads: Indices, rooms: Array, theta: float, *, tilted: bool
+) -> Candidates:
+    normals = body.normals[quads].reshape(-1, FINGERS, 3)
+    theta = INSIDE_FRICTION * theta
+    around = np.minimum(theta, BELOW_SPAN_ANGLE * np.arcsin(np.maximum(span_sines(normals), 0.0)))
+    axes, half_angles = [normals, normals], [around, np.zeros(len(quads))]
+    if tilted:
+        leaning = tilted_cones(normals, np.full((len(quads), FINGERS), theta))
+        axes[TILTED] = leaning.axes
+        half_angles[TILTED] = BELOW_SPAN_ANGLE * leaning.half_angles
     return Candidates(
         faces=quads,
-        normals=normals[quads],
-        half_angles=np.minimum(INSIDE_FRICTION * theta, BELOW_SPAN_ANGLE * found.span_angles),
-        depths=_mean_depths(normals[quads], _heights(body)[quads]),
-        rooms=room[quads].min(axis=1, initial=np.inf),
+        normals=normals,
+        axes=np.stack(axes, axis=1),
+        half_angles=np.stack(half_angles, axis=1),
+        reaches=np.stack([_reaches(body, quads, each) for each in axes], axis=1),
+        rooms=rooms[quads].min(axis=1, initial=np.inf),
     )
 
 
-def pieces_by_face(body: Polyhedron) -> PiecesByFace:
-    """The convex pieces with room for a contact, listed for each face."""
-    pieces: PiecesByFace = [[] for _ in body.faces]
-    for piece in unit_pieces(body):
-        pieces[piece.face].append(piece)
-    return pieces
-
-
-def _heights(body: Polyhedron) -> Array:
-    """Height n.x of each face's plane, about the centre of mass over the radius, (faces,)."""
-    centroids = np.array([face.centroid for face in body.faces])
-    return np.einsum("fi,fi->f", body.normals, centroids - body.center_of_mass) / body.radius
-
-
-def _mean_depths(normals: Array, heights: Array) -> Array:
-    """-sum lam h / sum lam, with the positive weights of sum lam n = 0, (q,)."""
-    return -np.einsum("qi,qi->q", balancing_weights(normals), heights)
+def _reaches(body: Polyhedron, quads: Indices, axes: Array) -> Array:
+    """Upper bounds on the mean distance of a focus before or behind its contacts, (q,)."""
+    corners = [
+        (np.vstack([face.polygon, *face.holes]) - body.center_of_mass) / body.radius
+        for face in body.faces
+    ]
+    most = max(len(each) for each in corners)
+    padded = np.array([np.vstack([each, np.repeat(each[:1], most - len(each), axis=0)])
+                       for each in corners])  # fmt: skip
+    heights = np.einsum("qfki,qfi->qfk", padded[quads], axes)
+    weights = balancing_weights(axes)
+    before = -np.einsum("qf,qf->q", weights, heights.min(axis=2, initial=np.inf))
+    behind = np.einsum("qf,qf->q", weights, heights.max(axis=2, initial=-np.inf))
+    return np.maximum(before, behind)

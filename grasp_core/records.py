@@ -127,6 +127,7 @@ class GraspsRecord(_Record):
     seed: int
     versions: dict[str, str]
     counts: dict[str, Any]
+    outcomes: dict[str, int] = Field(default_factory=dict)
     absence: str | None
     optimization: list[MovedRecord] = []
     grasps: list[GraspRecord]
@@ -179,6 +180,7 @@ def plan_to_json(body: Polyhedron, plan: Plan, moves: Sequence[Moved] = ()) -> s
         "seed": plan.seed,
         "versions": versions(),
         "counts": asdict(plan.counts),
+        "outcomes": asdict(plan.outcomes),
         "absence": plan.absence,
         "optimization": [
             {

@@ -54,6 +54,20 @@ def span_angle(normals: ArrayLike) -> float:
     return math.asin(min(abs(triple_sine(*triple)) for triple in triples))
 
 
+def span_sines(units: Array) -> Array:
+    """Sine of theta* of many quadruples of unit vectors (q, 4, 3); negative where they do not span.
+
+    The negative value is how far the worst weight of a vanishing combination is from positive.
+    """
+    minors = [np.linalg.det(units[:, rest]) for rest in OTHERS]
+    signed = np.stack(minors, axis=-1) * (1.0, -1.0, 1.0, -1.0)
+    signed *= np.sign(signed.sum(axis=-1, keepdims=True))
+    worst = signed.min(axis=-1)
+    sines = np.stack([np.abs(triple_sine(*(units[:, k] for k in rest))) for rest in OTHERS])
+    least: Array = sines.min(axis=0)
+    return np.where(worst > DEPENDENT, least, np.minimum(worst, 0.0))
+
+
 def cones_positively_span(axes: ArrayLike, half_angles: ArrayLike) -> bool:
     """Whether four circular cones positively span R^3 whatever vector each contributes.
 
@@ -92,7 +106,7 @@ def balancing_weights(vectors: Array) -> Array:
     All are positive where the four vectors, (..., 4, 3), positively span R^3.
     """
     signed = _signed_determinants(vectors)
-    total = np.abs(signed).sum(axis=-1, keepdims=True)
+    total = np.maximum(np.abs(signed).sum(axis=-1, keepdims=True), _TINY)
     return signed / total * np.sign(signed.sum(axis=-1, keepdims=True))
 
 
@@ -166,3 +180,6 @@ def spanning_quadruples(normals: Array, least_angle: float) -> SpanningQuadruple
     indices, sine = np.concatenate(found), np.concatenate(sines)
     order = np.lexsort(indices.T[::-1])
     return SpanningQuadruples(indices[order], np.arcsin(sine[order]))
+
+
+_TINY = float(np.finfo(np.float64).tiny)

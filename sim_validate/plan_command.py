@@ -5,7 +5,7 @@ from pathlib import Path
 
 from grasp_core.errors import InputError
 from grasp_core.mesh import FORMATS, load_polyhedron
-from grasp_core.planner import FAMILIES, plan
+from grasp_core.planner import METHODS, plan
 from grasp_core.plans import Plan
 from grasp_core.records import Moved, plan_to_json
 from grasp_core.values import Polyhedron
@@ -46,7 +46,8 @@ def plan_object(
         found = plan(
             body,
             planning.friction,
-            families=planning.family or FAMILIES,
+            families=planning.family or METHODS,
+            cones=planning.cones,
             theta_deg=planning.theta_deg,
             limit=planning.limit,
             seed=planning.seed,
@@ -96,6 +97,11 @@ def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
         f"{body.name}: {counts.faces} faces, {counts.quadruples} face quadruples, "
         f"{counts.spanning} spanning (P3), friction {found.friction:g}, "
         f"theta {math.degrees(found.theta):.4g} deg"
+    )
+    known = found.outcomes
+    reporter.say(
+        f"face quadruples: {known.held} with a certified grasp, {known.absent} proved to have "
+        f"none, {known.open} not decided"
     )
     for method, tally in counts.families.items():
         undecided = f"{tally.undecided} undecided, " if method == "free" else ""

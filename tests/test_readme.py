@@ -51,7 +51,10 @@ def test_the_gallery_shows_what_the_planner_finds():
     assert len(rows) == 5
     for name, grasp_id, family, disc_mm, critical in rows:
         plan = gc.plan(
-            scenes.example_object(name), math.tan(math.radians(10.0)), families=(family,)
+            scenes.example_object(name),
+            math.tan(math.radians(10.0)),
+            families=(family,),
+            cones="normal",
         )
         (grasp,) = (grasp for grasp in plan.grasps if grasp.id == grasp_id)
         assert f"{1e3 * grasp.radius:.2f}" == (disc_mm or "0.00")

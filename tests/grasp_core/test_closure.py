@@ -183,11 +183,13 @@ def test_symmetric_contacts_are_decided_at_small_and_large_friction(friction):
     assert gc.force_closure(TETRA_CENTERS, TETRA_NORMALS, friction).verify()
 
 
-def test_the_boundary_itself_is_left_undecided():
-    """Exactly critical: forces exist only on the cones."""
+def test_the_boundary_itself_is_refuted():
+    """Exactly critical: forces exist only on the cones, and a twist touches all of them."""
     positions, normals = turned(np.array([1.0, 0.25, 0.5]), np.array([-1.0, 0, 0]))
-    with pytest.raises(gc.UndecidedError, match="too close to zero"):
-        gc.force_closure(positions, normals, 0.25)
+    certificate = gc.force_closure(positions, normals, 0.25)
+    assert not certificate.closed
+    assert certificate.verify()
+    assert gc.force_closure(positions, normals, 0.25 * (1.0 + 1e-6)).closed
 
 
 def test_verdicts_carry_certificates_that_verify_and_pyramids_agree():

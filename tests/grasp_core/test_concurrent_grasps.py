@@ -96,7 +96,10 @@ def test_contacts_at_the_corners_of_the_footprints_are_in_force_closure():
     for quad, cones, placed in placements("random-20-7", theta, 40):
         if isinstance(placed, NoPlacement):
             continue
-        regions = [cone_footprint(p, c, placed.foci[0]) for p, c in zip(quad, cones, strict=True)]
+        regions = [
+            cone_footprint(piece, cone, placed.foci[0], at)
+            for piece, cone, at in zip(quad, cones, placed.positions, strict=True)
+        ]
         for k in range(6):
             points = [region[k % len(region)] for region in regions]
             normals = [piece.normal for piece in quad]

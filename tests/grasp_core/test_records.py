@@ -34,8 +34,8 @@ def test_a_plan_survives_the_file_to_the_last_bit(text):
 def test_the_file_has_the_fields_that_users_rely_on(text):
     document = json.loads(text)
     assert set(document) == {
-        "schema", "object", "friction", "theta_deg", "seed", "versions", "counts", "absence",
-        "optimization", "grasps",
+        "schema", "object", "friction", "theta_deg", "seed", "versions", "counts", "outcomes",
+        "absence", "optimization", "grasps",
     }  # fmt: skip
     assert {"name", "source_sha256", "mesh", "center_of_mass_m"} <= set(document["object"])
     grasp = document["grasps"][0]

@@ -1,0 +1,204 @@
+"""The free method over the face quadruples of one object that no construction holds.
+
+What it finds has no regions. But forces that balance, strictly inside the friction cones, are good
+axes for tilted force cones, so the constructions are asked once more around them.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from itertools import combinations, islice
+from typing import TypeAlias
+
+import numpy as np
+
+from grasp_core.certified import Certified, certify, named
+from grasp_core.constructions import Construction, point_region
+from grasp_core.errors import SolverError
+from grasp_core.face_pieces import FacePiece, FaceShape, choices_near
+from grasp_core.patch import RESTARTS, Absence, Undecided, place_free
+from grasp_core.placements import Placement
+from grasp_core.ranking import (
+    BELOW_SPAN_ANGLE,
+    INSIDE_FRICTION,
+    LEAST_SPAN_ANGLE,
+    ConeChoice,
+    Quadruple,
+    Shapes,
+)
+from grasp_core.search import MOST_CHOICES, Search, best_first, chosen_shapes, try_order
+from grasp_core.tilted_cones import widened
+from grasp_core.values import FINGERS, FaceQuadruple, ForceCone, four
+
+BATCH = 64
+"""Quadruples whose force cones are sought together."""
+
+Pieces: TypeAlias = tuple[FacePiece, ...]
+Answer: TypeAlias = tuple[Pieces, Placement | Absence | Undecided]
+"""What the method says about a choice of pieces."""
+
+
+@dataclass(frozen=True, slots=True)
+class FreeRequest:
+    """What the free method is to do."""
+
+    friction: float
+    theta: float
+    """Half-angle of the friction cones to plan with [rad]."""
+    seed: int
+    cells: int
+    """Into how many parts the faces of one quadruple may be cut."""
+    upgrades: Sequence[Construction]
+    """Constructions to try with force cones around the forces of what is found."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Placed:
+    """Contacts on a choice of pieces of four faces."""
+
+    faces: FaceQuadruple
+    pieces: Pieces
+    placement: Placement
+
+    @property
+    def normals(self) -> list[np.ndarray]:
+        """Of the four pieces."""
+        return [piece.normal for piece in self.pieces]
+
+
+def search_free(
+    shapes: Shapes, request: FreeRequest, search: Search, held: AbstractSet[FaceQuadruple]
+) -> Iterator[list[Certified]]:
+    """Go through the quadruples of faces that no family holds, until a limit is reached."""
+    quadruples, done = combinations(range(len(shapes)), FINGERS), 0
+    while batch := list(islice(quadruples, BATCH)):
+        if search.full:
+            search.tally["pruned"] += math.comb(len(shapes), FINGERS) - done
+            return
+        done += len(batch)
+        placed = [_decide(shapes, faces, request, search, held) for faces in batch]
+        choices = iter(_cone_choices([each for each in placed if each], request))
+        for each in placed:
+            found = _certified(each, next(choices), request, search) if each else None
+            if found is not None:
+                search.keep(found)
+            yield [found] if found else []
+
+
+def _decide(
+    shapes: Shapes,
+    faces: FaceQuadruple,
+    request: FreeRequest,
+    search: Search,
+    held: AbstractSet[FaceQuadruple],
+) -> _Placed | None:
+    """Contacts on four faces; where there are none, the proof or the doubt is noted."""
+    chosen = chosen_shapes(shapes, faces)
+    if faces in held or len(chosen) < FINGERS:
+        search.tally["pruned"] += 1
+        return None
+    search.tally["tried"] += 1
+    answers = _answers(faces, chosen, request, search)
+    pieces, last = answers[-1]
+    if isinstance(last, Placement):
+        return _Placed(faces, pieces, last)
+    proofs = tuple(proof for _, proof in answers if isinstance(proof, Absence))
+    if len(proofs) == len(answers):
+        search.tally["infeasible"] += 1
+        search.absences[faces] = proofs
+    else:
+        search.tally["undecided"] += 1
+        search.undecided.append(faces)
+    return None
+
+
+def _answers(
+    faces: FaceQuadruple, shapes: Sequence[FaceShape], request: FreeRequest, search: Search
+) -> list[Answer]:
+    """Answers that together decide four faces, unless one is undecided; a placement comes last.
+
+    First for the hulls: their absence is that of all pieces. Then for choices of pieces, until
+    one holds a grasp, and at last with more effort for the most likely one.
+    """
+    rng = np.random.default_rng([request.seed, *faces])
+    hulls = tuple(shape.hull for shape in shapes)
+    search.tally["solved"] += 1
+    whole = _place(hulls, request, rng)
+    if isinstance(whole, Absence) or all(len(shape.pieces) == 1 for shape in shapes):
+        return [(hulls, whole)]
+    at = whole.positions if isinstance(whole, Placement) else np.array([h.origin for h in hulls])
+    most = MOST_CHOICES * request.cells
+    answers: list[Answer] = []
+    for pieces in choices_near(shapes, at, most):
+        search.tally["solved"] += 1
+        answers.append((pieces, _place(pieces, request, rng, restarts=0)))
+        if isinstance(answers[-1][1], Placement):
+            return answers
+    if isinstance(answers[0][1], Undecided):
+        pieces, _ = answers.pop(0)
+        answers.append((pieces, _place(pieces, request, rng)))
+        if isinstance(answers[-1][1], Placement):
+            return answers
+    if math.prod(len(shape.pieces) for shape in shapes) > most:
+        answers.append((hulls, Undecided(1)))
+    return answers
+
+
+def _place(
+    pieces: Pieces, request: FreeRequest, rng: np.random.Generator, restarts: int = RESTARTS
+) -> Placement | Absence | Undecided:
+    friction = math.tan(request.theta)
+    try:
+        return place_free(pieces, friction, rng=rng, cells=request.cells, restarts=restarts)
+    except SolverError:
+        return Undecided(1)
+
+
+def _cone_choices(placed: Sequence[_Placed], request: FreeRequest) -> list[ConeChoice | None]:
+    """Tilted force cones around the forces of placements, None where they are too narrow."""
+    if not (placed and request.upgrades):
+        return [None] * len(placed)
+    forces = np.array([each.placement.forces for each in placed])
+    normals = np.array([each.normals for each in placed])
+    thetas = np.full((len(placed), FINGERS), INSIDE_FRICTION * request.theta)
+    found = widened(forces, normals, thetas)
+    return [
+        ConeChoice(four(ForceCone(axis, angle) for axis in axes), math.inf)
+        if (angle := BELOW_SPAN_ANGLE * float(reached)) > LEAST_SPAN_ANGLE
+        else None
+        for axes, reached in zip(found.axes, found.half_angles, strict=True)
+    ]
+
+
+def _certified(
+    placed: _Placed, choice: ConeChoice | None, request: FreeRequest, search: Search
+) -> Certified | None:
+    """The grasp, with regions if a construction offers them."""
+    if choice and (better := _upgraded(placed, choice, request)):
+        return better
+    cones = four(ForceCone(piece.normal, request.theta) for piece in placed.pieces)
+    certified = certify(
+        named("f", placed.faces), placed.faces, "regulus", placed.pieces, cones, placed.placement,
+        request.friction, point_region,
+    )  # fmt: skip
+    if certified is None:
+        search.tally["rejected"] += 1
+    return certified
+
+
+def _upgraded(placed: _Placed, choice: ConeChoice, request: FreeRequest) -> Certified | None:
+    shapes = [FaceShape((piece,), piece) for piece in placed.pieces]
+    for construction in request.upgrades:
+        quadruple = Quadruple(placed.faces, (choice,), construction.orders, spans=False)
+        try:
+            tries = [
+                try_order(construction, shapes, request.friction, quadruple, order, Counter[str]())
+                for order in construction.orders
+            ]
+        except SolverError:
+            continue
+        if found := [one for one in tries if one is not None]:
+            return min(found, key=best_first)
+    return None

@@ -1,0 +1,157 @@
+"""Force cones that positively span although the faces' normals do not.
+
+Solved: for four normals n_i with friction cones of half-angles theta_i, axes a_i and one half-angle
+psi, as large as a search finds, such that the cones around a_i lie inside the friction cones and
+positively span whatever direction each contributes (P3):
+
+    angle(a_i, n_i) + psi <= theta_i,      psi < theta*(a_1, .., a_4).
+
+Solutions exist exactly where four forces, each strictly inside its friction cone, can sum to zero
+without lying in a plane: then their directions positively span, and by continuity so do narrow
+cones around them. So boxes and prisms have them at any friction, though never around the
+normals, and so have all faces at frictions above 0.354, where P3 around the normals is impossible.
+
+With a_i = n_i and psi = theta this is Definition 3 of the paper; its constructions hold word for
+word, since nothing in them uses that an axis is a normal.
+
+Search. The height of the pyramid (theta, theta*) over the axes has one ridge after another, so
+nothing is claimed to be the largest. Axes that balance well are found first: each in turn is
+pointed against the sum of the others, as far as a cap around its normal lets it, for caps of
+several sizes. Then all four are moved at random, in steps that grow with success and shrink
+without. The moves are the same for any quadruple, in frames that turn with it, so that turned
+objects get turned cones.
+
+Source: this project's; P3 with its closed form is explained in `spanning`.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.spanning import OTHERS, span_sines
+from grasp_core.values import FINGERS
+
+CAPS = (0.3, 0.5, 0.7, 0.9)
+"""How far axes may lean while they are balanced, in friction angles."""
+SWEEPS = 8
+MOVES = 60
+FIRST_MOVE = 0.2
+"""Of the friction angle."""
+GROWTH, DECAY = 1.3, 0.9
+"""Of the moves, after a success and after a failure."""
+SLIGHT = 1e-9
+"""Improvements and directions below this are rounding, which must not decide anything."""
+BESIDE = 0.1
+"""Sine of the angle from which on another axis is beside one."""
+CHUNK = 20_000
+"""Quadruples that are searched at once: some tens of megabytes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TiltedCones:
+    """Four force cones for each of q quadruples."""
+
+    axes: Array
+    """Unit vectors, (q, 4, 3)."""
+    half_angles: Array
+    """psi, the same for all four, (q,) [rad]; not positive where none was found."""
+
+
+def tilted_cones(normals: Array, thetas: Array) -> TiltedCones:
+    """Force cones with wide half-angles for many quadruples.
+
+    Args:
+        normals: Unit vectors, (q, 4, 3).
+        thetas: Half-angles of the friction cones, (q, 4) [rad].
+    """
+    cuts = [*range(0, len(normals), CHUNK), len(normals)]
+    parts = [_search(normals[i:j], thetas[i:j]) for i, j in pairwise(cuts)]
+    if not parts:
+        return TiltedCones(np.empty((0, FINGERS, 3)), np.empty(0))
+    axes, half_angles = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return TiltedCones(axes, half_angles)
+
+
+def widened(directions: Array, normals: Array, thetas: Array) -> TiltedCones:
+    """Force cones whose axes are sought near given directions inside the friction cones.
+
+    Args:
+        directions: Such as those of balanced forces, (q, 4, 3).
+        normals: Unit vectors, (q, 4, 3).
+        thetas: Half-angles of the friction cones, (q, 4) [rad].
+    """
+    axes = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+    return TiltedCones(*_improved(axes, normals, thetas))
+
+
+def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
+    best, half_angles = normals.copy(), half_angle(normals, normals, thetas)
+    for cap in CAPS:
+        axes = _balanced(normals, cap * thetas)
+        reached = half_angle(axes, normals, thetas)
+        better = reached > half_angles + SLIGHT
+        best[better], half_angles[better] = axes[better], reached[better]
+    return _improved(best, normals, thetas)
+
+
+def half_angle(axes: Array, normals: Array, thetas: Array) -> Array:
+    """The largest psi that axes allow, (q,) [rad]; negative where they do not span."""
+    sines = span_sines(axes)
+    spans = np.where(sines > 0.0, np.arcsin(np.clip(sines, 0.0, 1.0)), sines)
+    return np.minimum(spans, (thetas - _angles(axes, normals)).min(axis=1))
+
+
+def _balanced(normals: Array, caps: Array) -> Array:
+    """Unit vectors within caps around the normals, each pointed against the sum of the others."""
+    axes = normals.copy()
+    for _ in range(SWEEPS):
+        for finger, others in enumerate(OTHERS):
+            against = -axes[:, others].sum(axis=1)
+            axes[:, finger] = _into_cap(against, normals[:, finger], caps[:, finger])
+    return axes
+
+
+def _into_cap(vectors: Array, centers: Array, angles: Array) -> Array:
+    """Unit vectors along vectors (q, 3), or the nearest ones within angles (q,) of unit centers.
+
+    Vectors without a direction across the center leave it where it is.
+    """
+    along = np.einsum("qi,qi->q", vectors, centers)
+    across = vectors - along[:, None] * centers
+    sideways = np.linalg.norm(across, axis=1)
+    turn = np.where(sideways > SLIGHT, np.minimum(np.arctan2(sideways, along), angles), 0.0)[
+        :, None
+    ]
+    aside = across / np.maximum(sideways, SLIGHT)[:, None]
+    return np.cos(turn) * centers + np.sin(turn) * aside
+
+
+def _improved(axes: Array, normals: Array, thetas: Array) -> tuple[Array, Array]:
+    reached = half_angle(axes, normals, thetas)
+    steps = FIRST_MOVE * thetas.min(axis=1)
+    for move in np.random.default_rng(0).normal(size=(MOVES, FINGERS, 2)):
+        moved = axes + steps[:, None, None] * _aside(axes, move)
+        moved /= np.linalg.norm(moved, axis=-1, keepdims=True)
+        now = half_angle(moved, normals, thetas)
+        better = now > reached + SLIGHT
+        axes = np.where(better[:, None, None], moved, axes)
+        reached = np.where(better, now, reached)
+        steps = steps * np.where(better, GROWTH, DECAY)
+    return axes, reached
+
+
+def _aside(axes: Array, move: Array) -> Array:
+    """Moves (4, 2) across axes (q, 4, 3), in frames of each axis and another one beside it."""
+    first = np.zeros_like(axes)
+    for ahead in range(FINGERS - 1, 0, -1):
+        cross = np.cross(axes, np.roll(axes, -ahead, axis=1))
+        length = np.linalg.norm(cross, axis=-1, keepdims=True)
+        first = np.where(length > BESIDE, cross / np.maximum(length, BESIDE), first)
+    return move[:, :1] * first + move[:, 1:] * np.cross(axes, first)
+
+
+def _angles(one: Array, other: Array) -> Array:
+    """Angles between unit vectors (..., 3), exact for small ones, (...)."""
+    return 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(one - other, axis=-1), 0.0, 1.0))
