@@ -60,9 +60,9 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     body: Polyhedron,
     friction: float = 0.5,
     *,
-    families: Sequence[Method] | Method = METHODS,
+    families: Sequence[Method] | Method = FAMILIES,
     theta_deg: float | None = None,
-    cones: ConeKind = "tilted",
+    cones: ConeKind = "normal",
     limit: int | None = None,
     seed: int = 0,
     cells: int = 1,
@@ -77,8 +77,8 @@ def plan(  # noqa: PLR0913 - the contract's keywords
             type. Beside constructions it gets the quadruples that they leave over.
         theta_deg: Half-angle of the friction cones to plan with [deg]; atan(friction) when
             None, and never more than that.
-        cones: `normal` keeps force cones around the normals, as in the paper; tilted ones are
-            tried too otherwise.
+        cones: `normal` keeps force cones around the normals, as in the paper; with `tilted` leaning
+            ones are tried too.
         limit: Keep only this many grasps, the best of each family in turn: those with the
             largest discs. Reguli and free grasps have no discs; of these the first found count, and
             free ones only as far as the others do not suffice.
@@ -104,9 +104,9 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
     body: Polyhedron,
     friction: float = 0.5,
     *,
-    families: Sequence[Method] | Method = METHODS,
+    families: Sequence[Method] | Method = FAMILIES,
     theta_deg: float | None = None,
-    cones: ConeKind = "tilted",
+    cones: ConeKind = "normal",
     seed: int = 0,
     cells: int = 1,
 ) -> Iterator[Grasp]:

@@ -57,12 +57,12 @@ class Planning:
     theta_deg: Positive | None = None
     """Half-angle of the friction cones to plan with [deg]; the friction angle if not given."""
     family: UseAppendAction[tuple[Literal["concurrent", "pencil", "regulus", "free"], ...]] = ()
-    """What to try, may be repeated; all if not given: the constructions of the paper, and `free`,
-    which looks for grasps of any type on the faces that they leave over, and proves for the others
-    that there is none, or says that it is undecided."""
-    cones: Literal["tilted", "normal"] = "tilted"
-    """Force cones to construct with: tilted ones too, or only those around the normals as in the
-    paper."""
+    """Construction to try, may be repeated; the first three if not given. `free` looks for grasps
+    of any type on the faces that they leave over, and proves for the others that there is none,
+    or says that it is undecided."""
+    cones: Literal["normal", "tilted"] = "normal"
+    """Force cones to construct with: those around the normals as in the paper, or leaning ones too,
+    which serve boxes, prisms and any friction."""
     limit: Count | None = None
     """Keep at most this many grasps, the best of each family in turn; None for all."""
     cells: Count = 1

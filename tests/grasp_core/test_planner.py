@@ -7,6 +7,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS
 from grasp_core.face_pieces import face_shapes
+from grasp_core.planner import METHODS
 from grasp_core.ranking import candidate_blocks
 from scenes.objects import example_object
 from tests.judges import pyramid_margin, random_rotation
@@ -109,10 +110,13 @@ def test_moving_turning_and_scaling_the_object_moves_its_grasps():
     tested = 0
     for name in ("wedge", "random-10-1", "octahedron", "box"):
         body = example_object(name)
-        here = gc.plan(body, 0.3, families=DISCS)
+        here = gc.plan(body, 0.3, families=DISCS, cones="tilted")
         R, scale = random_rotation(rng), float(rng.uniform(0.1, 3.0))
         there = gc.plan(
-            remade(body, lambda v, R=R, s=scale: s * v @ R.T + 0.4), 0.3, families=DISCS
+            remade(body, lambda v, R=R, s=scale: s * v @ R.T + 0.4),
+            0.3,
+            families=DISCS,
+            cones="tilted",
         )
         assert {g.id for g in here.grasps} == {g.id for g in there.grasps}
         radii = {g.id: g.radius for g in there.grasps}
@@ -161,8 +165,8 @@ def test_symmetric_objects_are_planned_at_small_friction(friction):
 def test_a_limit_returns_the_best_of_all_grasps(name, family):
     """Also where symmetry makes many grasps equally good."""
     body = example_object(name)
-    everything = gc.plan(body, 0.3, families=family)
-    few = gc.plan(body, 0.3, limit=7, families=family)
+    everything = gc.plan(body, 0.3, families=family, cones="tilted")
+    few = gc.plan(body, 0.3, limit=7, families=family, cones="tilted")
     assert len(few.grasps) == 7
     assert [g.id for g in few.grasps] == [g.id for g in everything.grasps[:7]]
     fewer = everything.counts.families[family].tried - few.counts.families[family].tried
@@ -182,8 +186,8 @@ def test_progress_is_reported_for_each_quadruple():
     gc.plan(example_object("wedge"), progress=lambda *numbers: seen.append(numbers))
     done = [each for each, _, _ in seen]
     assert done == sorted(done)
-    assert seen[-1][0] == seen[-1][1] == 4 * 70
-    assert len(seen) >= 70
+    assert seen[-1][0] == seen[-1][1] == 3 * 70
+    assert len(seen) >= 13
 
 
 @pytest.mark.parametrize(
@@ -235,8 +239,8 @@ def _inside(point, polygon, normal):
 
 
 def test_every_family_is_planned_and_every_witness_is_of_its_family():
-    found = gc.plan(example_object("chamfered-box"), TEN_DEGREES, limit=60)
-    assert list(found.counts.families) == [*FAMILIES, "free"]
+    found = gc.plan(example_object("chamfered-box"), TEN_DEGREES)
+    assert list(found.counts.families) == list(FAMILIES)
     assert {grasp.family for grasp in found.grasps} == set(FAMILIES)
     for grasp in found.grasps:
         x, f = grasp.witness.points, grasp.witness.forces
@@ -244,8 +248,7 @@ def test_every_family_is_planned_and_every_witness_is_of_its_family():
         np.testing.assert_array_equal(x, grasp.positions)
         np.testing.assert_allclose(f.sum(axis=0), 0.0, atol=1e-9)
         assert np.einsum("ki,ki->", f, grasp.normals) == pytest.approx(1.0)
-        foci = {"concurrent": (1,), "pencil": (2,), "regulus": (0, 2)}[grasp.family]
-        assert len(grasp.focus_points) in foci
+        assert len(grasp.focus_points) == (1 if grasp.family == "concurrent" else 2)
 
 
 @pytest.mark.parametrize("name", ["chamfered-box", "double-wedge-bar", "random-12-1"])
@@ -330,7 +333,7 @@ def test_radii_stay_below_the_bounds_that_prune():
     for family in DISCS:
         bounds = {q.faces: q.bound for q in candidates.ranked(CONSTRUCTIONS[family])}
         assert max(bounds.values()) <= room
-        for grasp in gc.plan(body, 1.0, theta_deg=8.0, families=family).grasps:
+        for grasp in gc.plan(body, 1.0, theta_deg=8.0, families=family, cones="tilted").grasps:
             assert grasp.radius <= bounds[tuple(sorted(grasp.faces))] * body.radius * (1 + 1e-6)
             tested += 1
     assert tested >= 80
@@ -358,7 +361,7 @@ def test_every_face_quadruple_is_held_absent_or_named_undecided():
 def test_every_four_faces_are_held_or_proved_to_hold_nothing(name):
     """Also where no normals span: with tilted cones most grasps have regions."""
     for friction in (0.3, 0.8):
-        found = gc.plan(example_object(name), friction)
+        found = gc.plan(example_object(name), friction, families=METHODS, cones="tilted")
         known, held = found.outcomes, {tuple(sorted(g.faces)) for g in found.grasps}
         assert (known.held, known.absent, known.open) == (len(held), len(found.absences), 0)
         assert known.held + known.absent == found.counts.quadruples
@@ -371,7 +374,10 @@ def test_every_four_faces_are_held_or_proved_to_hold_nothing(name):
 def test_what_less_friction_holds_more_friction_holds():
     tested = 0
     for name in ("box", "wedge", "octahedron"):
-        plans = [gc.plan(example_object(name), friction) for friction in (0.1, 0.3, 0.7)]
+        plans = [
+            gc.plan(example_object(name), friction, families=METHODS, cones="tilted")
+            for friction in (0.1, 0.3, 0.7)
+        ]
         for less, more in pairwise(plans):
             held = [{tuple(sorted(g.faces)) for g in plan.grasps} for plan in (less, more)]
             assert held[0] <= held[1]
