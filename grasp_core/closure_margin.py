@@ -77,9 +77,10 @@ def decide(arms: Array, normals: Array, friction: Array) -> Answer:
         return Answer(margin, forces, twist, closed=True)
     if margin < 0.0 and refutes_closure(twist, arms, normals, friction):
         return Answer(margin, forces, twist, closed=False)
-    touching = _touching_twist(twist, arms, normals, friction)
-    if abs(margin) < DECIDED and refutes_closure(touching, arms, normals, friction):
-        return Answer(0.0, forces, touching, closed=False)
+    if abs(margin) < DECIDED:
+        touching = _touching_twist(twist, arms, normals, friction)
+        if refutes_closure(touching, arms, normals, friction):
+            return Answer(0.0, forces, touching, closed=False)
     sparing = _twist_sparing_interior_forces(arms, normals, friction, forces)
     if sparing is not None and refutes_closure(sparing, arms, normals, friction):
         return Answer(0.0, forces, sparing, closed=False)

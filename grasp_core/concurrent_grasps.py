@@ -67,7 +67,9 @@ def place_concurrent(
     best: Placement | None = None
     bound = -math.inf
     for sides, reach in zip((BEFORE, BEHIND), _reaches(pieces, cones), strict=True):
-        if reach * math.tan(max(cone.half_angle for cone in cones)) < least:
+        limit = reach * math.tan(max(cone.half_angle for cone in cones))
+        if limit < least:
+            bound = max(bound, limit)
             continue
         found = place_on_sides(pieces, cones, sides, least=least)
         if isinstance(found, Placement):

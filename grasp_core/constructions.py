@@ -42,7 +42,7 @@ class Construction:
     place: Callable[[Sequence[FacePiece], Sequence[ForceCone], float], Placement | NoPlacement]
     """From pieces, force cones and the least merit worth having."""
     bounds: Callable[[Array, Array], Array] | None
-    """Upper bounds on the radius from depths and half-angles, see `concurrent_radius_bounds`;
+    """Upper bounds on the radius from reaches and half-angles, see `concurrent_radius_bounds`;
     None where no disc is claimed."""
     admits: Callable[[Array, Array], NDArray[np.bool_]]
     """Whether quadruples are worth a program, from their normals in finger order, (q, 4, 3), and

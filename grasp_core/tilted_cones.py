@@ -17,15 +17,17 @@ word, since nothing in them uses that an axis is a normal.
 Search. The height of the pyramid (theta, theta*) over the axes has one ridge after another, so
 nothing is claimed to be the largest. Axes that balance well are found first: each in turn is
 pointed against the sum of the others, as far as a cap around its normal lets it, for caps of
-several sizes. Then all four are moved at random, in steps that grow with success and shrink
+several sizes; normals that lie nearly in a plane, as those of a box's sides, are bent out of it.
+Then all four are moved at random, in steps that grow with success and shrink
 without. The moves are the same for any quadruple, in frames that turn with it, so that turned
 objects get turned cones.
 
 Source: this project's; P3 with its closed form is explained in `spanning`.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -45,6 +47,11 @@ SLIGHT = 1e-9
 """Improvements and directions below this are rounding, which must not decide anything."""
 BESIDE = 0.1
 """Sine of the angle from which on another axis is beside one."""
+FLAT = 0.5
+"""Normals lie nearly in a plane if their spread across it is below this share of the next one."""
+SIDES = [tuple(s * np.array(p)) for s in (1, -1)
+         for p in ((1, 1, -1, -1), (1, -1, 1, -1), (1, -1, -1, 1))]  # fmt: skip
+"""Two fingers to either side of a plane."""
 CHUNK = 20_000
 """Quadruples that are searched at once: some tens of megabytes."""
 
@@ -93,7 +100,29 @@ def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
         reached = half_angle(axes, normals, thetas)
         better = reached > half_angles + SLIGHT
         best[better], half_angles[better] = axes[better], reached[better]
+    for axes in _bent(normals, thetas):
+        reached = half_angle(axes, normals, thetas)
+        better = reached > half_angles + SLIGHT
+        best[better], half_angles[better] = axes[better], reached[better]
     return _improved(best, normals, thetas)
+
+
+def _bent(normals: Array, thetas: Array) -> Iterator[Array]:
+    """Axes that leave a plane in which the normals nearly lie, two to either side of it."""
+    _, sizes, directions = np.linalg.svd(normals)
+    across = directions[:, 2]
+    flat = sizes[:, 2] < FLAT * sizes[:, 1]
+    turns = np.cross(normals[:, :1], normals[:, 1:])
+    which = np.argmax(np.linalg.norm(turns, axis=-1) > BESIDE, axis=1)
+    handed = np.einsum("qi,qi->q", turns[np.arange(len(turns)), which], across)
+    across = across * np.where(handed < 0.0, -1.0, 1.0)[:, None]
+    for signs, cap in product(SIDES, CAPS[:-1]):
+        lean = np.where(flat, cap, 0.0)[:, None] * thetas
+        axes = [
+            _into_cap(sign * across, normals[:, finger], lean[:, finger])
+            for finger, sign in enumerate(signs)
+        ]
+        yield np.stack(axes, axis=1)
 
 
 def half_angle(axes: Array, normals: Array, thetas: Array) -> Array:
