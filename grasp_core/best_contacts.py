@@ -21,7 +21,7 @@ import numpy as np
 from grasp_core.arrays import Array, positive
 from grasp_core.certified import certify, to_grasp
 from grasp_core.closure import force_closure
-from grasp_core.constructions import point_region
+from grasp_core.constructions import point_region, regions_of
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.face_pieces import FacePiece, inset_piece, unit_pieces
 from grasp_core.on_faces import check_on_faces
@@ -189,6 +189,6 @@ def _certified(
     cones = tuple(ForceCone(piece.normal, theta) for piece in faces.pieces)
     found = certify(
         f"o-{grasp.id}", grasp.faces, "regulus", faces.pieces, cones, placement,
-        faces.friction, point_region,
+        faces.friction, regions_of(point_region, faces.pieces, cones, placement),
     )  # fmt: skip
     return None if found is None else to_grasp(body, faces.friction, found)

@@ -7,7 +7,6 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure import force_closure
-from grasp_core.constructions import Region
 from grasp_core.critical import critical_friction
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.face_pieces import FacePiece
@@ -62,7 +61,7 @@ def certify(  # noqa: PLR0913, PLR0917 - everything a grasp is made of
     cones: tuple[ForceCone, ...],
     placement: Placement,
     friction: float,
-    region: Region,
+    regions: tuple[ContactRegion, ...],
 ) -> Certified | None:
     """The placement, if its witness and the exact closure test both confirm it."""
     normals = np.array([piece.normal for piece in pieces])
@@ -70,10 +69,6 @@ def certify(  # noqa: PLR0913, PLR0917 - everything a grasp is made of
     fault = witness_fault(placement.positions, normals, placement.forces, friction, family)
     if margin is None or fault is not None:
         return None
-    regions = tuple(
-        region(piece, cone, placement, finger)
-        for finger, (piece, cone) in enumerate(zip(pieces, cones, strict=True))
-    )
     angle = span_angle(normals)
     return Certified(name, faces, family, angle, pieces, cones, regions, placement, margin)
 

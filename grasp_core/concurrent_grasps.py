@@ -14,6 +14,8 @@ its edges. All of it is linear in (x0, y_1..y_4, r):
     maximise r  subject to  g.x0 - (T_i'g).y_i - r |T_i'g| >= g.c_i    for all i, g
                             e.y_i + r <= b                             for all i, edges
 
+A curved patch has its surface at c_i + T_i y + h n_i, |h| <= eps: each left side loses eps |g.n_i|.
+
 The disc centres stay variables: eliminating them by shrinking the face over-estimates r as
 soon as an edge of the shrunk face vanishes.
 
@@ -124,7 +126,8 @@ def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array, contact: Arr
     """
     side = 1.0 if float(cone.axis @ (focus - contact)) > 0.0 else -1.0
     G = side * inscribed_facets(cone, piece.frame[:, 0])
-    flat = clip(piece.corners, G @ piece.frame, G @ (focus - piece.origin))
+    limits = G @ (focus - piece.origin) - piece.depth * np.abs(G @ piece.normal)
+    flat = clip(piece.corners, G @ piece.frame, limits)
     return piece.origin + flat @ piece.frame.T
 
 
@@ -179,5 +182,5 @@ def _rows(
         smallest = np.zeros((1, 16))
         smallest[0, 15], smallest[0, 11 + i] = 1.0, -1.0
         rows += [aim, inside, smallest]
-        limits += [-G @ piece.origin, piece.b, np.zeros(1)]
+        limits += [-G @ piece.origin - piece.depth * np.abs(G @ piece.normal), piece.b, np.zeros(1)]
     return np.vstack(rows), np.concatenate(limits)

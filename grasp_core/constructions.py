@@ -69,6 +69,16 @@ def _disc_region(piece: FacePiece, _: ForceCone, placed: Placement, finger: int)
     return ContactRegion("disc", placed.positions[finger] + radius * ring, radius)
 
 
+def regions_of(
+    region: Region, pieces: Sequence[FacePiece], cones: Sequence[ForceCone], placed: Placement
+) -> tuple[ContactRegion, ...]:
+    """The regions of all fingers, in the pieces' units."""
+    return tuple(
+        region(piece, cone, placed, finger)
+        for finger, (piece, cone) in enumerate(zip(pieces, cones, strict=True))
+    )
+
+
 def point_region(_: FacePiece, __: ForceCone, placed: Placement, finger: int) -> ContactRegion:
     """Nothing but the contact."""
     return ContactRegion("point", placed.positions[finger][None], 0.0)
@@ -78,9 +88,7 @@ CONSTRUCTIONS: dict[Family, Construction] = {
     "concurrent": Construction(
         "concurrent",
         AS_LISTED,
-        lambda pieces, cones, least: place_concurrent(
-            pieces, cones, least=max(least, LEAST_RADIUS)
-        ),
+        lambda pieces, cones, least: place_concurrent(pieces, cones, least=least),
         concurrent_radius_bounds,
         _always_admitted,
         _cone_region,
@@ -89,7 +97,7 @@ CONSTRUCTIONS: dict[Family, Construction] = {
         "pencil",
         PAIRINGS,
         lambda pieces, cones, least: place_pencil(
-            pieces, cones, least=max(least, LEAST_RADIUS), least_gap=LEAST_RADIUS
+            pieces, cones, least=least, least_gap=LEAST_RADIUS
         ),
         pencil_radius_bounds,
         _always_admitted,

@@ -12,7 +12,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.lp import LinearProgram, Optimum, maximize
 from grasp_core.polygons import clip, convex_hull, edge_rows
-from grasp_core.values import Face, Polyhedron
+from grasp_core.values import Polyhedron
 
 THINNEST = 1e-6
 """Pieces without room for a disc of this radius (object size one) hold no contact."""
@@ -44,6 +44,10 @@ class FacePiece:
     """(k,)"""
     inradius: float
     """Radius of the largest disc inside."""
+    spread: float = 0.0
+    """How far the true surface leans from the plane at most [rad]."""
+    depth: float = 0.0
+    """How far the true surface is from the plane at most."""
 
     def point(self, y: Array) -> Array:
         """The point in space of plane coordinates, (3,)."""
@@ -57,6 +61,8 @@ class FaceShape:
     pieces: tuple[FacePiece, ...]
     hull: FacePiece
     """What is impossible here is impossible on every piece."""
+    facets: Array | None = None
+    """Of a curved patch: corners of the triangles over it, wound as the piece, (f, 3, 3)."""
 
 
 def face_shapes(body: Polyhedron) -> tuple[FaceShape | None, ...]:
@@ -64,7 +70,13 @@ def face_shapes(body: Polyhedron) -> tuple[FaceShape | None, ...]:
     by_face: list[list[FacePiece]] = [[] for _ in body.faces]
     for piece in unit_pieces(body):
         by_face[piece.face].append(piece)
-    return tuple(shape_of(pieces) if pieces else None for pieces in by_face)
+    corners = (body.vertices - body.center_of_mass)[body.triangles[:, ::-1]] / body.radius
+    return tuple(
+        replace(shape_of(pieces), facets=corners[face.facets] if len(face.facets) else None)
+        if pieces
+        else None
+        for face, pieces in zip(body.faces, by_face, strict=True)
+    )
 
 
 def shape_of(pieces: Sequence[FacePiece]) -> FaceShape:
@@ -120,23 +132,34 @@ def inset_piece(piece: FacePiece, inset: float) -> FacePiece:
 def unit_pieces(body: Polyhedron) -> tuple[FacePiece, ...]:
     """All convex pieces with room for a contact, about the centre of mass over the radius."""
     pieces = [
-        _piece(index, face, (polygon - body.center_of_mass) / body.radius)
+        replace(
+            piece_of(index, face.normal, (polygon - body.center_of_mass) / body.radius),
+            spread=face.spread,
+            depth=face.depth / body.radius,
+        )
         for index, face in enumerate(body.faces)
         for polygon in face.pieces
     ]
     return tuple(piece for piece in pieces if piece.inradius > THINNEST)
 
 
-def _piece(index: int, face: Face, polygon: Array) -> FacePiece:
+def piece_of(face: int, normal: Array, polygon: Array) -> FacePiece:
+    """A convex polygon as a piece.
+
+    Args:
+        face: Index of its face.
+        normal: Unit vector into the object, (3,).
+        polygon: (k, 3), counter-clockwise about the normal.
+    """
     edge = polygon[1] - polygon[0]
     along = np.asarray(edge / np.linalg.norm(edge), dtype=np.float64)
-    frame = np.column_stack([along, np.cross(face.normal, along)])
+    frame = np.column_stack([along, np.cross(normal, along)])
     origin = polygon.mean(axis=0)
     corners = (polygon - origin) @ frame
     E, b = edge_rows(corners)
     return FacePiece(
-        face=index,
-        normal=face.normal,
+        face=face,
+        normal=normal,
         origin=origin,
         frame=frame,
         corners=corners,

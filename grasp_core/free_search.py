@@ -15,21 +15,22 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.certified import Certified, certify, named
-from grasp_core.constructions import Construction, point_region
+from grasp_core.constructions import Construction, point_region, regions_of
 from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece, FaceShape, choices_near
 from grasp_core.patch import RESTARTS, Absence, Undecided, place_free
 from grasp_core.placements import Placement
 from grasp_core.ranking import (
     BELOW_SPAN_ANGLE,
-    INSIDE_FRICTION,
     LEAST_SPAN_ANGLE,
     ConeChoice,
     Quadruple,
     Shapes,
+    usable_half_angles,
 )
 from grasp_core.search import MOST_CHOICES, Search, best_first, chosen_shapes, try_order
 from grasp_core.tilted_cones import widened
+from grasp_core.true_surface import on_true_surface
 from grasp_core.values import FINGERS, FaceQuadruple, ForceCone, four
 
 BATCH = 64
@@ -102,6 +103,8 @@ def _decide(
     search.tally["tried"] += 1
     answers = _answers(faces, chosen, request, search)
     pieces, last = answers[-1]
+    if any(shape.facets is not None for shape in chosen):
+        return _on_triangles(faces, chosen, pieces, last, request, search)
     if isinstance(last, Placement):
         return _Placed(faces, pieces, last)
     proofs = tuple(proof for _, proof in answers if isinstance(proof, Absence))
@@ -146,12 +149,39 @@ def _answers(
     return answers
 
 
+def _on_triangles(
+    faces: FaceQuadruple,
+    shapes: Sequence[FaceShape],
+    pieces: Pieces,
+    answer: Placement | Absence | Undecided,
+    request: FreeRequest,
+    search: Search,
+) -> _Placed | None:
+    """Contacts on the triangles of curved patches; that patches hold none proves nothing."""
+    if isinstance(answer, Placement):
+        cones = [ForceCone(piece.normal, 0.0) for piece in pieces]
+        points = [point_region(piece, cone, answer, finger)
+                  for finger, (piece, cone) in enumerate(zip(pieces, cones, strict=True))]  # fmt: skip
+        rng = np.random.default_rng([request.seed, *faces])
+
+        def place(facets: Pieces) -> Placement | None:
+            found = _place(facets, request, rng, restarts=0)
+            return found if isinstance(found, Placement) else None
+
+        settled = on_true_surface(shapes, pieces, cones, answer, points, place)
+        if settled is not None:
+            return _Placed(faces, *settled)
+    search.tally["undecided"] += 1
+    search.undecided.append(faces)
+    return None
+
+
 def _place(
     pieces: Pieces, request: FreeRequest, rng: np.random.Generator, restarts: int = RESTARTS
 ) -> Placement | Absence | Undecided:
-    friction = math.tan(request.theta)
+    theta = max(request.theta - max(piece.spread for piece in pieces), LEAST_SPAN_ANGLE)
     try:
-        return place_free(pieces, friction, rng=rng, cells=request.cells, restarts=restarts)
+        return place_free(pieces, math.tan(theta), rng=rng, cells=request.cells, restarts=restarts)
     except SolverError:
         return Undecided(1)
 
@@ -162,7 +192,8 @@ def _cone_choices(placed: Sequence[_Placed], request: FreeRequest) -> list[ConeC
         return [None] * len(placed)
     forces = np.array([each.placement.forces for each in placed])
     normals = np.array([each.normals for each in placed])
-    thetas = np.full((len(placed), FINGERS), INSIDE_FRICTION * request.theta)
+    spreads = np.array([[piece.spread for piece in each.pieces] for each in placed])
+    thetas = usable_half_angles(request.theta, spreads)
     found = widened(forces, normals, thetas)
     return [
         ConeChoice(four(ForceCone(axis, angle) for axis in axes), math.inf)
@@ -181,7 +212,7 @@ def _certified(
     cones = four(ForceCone(piece.normal, request.theta) for piece in placed.pieces)
     certified = certify(
         named("f", placed.faces), placed.faces, "regulus", placed.pieces, cones, placed.placement,
-        request.friction, point_region,
+        request.friction, regions_of(point_region, placed.pieces, cones, placed.placement),
     )  # fmt: skip
     if certified is None:
         search.tally["rejected"] += 1

@@ -9,17 +9,21 @@ turned, and the polyhedron's notes say so. Nothing else is repaired.
 import hashlib
 import importlib
 import io
+import math
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array, Indices, frozen
 from grasp_core.errors import InputError, MeshError, MeshRefusal
-from grasp_core.planar_faces import FlatnessLimits, planar_faces
-from grasp_core.solids import Solid, intersection_volume, triangulate, union_volume
-from grasp_core.values import Polyhedron
+from grasp_core.patches import flat_patches
+from grasp_core.planar_faces import MAX_FACES, FlatnessLimits, coplanar_groups, planar_faces
+from grasp_core.solid_checks import oriented, surface_fault, turned_out, welded
+from grasp_core.solids import Solid, hull, triangulate
+from grasp_core.values import Face, FaceKind, PatchLimits, Polyhedron
 
 AnyPolyhedron = TypeVar("AnyPolyhedron", bound=Polyhedron)
 
@@ -30,20 +34,17 @@ MAX_FILE_BYTES = 64 * 2**20
 MAX_TRIANGLES = 200_000
 SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0
 """Half a millimetre to twenty metres: outside it the unit is almost surely wrong."""
-WELD = 1e-8
-"""Vertices closer than this, relative to the extent, are one: single precision in a file
-keeps 6e-8, and equal numbers in a file are equal to the last bit."""
-THINNEST = 1e-9
-"""Least volume relative to the cube of the extent."""
-OVERLAP = 1e-6
-"""Shared volume of two parts, relative to the whole, that counts as overlap; parts that
-only touch share what rounding leaves."""
-
 DEFAULT_FLATNESS = FlatnessLimits()
 
 
-def load_polyhedron(
-    path: str | Path, *, unit: str = "m", flatness: FlatnessLimits = DEFAULT_FLATNESS
+def load_polyhedron(  # noqa: PLR0913 - what a file does not say
+    path: str | Path,
+    *,
+    unit: str = "m",
+    flatness: FlatnessLimits = DEFAULT_FLATNESS,
+    faces: FaceKind = "auto",
+    patches: PatchLimits | None = None,
+    center_of_mass: ArrayLike | None = None,
 ) -> Polyhedron:
     """Read a solid from a mesh file.
 
@@ -51,6 +52,12 @@ def load_polyhedron(
         path: An OBJ, STL, PLY, OFF or GLB file.
         unit: What one unit in the file is: "m", "cm", "mm" or "in".
         flatness: How far triangles may deviate and still be one planar face.
+        faces: `planar` for exact planar faces; `patches` for the nearly flat parts of a curved or
+            scanned surface, which may have holes; `auto` takes patches where there are more than
+            `MAX_FACES` planar faces.
+        patches: How flat patches are, and how many.
+        center_of_mass: (3,) [m], in the file's frame; that of uniform density if not given,
+            estimated from the convex hull where the surface has holes.
 
     Raises:
         InputError: The unit is unknown.
@@ -66,52 +73,105 @@ def load_polyhedron(
         name=path.stem,
         source_sha256=hashlib.sha256(data).hexdigest(),
         flatness=flatness,
+        faces=faces,
+        patches=patches,
+        center_of_mass=center_of_mass,
     )
 
 
-def polyhedron_from_mesh(
+def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
     vertices: ArrayLike,
     triangles: ArrayLike,
     *,
     name: str = "object",
     source_sha256: str | None = None,
     flatness: FlatnessLimits = DEFAULT_FLATNESS,
+    faces: FaceKind = "auto",
+    patches: PatchLimits | None = None,
+    center_of_mass: ArrayLike | None = None,
     kind: type[AnyPolyhedron] = Polyhedron,
 ) -> AnyPolyhedron:
-    """Check a triangle mesh and build the polyhedron of its planar faces.
+    """Check a triangle mesh and build the polyhedron of its faces.
 
     Args:
         vertices: (n, 3) [m].
         triangles: Vertex indices, (t, 3).
         name: What to call the object.
         source_sha256: Hash of the file it came from, if any.
-        flatness: How far triangles may deviate and still be one planar face.
+        flatness: As `load_polyhedron`.
+        faces: As `load_polyhedron`.
+        patches: As `load_polyhedron`.
+        center_of_mass: As `load_polyhedron`.
         kind: The class to build.
 
     Raises:
+        InputError: The centre of mass is not a point.
         MeshError: The mesh is not a solid; its `reason` says why.
     """
     points, corners = _checked_arrays(vertices, triangles)
-    points, corners, dropped = _welded(points, corners)
-    _check_topology(corners)
+    points, corners, dropped = welded(points, corners)
     notes = [f"dropped {dropped} triangles without area"] if dropped else []
-    corners, flipped = _oriented(points, corners)
+    groups = _planar_groups(points, corners, flatness, faces)
+    limits = (patches or PatchLimits()) if groups is None else None
+    fault = surface_fault(corners)
+    if fault and (limits is None or fault.reason is MeshRefusal.WINDING):
+        raise fault
+    corners, flipped = turned_out(points, corners) if fault else oriented(points, corners)
     if flipped:
         notes.append("the mesh was inside out; its triangles were turned")
+    if limits is not None:
+        found = flat_patches(points, corners, limits)
+        notes += _said_of_patches(found, fault)
+    else:
+        found = planar_faces(points, corners, groups or [], flatness, triangulate)
+    solid = hull(points) if fault and fault.reason is MeshRefusal.OPEN else Solid(points, corners)
+    mass: Any = _trimesh("triangles").mass_properties(
+        solid.vertices[solid.triangles], density=1.0,
+        center_mass=None if center_of_mass is None else frozen(center_of_mass, (3,), "center"),
+    )  # fmt: skip
     content = _content_hash(points, corners)
-    mass: Any = _trimesh("triangles").mass_properties(points[corners], density=1.0)
     return kind(
         name=name,
         vertices=points,
         triangles=corners,
-        faces=planar_faces(points, corners, flatness, triangulate),
+        faces=found,
         volume=float(mass.volume),
         center_of_mass=np.asarray(mass.center_mass),
         inertia=np.asarray(mass.inertia),
         content_sha256=content,
         source_sha256=source_sha256 or content,
+        patches=limits,
         notes=tuple(notes),
     )
+
+
+def _planar_groups(
+    points: Array, corners: Indices, flatness: FlatnessLimits, faces: FaceKind
+) -> list[Indices] | None:
+    """Triangles grouped into planar faces; None where patches are to be used instead."""
+    if faces not in get_args(FaceKind):
+        raise InputError(f"faces must be one of {get_args(FaceKind)}, got {faces!r}")
+    if faces == "patches":
+        return None
+    groups = coplanar_groups(points, corners, flatness)
+    return groups if faces == "planar" or len(groups) <= MAX_FACES else None
+
+
+def _said_of_patches(patches: Sequence[Face], fault: MeshError | None) -> list[str]:
+    lean = max((face.spread for face in patches), default=0.0)
+    off = max((face.depth for face in patches), default=0.0)
+    notes = [
+        f"a curved surface: planned on {len(patches)} patches, whose surface leans from their "
+        f"planes by up to {math.degrees(lean):.3g} deg and is up to {1e3 * off:.3g} mm off"
+    ]
+    if fault and fault.reason is MeshRefusal.OPEN:
+        notes.append(
+            f"not a closed surface ({fault}); only its patches are used, and the centre of mass is "
+            "that of the convex hull unless it is given"
+        )
+    elif fault:
+        notes.append(f"not a proper surface ({fault}); only its patches are used")
+    return notes
 
 
 def _trimesh(submodule: str) -> Any:
@@ -211,87 +271,6 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike) -> tuple[Array, I
         )
         raise MeshError(MeshRefusal.SIZE, message)
     return points, corners.astype(np.int64)
-
-
-def _welded(points: Array, corners: Indices) -> tuple[Array, Indices, int]:
-    """Join vertices closer than WELD, drop unused ones and collapsed triangles."""
-    spatial: Any = importlib.import_module("scipy.spatial")
-    graph: Any = importlib.import_module("scipy.sparse")
-    used, corners = np.unique(corners, return_inverse=True)
-    points, corners = points[used], corners.reshape(-1, 3)
-    reach = WELD * float(np.ptp(points, axis=0).max())
-    pairs = spatial.cKDTree(points).query_pairs(reach, output_type="ndarray")
-    links = graph.coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
-    _, label = graph.csgraph.connected_components(links, directed=False)
-    _, first, order = np.unique(label, return_index=True, return_inverse=True)
-    rank = np.argsort(np.argsort(first))
-    points, corners = points[np.sort(first)], rank[order][corners]
-    whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
-    return points, corners[whole], int((~whole).sum())
-
-
-def _check_topology(corners: Indices) -> None:
-    """Each undirected edge must belong to two triangles that run along it both ways."""
-    tail, head = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
-    edges, where, uses = np.unique(
-        np.sort(np.column_stack([tail, head]), axis=1), axis=0, return_inverse=True,
-        return_counts=True,
-    )  # fmt: skip
-    if (uses == 1).any():
-        message = f"{int((uses == 1).sum())} edges belong to one triangle only; close the surface"
-        raise MeshError(MeshRefusal.OPEN, message)
-    if (uses != 2).any():  # noqa: PLR2004 - the two sides of an edge
-        message = f"edge {edges[uses != 2][0].tolist()} belongs to {uses[uses != 2][0]} triangles"  # noqa: PLR2004
-        raise MeshError(MeshRefusal.NON_MANIFOLD, message)
-    forward = np.bincount(where.ravel(), weights=tail < head)
-    if (forward != 1).any():
-        message = (
-            f"{int((forward != 1).sum())} edges have both triangles on the same side; wind all "
-            "triangles counter-clockwise seen from outside"
-        )
-        raise MeshError(MeshRefusal.WINDING, message)
-
-
-def _oriented(points: Array, corners: Indices) -> tuple[Indices, bool]:
-    """Turn an inside-out mesh; refuse flat, inconsistent and overlapping parts."""
-    extent = float(np.ptp(points, axis=0).max())
-    total = Solid(points, corners).volume
-    if abs(total) < THINNEST * extent**3:
-        message = f"the volume is {total:.3g} m^3; a solid must have one"
-        raise MeshError(MeshRefusal.ZERO_VOLUME, message)
-    if total < 0.0:
-        corners = corners[:, ::-1]
-    parts = _parts(points, corners)
-    bodies = [part for part in parts if part.volume > 0.0]
-    cavities = [Solid(part.vertices, part.triangles[:, ::-1]) for part in parts if part.volume <= 0]
-    slack = OVERLAP * abs(total)
-    if len(bodies) > 1 and sum(body.volume for body in bodies) - union_volume(bodies) > slack:
-        message = f"{len(bodies)} solids overlap; unite them into one surface first"
-        raise MeshError(MeshRefusal.OVERLAP, message)
-    if len(bodies) > 1:
-        message = f"{len(bodies)} separate solids; a grasp holds one, so give one solid a file"
-        raise MeshError(MeshRefusal.SEPARATE, message)
-    for cavity in cavities:
-        inside = sum(intersection_volume(body, cavity) for body in bodies)
-        if cavity.volume - inside > slack:
-            message = "one part is inside out and not a cavity of another; turn its triangles"
-            raise MeshError(MeshRefusal.WINDING, message)
-    return corners, total < 0.0
-
-
-def _parts(points: Array, corners: Indices) -> list[Solid]:
-    """The edge-connected parts of a mesh."""
-    graph: Any = importlib.import_module("scipy.sparse")
-    links = graph.coo_array(
-        (np.ones(corners.size), (corners.ravel(), np.roll(corners, 1, axis=1).ravel())),
-        shape=(len(points),) * 2,
-    )
-    count, label = graph.csgraph.connected_components(links, directed=False)
-    parts: list[Solid] = []
-    for part in range(count):
-        used, local = np.unique(corners[label[corners[:, 0]] == part], return_inverse=True)
-        parts.append(Solid(points[used], local.reshape(-1, 3)))
-    return parts
 
 
 def _content_hash(points: Array, corners: Indices) -> str:

@@ -31,7 +31,9 @@ equilibrium. The order is safe in two cells, c_1 = x0 -+ k u, c_2 = x0 +- k u wi
 Each is a linear program in (x0, k, R, r_11..r_22, r). The paper's text leaves out the order:
 outside both cells extending L beyond e_1 and e_2 can magnify its offset without limit. The
 paper's program often ends there, and some of its regions then hold contacts out of equilibrium.
-As R >= r_ij is needed, the radii are at most depth times tan(theta / 2) when axis = normal.
+Where the surface of a curved patch is up to eps off its plane, a contact is that much nearer to the
+borders of its cone and to P_i: s_ij sin(psi) >= R + kappa_ij r_ij + eps and R >= r_ij + eps, and the
+bound of cell B loses eps |n_ij.u|. As R >= r_ij is needed, the radii are at most depth times tan(theta / 2) when axis = normal.
 
 Source: Sudsang & Ponce 1995, section 3.2; the order and the two cells are this project's.
 """
@@ -177,15 +179,15 @@ def _rows(
             np.eye(VARIABLES)[SMALLEST] - r_i,
         ]
         limits += [
-            math.sin(cone.half_angle) * disc.s0,
+            math.sin(cone.half_angle) * disc.s0 - piece.depth,
             piece.b - piece.E @ disc.q,
-            0.0,
+            -piece.depth,
             0.0,
         ]
         if near:
             toward = float(cone.axis @ u) * (1.0 if i < FINGERS // 2 else -1.0)
             rows.append(2.0 * k + float(np.linalg.norm(piece.frame.T @ u)) * r_i - toward * disc.s)
-            limits.append(toward * disc.s0)
+            limits.append(toward * disc.s0 - piece.depth * abs(float(piece.normal @ u)))
     return np.vstack(rows), np.hstack(limits)
 
 

@@ -5,7 +5,7 @@ own plane, never from neighbour to neighbour, so that the facets of a fine spher
 creep into one "face".
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -21,6 +21,11 @@ from grasp_core.polygons import (
     without_straight_corners,
 )
 from grasp_core.values import Face
+
+MAX_FACES = 200
+"""Objects with more planar faces are curved: 65 million quadruples, some 6 million of which span."""
+SIDES = 2
+"""Triangles at an edge of a closed surface."""
 
 Triangulate: TypeAlias = Callable[[list[Array]], Indices]
 """Corners of an outer border and holes, in order, to counter-clockwise triangles."""
@@ -38,16 +43,21 @@ class FlatnessLimits:
 
 
 def planar_faces(
-    vertices: Array, triangles: Indices, limits: FlatnessLimits, triangulate: Triangulate
+    vertices: Array,
+    triangles: Indices,
+    groups: Sequence[Indices],
+    limits: FlatnessLimits,
+    triangulate: Triangulate,
 ) -> tuple[Face, ...]:
-    """All planar faces of a closed, outward-wound mesh, in the order of their first triangle."""
-    groups = coplanar_groups(vertices, triangles, limits)
+    """The planar faces of a closed, outward-wound mesh, one for each coplanar group."""
     slack = limits.distance * float(np.ptp(vertices, axis=0).max())
     return tuple(_face(vertices, triangles[group], slack, triangulate) for group in groups)
 
 
 def coplanar_groups(vertices: Array, triangles: Indices, limits: FlatnessLimits) -> list[Indices]:
     """Edge-connected groups of triangles that lie in one plane within the limits.
+
+    They are in the order of their first triangle; wound inwards or outwards, they are the same.
 
     The largest triangles seed first: their planes are the least affected by rounding. A
     triangle thinner than the distance limit has no meaningful normal, so only its
@@ -69,7 +79,7 @@ def coplanar_groups(vertices: Array, triangles: Indices, limits: FlatnessLimits)
         stack, group_of[seed] = [int(seed)], seed
         while stack:
             for other in neighbours[stack.pop()]:
-                if group_of[other] >= 0:
+                if other < 0 or group_of[other] >= 0:
                     continue
                 tilt = 0.0 if sliver[other] else np.linalg.norm(normals[other] - normal)
                 if tilt <= limits.angle and _off(corners[other], origin, normal) <= distance:
@@ -84,13 +94,14 @@ def _off(points: Array, origin: Array, normal: Array) -> float:
 
 
 def triangle_neighbours(triangles: Indices) -> Indices:
-    """The triangle across each edge (k, k+1) of each triangle, (t, 3), for a closed mesh."""
-    count = len(triangles)
+    """The triangle across each edge (k, k+1) of each triangle, -1 if it is not one, (t, 3)."""
     tail, head = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    side = np.lexsort((np.where(tail < head, tail, head), np.where(tail < head, head, tail)))
-    pairs = side.reshape(-1, 2)
-    across = np.empty(3 * count, dtype=np.int64)
-    across[pairs[:, 0]], across[pairs[:, 1]] = pairs[:, 1] // 3, pairs[:, 0] // 3
+    edges = np.sort(np.column_stack([tail, head]), axis=1)
+    _, place, uses = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(place, kind="stable")
+    paired = order[(uses == SIDES)[place[order]]].reshape(-1, SIDES)
+    across = np.full(len(tail), -1, dtype=np.int64)
+    across[paired[:, 0]], across[paired[:, 1]] = paired[:, 1] // 3, paired[:, 0] // 3
     return across.reshape(-1, 3)
 
 

@@ -20,6 +20,7 @@ from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS
 from grasp_core.errors import InputError
 from grasp_core.face_pieces import face_shapes
 from grasp_core.free_search import FreeRequest, search_free
+from grasp_core.planar_faces import MAX_FACES
 from grasp_core.plans import Outcomes, Plan, PlanCounts
 from grasp_core.ranking import Candidates, candidate_blocks
 from grasp_core.search import Search, search_construction
@@ -37,8 +38,6 @@ FAMILIES: tuple[Family, ...] = get_args(Family)
 """The families of the paper, each with its construction."""
 METHODS: tuple[Method, ...] = get_args(Method)
 """Everything that `families` may name: the three constructions and `free`."""
-MAX_FACES = 200
-"""65 million quadruples, some 6 million of which span: half a gigabyte."""
 ConeKind: TypeAlias = Literal["tilted", "normal"]
 Progress: TypeAlias = Callable[[int, int, int], None]
 """Called with quadruples done, quadruples in all, and grasps found so far."""
@@ -60,9 +59,9 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     body: Polyhedron,
     friction: float = 0.5,
     *,
-    families: Sequence[Method] | Method = FAMILIES,
+    families: Sequence[Method] | Method = METHODS,
     theta_deg: float | None = None,
-    cones: ConeKind = "normal",
+    cones: ConeKind = "tilted",
     limit: int | None = None,
     seed: int = 0,
     cells: int = 1,
@@ -104,9 +103,9 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
     body: Polyhedron,
     friction: float = 0.5,
     *,
-    families: Sequence[Method] | Method = FAMILIES,
+    families: Sequence[Method] | Method = METHODS,
     theta_deg: float | None = None,
-    cones: ConeKind = "normal",
+    cones: ConeKind = "tilted",
     seed: int = 0,
     cells: int = 1,
 ) -> Iterator[Grasp]:

@@ -32,8 +32,8 @@ class MethodCounts:
     solved: int = 0
     """Choices of one convex piece per face that were considered."""
     infeasible: int = 0
-    """No placement with discs of the least radius at the planned angle; for the free method,
-    proved to have no grasp at all."""
+    """No placement with discs of the least radius at the planned angle, or none on the surface of
+    curved patches; for the free method, proved to have no grasp at all."""
     undecided: int = 0
     """Free method only: neither a grasp nor a proof of absence."""
     duplicates: int = 0

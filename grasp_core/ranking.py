@@ -217,15 +217,29 @@ def _with_a_new_one(order: Indices, start: int, end: int) -> Indices:
     return quads[np.lexsort(quads.T[::-1])]
 
 
+def usable_half_angles(theta: float, spreads: Array) -> Array:
+    """Half-angles that fit inside the friction cones wherever a curved patch leans to [rad].
+
+    Args:
+        theta: Half-angle of the friction cones to plan with [rad].
+        spreads: How far each patch leans from its plane [rad].
+
+    Returns:
+        Like `spreads`; a trifle, of no use to any construction, where nothing is left.
+    """
+    return np.maximum(INSIDE_FRICTION * theta - spreads, 0.5 * LEAST_SPAN_ANGLE)
+
+
 def _candidates(
     body: Polyhedron, quads: Indices, rooms: Array, theta: float, *, tilted: bool
 ) -> Candidates:
     normals = body.normals[quads].reshape(-1, FINGERS, 3)
-    theta = INSIDE_FRICTION * theta
-    around = np.minimum(theta, BELOW_SPAN_ANGLE * np.arcsin(np.maximum(span_sines(normals), 0.0)))
+    thetas = usable_half_angles(theta, np.array([face.spread for face in body.faces]))[quads]
+    spanned = BELOW_SPAN_ANGLE * np.arcsin(np.maximum(span_sines(normals), 0.0))
+    around = np.minimum(thetas.min(axis=1, initial=np.inf), spanned)
     axes, half_angles = [normals, normals], [around, np.zeros(len(quads))]
     if tilted:
-        leaning = tilted_cones(normals, np.full((len(quads), FINGERS), theta))
+        leaning = tilted_cones(normals, thetas)
         axes[TILTED] = leaning.axes
         half_angles[TILTED] = BELOW_SPAN_ANGLE * leaning.half_angles
     return Candidates(

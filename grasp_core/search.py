@@ -6,12 +6,13 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
 
 from grasp_core.certified import Certified, certify, named
-from grasp_core.constructions import Construction, FingerOrder
+from grasp_core.constructions import LEAST_RADIUS, Construction, FingerOrder, regions_of
 from grasp_core.face_pieces import FacePiece, FaceShape, choices_near
 from grasp_core.placements import Placement
 from grasp_core.plans import MethodCounts, Proof
@@ -21,6 +22,7 @@ from grasp_core.ranking import (
     Shapes,
 )
 from grasp_core.spanning import cones_positively_span
+from grasp_core.true_surface import on_true_surface
 from grasp_core.values import (
     FaceQuadruple,
     ForceCone,
@@ -152,7 +154,8 @@ def try_order(
     tally["tried"] += 1
     placed = None
     for choice in quadruple.choices:
-        least = -math.inf if placed is None else placed[2].merit
+        least = LEAST_RADIUS if construction.bounds else -math.inf
+        least = least if placed is None else placed[2].merit
         if choice.bound <= least:
             break
         cones = four(choice.cones[finger] for finger in order)
@@ -160,18 +163,33 @@ def try_order(
     if placed is None:
         tally["infeasible"] += 1
         return None
-    chosen, cones, placement = placed
+    chosen, cones, planned = placed
+    regions = regions_of(construction.region, chosen, cones, planned)
+    settled = on_true_surface(
+        ordered, chosen, cones, planned, regions, partial(_placed_on, construction, cones)
+    )
+    if settled is None:
+        tally["infeasible"] += 1
+        return None
+    chosen, placement = settled
     family = construction.family
     certified = certify(
-        named(family[0], faces), faces, family, chosen, cones, placement, friction,
-        construction.region,
-    )  # fmt: skip
+        named(family[0], faces), faces, family, chosen, cones, placement, friction, regions
+    )
     if certified is None or not cones_positively_span(
         [cone.axis for cone in cones], [cone.half_angle for cone in cones]
     ):
         tally["rejected"] += 1
         return None
     return certified
+
+
+def _placed_on(
+    construction: Construction, cones: Cones, pieces: tuple[FacePiece, ...]
+) -> Placement | None:
+    """Any placement on pieces, however small its discs."""
+    placed = construction.place(pieces, cones, 0.0 if construction.bounds else -math.inf)
+    return placed if isinstance(placed, Placement) else None
 
 
 def _best_placement(

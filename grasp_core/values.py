@@ -5,7 +5,7 @@ point into the object. Arrays are copied, checked and made read-only on construc
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, Self, TypeAlias, TypeVar
 
 import numpy as np
@@ -18,6 +18,8 @@ Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
 """The class of a grasp's witness lines."""
 Method: TypeAlias = Literal["concurrent", "pencil", "regulus", "free"]
 """How grasps are looked for: by one of the paper's constructions, or free of any type."""
+FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
+"""What counts as a face: flat parts, nearly flat patches, or what suits the surface."""
 RegionKind: TypeAlias = Literal["cone", "disc", "point"]
 FaceQuadruple: TypeAlias = tuple[int, int, int, int]
 """Indices of four faces, in finger order."""
@@ -45,14 +47,45 @@ class Face:
     """Borders of the holes, each (k, 3) [m], clockwise in the same view."""
     pieces: tuple[Array, ...]
     """Convex polygons that tile the face, each (k, 3) [m], wound as `polygon`."""
+    spread: float = 0.0
+    """Of a curved patch: the most that the surface over it leans from the plane [rad]."""
+    depth: float = 0.0
+    """Of a curved patch: largest distance of the surface over it from the plane [m]."""
+    facets: Indices = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    """Of a curved patch: the triangles that are the surface over the polygon, (f,)."""
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "facets", frozen_indices(self.facets, (None,), "facets"))
         object.__setattr__(self, "normal", frozen_units(self.normal, (3,), "normal"))
         object.__setattr__(self, "centroid", frozen(self.centroid, (3,), "centroid"))
         object.__setattr__(self, "polygon", frozen(self.polygon, (None, 3), "polygon"))
         for name in ("holes", "pieces"):
             loops = tuple(frozen(loop, (None, 3), name) for loop in getattr(self, name))
             object.__setattr__(self, name, loops)
+
+
+@dataclass(frozen=True, slots=True)
+class PatchLimits:
+    """How far a patch may be from flat, and how many there are.
+
+    Raises:
+        InputError: A limit is out of range.
+    """
+
+    spread_deg: float = 10.0
+    """Largest angle between the surface and the patch's plane [deg]; friction loses it."""
+    depth: float = 0.01
+    """Largest distance of the surface from the plane, relative to the object's largest extent."""
+    most: int = 20
+    """So many patches, those with the largest discs."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.spread_deg <= 45.0:  # noqa: PLR2004 - above it nothing is flat
+            raise InputError(f"spread_deg must be above 0 and at most 45, got {self.spread_deg}")
+        if not 0.0 < self.depth <= 0.1:  # noqa: PLR2004
+            raise InputError(f"depth must be above 0 and at most 0.1, got {self.depth}")
+        if not 4 <= self.most <= 200:  # noqa: PLR2004 - four fingers; what the planner takes
+            raise InputError(f"most must be from 4 to 200, got {self.most}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,6 +108,8 @@ class Polyhedron:
     """Hash of the canonical mesh: the same for any file name, vertex or triangle order."""
     source_sha256: str
     """Hash of the file's bytes; `content_sha256` when there was no file."""
+    patches: PatchLimits | None = None
+    """Of a curved or scanned surface whose faces are patches; None where they are exact."""
     notes: tuple[str, ...] = ()
     """What was mended on the way in, for people to read."""
 
@@ -87,20 +122,35 @@ class Polyhedron:
         object.__setattr__(self, "inertia", frozen(self.inertia, (3, 3), "inertia"))
 
     @classmethod
-    def from_mesh(cls, vertices: ArrayLike, triangles: ArrayLike, *, name: str = "object") -> Self:
+    def from_mesh(
+        cls,
+        vertices: ArrayLike,
+        triangles: ArrayLike,
+        *,
+        name: str = "object",
+        faces: FaceKind = "auto",
+        patches: PatchLimits | None = None,
+        center_of_mass: ArrayLike | None = None,
+    ) -> Self:
         """Build from a triangle mesh, with the checks and refusals of a mesh file.
 
         Args:
             vertices: (n, 3) [m].
             triangles: Vertex indices, (t, 3).
             name: What to call the object.
+            faces: As `load_polyhedron`.
+            patches: As `load_polyhedron`.
+            center_of_mass: As `load_polyhedron`.
 
         Raises:
             MeshError: The mesh is not a solid; its `reason` says why.
         """
         from grasp_core.mesh import polyhedron_from_mesh
 
-        return polyhedron_from_mesh(vertices, triangles, name=name, kind=cls)
+        return polyhedron_from_mesh(
+            vertices, triangles, name=name, faces=faces, patches=patches,
+            center_of_mass=center_of_mass, kind=cls,
+        )  # fmt: skip
 
     @property
     def radius(self) -> float:

@@ -60,7 +60,7 @@ class Planning:
     """Construction to try, may be repeated; the first three if not given. `free` looks for grasps
     of any type on the faces that they leave over, and proves for the others that there is none,
     or says that it is undecided."""
-    cones: Literal["normal", "tilted"] = "normal"
+    cones: Literal["normal", "tilted"] = "tilted"
     """Force cones to construct with: those around the normals as in the paper, or leaning ones too,
     which serve boxes, prisms and any friction."""
     limit: Count | None = None

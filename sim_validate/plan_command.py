@@ -5,7 +5,7 @@ from pathlib import Path
 
 from grasp_core.errors import InputError
 from grasp_core.mesh import FORMATS, load_polyhedron
-from grasp_core.planner import FAMILIES, plan
+from grasp_core.planner import METHODS, plan
 from grasp_core.plans import Plan
 from grasp_core.records import Moved, plan_to_json
 from grasp_core.values import Polyhedron
@@ -46,7 +46,7 @@ def plan_object(
         found = plan(
             body,
             planning.friction,
-            families=planning.family or FAMILIES,
+            families=planning.family or METHODS,
             cones=planning.cones,
             theta_deg=planning.theta_deg,
             limit=planning.limit,

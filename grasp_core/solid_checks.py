@@ -1,0 +1,124 @@
+"""Whether triangles bound one solid: welding, closure, winding, separate and overlapping parts."""
+
+import importlib
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.errors import MeshError, MeshRefusal
+from grasp_core.planar_faces import SIDES
+from grasp_core.solids import Solid, intersection_volume, union_volume
+
+WELD = 1e-8
+"""Vertices closer than this, relative to the extent, are one: single precision in a file
+keeps 6e-8, and equal numbers in a file are equal to the last bit."""
+THINNEST = 1e-9
+"""Least volume relative to the cube of the extent."""
+OVERLAP = 1e-6
+"""Shared volume of two parts, relative to the whole, that counts as overlap; parts that
+only touch share what rounding leaves."""
+
+
+def welded(points: Array, corners: Indices) -> tuple[Array, Indices, int]:
+    """Join vertices closer than WELD, drop unused ones and collapsed triangles."""
+    spatial: Any = importlib.import_module("scipy.spatial")
+    graph: Any = importlib.import_module("scipy.sparse")
+    used, corners = np.unique(corners, return_inverse=True)
+    points, corners = points[used], corners.reshape(-1, 3)
+    reach = WELD * float(np.ptp(points, axis=0).max())
+    pairs = spatial.cKDTree(points).query_pairs(reach, output_type="ndarray")
+    links = graph.coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
+    _, label = graph.csgraph.connected_components(links, directed=False)
+    _, first, order = np.unique(label, return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))
+    points, corners = points[np.sort(first)], rank[order][corners]
+    whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    return points, corners[whole], int((~whole).sum())
+
+
+def surface_fault(corners: Indices) -> MeshError | None:
+    """Why triangles are not a closed surface without junctions, wound to one side; None if so.
+
+    Each undirected edge must belong to two triangles that run along it both ways. Contradictory
+    sides come first: of the other faults, what is left of the surface can be sound.
+    """
+    tail, head = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    edges, where, uses = np.unique(
+        np.sort(np.column_stack([tail, head]), axis=1), axis=0, return_inverse=True,
+        return_counts=True,
+    )  # fmt: skip
+    forward = np.bincount(where.ravel(), weights=tail < head)
+    same_side = int(((uses == SIDES) & (forward != 1)).sum())
+    if same_side:
+        message = (
+            f"{same_side} edges have both triangles on the same side; wind all "
+            "triangles counter-clockwise seen from outside"
+        )
+        return MeshError(MeshRefusal.WINDING, message)
+    if (uses == 1).any():
+        message = f"{int((uses == 1).sum())} edges belong to one triangle only; close the surface"
+        return MeshError(MeshRefusal.OPEN, message)
+    if (uses != SIDES).any():
+        message = (
+            f"edge {edges[uses != SIDES][0].tolist()} belongs to {uses[uses != SIDES][0]} triangles"
+        )
+        return MeshError(MeshRefusal.NON_MANIFOLD, message)
+    return None
+
+
+def turned_out(points: Array, corners: Indices) -> tuple[Indices, bool]:
+    """The triangles of a surface, perhaps with holes, so wound that they enclose something.
+
+    Returns:
+        The triangles, (t, 3), and whether they were turned.
+
+    Raises:
+        MeshError: They enclose nothing to speak of.
+    """
+    extent = float(np.ptp(points, axis=0).max())
+    total = Solid(points, corners).volume
+    if abs(total) < THINNEST * extent**3:
+        message = f"the volume is {total:.3g} m^3; a solid must have one"
+        raise MeshError(MeshRefusal.ZERO_VOLUME, message)
+    return (corners[:, ::-1], True) if total < 0.0 else (corners, False)
+
+
+def oriented(points: Array, corners: Indices) -> tuple[Indices, bool]:
+    """The triangles with their outsides outside, and whether they were turned.
+
+    Raises:
+        MeshError: The mesh is flat, or its parts are separate, overlap or contradict each other.
+    """
+    corners, turned = turned_out(points, corners)
+    parts = _parts(points, corners)
+    bodies = [part for part in parts if part.volume > 0.0]
+    cavities = [Solid(part.vertices, part.triangles[:, ::-1]) for part in parts if part.volume <= 0]
+    slack = OVERLAP * Solid(points, corners).volume
+    if len(bodies) > 1 and sum(body.volume for body in bodies) - union_volume(bodies) > slack:
+        message = f"{len(bodies)} solids overlap; unite them into one surface first"
+        raise MeshError(MeshRefusal.OVERLAP, message)
+    if len(bodies) > 1:
+        message = f"{len(bodies)} separate solids; a grasp holds one, so give one solid a file"
+        raise MeshError(MeshRefusal.SEPARATE, message)
+    for cavity in cavities:
+        inside = sum(intersection_volume(body, cavity) for body in bodies)
+        if cavity.volume - inside > slack:
+            message = "one part is inside out and not a cavity of another; turn its triangles"
+            raise MeshError(MeshRefusal.WINDING, message)
+    return corners, turned
+
+
+def _parts(points: Array, corners: Indices) -> list[Solid]:
+    """The edge-connected parts of a mesh."""
+    graph: Any = importlib.import_module("scipy.sparse")
+    links = graph.coo_array(
+        (np.ones(corners.size), (corners.ravel(), np.roll(corners, 1, axis=1).ravel())),
+        shape=(len(points),) * 2,
+    )
+    count, label = graph.csgraph.connected_components(links, directed=False)
+    parts: list[Solid] = []
+    for part in range(count):
+        used, local = np.unique(corners[label[corners[:, 0]] == part], return_inverse=True)
+        parts.append(Solid(points[used], local.reshape(-1, 3)))
+    return parts

@@ -1,0 +1,98 @@
+"""Contacts on curved patches move from the plane they were planned on to the true surface.
+
+Solved: for a placement on the planes of patches, one with the same force cones on the triangles
+that the surface is made of over the contacts, each within the region of its finger.
+
+Why there is one. The planes were planned with friction cones that fit inside those of every
+triangle over them, and with contacts anywhere within `depth` of the planes, so the planned focus
+points can be aimed at from the surface too. The construction is run again on the triangles:
+what it returns has its contacts on the surface, and is certified with the true normals.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.face_pieces import FacePiece, FaceShape, piece_of
+from grasp_core.placements import Placement
+from grasp_core.polygons import clip, edge_rows
+from grasp_core.values import ContactRegion, ForceCone
+
+LEAST_FACET = 1e-5
+"""Triangles, or parts of them, without room for a disc of this radius (object size one) are left."""
+
+OnFacets = Callable[[tuple[FacePiece, ...]], Placement | None]
+
+
+def on_true_surface(
+    shapes: Sequence[FaceShape],
+    pieces: tuple[FacePiece, ...],
+    cones: Sequence[ForceCone],
+    planned: Placement,
+    regions: Sequence[ContactRegion],
+    place: OnFacets,
+) -> tuple[tuple[FacePiece, ...], Placement] | None:
+    """The same grasp with contacts on the surface, None if that fails.
+
+    Args:
+        shapes: Of the four faces, in finger order.
+        pieces: On which it is planned.
+        cones: The force cones.
+        planned: The placement on the planes; its radii and merit are kept.
+        regions: Of the fingers, in the pieces' units.
+        place: The construction, as a function of pieces.
+    """
+    if all(shape.facets is None for shape in shapes):
+        return pieces, planned
+    along = [np.array([piece.normal for piece in pieces]), np.array([c.axis for c in cones])]
+    for directions in along:
+        facets = [
+            _facet(shape, piece, at, direction, region)
+            for shape, piece, at, direction, region in zip(
+                shapes, pieces, planned.positions, directions, regions, strict=True
+            )
+        ]
+        if any(facet is None for facet in facets):
+            continue
+        chosen = tuple(facet for facet in facets if facet is not None)
+        if (found := place(chosen)) is not None:
+            return chosen, replace(found, radii=planned.radii, merit=planned.merit)
+    return None
+
+
+def _facet(
+    shape: FaceShape, piece: FacePiece, at: Array, along: Array, region: ContactRegion
+) -> FacePiece | None:
+    """The part of the surface's triangle on the line through a point that is over a region."""
+    if shape.facets is None:
+        return piece
+    triangle = _hit(shape.facets, at, along)
+    if triangle is None:
+        return None
+    cross = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
+    facet = piece_of(piece.face, cross / np.linalg.norm(cross), triangle)
+    E, b = piece.E, piece.b
+    if len(region.polygon) > 1:
+        E, b = edge_rows((region.polygon - piece.origin) @ piece.frame)
+    rows = E @ piece.frame.T
+    inside = clip(facet.corners, rows @ facet.frame, b - rows @ (facet.origin - piece.origin))
+    if len(inside) < 3:  # noqa: PLR2004 - not a polygon
+        return None
+    part = piece_of(piece.face, facet.normal, facet.origin + inside @ facet.frame.T)
+    return part if part.inradius > LEAST_FACET else None
+
+
+def _hit(triangles: Array, point: Array, along: Array) -> Array | None:
+    """The triangle that a line meets, nearest to the line's point, (3, 3)."""
+    edges = np.roll(triangles, -1, axis=1) - triangles
+    sides = np.cross(edges, point - triangles) @ along
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    met = np.flatnonzero((sides >= 0.0).all(axis=1) & (normals @ along > 0.0))
+    if not met.size:
+        return None
+    heights = np.einsum("fi,fi->f", triangles[met, 0] - point, normals[met]) / (
+        normals[met] @ along
+    )
+    return triangles[met[int(np.abs(heights).argmin())]]
