@@ -47,6 +47,11 @@ class Certified:
     placement: Placement
     margin: float
 
+    @property
+    def normals(self) -> Array:
+        """Inward normals at the contacts, (4, 3)."""
+        return np.array([piece.normal for piece in self.pieces])
+
 
 def named(letter: str, faces: FaceQuadruple) -> str:
     """The id of a grasp: the method's letter and the faces in finger order."""
@@ -140,7 +145,7 @@ def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:
     """The grasp in the object's frame, with its critical friction."""
     placement = found.placement
     positions = _at(body, placement.positions)
-    normals = np.array([piece.normal for piece in found.pieces])
+    normals = found.normals
     return Grasp(
         id=found.id,
         family=found.family,

@@ -151,8 +151,8 @@ def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES)
     return np.sin(psi) * cone.axis - np.cos(psi) * across
 
 
-def concurrent_radius_bounds(reaches: Array, half_angles: Array) -> Array:
-    """Upper bounds on the discs of quadruples.
+def concurrent_radius_bounds(reaches: Array, _: Array, half_angles: Array) -> Array:
+    """Upper bounds on the discs of quadruples, (..., 1).
 
     A disc needs r <= s_i tan(half_angle), s_i the distance along the axis between the planes
     across it through the focus and through the disc's centre: the two points of its border across
@@ -162,7 +162,8 @@ def concurrent_radius_bounds(reaches: Array, half_angles: Array) -> Array:
         reaches: Upper bounds of the mean distance along the axes, of any shape.
         half_angles: Likewise [rad].
     """
-    return reaches * np.tan(half_angles)
+    bounds: Array = reaches * np.tan(half_angles)
+    return bounds[..., None]
 
 
 def _rows(

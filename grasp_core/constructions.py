@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -41,9 +42,9 @@ class Construction:
     """Finger orders that give different grasps of the same faces."""
     place: Callable[[Sequence[FacePiece], Sequence[ForceCone], float], Placement | NoPlacement]
     """From pieces, force cones and the least merit worth having."""
-    bounds: Callable[[Array, Array], Array] | None
-    """Upper bounds on the radius from reaches and half-angles, see `concurrent_radius_bounds`;
-    None where no disc is claimed."""
+    bounds: Callable[[Array, Array, Array], Array] | None
+    """Upper bounds on the radius for each finger order, from reaches, widths and half-angles (see
+    `candidates`); None where no disc is claimed."""
     admits: Callable[[Array, Array], NDArray[np.bool_]]
     """Whether quadruples are worth a program, from their normals in finger order, (q, 4, 3), and
     half-angles (q,): False only where none can be feasible."""
@@ -99,7 +100,7 @@ CONSTRUCTIONS: dict[Family, Construction] = {
         lambda pieces, cones, least: place_pencil(
             pieces, cones, least=least, least_gap=LEAST_RADIUS
         ),
-        pencil_radius_bounds,
+        partial(pencil_radius_bounds, orders=PAIRINGS),
         _always_admitted,
         _disc_region,
     ),

@@ -64,7 +64,9 @@ def _cut(box: Array, middle: Array, segments: Array, stretch: Array, gap: float)
         limit = distances[nearest]
         row = away @ stretch
         length = float(np.linalg.norm(row))
-        polygon = clip(polygon, row[None] / length, [(limit + row @ middle) / length - gap])
+        polygon = clip(
+            polygon, row[None] / length, np.array([(limit + row @ middle) / length - gap])
+        )
         left = left[(left @ away < limit * (1.0 - 1e-12)).any(axis=1)]
     return polygon
 

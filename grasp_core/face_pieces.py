@@ -6,6 +6,7 @@ The programs work on these: their tolerances then mean the same for every object
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import TypeAlias
 
 import numpy as np
 
@@ -65,8 +66,12 @@ class FaceShape:
     """Of a curved patch: corners of the triangles over it, wound as the piece, (f, 3, 3)."""
 
 
+Shapes: TypeAlias = Sequence[FaceShape | None]
+"""The faces of an object as the programs see them; None for those without room."""
+
+
 def face_shapes(body: Polyhedron) -> tuple[FaceShape | None, ...]:
-    """The faces of an object as the programs see them; None for those without room."""
+    """The faces of an object as the programs see them."""
     by_face: list[list[FacePiece]] = [[] for _ in body.faces]
     for piece in unit_pieces(body):
         by_face[piece.face].append(piece)

@@ -14,21 +14,15 @@ from typing import TypeAlias
 
 import numpy as np
 
+from grasp_core.candidates import BELOW_SPAN_ANGLE, LEAST_SPAN_ANGLE, usable_half_angles
 from grasp_core.certified import Certified, certify, named
 from grasp_core.constructions import Construction, point_region, regions_of
 from grasp_core.errors import SolverError
-from grasp_core.face_pieces import FacePiece, FaceShape, choices_near
+from grasp_core.face_pieces import FacePiece, FaceShape, Shapes, choices_near
 from grasp_core.patch import RESTARTS, Absence, Undecided, place_free
 from grasp_core.placements import Placement
-from grasp_core.ranking import (
-    BELOW_SPAN_ANGLE,
-    LEAST_SPAN_ANGLE,
-    ConeChoice,
-    Quadruple,
-    Shapes,
-    usable_half_angles,
-)
-from grasp_core.search import MOST_CHOICES, Search, best_first, chosen_shapes, try_order
+from grasp_core.ranking import Attempt, ConeChoice
+from grasp_core.search import MOST_CHOICES, Search, best_first, chosen_shapes, tried
 from grasp_core.tilted_cones import widened
 from grasp_core.true_surface import on_true_surface
 from grasp_core.values import FINGERS, FaceQuadruple, ForceCone, four
@@ -83,9 +77,21 @@ def search_free(
         choices = iter(_cone_choices([each for each in placed if each], request))
         for each in placed:
             found = _certified(each, next(choices), request, search) if each else None
-            if found is not None:
-                search.keep(found)
-            yield [found] if found else []
+            yield [found] if found and search.keep(found) else []
+
+
+def search_undecided(
+    shapes: Shapes, request: FreeRequest, search: Search
+) -> Iterator[list[Certified]]:
+    """Go once more, with more cells, through the quadruples that were left undecided."""
+    for faces in tuple(search.undecided):
+        del search.undecided[faces]
+        search.tally["undecided"] -= 1
+        search.tally["tried"] -= 1
+        placed = _decide(shapes, faces, request, search, frozenset())
+        (choice,) = _cone_choices([placed] if placed else [], request) or [None]
+        found = _certified(placed, choice, request, search) if placed else None
+        yield [found] if found and search.keep(found) else []
 
 
 def _decide(
@@ -113,7 +119,9 @@ def _decide(
         search.absences[faces] = proofs
     else:
         search.tally["undecided"] += 1
-        search.undecided.append(faces)
+        search.undecided[faces] = max(
+            answer.open_share for _, answer in answers if isinstance(answer, Undecided)
+        )
     return None
 
 
@@ -145,7 +153,7 @@ def _answers(
         if isinstance(answers[-1][1], Placement):
             return answers
     if math.prod(len(shape.pieces) for shape in shapes) > most:
-        answers.append((hulls, Undecided(1)))
+        answers.append((hulls, Undecided(1, 1.0)))
     return answers
 
 
@@ -160,8 +168,7 @@ def _on_triangles(
     """Contacts on the triangles of curved patches; that patches hold none proves nothing."""
     if isinstance(answer, Placement):
         cones = [ForceCone(piece.normal, 0.0) for piece in pieces]
-        points = [point_region(piece, cone, answer, finger)
-                  for finger, (piece, cone) in enumerate(zip(pieces, cones, strict=True))]  # fmt: skip
+        points = regions_of(point_region, pieces, cones, answer)
         rng = np.random.default_rng([request.seed, *faces])
 
         def place(facets: Pieces) -> Placement | None:
@@ -172,7 +179,7 @@ def _on_triangles(
         if settled is not None:
             return _Placed(faces, *settled)
     search.tally["undecided"] += 1
-    search.undecided.append(faces)
+    search.undecided[faces] = 1.0
     return None
 
 
@@ -183,7 +190,7 @@ def _place(
     try:
         return place_free(pieces, math.tan(theta), rng=rng, cells=request.cells, restarts=restarts)
     except SolverError:
-        return Undecided(1)
+        return Undecided(1, 1.0)
 
 
 def _cone_choices(placed: Sequence[_Placed], request: FreeRequest) -> list[ConeChoice | None]:
@@ -222,12 +229,14 @@ def _certified(
 def _upgraded(placed: _Placed, choice: ConeChoice, request: FreeRequest) -> Certified | None:
     shapes = [FaceShape((piece,), piece) for piece in placed.pieces]
     for construction in request.upgrades:
-        quadruple = Quadruple(placed.faces, (choice,), construction.orders, spans=False)
+        attempts = [Attempt(order, (choice,)) for order in construction.orders]
         try:
             tries = [
-                try_order(construction, shapes, request.friction, quadruple, order, Counter[str]())
-                for order in construction.orders
-            ]
+                tried(
+                    construction, shapes, request.friction, placed.faces, attempt, Counter[str]()
+                )
+                for attempt in attempts
+            ]  # fmt: skip
         except SolverError:
             continue
         if found := [one for one in tries if one is not None]:

@@ -37,7 +37,7 @@ SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0
 DEFAULT_FLATNESS = FlatnessLimits()
 
 
-def load_polyhedron(  # noqa: PLR0913 - what a file does not say
+def load_polyhedron(
     path: str | Path,
     *,
     unit: str = "m",

@@ -1,4 +1,4 @@
-"""Whether a grasp from elsewhere belongs to an object: its contacts lie on the faces it names."""
+"""Where contacts are on an object: the face, and on curved patches the triangle, under each."""
 
 import numpy as np
 
@@ -14,31 +14,46 @@ def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
     """Refuse a grasp whose contacts are not on the faces it names.
 
     Raises:
-        InputError: A face does not exist, or a contact is off its plane or outside its border.
+        InputError: A face does not exist, or a contact is off its surface or outside its border.
     """
+    slack = ON_FACE * body.radius
     for finger, (face, contact) in enumerate(zip(grasp.faces, grasp.contacts, strict=True)):
         where = f"grasp {grasp.id}: contact {finger}"
         if not 0 <= face < len(body.faces):
             raise InputError(f"{where} names face {face}; there are 0..{len(body.faces) - 1}")
-        plane, slack = body.faces[face], ON_FACE * body.radius
-        off = abs(float(plane.normal @ (contact.position - plane.centroid)))
-        if off > slack or float(np.abs(contact.normal - plane.normal).max()) > ON_FACE:
+        if not _on_surface(body, body.faces[face], contact):
             raise InputError(f"{where} does not lie on face {face} with that face's normal")
+        plane = body.faces[face]
         if not any(within(contact.position, piece, plane.normal, slack) for piece in plane.pieces):
             raise InputError(f"{where} lies outside the border of face {face}")
 
 
 def face_under(body: Polyhedron, contact: Contact) -> Face | None:
-    """The face on which a contact lies, with that face's normal, if there is one."""
+    """The face on which a contact lies, with its surface's normal, if there is one."""
     slack = ON_FACE * body.radius
     for face in body.faces:
-        off = abs(float(face.normal @ (contact.position - face.centroid)))
-        turned = float(np.abs(contact.normal - face.normal).max())
-        if max(off / body.radius, turned) <= ON_FACE and any(
+        if _on_surface(body, face, contact) and any(
             within(contact.position, piece, face.normal, slack) for piece in face.pieces
         ):
             return face
     return None
+
+
+def _on_surface(body: Polyhedron, face: Face, contact: Contact) -> bool:
+    """Whether a contact is in the plane of a face, or on a triangle of a curved patch."""
+    slack = ON_FACE * body.radius
+    if not len(face.facets):
+        off = abs(float(face.normal @ (contact.position - face.centroid)))
+        return off <= slack and float(np.abs(contact.normal - face.normal).max()) <= ON_FACE
+    corners = body.vertices[body.triangles[face.facets][:, ::-1]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    heights = np.abs(np.einsum("fi,fi->f", normals, contact.position - corners[:, 0]))
+    turned = np.abs(normals - contact.normal).max(axis=1)
+    return any(
+        within(contact.position, corners[facet], normals[facet], slack)
+        for facet in np.flatnonzero((heights <= slack) & (turned <= ON_FACE))
+    )
 
 
 def within(point: Array, polygon: Array, normal: Array, slack: float) -> bool:

@@ -92,6 +92,8 @@ class Undecided:
     """Neither a grasp nor a proof of absence within the budget."""
 
     open_parts: int
+    open_share: float
+    """Of all choices of contacts, where each cut counts for half."""
 
 
 def place_free(
@@ -133,13 +135,17 @@ def place_free(
             found = _restarted(pieces, friction, rng, restarts)
         if found is not None:
             general = of_general_type(pieces, found, friction, rng)
-            return general or Undecided(len(waiting) + 1)
+            return general or Undecided(len(waiting) + 1, _share([*waiting, (0.0, path)]))
         margin = patch.margin if patch is not None else 0.0
         for half in (0, 1):
             heappush(waiting, (-margin, (*path, half)))
     if waiting:
-        return Undecided(len(waiting))
+        return Undecided(len(waiting), _share(waiting))
     return Absence(tuple(pieces), friction, tuple(leaves))
+
+
+def _share(waiting: Sequence[tuple[float, Path]]) -> float:
+    return sum(0.5 ** len(path) for _, path in waiting)
 
 
 def close_patch(

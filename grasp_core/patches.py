@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.convex_clearings import clearing, clearest_point
+from grasp_core.convex_clearings import clearest_point, clearing
 from grasp_core.planar_faces import triangle_neighbours
 from grasp_core.polygons import area_and_centroid, edge_rows, plane_frame
 from grasp_core.values import Face, PatchLimits

@@ -31,9 +31,11 @@ equilibrium. The order is safe in two cells, c_1 = x0 -+ k u, c_2 = x0 +- k u wi
 Each is a linear program in (x0, k, R, r_11..r_22, r). The paper's text leaves out the order:
 outside both cells extending L beyond e_1 and e_2 can magnify its offset without limit. The
 paper's program often ends there, and some of its regions then hold contacts out of equilibrium.
-Where the surface of a curved patch is up to eps off its plane, a contact is that much nearer to the
-borders of its cone and to P_i: s_ij sin(psi) >= R + kappa_ij r_ij + eps and R >= r_ij + eps, and the
-bound of cell B loses eps |n_ij.u|. As R >= r_ij is needed, the radii are at most depth times tan(theta / 2) when axis = normal.
+As R >= r_ij is needed, the radii are at most depth times tan(theta / 2) when axis = normal.
+
+Where the surface of a curved patch is up to eps off its plane, contacts are that much nearer to the
+borders of their cones and farther from P_i: s_ij sin(psi) >= R + kappa_ij r_ij + eps and
+R >= r_ij + eps, and the bound of cell B loses eps |n_ij.u|.
 
 Source: Sudsang & Ponce 1995, section 3.2; the order and the two cells are this project's.
 """
@@ -54,7 +56,7 @@ from grasp_core.placements import (
     balanced_forces,
     focus_direction,
 )
-from grasp_core.values import FINGERS, ForceCone
+from grasp_core.values import FINGERS, FaceQuadruple, ForceCone
 
 Cell: TypeAlias = tuple[float, float]
 CELL_A, CELL_B = (-1.0, 1.0), (1.0, -1.0)
@@ -95,8 +97,14 @@ def place_pencil(
     return best or NoPlacement(bound)
 
 
-def pencil_radius_bounds(reaches: Array, half_angles: Array) -> Array:
-    """Upper bounds on the discs of quadruples.
+def pencil_radius_bounds(
+    reaches: Array, widths: Array, half_angles: Array, orders: Sequence[FaceQuadruple]
+) -> Array:
+    """Upper bounds on the discs of quadruples, in several orders of the fingers, (..., orders).
+
+    R + kappa r <= s sin(psi) with R >= r and kappa >= cos(psi) leaves r <= s tan(psi / 2), for each
+    finger, and so for the mean of any. Two fingers of a pair share a focus, hence the mean of
+    their s is at most half of their width.
 
     With positive weights of sum lam a = 0 and distances s_ij of the foci along the axes,
     sum lam_ij s_ij = -sum lam_ij a_ij.q_ij - (c_2 - c_1).w. In cell A the last term only lowers it.
@@ -104,9 +112,15 @@ def pencil_radius_bounds(reaches: Array, half_angles: Array) -> Array:
 
     Args:
         reaches: Upper bounds of the mean distance of a focus along the axes, of any shape.
-        half_angles: Likewise [rad].
+        widths: Upper bounds of s_i + s_j for two fingers of one focus, (..., 4, 4).
+        half_angles: As `reaches` [rad].
+        orders: In finger order, pairs are the first two and the last two.
     """
-    return 2.0 * reaches * np.tan(half_angles / 2.0)
+    depths = [
+        np.minimum(2.0 * reaches, 0.5 * np.minimum(widths[..., i, j], widths[..., k, m]))
+        for i, j, k, m in orders
+    ]
+    return np.stack(depths, axis=-1) * np.tan(half_angles / 2.0)[..., None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

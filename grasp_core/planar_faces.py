@@ -23,7 +23,7 @@ from grasp_core.polygons import (
 from grasp_core.values import Face
 
 MAX_FACES = 200
-"""Objects with more planar faces are curved: 65 million quadruples, some 6 million of which span."""
+"""Objects with more count as curved: 65 million quadruples, some 6 million of which span."""
 SIDES = 2
 """Triangles at an edge of a closed surface."""
 

@@ -20,7 +20,7 @@ class MethodCounts:
     """What became of the candidates of one method.
 
     A candidate is a set of four faces; for pencils and reguli, with one of the three ways to pair
-    them. Tried candidates end as one of the last five.
+    them. Tried candidates end as one of the last six.
     """
 
     tried: int = 0
@@ -40,6 +40,8 @@ class MethodCounts:
     """Found again at the same contacts, with another pairing."""
     found: int = 0
     """Grasps whose witness is of its family and which exact force closure certified."""
+    unreachable: int = 0
+    """Certified grasps that the fingers asked for do not reach."""
     rejected: int = 0
     """Placements that the witness or the exact closure test did not confirm: a bug if not 0."""
 
@@ -54,6 +56,8 @@ class Outcomes:
     """It is proved that there is none, or a face has no room for a contact."""
     open: int
     """Neither: undecided by the free method, or not examined."""
+    out_of_reach: int = 0
+    """Certified contacts exist, but no fingers as asked for reached those that were found."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +92,10 @@ class Plan:
     """Face quadruples that the free method proved to hold no grasp with friction tan(theta), with
     a proof for their convex hulls, or for each choice of one convex piece per face. Pieces too
     small for a contact, a millionth of the object, are left out."""
-    undecided: tuple[FaceQuadruple, ...] = ()
-    """Face quadruples on which the free method found neither."""
+    undecided: Mapping[FaceQuadruple, float] = field(default_factory=dict[FaceQuadruple, float])
+    """Face quadruples on which the free method found neither, and the share of the choices of
+    contacts that is open, where each cut counts for half."""
+    unreached: Mapping[FaceQuadruple, str] = field(default_factory=dict[FaceQuadruple, str])
+    """Face quadruples with contacts that fingers do not reach, and why."""
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
     """Processor time of each method, from its first program to the last critical friction."""

@@ -23,6 +23,7 @@ from grasp_core.values import (
     Family,
     ForceCone,
     Grasp,
+    PatchLimits,
     Polyhedron,
     RegionKind,
     Witness,
@@ -48,6 +49,14 @@ class MeshRecord(_Record):
     triangles: list[tuple[int, int, int]]
 
 
+class PatchesRecord(_Record):
+    """How flat the patches of a curved surface are, and how many there may be."""
+
+    spread_deg: Finite
+    depth: Finite
+    most: int
+
+
 class ObjectRecord(_Record):
     """The object that was planned on."""
 
@@ -56,6 +65,8 @@ class ObjectRecord(_Record):
     content_sha256: str
     mesh: MeshRecord
     center_of_mass_m: Triple
+    patches: PatchesRecord | None = None
+    """None for exact planar faces."""
 
 
 class ContactRecord(_Record):
@@ -174,6 +185,7 @@ def plan_to_json(body: Polyhedron, plan: Plan, moves: Sequence[Moved] = ()) -> s
                 "triangles": body.triangles.tolist(),
             },
             "center_of_mass_m": body.center_of_mass.tolist(),
+            "patches": None if body.patches is None else asdict(body.patches),
         },
         "friction": plan.friction,
         "theta_deg": math.degrees(plan.theta),
@@ -245,12 +257,15 @@ def grasps_from_json(text: str) -> SavedGrasps:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "the document"
         raise InputError(f"grasps file: {where}: {first['msg']}") from error
-    mesh = record.object.mesh
+    mesh, patches = record.object.mesh, record.object.patches
     body = polyhedron_from_mesh(
         mesh.vertices_m,
         mesh.triangles,
         name=record.object.name,
         source_sha256=record.object.source_sha256,
+        faces="patches" if patches else "planar",
+        patches=PatchLimits(**patches.model_dump()) if patches else None,
+        center_of_mass=record.object.center_of_mass_m,
     )
     if body.content_sha256 != record.object.content_sha256:
         raise InputError("grasps file: object.content_sha256 does not match its mesh")

@@ -3,7 +3,7 @@
 import math
 from bisect import insort
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from functools import partial
@@ -12,15 +12,11 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.certified import Certified, certify, named
-from grasp_core.constructions import LEAST_RADIUS, Construction, FingerOrder, regions_of
-from grasp_core.face_pieces import FacePiece, FaceShape, choices_near
+from grasp_core.constructions import LEAST_RADIUS, Construction, regions_of
+from grasp_core.face_pieces import FacePiece, FaceShape, Shapes, choices_near
 from grasp_core.placements import Placement
 from grasp_core.plans import MethodCounts, Proof
-from grasp_core.ranking import (
-    Quadruple,
-    Ranking,
-    Shapes,
-)
+from grasp_core.ranking import Attempt, Ranking
 from grasp_core.spanning import cones_positively_span
 from grasp_core.true_surface import on_true_surface
 from grasp_core.values import (
@@ -46,8 +42,8 @@ class Search:
     """What one method has found so far."""
 
     limit: int | None
-    total: int
-    """Quadruples to go through."""
+    out_of_reach: Callable[[Certified], str]
+    """Why fingers do not get to the contacts of a grasp, nothing if they do."""
     best: list[Certified] = field(default_factory=list[Certified])
     """At most `limit` grasps, best first."""
     held: set[FaceQuadruple] = field(default_factory=set[FaceQuadruple])
@@ -56,7 +52,8 @@ class Search:
     absences: dict[FaceQuadruple, tuple[Proof, ...]] = field(
         default_factory=dict[FaceQuadruple, tuple[Proof, ...]]
     )
-    undecided: list[FaceQuadruple] = field(default_factory=list[FaceQuadruple])
+    undecided: dict[FaceQuadruple, float] = field(default_factory=dict[FaceQuadruple, float])
+    unreached: dict[FaceQuadruple, str] = field(default_factory=dict[FaceQuadruple, str])
     seconds: float = 0.0
 
     @property
@@ -76,13 +73,19 @@ class Search:
         worst = self.best[-1].placement.merit
         return construction.bounds is not None and room >= worst * (1.0 - SAME_MERIT)
 
-    def keep(self, found: Certified) -> None:
-        """Count a grasp and sort it in."""
+    def keep(self, found: Certified) -> bool:
+        """Count a grasp and, if fingers reach it, sort it in; whether they do."""
+        faces = four(sorted(found.faces))
+        if reason := self.out_of_reach(found):
+            self.tally["unreachable"] += 1
+            self.unreached[faces] = reason
+            return False
         self.tally["found"] += 1
-        self.held.add(four(sorted(found.faces)))
+        self.held.add(faces)
         insort(self.best, found, key=best_first)
         if self.limit is not None:
             del self.best[self.limit :]
+        return True
 
 
 def best_first(found: Certified) -> tuple[float, FaceQuadruple]:
@@ -110,20 +113,21 @@ def search_construction(
             search.tally["pruned"] += ranking.candidates_from(done)
             return
         if not quadruple.spans and quadruple.faces in held:
-            search.tally["pruned"] += len(quadruple.orders)
+            search.tally["pruned"] += len(quadruple.attempts)
             yield []
             continue
-        tries = [
-            try_order(
-                construction, chosen_shapes(shapes, quadruple.faces), friction, quadruple, order,
-                search.tally,
-            )
-            for order in quadruple.orders
-        ]  # fmt: skip
-        found = _without_duplicates([one for one in tries if one is not None], search.tally)
-        for one in found:
-            search.keep(one)
-        yield found
+        found: list[Certified] = []
+        for attempt in quadruple.attempts:
+            if not search.may_gain(construction, attempt.bound):
+                search.tally["pruned"] += 1
+                continue
+            one = tried(
+                construction, chosen_shapes(shapes, quadruple.faces), friction, quadruple.faces,
+                attempt, search.tally,
+            )  # fmt: skip
+            found += [one] if one else []
+        found = _without_duplicates(found, search.tally)
+        yield [one for one in found if search.keep(one)]
 
 
 def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]:
@@ -131,34 +135,34 @@ def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]
     return tuple(shape for face in faces if (shape := shapes[face]) is not None)
 
 
-def try_order(
+def tried(
     construction: Construction,
     shapes: Sequence[FaceShape],
     friction: float,
-    quadruple: Quadruple,
-    order: FingerOrder,
+    quadruple: FaceQuadruple,
+    attempt: Attempt,
     tally: Counter[str],
 ) -> Certified | None:
     """What a construction makes of four faces in one order of the fingers.
 
     Args:
         construction: Of one family.
-        shapes: Of the quadruple's faces, in its order.
+        shapes: Of the four faces.
         friction: Coulomb coefficient at every contact.
-        quadruple: With its choices of force cones.
-        order: Which of its faces each finger touches.
+        quadruple: The four faces.
+        attempt: Which of them each finger touches, and with which force cones.
         tally: Where to count.
     """
-    faces = four(quadruple.faces[finger] for finger in order)
-    ordered = [shapes[finger] for finger in order]
+    faces = four(quadruple[finger] for finger in attempt.order)
+    ordered = [shapes[finger] for finger in attempt.order]
     tally["tried"] += 1
     placed = None
-    for choice in quadruple.choices:
+    for choice in attempt.choices:
         least = LEAST_RADIUS if construction.bounds else -math.inf
         least = least if placed is None else placed[2].merit
         if choice.bound <= least:
             break
-        cones = four(choice.cones[finger] for finger in order)
+        cones = four(choice.cones[finger] for finger in attempt.order)
         placed = _best_placement(construction, cones, ordered, least, tally) or placed
     if placed is None:
         tally["infeasible"] += 1

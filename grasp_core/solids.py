@@ -10,6 +10,10 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
+from grasp_core.polygons import signed_area
+
+GRID = 4e-8
+"""Figures of size one are inset by so much more: the kernel rounds coordinates to 1e-8."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,6 +60,26 @@ def extrusion(outline: ArrayLike, height: float, holes: Sequence[ArrayLike] = ()
 def triangulate(loops: Sequence[Array]) -> Indices:
     """Triangles between an outer border and its holes, as indices into all corners in order."""
     return np.asarray(_kernel().triangulate([*loops]), dtype=np.int64)
+
+
+def inset_figure(loops: Sequence[Array], margin: float) -> list[list[Array]]:
+    """The parts of a plane figure that are at least a margin away from its border.
+
+    At corners that turn inwards somewhat more is cut off, so that what is left has few corners.
+
+    Args:
+        loops: Outer border and holes, each (k, 2).
+        margin: In the same unit.
+
+    Returns:
+        Outer border and holes of each part; nothing if the figure is too narrow.
+    """
+    kernel = _kernel()
+    size = float(np.ptp(np.vstack(loops), axis=0).max())
+    figure = kernel.CrossSection([loop / size for loop in loops], kernel.FillRule.EvenOdd)
+    inset = figure.offset(-(margin / size + GRID), kernel.JoinType.Miter)
+    parts = [[np.asarray(loop) * size for loop in part.to_polygons()] for part in inset.decompose()]
+    return [sorted(part, key=signed_area, reverse=True) for part in parts if part]
 
 
 def intersection_volume(one: Solid, two: Solid) -> float:

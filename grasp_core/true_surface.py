@@ -21,7 +21,7 @@ from grasp_core.polygons import clip, edge_rows
 from grasp_core.values import ContactRegion, ForceCone
 
 LEAST_FACET = 1e-5
-"""Triangles, or parts of them, without room for a disc of this radius (object size one) are left."""
+"""Parts of triangles without room for a disc of this radius (object size one) are left."""
 
 OnFacets = Callable[[tuple[FacePiece, ...]], Placement | None]
 
@@ -73,9 +73,8 @@ def _facet(
         return None
     cross = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
     facet = piece_of(piece.face, cross / np.linalg.norm(cross), triangle)
-    E, b = piece.E, piece.b
-    if len(region.polygon) > 1:
-        E, b = edge_rows((region.polygon - piece.origin) @ piece.frame)
+    claimed = (region.polygon - piece.origin) @ piece.frame
+    E, b = edge_rows(claimed) if len(claimed) > 1 else (piece.E, piece.b)
     rows = E @ piece.frame.T
     inside = clip(facet.corners, rows @ facet.frame, b - rows @ (facet.origin - piece.origin))
     if len(inside) < 3:  # noqa: PLR2004 - not a polygon

@@ -14,11 +14,11 @@ from typing import Literal
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
 from grasp_core.mesh import nearest_on_surface
-from grasp_core.on_faces import ON_FACE
-from grasp_core.values import Polyhedron
+from grasp_core.on_faces import ON_FACE, face_under
+from grasp_core.values import Contact, Polyhedron
 
 SMALLEST, LARGEST = 1e-9, 1e9
 """Settings outside are mistakes, in SI units."""
@@ -128,19 +128,40 @@ def _largest_apart(positions: Array, normals: Array) -> float:
 
 
 def _largest_clear(body: Polyhedron, positions: Array, normals: Array, start: float) -> Array:
-    """Radius of each fingertip, up to `start`, up to which it meets no other part, (k,).
+    """Radius of each fingertip, up to `start`, up to which it meets no other part, (k,)."""
+    return np.array(
+        [_clear_radius(body, *contact, start) for contact in zip(positions, normals, strict=True)]
+    )
 
-    Contacts may be a little below their own faces: positions in files are rounded.
+
+def _clear_radius(body: Polyhedron, position: Array, normal: Array, start: float) -> float:
+    """Radius of one fingertip, up to `start`, up to which it meets nothing beside its contact.
+
+    Contacts may be a little below their own faces: positions in files are rounded. The surface of
+    a curved patch does not count where it is touched: fingers are thought to touch its plane.
     """
-    slack = ON_FACE * body.radius
-    radii = np.full(len(positions), start)
-    for _ in range(MAX_SHRINKING):
-        centers = positions - radii[:, None] * normals
-        nearest = nearest_on_surface(body.vertices, body.triangles, centers)
-        inside = np.linalg.norm(nearest - centers, axis=1) < radii * (1.0 - TOUCHING) - slack
-        if not inside.any():
+    slack, radius = ON_FACE * body.radius, start
+    triangles = _triangles_near(body, position, normal, start)
+    for _ in range(MAX_SHRINKING if len(triangles) else 0):
+        center = position - radius * normal
+        nearest = nearest_on_surface(body.vertices, triangles, center[None])[0]
+        if np.linalg.norm(nearest - center) >= radius * (1.0 - TOUCHING) - slack:
             break
-        away = nearest[inside] - positions[inside]
-        height = -np.einsum("ki,ki->k", away, normals[inside])
-        radii[inside] = np.einsum("ki,ki->k", away, away) / (2.0 * height)
-    return radii
+        away = nearest - position
+        radius = float(away @ away) / (-2.0 * float(away @ normal))
+    return radius
+
+
+def _triangles_near(body: Polyhedron, position: Array, normal: Array, radius: float) -> Indices:
+    """Triangles that a fingertip up to a radius may meet, (t, 3): smaller ones are inside it."""
+    face = face_under(body, Contact(position, normal)) if body.patches else None
+    keep = np.ones(len(body.triangles), dtype=np.bool_)
+    if face is not None:
+        keep[face.facets] = False
+    triangles = body.triangles[keep]
+    corners = body.vertices[triangles]
+    middles = corners.mean(axis=1)
+    extents = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
+    return triangles[
+        np.linalg.norm(middles - position + radius * normal, axis=1) <= radius + extents
+    ]

@@ -22,6 +22,7 @@ from sim_validate.flags import (
     Count,
     Edges,
     Fingers,
+    Mesh,
     Planning,
     Positive,
     Seed,
@@ -142,8 +143,7 @@ class Inspect:
 
     object: Positional[str]
     """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
-    unit: Literal["m", "cm", "mm", "in"] = "m"
-    """What one unit in the file is."""
+    mesh: OmitArgPrefixes[Mesh] = Mesh()
     speech: OmitArgPrefixes[Speech] = Speech()
 
 

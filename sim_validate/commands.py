@@ -3,15 +3,17 @@
 import math
 import re
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
+from grasp_core.candidates import LEAST_SPAN_ANGLE
 from grasp_core.closure import force_closure
 from grasp_core.concurrent_grasps import PYRAMID_SIDES
 from grasp_core.critical import critical_friction
 from grasp_core.errors import InputError
-from grasp_core.planner import MAX_FACES, plan
-from grasp_core.ranking import LEAST_SPAN_ANGLE
+from grasp_core.planar_faces import MAX_FACES
+from grasp_core.planner import plan
 from grasp_core.records import SavedGrasps, grasps_from_json, plan_to_json
 from grasp_core.spanning import spanning_quadruples
 from grasp_core.versions import versions
@@ -106,7 +108,7 @@ def _scene(command: cli.Scene, reporter: Reporter) -> int:
 
 
 def _inspect(command: cli.Inspect, reporter: Reporter) -> int:
-    body = load_object(command.object, command.unit)
+    body = load_object(command.object, command.mesh)
     spanning = (
         len(spanning_quadruples(body.normals, LEAST_SPAN_ANGLE).indices)
         if len(body.faces) <= MAX_FACES
@@ -119,6 +121,9 @@ def _inspect(command: cli.Inspect, reporter: Reporter) -> int:
         "faces": len(body.faces),
         "faces_with_holes": sum(bool(face.holes) for face in body.faces),
         "non_convex_faces": sum(len(face.pieces) > 1 for face in body.faces),
+        "patches": None if body.patches is None else asdict(body.patches),
+        "largest_spread_deg": math.degrees(max((face.spread for face in body.faces), default=0.0)),
+        "largest_depth_m": max((face.depth for face in body.faces), default=0.0),
         "volume_m3": body.volume,
         "radius_m": body.radius,
         "center_of_mass_m": body.center_of_mass.tolist(),
@@ -136,7 +141,7 @@ def _short(value: Any) -> str:
         return f"{value:.6g}"
     if isinstance(value, list):
         return ", ".join(_short(item) for item in cast("list[Any]", value)) or "-"
-    return "not counted" if value is None else str(value)
+    return "-" if value is None else str(value)
 
 
 def _objects(_: cli.Objects, reporter: Reporter) -> int:

@@ -32,6 +32,7 @@ Wrench = Annotated[
     tuple[Finite, Finite, Finite, Finite, Finite, Finite],
     AfterValidator(_not_zero),
 ]
+Point = tuple[Finite, Finite, Finite]
 Direction = Annotated[tuple[Finite, Finite, Finite], AfterValidator(_not_zero)]
 RuleName = Literal["5cm-15deg", "contact-remains", "2cm", "3cm", "six-forces"]
 
@@ -49,37 +50,66 @@ class Speech:
 
 
 @dataclass(frozen=True)
+class Mesh:
+    """How a mesh file is to be read."""
+
+    unit: Literal["m", "cm", "mm", "in"] = "m"
+    """What one unit in a mesh file is."""
+    faces: Literal["auto", "planar", "patches"] = "auto"
+    """Exact planar faces, or nearly flat patches of a curved or scanned surface, which may have
+    holes; auto takes patches where there are more than 200 planar faces."""
+    patches: Annotated[int, Field(ge=4, le=200)] = 20
+    """So many patches at most, those with the largest discs."""
+    patch_spread_deg: Annotated[float, Field(gt=0.0, le=45.0)] = 10.0
+    """Largest angle between the surface and a patch's plane [deg]; friction loses it."""
+    patch_depth: Annotated[float, Field(gt=0.0, le=0.1)] = 0.01
+    """Largest distance of the surface from a patch's plane, relative to the object's extent."""
+    center_of_mass_m: Annotated[Point | None, arg(metavar="X Y Z")] = None
+    """In the file's frame, in metres; that of uniform density if not given, or of the convex hull
+    where the surface has holes."""
+
+
+@dataclass(frozen=True)
 class Planning:
     """What to plan."""
 
+    mesh: OmitArgPrefixes[Mesh] = Mesh()
     friction: Positive = 0.5
     """Coulomb coefficient at every contact."""
     theta_deg: Positive | None = None
     """Half-angle of the friction cones to plan with [deg]; the friction angle if not given."""
     family: UseAppendAction[tuple[Literal["concurrent", "pencil", "regulus", "free"], ...]] = ()
-    """Construction to try, may be repeated; the first three if not given. `free` looks for grasps
-    of any type on the faces that they leave over, and proves for the others that there is none,
-    or says that it is undecided."""
+    """Construction to try, may be repeated; all if not given. `free` looks for grasps of any type
+    on the faces that the others leave over, and proves for those without that there is none, or
+    says that it is undecided."""
     cones: Literal["normal", "tilted"] = "tilted"
     """Force cones to construct with: those around the normals as in the paper, or leaning ones too,
     which serve boxes, prisms and any friction."""
     limit: Count | None = None
-    """Keep at most this many grasps, the best of each family in turn; None for all."""
+    """Keep at most this many grasps, the best ones; None for all."""
+    rank_by: Literal["radius", "friction-margin", "ferrari-canny", "diverse"] = "radius"
+    """Which are the best: the largest discs, of each family in turn; the least critical friction;
+    the largest quality; or each next one the farthest from those before it."""
     cells: Count = 1
     """Into how many parts the free method may cut the four faces where it is undecided."""
+    complete: bool = False
+    """Cut the faces that stay undecided until each is decided."""
+    approach_m: Positive | None = None
+    """With --finger-radius-m: keep only grasps that fingers of that radius reach on straight free
+    lines of this length [m]."""
+    edge_clearance_m: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] = 0.0
+    """How far contacts and their regions stay from the edges of their faces [m]."""
     optimize: bool = False
     """Move the contacts of each grasp on their faces to raise its Ferrari-Canny quality."""
     finger_radius_m: Positive | None = None
-    """How far optimised contacts stay from edges [m], or half the radius of the largest disc in a
-    face if that is less. If not given, a twentieth of the object's radius, or as far as the planned
-    contact on that face."""
+    """Radius of the fingertips that --approach-m lets come [m], and with --optimize how far moved
+    contacts stay from edges, or half the radius of the largest disc in a face if that is less. If
+    not given, they stay a twentieth of the object's radius from edges, or as far as planned."""
     ceiling: Count | None = None
     """With --optimize: also prove an upper bound of the quality of all contacts on the same faces
     that are as clear of edges, cut into so many parts at most."""
     seed: Seed = 0
     """For everything random."""
-    unit: Literal["m", "cm", "mm", "in"] = "m"
-    """What one unit in a mesh file is."""
 
 
 @dataclass(frozen=True)

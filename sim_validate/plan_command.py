@@ -1,14 +1,18 @@
 """The command that plans: from an object to certified grasps, a file and tables."""
 
 import math
+import re
+from collections import Counter
 from pathlib import Path
 
 from grasp_core.errors import InputError
 from grasp_core.mesh import FORMATS, load_polyhedron
-from grasp_core.planner import METHODS, plan
+from grasp_core.planner import plan
 from grasp_core.plans import Plan
+from grasp_core.reach import Finger
 from grasp_core.records import Moved, plan_to_json
-from grasp_core.values import Polyhedron
+from grasp_core.requests import METHODS
+from grasp_core.values import FaceQuadruple, PatchLimits, Polyhedron
 from scenes.objects import example_object
 from sim_validate import cli, flags
 from sim_validate.console import TABLE_ROWS, Reporter
@@ -16,11 +20,18 @@ from sim_validate.files import write_text
 from sim_validate.improving import improved, show_gains
 
 
-def load_object(name: str, unit: str) -> Polyhedron:
+def load_object(name: str, mesh: flags.Mesh) -> Polyhedron:
     """A mesh file, or a built-in object when the name has no mesh ending."""
     path = Path(name)
     if path.suffix.lower().lstrip(".") in FORMATS or path.is_file():
-        return load_polyhedron(path, unit=unit)
+        limits = PatchLimits(mesh.patch_spread_deg, mesh.patch_depth, mesh.patches)
+        return load_polyhedron(
+            path,
+            unit=mesh.unit,
+            faces=mesh.faces,
+            patches=limits,
+            center_of_mass=mesh.center_of_mass_m,
+        )
     if path.suffix or len(path.parts) > 1:
         raise InputError(f"{name}: no such file, and the ending is none of {', '.join(FORMATS)}")
     return example_object(name)
@@ -36,9 +47,11 @@ def plan_object(
     """
     if planning.ceiling is not None and not planning.optimize:
         raise InputError("--ceiling bounds what --optimize may reach; give both or neither")
-    if planning.finger_radius_m is not None and not planning.optimize:
-        raise InputError("--finger-radius-m is where --optimize keeps contacts; give both or none")
-    body = load_object(name, planning.unit)
+    body = load_object(name, planning.mesh)
+    if planning.optimize and body.patches:
+        raise InputError(
+            f"{body.name} has a curved surface; --optimize is for exact planar faces only"
+        )
     for note in body.notes:
         reporter.warn(f"{body.name}: {note}")
     reporter.detail(f"{body.name}: mesh {body.content_sha256}, {len(body.triangles)} triangles")
@@ -50,8 +63,12 @@ def plan_object(
             cones=planning.cones,
             theta_deg=planning.theta_deg,
             limit=planning.limit,
+            rank_by=planning.rank_by,
             seed=planning.seed,
             cells=planning.cells,
+            complete=planning.complete,
+            finger=_finger(planning),
+            clearance=planning.edge_clearance_m,
             progress=lambda done, total, grasps: steps.update(done, total, f"({grasps} grasps)"),
         )
     if not (planning.optimize and found.grasps):
@@ -61,6 +78,19 @@ def plan_object(
         reporter=reporter,
     )  # fmt: skip
     return body, found, moves
+
+
+def _finger(planning: flags.Planning) -> Finger | None:
+    if planning.approach_m is None:
+        if planning.finger_radius_m is not None and not planning.optimize:
+            raise InputError(
+                "--finger-radius-m also needs --approach-m, the length of the free line on which "
+                "fingers come, or --optimize, which keeps contacts that far from edges"
+            )
+        return None
+    if planning.finger_radius_m is None:
+        raise InputError("--approach-m also needs --finger-radius-m, the radius of the fingertips")
+    return Finger(planning.finger_radius_m, planning.approach_m)
 
 
 def plan_file(command: cli.Plan, reporter: Reporter) -> int:
@@ -102,19 +132,28 @@ def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
     reporter.say(
         f"face quadruples: {known.held} with a certified grasp, {known.absent} proved to have "
         f"none, {known.open} not decided"
+        + (f", {known.out_of_reach} out of reach" if found.unreached else "")
     )
     for method, tally in counts.families.items():
         undecided = f"{tally.undecided} undecided, " if method == "free" else ""
+        undecided += f"{tally.unreachable} out of reach, " if found.unreached else ""
         reporter.say(
             f"{method}: {tally.tried} tried, {tally.pruned} pruned, {tally.infeasible} "
             f"infeasible, {undecided}{tally.duplicates} duplicates, {tally.found} found, "
             f"{tally.rejected} rejected, {found.seconds[method]:.2f} s"
         )
-
     if found.undecided:
-        named = ["-".join(str(face) for face in faces) for faces in found.undecided]
+        named = [f"{_listed(faces)} ({100.0 * share:.3g} % open)"
+                 for faces, share in found.undecided.items()]  # fmt: skip
         reporter.say(f"undecided faces: {', '.join(named[:TABLE_ROWS])}")
         say_cut(len(named), reporter)
+    reasons = Counter(re.sub(r"\d+", "N", why) for why in found.unreached.values())
+    for why, count in reasons.most_common():
+        reporter.say(f"out of reach: {why}, on {count} face quadruples")
+
+
+def _listed(faces: FaceQuadruple) -> str:
+    return "-".join(str(face) for face in faces)
 
 
 def say_cut(count: int, reporter: Reporter) -> None:

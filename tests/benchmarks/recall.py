@@ -17,7 +17,7 @@ import numpy as np
 import grasp_core as gc
 import scenes
 from grasp_core.errors import UndecidedError
-from grasp_core.planner import METHODS
+from grasp_core.requests import METHODS
 from sim_validate.engines import available_cores, each
 
 OBJECTS = (

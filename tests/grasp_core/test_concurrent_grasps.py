@@ -116,8 +116,9 @@ def test_no_placement_is_larger_than_its_bound_and_refusals_are_bounded():
             continue
         weights = balancing_weights(np.array([piece.normal for piece in quad]))
         depth = -sum(w * (p.normal @ p.origin) for w, p in zip(weights, quad, strict=True))
-        bound = concurrent_radius_bounds(np.array([depth]), np.array([cones[0].half_angle]))
-        assert placed.merit <= bound[0] + TOLERANCE
+        half_angle, no_widths = np.array([cones[0].half_angle]), np.full((1, 4, 4), np.inf)
+        bound = concurrent_radius_bounds(np.array([depth]), no_widths, half_angle)
+        assert placed.merit <= bound.item() + TOLERANCE
         assert placed.merit <= min(piece.inradius for piece in quad) + TOLERANCE
         tested += 1
     assert tested >= 50

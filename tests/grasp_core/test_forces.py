@@ -27,7 +27,7 @@ def cases(per_object=4):
     """Grasps with wrenches at 0.8 of what they resist at friction 0.5."""
     for name in ("wedge", "dodecahedron", "random-20-7", "screwdriver"):
         body = example_object(name)
-        for grasp in gc.plan(body, 0.5, limit=per_object).grasps:
+        for grasp in gc.plan(body, 0.5, limit=per_object, cones="normal").grasps:
             resisted = WrenchBody(
                 grasp.positions - body.center_of_mass, grasp.normals, np.full(4, 0.5), LIMITS[1]
             )

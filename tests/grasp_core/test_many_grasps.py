@@ -37,7 +37,7 @@ def test_a_thousand_grasps_of_each_family_are_closed_and_are_what_they_claim():
         wanted = [f for f in ("concurrent", "pencil", "regulus") if found[f] < 1000]
         if not wanted:
             break
-        plan = gc.plan(body, FRICTION, families=wanted)
+        plan = gc.plan(body, FRICTION, families=wanted, cones="normal")
         rejected += sum(counts.rejected for counts in plan.counts.families.values())
         for grasp in plan.grasps:
             x, n, f = grasp.witness.points, grasp.normals, grasp.witness.forces
@@ -62,7 +62,7 @@ def test_no_contacts_in_the_regions_of_two_hundred_grasps_lose_closure(family):
     grasps = points = 0
     for name in ("random-20-7", "icosahedron", "random-24-2", "random-16-1", "dodecahedron"):
         body = example_object(name)
-        planned = gc.plan(body, FRICTION, families=(family,), limit=240).grasps
+        planned = gc.plan(body, FRICTION, families=(family,), limit=240, cones="normal").grasps
         # with narrow cones, margins on the borders come near what the closure test can decide
         wide = [grasp for grasp in planned if grasp.force_cones[0].half_angle > 0.5 * THETA]
         for grasp in wide[:: max(1, len(wide) // 44)]:

@@ -5,6 +5,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.concurrent_grasps import place_concurrent
+from grasp_core.constructions import AS_LISTED
 from grasp_core.face_pieces import unit_pieces
 from grasp_core.pencil_grasps import CELL_A, CELL_B, pencil_radius_bounds, place_pencil
 from grasp_core.placements import Placement
@@ -169,8 +170,9 @@ def test_no_radius_exceeds_its_bound():
     for quad, cones, placed in pencils("random-30-1", math.radians(6.0), 150):
         weights = balancing_weights(np.array([piece.normal for piece in quad]))
         depth = -sum(w * (p.normal @ p.origin) for w, p in zip(weights, quad, strict=True))
-        bound = pencil_radius_bounds(np.array([depth]), np.array([cones[0].half_angle]))
-        assert placed.merit <= bound[0] + TOLERANCE
+        half_angle, no_widths = np.array([cones[0].half_angle]), np.full((1, 4, 4), np.inf)
+        bound = pencil_radius_bounds(np.array([depth]), no_widths, half_angle, AS_LISTED)
+        assert placed.merit <= bound.item() + TOLERANCE
         tested += 1
     assert tested >= 300
 

@@ -56,7 +56,7 @@ def test_the_weakest_wrench_is_weaker_than_axes_and_random_wrenches():
     tested = 0
     for name in ("wedge", "dodecahedron", "random-20-7"):
         body = example_object(name)
-        for grasp in gc.plan(body, 0.5, limit=4).grasps:
+        for grasp in gc.plan(body, 0.5, limit=4, cones="normal").grasps:
             scale = np.array([1.0] * 3 + [body.radius] * 3)
             resisted = WrenchBody(
                 grasp.positions - body.center_of_mass, grasp.normals, np.full(4, 0.5), 10.0

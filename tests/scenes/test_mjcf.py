@@ -17,7 +17,7 @@ OBJECTS = ("wedge", "icosahedron", "screwdriver")
 @pytest.fixture(params=OBJECTS, scope="module")
 def held(request):
     body = scenes.example_object(request.param)
-    grasp = gc.plan(body, 0.5, limit=1).grasps[0]
+    grasp = gc.plan(body, 0.5, limit=1, cones="normal").grasps[0]
     scene = scenes.build_scene(body, grasp, 0.5)
     return body, grasp, scene, mujoco.MjModel.from_xml_string(scene.xml)
 

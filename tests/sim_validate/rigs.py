@@ -15,9 +15,9 @@ from sim_validate.simulate import Bench
 MAX_FORCE = 10.0
 
 
-def grasps(name, friction, limit, families=("concurrent",)):
+def grasps(name, friction, limit, families=("concurrent",), cones="normal"):
     body = scenes.example_object(name)
-    return body, gc.plan(body, friction, limit=limit, families=families).grasps
+    return body, gc.plan(body, friction, limit=limit, families=families, cones=cones).grasps
 
 
 def rig_of(body, grasp, friction, setup=None, surface="pads"):

@@ -1,0 +1,200 @@
+"""Which face quadruples may hold grasps: their force cones, and what bounds their discs.
+
+Around the normals, as in the paper, each is planned at theta_plan = min(theta, just below its span
+angle theta*): the smaller cones lie inside the real ones, so what holds there holds at the friction
+asked for. Tilted cones are an alternative, and for most quadruples the only one.
+
+Reach. With positive weights w of sum w_i a_i = 0 for the axes, and contacts c_i on the faces,
+sum w_i a_i.(x0 - c_i) = -sum w_i a_i.c_i wherever the focus x0 is: the weighted mean of the
+distances along the axes is at most -sum w_i min a_i.c_i over the corners of each face, and for a
+focus behind the fingers at most sum w_i max a_i.c_i.
+
+Width. If two axes lead from one focus back to their contacts, c_i = x - s_i a_i and
+c_j = x - s_j a_j, then d = (a_i - a_j) / (1 - a_i.a_j) has d.a_i = 1 and d.a_j = -1, and so
+s_i + s_j = d.(c_j - c_i), which the corners of the two faces bound.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import combinations
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.constructions import LEAST_RADIUS
+from grasp_core.face_pieces import Shapes
+from grasp_core.spanning import balancing_weights, span_sines, spanning_quadruples
+from grasp_core.tilted_cones import tilted_cones
+from grasp_core.values import FINGERS, ForceCone, Polyhedron, four
+
+LEAST_SPAN_ANGLE = math.atan(LEAST_RADIUS)
+"""With narrower cones no disc at a depth of one object radius would count."""
+BELOW_SPAN_ANGLE = 0.999
+"""Share of theta* to plan with: P3 is strict."""
+INSIDE_FRICTION = 1.0 - 1e-6
+"""Share of the friction angle to plan with, so that equilibrium is not marginal."""
+BLOCK = 30
+"""Faces of the first block: 27,405 quadruples, whose cones are tilted in some seconds."""
+NORMAL, TILTED = 0, 1
+"""The two choices of force cones."""
+PARALLEL = 1e-6
+"""Axes whose 1 - a_i.a_j is below this bound no width."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """Quadruples of faces with two choices of force cones, and what bounds their grasps."""
+
+    faces: Indices
+    """(q, 4)"""
+    normals: Array
+    """(q, 4, 3)"""
+    axes: Array
+    """Of both choices, around the normals and tilted, (q, 2, 4, 3)."""
+    half_angles: Array
+    """(q, 2) [rad]; not positive where there is no such choice."""
+    reaches: Array
+    """Upper bounds on the mean distance of a focus from its contacts, (q, 2), in object radii."""
+    widths: Array
+    """Upper bounds on the distances of two contacts from a common focus, added, (q, 2, 4, 4)."""
+    rooms: Array
+    """Radius of the largest disc that fits in each of the four faces, (q,)."""
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+    @property
+    def spanning(self) -> int:
+        """How many have normals that span at the least angle (P3)."""
+        return int((self.half_angles[:, NORMAL] > LEAST_SPAN_ANGLE).sum())
+
+    def cones(self, place: int, kind: int) -> tuple[ForceCone, ForceCone, ForceCone, ForceCone]:
+        """One choice of force cones of one quadruple."""
+        half_angle = float(self.half_angles[place, kind])
+        return four(ForceCone(axis, half_angle) for axis in self.axes[place, kind])
+
+
+def candidate_blocks(
+    body: Polyhedron, shapes: Shapes, theta: float, *, tilted: bool
+) -> Iterator[tuple[float, Callable[[], Candidates]]]:
+    """The quadruples of an object in blocks, those of faces with more room first.
+
+    With each block comes the room of the first face that it adds: no disc of this block or a later
+    one is larger. The block itself is made on request.
+
+    Args:
+        body: The object.
+        shapes: Its faces.
+        theta: Half-angle of the friction cones to plan with [rad].
+        tilted: Whether force cones may lean; else they surround the normals.
+    """
+    rooms = np.array(
+        [max(piece.inradius for piece in shape.pieces) if shape else 0.0 for shape in shapes]
+    )
+    order = np.argsort(-rooms, kind="stable")
+    order = order[rooms[order] > 0.0]
+    if not tilted:
+        quads = spanning_quadruples(body.normals, LEAST_SPAN_ANGLE).indices
+        yield float(rooms.max()), partial(_candidates, body, quads, rooms, theta, tilted=False)
+        return
+    cuts = _block_ends(len(order))
+    for start, end in zip([0, *cuts], cuts, strict=False):
+        quads = _with_a_new_one(order, start, end)
+        room = float(rooms[order[max(start, FINGERS - 1)]]) if end >= FINGERS else 0.0
+        yield room, partial(_candidates, body, quads, rooms, theta, tilted=tilted)
+
+
+def _block_ends(count: int) -> list[int]:
+    """How many faces each block reaches to: about as many new quadruples in each."""
+    ends, size = [min(BLOCK, count)], math.comb(BLOCK, FINGERS)
+    while ends[-1] < count:
+        before = math.comb(ends[-1], FINGERS)
+        end = ends[-1] + 1
+        while end < count and math.comb(end + 1, FINGERS) - before <= size:
+            end += 1
+        ends.append(end)
+    return ends
+
+
+def _with_a_new_one(order: Indices, start: int, end: int) -> Indices:
+    """Quadruples of the first `end` faces that are not all among the first `start`, (q, 4)."""
+    listed = [
+        np.array([(*rest, new) for rest in combinations(range(new), FINGERS - 1)])
+        for new in range(max(start, FINGERS - 1), end)
+    ]
+    if not listed:
+        return np.empty((0, FINGERS), dtype=np.int64)
+    quads = np.sort(order[np.concatenate(listed)], axis=1)
+    return quads[np.lexsort(quads.T[::-1])]
+
+
+def usable_half_angles(theta: float, spreads: Array) -> Array:
+    """Half-angles that fit inside the friction cones wherever a curved patch leans to [rad].
+
+    Args:
+        theta: Half-angle of the friction cones to plan with [rad].
+        spreads: How far each patch leans from its plane [rad].
+
+    Returns:
+        Like `spreads`; a trifle, of no use to any construction, where nothing is left.
+    """
+    return np.maximum(INSIDE_FRICTION * theta - spreads, 0.5 * LEAST_SPAN_ANGLE)
+
+
+def _candidates(
+    body: Polyhedron, quads: Indices, rooms: Array, theta: float, *, tilted: bool
+) -> Candidates:
+    normals = body.normals[quads].reshape(-1, FINGERS, 3)
+    thetas = usable_half_angles(theta, np.array([face.spread for face in body.faces]))[quads]
+    spanned = BELOW_SPAN_ANGLE * np.arcsin(np.maximum(span_sines(normals), 0.0))
+    around = np.minimum(thetas.min(axis=1, initial=np.inf), spanned)
+    axes, half_angles = [normals, normals], [around, np.zeros(len(quads))]
+    if tilted:
+        leaning = tilted_cones(normals, thetas)
+        axes[TILTED] = leaning.axes
+        half_angles[TILTED] = BELOW_SPAN_ANGLE * leaning.half_angles
+    corners = _corners(body)[quads]
+    return Candidates(
+        faces=quads,
+        normals=normals,
+        axes=np.stack(axes, axis=1),
+        half_angles=np.stack(half_angles, axis=1),
+        reaches=np.stack([_reaches(corners, each) for each in axes], axis=1),
+        widths=np.stack([_widths(corners, each) for each in axes], axis=1),
+        rooms=rooms[quads].min(axis=1, initial=np.inf),
+    )
+
+
+def _corners(body: Polyhedron) -> Array:
+    """Corners of each face about the centre of mass over the radius, some repeated, (f, k, 3)."""
+    corners = [
+        (np.vstack([face.polygon, *face.holes]) - body.center_of_mass) / body.radius
+        for face in body.faces
+    ]
+    most = max(len(each) for each in corners)
+    return np.array([np.vstack([each, np.repeat(each[:1], most - len(each), axis=0)])
+                     for each in corners])  # fmt: skip
+
+
+def _reaches(corners: Array, axes: Array) -> Array:
+    """Upper bounds on the mean distance of a focus before or behind its contacts, (q,)."""
+    heights = np.einsum("qfki,qfi->qfk", corners, axes)
+    weights = balancing_weights(axes)
+    before = -np.einsum("qf,qf->q", weights, heights.min(axis=2, initial=np.inf))
+    behind = np.einsum("qf,qf->q", weights, heights.max(axis=2, initial=-np.inf))
+    return np.maximum(before, behind)
+
+
+def _widths(corners: Array, axes: Array) -> Array:
+    """Upper bounds on s_i + s_j for contacts i and j of one focus, (q, 4, 4)."""
+    widths = np.full((len(axes), FINGERS, FINGERS), np.inf)
+    for i, j in combinations(range(FINGERS), 2):
+        apart = axes[:, i] - axes[:, j]
+        low = np.einsum("qki,qi->qk", corners[:, i], apart).min(axis=1, initial=np.inf)
+        high = np.einsum("qki,qi->qk", corners[:, j], apart).max(axis=1, initial=-np.inf)
+        share = 0.5 * np.einsum("qi,qi->q", apart, apart)
+        bound = np.where(share > PARALLEL, (high - low) / np.maximum(share, PARALLEL), np.inf)
+        widths[:, i, j] = widths[:, j, i] = bound
+    return widths

@@ -1,0 +1,73 @@
+"""Which of the grasps found are kept, and in which order."""
+
+from collections.abc import Callable, Sequence
+from itertools import chain, zip_longest
+
+import numpy as np
+
+from grasp_core.certified import Certified
+from grasp_core.critical import critical_friction
+from grasp_core.errors import UndecidedError
+from grasp_core.quality import ferrari_canny
+from grasp_core.requests import PlanRequest
+from grasp_core.search import best_first
+
+
+def chosen(lists: Sequence[Sequence[Certified]], request: PlanRequest) -> list[Certified]:
+    """The grasps to return, best first.
+
+    By radius, families take turns: the best of each, then the second of each, and so on. By another
+    measure all grasps compete. `diverse` begins with the largest discs and goes on with the grasp
+    that is farthest from all before it.
+
+    Args:
+        lists: What each method found, best first.
+        request: How many are wanted, and what makes one better.
+    """
+    if request.rank_by == "radius":
+        turns = chain.from_iterable(zip_longest(*lists))
+        kept = {found.id for found in [one for one in turns if one is not None][: request.limit]}
+        every = [found for each in lists for found in each if found.id in kept]
+        return sorted(every, key=lambda found: -float(f"{found.placement.radii.min():.6g}"))
+    every = sorted(chain.from_iterable(lists), key=best_first)
+    if request.rank_by == "diverse":
+        return _far_apart(every, request.limit)
+    measure = _critical if request.rank_by == "friction-margin" else _weakness(request.friction)
+    return sorted(every, key=lambda found: float(f"{measure(found):.6g}"))[: request.limit]
+
+
+def _critical(found: Certified) -> float:
+    """Least friction at which the contacts are in force closure."""
+    try:
+        return critical_friction(found.placement.positions, found.normals)
+    except UndecidedError:
+        return np.inf
+
+
+def _weakness(friction: float) -> Callable[[Certified], float]:
+    """Minus the Ferrari-Canny quality."""
+
+    def measure(found: Certified) -> float:
+        contacts = found.placement.positions, found.normals
+        return -ferrari_canny(*contacts, friction, torque_scale=1.0).lower
+
+    return measure
+
+
+def _far_apart(every: Sequence[Certified], limit: int | None) -> list[Certified]:
+    """Each next one as far as possible from the nearest before it.
+
+    The distance of two grasps is the largest of a contact of one from the nearest of the other.
+    """
+    if not every:
+        return []
+    places = np.array([found.placement.positions for found in every])
+    nearest = np.full(len(every), np.inf)
+    kept = [0]
+    while len(kept) < min(len(every), limit or len(every)):
+        gaps = np.linalg.norm(places[:, :, None] - places[kept[-1]][None, None], axis=-1)
+        there = np.maximum(gaps.min(axis=1).max(axis=1), gaps.min(axis=2).max(axis=1))
+        nearest = np.minimum(nearest, there)
+        nearest[kept] = -np.inf
+        kept.append(int(np.round(nearest, 9).argmax()))
+    return [every[place] for place in kept]

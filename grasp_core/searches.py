@@ -1,0 +1,161 @@
+"""Runs each method over the face quadruples of one object, and adds up what they found."""
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from itertools import islice
+from typing import TypeAlias
+
+from grasp_core.candidates import Candidates, candidate_blocks
+from grasp_core.certified import Certified
+from grasp_core.clear_of_edges import clear_of_edges
+from grasp_core.constructions import CONSTRUCTIONS, Construction
+from grasp_core.face_pieces import face_shapes
+from grasp_core.free_search import FreeRequest, search_free, search_undecided
+from grasp_core.plans import Outcomes
+from grasp_core.ranking import ranked
+from grasp_core.reach import reach
+from grasp_core.requests import COMPLETE_CELLS, FAMILIES, METHODS, PlanRequest
+from grasp_core.search import Search, search_construction
+from grasp_core.values import FINGERS, FaceQuadruple, Family, Method, Polyhedron
+
+KEPT_BLOCKS = 8
+"""Blocks of quadruples that are made once for all families: some hundred megabytes."""
+Progress: TypeAlias = Callable[[int, int, int], None]
+"""Called with quadruples done, quadruples in all, and grasps found so far."""
+
+
+class Searches:
+    """One search per method over blocks of quadruples; the free method goes last."""
+
+    def __init__(self, body: Polyhedron, request: PlanRequest) -> None:
+        self.request = request
+        self.body = clear_of_edges(body, request.clearance) if request.clearance else body
+        self.shapes = face_shapes(self.body)
+        self.quadruples = math.comb(len(body.faces), FINGERS)
+        self.by_method: dict[Method, Search] = {
+            method: Search(request.searched, self._out_of_reach)
+            for method in METHODS
+            if method in request.families
+        }
+        tilted = request.cones == "tilted"
+        self.candidate_blocks = tuple(
+            candidate_blocks(self.body, self.shapes, request.theta, tilted=tilted)
+        )
+        self.made: dict[int, Candidates] = {}
+        self.spanning: dict[int, int] = {}
+
+    @property
+    def constructions(self) -> dict[Family, Search]:
+        """The searches of the paper's families."""
+        return {family: self.by_method[family] for family in FAMILIES if family in self.by_method}
+
+    @property
+    def held(self) -> set[FaceQuadruple]:
+        """Faces, ascending, on which some family has a grasp."""
+        return set[FaceQuadruple]().union(*(search.held for search in self.constructions.values()))
+
+    def run(self, progress: Progress | None) -> Iterator[Certified]:
+        """Yield each certified grasp, in the order of the search."""
+        total, found = len(self.by_method) * self.quadruples, 0
+        for done, grasps in self._steps():
+            found += len(grasps)
+            if progress is not None:
+                progress(done, total, found)
+            yield from grasps
+        if progress is not None:
+            progress(total, total, found)
+
+    def _steps(self) -> Iterator[tuple[int, list[Certified]]]:
+        """What each quadruple gives, and how many have been dealt with."""
+        for place, (method, search) in enumerate(self.constructions.items()):
+            construction, dealt_with = CONSTRUCTIONS[method], place * self.quadruples
+            search.limit = self._share(place)
+            for block in self._blocks(construction, search):
+                ranking = ranked(block, construction)
+                steps = search_construction(
+                    construction, self.shapes, self.request.friction, ranking, search, self.held
+                )
+                yield from enumerate(_timed(steps, search), start=dealt_with + 1)
+                dealt_with += len(block)
+        if "free" in self.by_method:
+            search = self.by_method["free"]
+            search.limit = self._left()
+            dealt_with = len(self.constructions) * self.quadruples
+            steps = search_free(self.shapes, self._free_request(), search, self.held)
+            yield from enumerate(_timed(steps, search), start=dealt_with + 1)
+            if self.request.complete:
+                request = self._free_request(COMPLETE_CELLS)
+                steps = search_undecided(self.shapes, request, search)
+                for found in _timed(steps, search):
+                    yield dealt_with + self.quadruples, found
+
+    def _left(self) -> int | None:
+        """How many grasps the constructions leave for the free method to find."""
+        if self.request.searched is None:
+            return None
+        found = sum(len(search.best) for search in self.constructions.values())
+        return max(self.request.searched - found, 0)
+
+    def _share(self, place: int) -> int | None:
+        """How many grasps of a construction can be kept, given what those before it found.
+
+        Families take turns. If only some of the earlier ones, with n_1, n_2, .. grasps, do not run
+        out, k of them, this one gets at most every (k + 1)-th of what the others leave.
+        """
+        limit = self.request.searched
+        if limit is None:
+            return None
+        found = sorted(len(search.best) for search in islice(self.by_method.values(), place))
+        left = [limit - sum(found[:short]) for short in range(place + 1)]
+        return max(each // (place - short + 1) for short, each in enumerate(left))
+
+    def _blocks(self, construction: Construction, search: Search) -> Iterator[Candidates]:
+        """Blocks of quadruples, as long as one may hold a grasp that is worth keeping."""
+        for place, (room, make) in enumerate(self.candidate_blocks):
+            if not search.may_gain(construction, room):
+                return
+            block = self.made.get(place) or make()
+            if place < KEPT_BLOCKS:
+                self.made[place] = block
+            self.spanning[place] = block.spanning
+            yield block
+
+    def _free_request(self, cells: int | None = None) -> FreeRequest:
+        request = self.request
+        structured = [CONSTRUCTIONS[method] for method in self.constructions]
+        upgrades = [each for each in structured if each.bounds and request.cones == "tilted"]
+        return FreeRequest(
+            request.friction, request.theta, request.seed, cells or request.cells, upgrades
+        )
+
+    def _out_of_reach(self, found: Certified) -> str:
+        """Why fingers do not get to the contacts; nothing if they do, or are not given."""
+        finger = self.request.finger
+        if finger is None:
+            return ""
+        positions = self.body.center_of_mass + self.body.radius * found.placement.positions
+        return reach(self.body, found.faces, positions, found.normals, finger).reason
+
+    def outcomes(self) -> Outcomes:
+        """What became of every four faces."""
+        searches = list(self.by_method.values())
+        held = set[FaceQuadruple]().union(*(search.held for search in searches))
+        absences = set[FaceQuadruple]().union(*(search.absences for search in searches))
+        unreached = set[FaceQuadruple]().union(*(search.unreached for search in searches))
+        roomy = sum(shape is not None for shape in self.shapes)
+        absent = len(absences) + self.quadruples - math.comb(roomy, FINGERS)
+        out_of_reach = len(unreached - held - absences)
+        undecided = self.quadruples - len(held) - absent - out_of_reach
+        return Outcomes(len(held), absent, undecided, out_of_reach)
+
+
+def _timed(steps: Iterator[list[Certified]], search: Search) -> Iterator[list[Certified]]:
+    """The same steps, their processor time added to the search."""
+    while True:
+        start = time.process_time()
+        step = next(steps, None)
+        search.seconds += time.process_time() - start
+        if step is None:
+            return
+        yield step
