@@ -16,7 +16,7 @@ prove that no other is.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import combinations, islice, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,33 +76,60 @@ def reach(
     for i, j in combinations(range(len(tips)), 2):
         if np.linalg.norm(tips[i] - tips[j]) < 2.0 * finger.radius_m - slack:
             return Reach(None, f"fingertips {i} and {j} overlap")
-    ways: list[list[Array]] = []
-    for place, (face, tip, normal) in enumerate(zip(faces, tips, normals, strict=True)):
-        near = _others(body, face, tip, finger)
-        if segment_distances(tip, tip, near).min(initial=np.inf) < finger.radius_m - slack:
+    surroundings = [_Surroundings.of(body, face) for face in faces]
+    for place, (others, tip) in enumerate(zip(surroundings, tips, strict=True)):
+        if others.distance(tip, tip, finger.radius_m) < finger.radius_m - slack:
             return Reach(None, f"fingertip {place} meets the object beside its contact")
+    free: list[list[Array]] = []
+    for most in (1, None):  # most fingers come along their normals
         free = [
-            way
-            for way in _directions(-normal)
-            if segment_distances(tip, tip + finger.approach_m * way, near).min(initial=np.inf)
-            >= finger.radius_m - slack
+            [
+                way
+                for way in islice(_directions(-normal), most)
+                if others.distance(tip, tip + finger.approach_m * way, finger.radius_m)
+                >= finger.radius_m - slack
+            ]
+            for others, tip, normal in zip(surroundings, tips, normals, strict=True)
         ]
-        if not free:
-            return Reach(None, f"finger {place} has no free line to its contact")
-        ways.append(free)
-    chosen = _apart(tips, ways, finger, slack)
-    return Reach(chosen) if chosen is not None else Reach(None, "the fingers' lines cross")
+        if all(free) and (chosen := _apart(tips, free, finger, slack)) is not None:
+            return Reach(chosen)
+    blocked = [place for place, ways in enumerate(free) if not ways]
+    if blocked:
+        return Reach(None, f"finger {blocked[0]} has no free line to its contact")
+    return Reach(None, "the fingers' lines cross")
 
 
-def _others(body: Polyhedron, face: int, tip: Array, finger: Finger) -> Array:
-    """Triangles that a finger may meet, those of the patch it touches left out, (t, 3, 3)."""
-    keep = np.ones(len(body.triangles), dtype=np.bool_)
-    keep[body.faces[face].facets] = False
-    corners = body.vertices[body.triangles[keep]]
-    middles = corners.mean(axis=1)
-    extents = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
-    farthest = finger.approach_m + finger.radius_m
-    return corners[np.linalg.norm(middles - tip, axis=1) <= farthest + extents]
+@dataclass(frozen=True, slots=True, eq=False)
+class _Surroundings:
+    """The triangles that a finger may meet, each in a ball."""
+
+    corners: Array
+    """(t, 3, 3)"""
+    middles: Array
+    """(t, 3)"""
+    extents: Array
+    """Radii of the balls, (t,)."""
+
+    @classmethod
+    def of(cls, body: Polyhedron, face: int) -> "_Surroundings":
+        """All triangles but those of the curved patch that is touched."""
+        keep = np.ones(len(body.triangles), dtype=np.bool_)
+        keep[body.faces[face].facets] = False
+        corners = body.vertices[body.triangles[keep]]
+        middles = corners.mean(axis=1)
+        extents = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
+        return cls(corners, middles, extents)
+
+    def distance(self, start: Array, end: Array, within: float) -> float:
+        """Distance of a segment from the nearest triangle, if less than `within`."""
+        along = end - start
+        squared = float(along @ along)
+        shares = np.clip((self.middles - start) @ along / squared, 0.0, 1.0) if squared else 0.0
+        away = self.middles - start - np.multiply.outer(shares, along)
+        near = np.einsum("ti,ti->t", away, away) <= (within + self.extents) ** 2
+        if not near.any():
+            return math.inf
+        return float(segment_distances(start, end, self.corners[near]).min())
 
 
 def _directions(outward: Array) -> Iterator[Array]:
