@@ -13,6 +13,7 @@ from grasp_core.concurrent_grasps import (
     concurrent_radius_bounds,
     cone_footprint,
     place_concurrent,
+    place_on_mixed_sides,
 )
 from grasp_core.face_pieces import FacePiece, inscribed_disc_radius
 from grasp_core.pencil_grasps import pencil_radius_bounds, place_pencil
@@ -84,6 +85,16 @@ def point_region(_: FacePiece, __: ForceCone, placed: Placement, finger: int) ->
     """Nothing but the contact."""
     return ContactRegion("point", placed.positions[finger][None], 0.0)
 
+
+MIXED = Construction(
+    "concurrent",
+    AS_LISTED,
+    lambda pieces, cones, least: place_on_mixed_sides(pieces, cones, least=least),
+    concurrent_radius_bounds,
+    _always_admitted,
+    _cone_region,
+)
+"""Concurrent grasps with the focus before some fingers and behind the others."""
 
 CONSTRUCTIONS: dict[Family, Construction] = {
     "concurrent": Construction(

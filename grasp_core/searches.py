@@ -9,7 +9,7 @@ from typing import TypeAlias
 from grasp_core.candidates import Candidates, candidate_blocks
 from grasp_core.certified import Certified
 from grasp_core.clear_of_edges import clear_of_edges
-from grasp_core.constructions import CONSTRUCTIONS, Construction
+from grasp_core.constructions import CONSTRUCTIONS, MIXED, Construction
 from grasp_core.face_pieces import face_shapes
 from grasp_core.free_search import FreeRequest, search_free, search_undecided
 from grasp_core.plans import Outcomes
@@ -125,6 +125,7 @@ class Searches:
         request = self.request
         structured = [CONSTRUCTIONS[method] for method in self.constructions]
         upgrades = [each for each in structured if each.bounds and request.cones == "tilted"]
+        upgrades += [MIXED for each in upgrades if each.family == MIXED.family]
         return FreeRequest(
             request.friction, request.theta, request.seed, cells or request.cells, upgrades
         )
