@@ -26,6 +26,7 @@ from grasp_core.quality import FerrariCanny as FerrariCanny
 from grasp_core.quality import ferrari_canny as ferrari_canny
 from grasp_core.quality_ceiling import QualityCeiling as QualityCeiling
 from grasp_core.quality_ceiling import quality_ceiling as quality_ceiling
+from grasp_core.reach import Finger as Finger
 from grasp_core.resisted_wrenches import WrenchLimit as WrenchLimit
 from grasp_core.resisted_wrenches import max_resisted_wrench as max_resisted_wrench
 from grasp_core.resisted_wrenches import wrench_limits as wrench_limits
@@ -36,5 +37,6 @@ from grasp_core.values import ContactRegion as ContactRegion
 from grasp_core.values import Face as Face
 from grasp_core.values import ForceCone as ForceCone
 from grasp_core.values import Grasp as Grasp
+from grasp_core.values import PatchLimits as PatchLimits
 from grasp_core.values import Polyhedron as Polyhedron
 from grasp_core.values import Witness as Witness

@@ -1,0 +1,142 @@
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from scipy.spatial import cKDTree
+
+import grasp_core as gc
+from grasp_core.reach import Finger, reach, segment_distances
+from scenes.objects import example_object
+from tests.grasp_core.curved import curved_body
+
+
+def nearest(start, end, triangle, rng):
+    """Distance by minimising over the segment and the triangle, from several starts."""
+
+    def gap(x):
+        on = triangle[0] + x[1] * (triangle[1] - triangle[0]) + x[2] * (triangle[2] - triangle[0])
+        return float(((start + x[0] * (end - start) - on) ** 2).sum())
+
+    rim = {"type": "ineq", "fun": lambda x: 1.0 - x[1] - x[2]}
+    found = [
+        minimize(gap, rng.random(3) / 2.0, bounds=[(0.0, 1.0)] * 3, constraints=rim, tol=1e-14).fun
+        for _ in range(6)
+    ]
+    return np.sqrt(max(min(found), 0.0))
+
+
+def test_distances_of_segments_from_triangles_are_the_least():
+    rng, crossing = np.random.default_rng(0), 0
+    for case in range(150):
+        start, end, triangle = rng.normal(size=3), rng.normal(size=3), rng.normal(size=(3, 3))
+        if case % 5 == 0:
+            end = start  # the ball before it moves
+        if case % 7 == 0:
+            triangle[2] = 0.5 * (triangle[0] + triangle[1])  # a sliver
+        found = segment_distances(start, end, triangle[None])[0]
+        assert found == pytest.approx(nearest(start, end, triangle, rng), abs=2e-6)
+        crossing += found == 0.0
+    assert crossing >= 5
+
+
+SAMPLES = 24
+"""Steps along each edge of a triangle."""
+
+
+def least_gap(body, grasp, finger, directions):
+    """Least room left between the rods and what they may meet, by sampling, and its accuracy."""
+    tips = grasp.positions - finger.radius_m * grasp.normals
+    shares = np.linspace(0.0, 1.0, 60)[:, None]
+    rods = [
+        tip + shares * finger.approach_m * way for tip, way in zip(tips, directions, strict=True)
+    ]
+    corners = body.vertices[body.triangles]
+    steps = [(i, j) for i in range(SAMPLES + 1) for j in range(SAMPLES + 1 - i)]
+    grid = np.array(steps)[None] / SAMPLES
+    points = (
+        corners[:, None, 0]
+        + grid[..., :1] * (corners[:, None, 1] - corners[:, None, 0])
+        + grid[..., 1:] * (corners[:, None, 2] - corners[:, None, 0])
+    ).reshape(-1, 3)
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
+    accuracy = longest / SAMPLES + finger.approach_m / 59.0
+    gap = np.inf
+    for i, rod in enumerate(rods):
+        gap = min(gap, cKDTree(points).query(rod)[0].min() - finger.radius_m)
+        for other in rods[:i]:
+            gap = min(gap, cKDTree(other).query(rod)[0].min() - 2.0 * finger.radius_m)
+    return gap, accuracy
+
+
+@pytest.mark.parametrize(("name", "thickness"), [("l-bracket", 0.06), ("hex-nut", 0.2)])
+def test_reached_contacts_have_free_rods_and_others_say_why(name, thickness):
+    body = example_object(name)
+    finger = Finger(thickness * body.radius, 0.8 * body.radius)
+    reached, reasons = 0, set()
+    plan = gc.plan(body, 0.5, limit=40, families="concurrent", cones="tilted")
+    for grasp in plan.grasps[:40]:
+        found = reach(body, grasp.faces, grasp.positions, grasp.normals, finger)
+        if found.directions is None:
+            reasons.add(found.reason)
+            gap, accuracy = least_gap(body, grasp, finger, -grasp.normals)
+            assert gap < accuracy
+        else:
+            np.testing.assert_allclose(np.linalg.norm(found.directions, axis=1), 1.0)
+            assert (np.einsum("ki,ki->k", found.directions, grasp.normals) < 0.0).all()
+            gap, _ = least_gap(body, grasp, finger, found.directions)
+            assert gap >= -2e-6 * body.radius
+            reached += 1
+    assert reached >= 10
+    assert reasons
+
+
+def test_nothing_too_large_gets_into_a_bore():
+    """The nut's bore: a ball wider than it never, one that fits only from a slanting line."""
+    body = example_object("hex-nut")
+    inner = [
+        index for index, face in enumerate(body.faces)
+        if face.normal @ (face.centroid - body.center_of_mass) > 0.0
+    ]  # fmt: skip
+    assert len(inner) >= 6
+    face = body.faces[inner[0]]
+    bore = float(np.linalg.norm((face.centroid - body.center_of_mass)[:2]))
+    contact = face.centroid[None], face.normal[None]
+    wide = reach(body, (inner[0],), *contact, Finger(1.01 * bore, body.radius))
+    assert wide.directions is None
+    assert "meets the object" in wide.reason
+    straight = reach(body, (inner[0],), *contact, Finger(0.3 * bore, 3.0 * bore))
+    if straight.directions is not None:
+        assert straight.directions[0] @ -face.normal < 0.99
+
+
+def test_a_plan_for_fingers_holds_only_grasps_that_they_reach():
+    body = example_object("l-bracket")
+    every = gc.plan(body, 0.5)
+    finger = Finger(0.1 * body.radius, body.radius)
+    some = gc.plan(body, 0.5, finger=finger)
+    assert 0 < len(some.grasps) < len(every.grasps)
+    for grasp in some.grasps:
+        assert (
+            reach(body, grasp.faces, grasp.positions, grasp.normals, finger).directions is not None
+        )
+    assert sum(counts.unreachable for counts in some.counts.families.values()) > 0
+    assert some.outcomes.out_of_reach == len(
+        set(some.unreached) - {tuple(sorted(grasp.faces)) for grasp in some.grasps}
+    )
+    known = some.outcomes
+    assert known.held + known.absent + known.open + known.out_of_reach == some.counts.quadruples
+    box = example_object("box")
+    nothing = gc.plan(box, 0.5, finger=Finger(5.0 * box.radius, box.radius))
+    assert not nothing.grasps
+    assert "fingers reach" in nothing.absence
+
+
+def test_the_patch_that_is_touched_is_not_in_the_way():
+    body = curved_body(noise=0.002)
+    plan = gc.plan(body, 0.5, limit=6, finger=Finger(0.1 * body.radius, body.radius))
+    assert len(plan.grasps) == 6
+
+
+@pytest.mark.parametrize("lengths", [(0.0, 0.1), (0.01, -1.0), (np.nan, 0.1)])
+def test_fingers_without_size_are_refused(lengths):
+    with pytest.raises(gc.InputError):
+        Finger(*lengths)
