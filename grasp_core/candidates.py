@@ -77,7 +77,7 @@ class Candidates:
 
 
 def candidate_blocks(
-    body: Polyhedron, shapes: Shapes, theta: float, *, tilted: bool
+    body: Polyhedron, shapes: Shapes, theta: float, whole: int, shared: Indices, *, tilted: bool
 ) -> Iterator[tuple[float, Callable[[], Candidates]]]:
     """The quadruples of an object in blocks, those of faces with more room first.
 
@@ -88,15 +88,17 @@ def candidate_blocks(
         body: The object.
         shapes: Its faces.
         theta: Half-angle of the friction cones to plan with [rad].
+        whole: How many of the faces count by themselves; the others are parts of them.
+        shared: Quadruples with such parts, (s, 4).
         tilted: Whether force cones may lean; else they surround the normals.
     """
     rooms = np.array(
         [max(piece.inradius for piece in shape.pieces) if shape else 0.0 for shape in shapes]
     )
-    order = np.argsort(-rooms, kind="stable")
+    order = np.argsort(-rooms[:whole], kind="stable")
     order = order[rooms[order] > 0.0]
     if not tilted:
-        quads = spanning_quadruples(body.normals, LEAST_SPAN_ANGLE).indices
+        quads = spanning_quadruples(body.normals[:whole], LEAST_SPAN_ANGLE).indices
         yield float(rooms.max()), partial(_candidates, body, quads, rooms, theta, tilted=False)
         return
     cuts = _block_ends(len(order))
@@ -104,6 +106,13 @@ def candidate_blocks(
         quads = _with_a_new_one(order, start, end)
         room = float(rooms[order[max(start, FINGERS - 1)]]) if end >= FINGERS else 0.0
         yield room, partial(_candidates, body, quads, rooms, theta, tilted=tilted)
+    for part in np.array_split(shared, math.ceil(len(shared) / math.comb(BLOCK, FINGERS)) or 1):
+        with_room = part[(rooms[part] > 0.0).all(axis=1)]
+        if len(with_room):
+            yield (
+                float(rooms.max()),
+                partial(_candidates, body, with_room, rooms, theta, tilted=tilted),
+            )
 
 
 def _block_ends(count: int) -> list[int]:

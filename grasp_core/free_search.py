@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
-from itertools import combinations, islice
+from itertools import islice
 from typing import TypeAlias
 
 import numpy as np
@@ -47,6 +47,8 @@ class FreeRequest:
     """Into how many parts the faces of one quadruple may be cut."""
     upgrades: Sequence[Construction]
     """Constructions to try with force cones around the forces of what is found."""
+    owners: Sequence[int]
+    """Of each face the one that it is, or is a half of."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,15 +66,17 @@ class _Placed:
 
 
 def search_free(
-    shapes: Shapes, request: FreeRequest, search: Search, held: AbstractSet[FaceQuadruple]
+    shapes: Shapes,
+    quadruples: Iterator[FaceQuadruple],
+    request: FreeRequest,
+    search: Search,
+    held: AbstractSet[FaceQuadruple],
 ) -> Iterator[list[Certified]]:
     """Go through the quadruples of faces that no family holds, until a limit is reached."""
-    quadruples, done = combinations(range(len(shapes)), FINGERS), 0
     while batch := list(islice(quadruples, BATCH)):
         if search.full:
-            search.tally["pruned"] += math.comb(len(shapes), FINGERS) - done
+            search.tally["pruned"] += len(batch) + sum(1 for _ in quadruples)
             return
-        done += len(batch)
         placed = [_decide(shapes, faces, request, search, held) for faces in batch]
         choices = iter(_cone_choices([each for each in placed if each], request))
         for each in placed:
@@ -113,6 +117,8 @@ def _decide(
         return _on_triangles(faces, chosen, pieces, last, request, search)
     if isinstance(last, Placement):
         return _Placed(faces, pieces, last)
+    if any(request.owners[face] != face for face in faces):
+        answers = [_whole(shapes, faces, request, search)]
     proofs = tuple(proof for _, proof in answers if isinstance(proof, Absence))
     if len(proofs) == len(answers):
         search.tally["infeasible"] += 1
@@ -123,6 +129,15 @@ def _decide(
             answer.open_share for _, answer in answers if isinstance(answer, Undecided)
         )
     return None
+
+
+def _whole(shapes: Shapes, faces: FaceQuadruple, request: FreeRequest, search: Search) -> Answer:
+    """Whether faces hold no grasp at all, where their halves were not proved to hold one."""
+    whole = four(request.owners[face] for face in faces)
+    hulls = tuple(shape.hull for shape in chosen_shapes(shapes, whole))
+    search.tally["solved"] += 1
+    answer = _place(hulls, request, np.random.default_rng([request.seed, *faces]), restarts=0)
+    return hulls, answer if isinstance(answer, Absence) else Undecided(1, 1.0)
 
 
 def _answers(

@@ -34,6 +34,7 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     complete: bool = False,
     finger: Finger | None = None,
     clearance: float = 0.0,
+    share_faces: float | None = None,
     progress: Progress | None = None,
 ) -> Plan:
     """Find the four-finger force-closure grasps of an object.
@@ -58,6 +59,8 @@ def plan(  # noqa: PLR0913 - the contract's keywords
         complete: Cut the faces that would stay undecided until each is decided.
         finger: Keep only grasps that such fingers reach on straight free lines.
         clearance: How far contacts and their regions stay from all edges of their faces [m].
+        share_faces: Let two fingers stand on one face, at least so far apart [m]; each face is cut
+            once for that, across its longest direction.
         progress: Called after each quadruple.
 
     Returns:
@@ -69,7 +72,7 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     """
     request = PlanRequest(
         friction, _listed(families), theta_deg, cones, limit, rank_by, seed, cells, complete,
-        finger, clearance,
+        finger, clearance, share_faces,
     )  # fmt: skip
     check_request(body, request)
     searches = Searches(body, request)
@@ -89,6 +92,7 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
     cells: int = 1,
     finger: Finger | None = None,
     clearance: float = 0.0,
+    share_faces: float | None = None,
 ) -> Iterator[Grasp]:
     """Like `plan`, but yields each grasp as soon as it is certified, in no particular order.
 
@@ -98,11 +102,11 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
     """
     request = PlanRequest(
         friction, _listed(families), theta_deg, cones, seed=seed, cells=cells, finger=finger,
-        clearance=clearance,
+        clearance=clearance, share_faces=share_faces,
     )  # fmt: skip
     check_request(body, request)
-    found = Searches(body, request).run(None)
-    return (to_grasp(body, friction, each) for each in found)
+    searches = Searches(body, request)
+    return (to_grasp(body, friction, searches.as_found(each)) for each in searches.run(None))
 
 
 def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
@@ -115,7 +119,7 @@ def _planned(body: Polyhedron, request: PlanRequest, searches: Searches) -> Plan
     owner = {id(found): search for search in searches.by_method.values() for found in search.best}
     for found in chosen([search.best for search in searches.by_method.values()], request):
         start = time.process_time()
-        grasps.append(to_grasp(body, request.friction, found))
+        grasps.append(to_grasp(body, request.friction, searches.as_found(found)))
         owner[id(found)].seconds += time.process_time() - start
     counts = PlanCounts(
         len(body.faces),
@@ -123,7 +127,7 @@ def _planned(body: Polyhedron, request: PlanRequest, searches: Searches) -> Plan
         sum(searches.spanning.values()),
         {method: search.counts for method, search in searches.by_method.items()},
     )
-    outcomes = searches.outcomes()
+    outcomes, whole = searches.outcomes(), searches.whole_faces
     every = searches.by_method.values()
     return Plan(
         grasps=tuple(grasps),
@@ -133,9 +137,9 @@ def _planned(body: Polyhedron, request: PlanRequest, searches: Searches) -> Plan
         counts=counts,
         outcomes=outcomes,
         absence=None if grasps else _absence(body.name, counts, outcomes, request.cones),
-        absences={faces: proofs for each in every for faces, proofs in each.absences.items()},
-        undecided={faces: share for each in every for faces, share in each.undecided.items()},
-        unreached={faces: why for each in every for faces, why in each.unreached.items()},
+        absences={whole(faces): proof for s in every for faces, proof in s.absences.items()},
+        undecided={whole(faces): share for s in every for faces, share in s.undecided.items()},
+        unreached={whole(faces): why for s in every for faces, why in s.unreached.items()},
         seconds={method: search.seconds for method, search in searches.by_method.items()},
     )
 

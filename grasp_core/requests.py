@@ -36,6 +36,7 @@ class PlanRequest:
     complete: bool = False
     finger: Finger | None = None
     clearance: float = 0.0
+    share_faces: float | None = None
 
     @property
     def theta(self) -> float:
@@ -68,6 +69,11 @@ def check_request(body: Polyhedron, request: PlanRequest) -> None:
         raise InputError(
             f"clearance must be from 0 to the object's radius of {body.radius:.4g} m, got "
             f"{request.clearance}"
+        )
+    if request.share_faces is not None and not 0.0 <= request.share_faces < 2.0 * body.radius:
+        raise InputError(
+            f"share_faces must be from 0 to the object's size of {2.0 * body.radius:.4g} m, got "
+            f"{request.share_faces}"
         )
     if len(body.faces) > MAX_FACES:
         raise InputError(

@@ -3,11 +3,12 @@
 import math
 import time
 from collections.abc import Callable, Iterator
-from itertools import islice
+from dataclasses import replace
+from itertools import combinations, islice
 from typing import TypeAlias
 
 from grasp_core.candidates import Candidates, candidate_blocks
-from grasp_core.certified import Certified
+from grasp_core.certified import Certified, named
 from grasp_core.clear_of_edges import clear_of_edges
 from grasp_core.constructions import CONSTRUCTIONS, MIXED, Construction
 from grasp_core.face_pieces import face_shapes
@@ -17,7 +18,8 @@ from grasp_core.ranking import ranked
 from grasp_core.reach import reach
 from grasp_core.requests import COMPLETE_CELLS, FAMILIES, METHODS, PlanRequest
 from grasp_core.search import Search, search_construction
-from grasp_core.values import FINGERS, FaceQuadruple, Family, Method, Polyhedron
+from grasp_core.shared_faces import shared_quadruples, with_halves
+from grasp_core.values import FINGERS, FaceQuadruple, Family, Method, Polyhedron, four
 
 KEPT_BLOCKS = 8
 """Blocks of quadruples that are made once for all families: some hundred megabytes."""
@@ -31,16 +33,23 @@ class Searches:
     def __init__(self, body: Polyhedron, request: PlanRequest) -> None:
         self.request = request
         self.body = clear_of_edges(body, request.clearance) if request.clearance else body
+        self.owners = tuple(range(len(body.faces)))
+        if request.share_faces is not None:
+            self.body, self.owners = with_halves(self.body, request.share_faces)
         self.shapes = face_shapes(self.body)
-        self.quadruples = math.comb(len(body.faces), FINGERS)
+        self.shared = shared_quadruples(self.owners)
+        self.quadruples = math.comb(len(body.faces), FINGERS) + len(self.shared)
         self.by_method: dict[Method, Search] = {
             method: Search(request.searched, self._out_of_reach)
             for method in METHODS
             if method in request.families
         }
         tilted = request.cones == "tilted"
+        whole = len(body.faces)
         self.candidate_blocks = tuple(
-            candidate_blocks(self.body, self.shapes, request.theta, tilted=tilted)
+            candidate_blocks(
+                self.body, self.shapes, request.theta, whole, self.shared, tilted=tilted
+            )
         )
         self.made: dict[int, Candidates] = {}
         self.spanning: dict[int, int] = {}
@@ -82,13 +91,20 @@ class Searches:
             search = self.by_method["free"]
             search.limit = self._left()
             dealt_with = len(self.constructions) * self.quadruples
-            steps = search_free(self.shapes, self._free_request(), search, self.held)
+            steps = search_free(self.shapes, self._every(), self._free_request(), search, self.held)
             yield from enumerate(_timed(steps, search), start=dealt_with + 1)
             if self.request.complete:
                 request = self._free_request(COMPLETE_CELLS)
                 steps = search_undecided(self.shapes, request, search)
                 for found in _timed(steps, search):
                     yield dealt_with + self.quadruples, found
+
+    def _every(self) -> Iterator[FaceQuadruple]:
+        """All quadruples of faces, those that share one last."""
+        whole = [index for index, owner in enumerate(self.owners) if index == owner]
+        yield from combinations(whole, FINGERS)
+        for faces in self.shared.tolist():
+            yield four(faces)
 
     def _left(self) -> int | None:
         """How many grasps the constructions leave for the free method to find."""
@@ -127,8 +143,9 @@ class Searches:
         upgrades = [each for each in structured if each.bounds and request.cones == "tilted"]
         upgrades += [MIXED for each in upgrades if each.family == MIXED.family]
         return FreeRequest(
-            request.friction, request.theta, request.seed, cells or request.cells, upgrades
-        )
+            request.friction, request.theta, request.seed, cells or request.cells, upgrades,
+            self.owners,
+        )  # fmt: skip
 
     def _out_of_reach(self, found: Certified) -> str:
         """Why fingers do not get to the contacts; nothing if they do, or are not given."""
@@ -138,14 +155,24 @@ class Searches:
         positions = self.body.center_of_mass + self.body.radius * found.placement.positions
         return reach(self.body, found.faces, positions, found.normals, finger).reason
 
+    def whole_faces(self, faces: FaceQuadruple) -> FaceQuadruple:
+        """The object's faces, where some may be halves."""
+        return four(self.owners[face] for face in faces)
+
+    def as_found(self, found: Certified) -> Certified:
+        """A grasp named by the object's faces."""
+        faces = self.whole_faces(found.faces)
+        return replace(found, faces=faces, id=named(found.id[0], faces))
+
     def outcomes(self) -> Outcomes:
         """What became of every four faces."""
         searches = list(self.by_method.values())
         held = set[FaceQuadruple]().union(*(search.held for search in searches))
         absences = set[FaceQuadruple]().union(*(search.absences for search in searches))
         unreached = set[FaceQuadruple]().union(*(search.unreached for search in searches))
-        roomy = sum(shape is not None for shape in self.shapes)
-        absent = len(absences) + self.quadruples - math.comb(roomy, FINGERS)
+        absent = len(absences) + sum(
+            any(self.shapes[face] is None for face in faces) for faces in self._every()
+        )
         out_of_reach = len(unreached - held - absences)
         undecided = self.quadruples - len(held) - absent - out_of_reach
         return Outcomes(len(held), absent, undecided, out_of_reach)

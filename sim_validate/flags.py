@@ -99,6 +99,8 @@ class Planning:
     lines of this length [m]."""
     edge_clearance_m: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] = 0.0
     """How far contacts and their regions stay from the edges of their faces [m]."""
+    share_faces_m: Annotated[float | None, Field(ge=0.0, allow_inf_nan=False)] = None
+    """Let two fingers stand on one face, at least so far apart [m]."""
     optimize: bool = False
     """Move the contacts of each grasp on their faces to raise its Ferrari-Canny quality."""
     finger_radius_m: Positive | None = None

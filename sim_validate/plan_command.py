@@ -69,6 +69,7 @@ def plan_object(
             complete=planning.complete,
             finger=_finger(planning),
             clearance=planning.edge_clearance_m,
+            share_faces=planning.share_faces_m,
             progress=lambda done, total, grasps: steps.update(done, total, f"({grasps} grasps)"),
         )
     if not (planning.optimize and found.grasps):

@@ -17,7 +17,7 @@ import numpy as np
 import grasp_core as gc
 import scenes
 from grasp_core.errors import UndecidedError
-from grasp_core.requests import METHODS
+from grasp_core.requests import FAMILIES
 from sim_validate.engines import available_cores, each
 
 OBJECTS = (
@@ -45,8 +45,8 @@ def examine(case):
     """Count what became of the face quadruples, and sample."""
     name, friction = case
     body = scenes.example_object(name)
-    paper = gc.plan(body, friction)
-    found = gc.plan(body, friction, families=METHODS, cones="tilted")
+    paper = gc.plan(body, friction, families=FAMILIES, cones="normal")
+    found = gc.plan(body, friction)
     held = {tuple(sorted(g.faces)) for g in found.grasps}
     regions = {tuple(sorted(g.faces)) for g in found.grasps if g.radius > 0.0}
     rng = np.random.default_rng(0)

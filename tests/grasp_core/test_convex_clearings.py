@@ -29,7 +29,7 @@ def test_no_segment_enters_a_clearing(stretch):
         assert (E @ start < b).all()
         shares = np.linspace(0.0, 1.0, 200)[:, None, None]
         points = (segments[:, 0] + shares * (segments[:, 1] - segments[:, 0])).reshape(-1, 2)
-        assert (E @ points.T > b[:, None]).any(axis=0).all()
+        assert (b[:, None] < E @ points.T).any(axis=0).all()
         assert signed_area(polygon) > 0.9 * np.pi * room**2
         made += 1
     assert made == 40

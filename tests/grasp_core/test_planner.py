@@ -329,7 +329,9 @@ def test_less_friction_leaves_more_faces_without_a_grasp():
 
 def test_radii_stay_below_the_bounds_that_prune():
     body, theta = example_object("random-12-1"), math.radians(8.0)
-    ((room, block),) = candidate_blocks(body, face_shapes(body), theta, tilted=True)
+    ((room, block),) = candidate_blocks(
+        body, face_shapes(body), theta, len(body.faces), np.empty((0, 4), dtype=int), tilted=True
+    )
     candidates, tested = block(), 0
     for family in DISCS:
         bounds = {q.faces: q.bound for q in ranked(candidates, CONSTRUCTIONS[family])}
