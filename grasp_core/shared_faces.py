@@ -61,7 +61,7 @@ def _halves(face: Face, apart: float) -> list[Face]:
     pieces = [(piece - face.centroid) @ frame for piece in face.pieces]
     if not pieces:
         return []
-    along = _longest(convex_hull(np.vstack(pieces)))
+    along = _longest((face.polygon - face.centroid) @ frame)
     heights = np.concatenate(pieces) @ along
     middle = 0.5 * float(heights.min() + heights.max())
     halves: list[Face] = []
@@ -82,8 +82,8 @@ def _halves(face: Face, apart: float) -> list[Face]:
     return halves if len(halves) == 2 else []  # noqa: PLR2004 - both or none
 
 
-def _longest(corners: Array) -> Array:
+def _longest(border: Array) -> Array:
     """Unit vector between the two corners that are farthest apart, (2,)."""
-    gaps = np.linalg.norm(corners[:, None] - corners[None], axis=2)
+    gaps = np.linalg.norm(border[:, None] - border[None], axis=2)
     i, j = np.argwhere(gaps >= SAME_LENGTH * gaps.max())[0]
-    return (corners[j] - corners[i]) / gaps[i, j]
+    return (border[j] - border[i]) / gaps[i, j]

@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 
@@ -40,9 +42,7 @@ def test_a_long_clearing_grows_long():
     ticks = np.linspace(-5.0, 5.0, 41)
     lanes = [np.column_stack([ticks, np.full(41, side)]) for side in (-0.5, 0.5)]
     ends = [np.array([[end, -0.5], [end, 0.5]]) for end in (-5.0, 5.0)]
-    segments = np.array(
-        [[a, b] for line in (*lanes, *ends) for a, b in zip(line, line[1:], strict=False)]
-    )
+    segments = np.array([[a, b] for line in (*lanes, *ends) for a, b in itertools.pairwise(line)])
     polygon = clearing(np.array([0.3, 0.1]), segments, GAP)
     assert signed_area(polygon) == pytest.approx(10.0, rel=1e-3)
 

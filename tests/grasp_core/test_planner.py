@@ -403,3 +403,40 @@ def test_tilted_cones_never_make_discs_smaller():
             tested += 1
     assert tested >= 30
     assert larger > 0.5 * tested
+
+
+def test_what_is_left_open_is_decided_when_asked_and_the_gap_is_said_before():
+    """Long faces on which whole patches balance though no contacts do, or only few."""
+    body = example_object("double-wedge-bar")
+    quick, complete = (gc.plan(body, 0.3, complete=whole) for whole in (False, True))
+    assert quick.outcomes.open == len(quick.undecided) == 8
+    assert all(0.0 < share <= 1.0 for share in quick.undecided.values())
+    assert complete.outcomes.open == len(complete.undecided) == 0
+    assert complete.counts.families["free"].undecided == 0
+    settled = set(complete.absences) - set(quick.absences)
+    settled |= {tuple(sorted(g.faces)) for g in complete.grasps} - {
+        tuple(sorted(g.faces)) for g in quick.grasps
+    }
+    assert settled == set(quick.undecided)
+    assert all(proof.verify() for faces in settled for proof in complete.absences.get(faces, ()))
+
+
+def test_a_focus_before_some_fingers_and_behind_others_gives_regions_where_nothing_else_does():
+    body, mixed = example_object("l-bracket"), 0
+    for grasp in gc.plan(body, 0.5).grasps:
+        if grasp.family != "concurrent":
+            continue
+        heights = np.einsum(
+            "ki,ki->k", grasp.focus_points[0] - grasp.positions,
+            np.array([cone.axis for cone in grasp.force_cones]),
+        )  # fmt: skip
+        if heights.min() < 0.0 < heights.max():
+            rng = np.random.default_rng(0)
+            for _ in range(20):
+                points = [
+                    rng.dirichlet(np.full(len(region.polygon), 0.3)) @ region.polygon
+                    for region in grasp.regions
+                ]
+                assert gc.force_closure(np.array(points), grasp.normals, 0.5).closed
+            mixed += 1
+    assert mixed >= 4
