@@ -18,6 +18,8 @@ from grasp_core.values import Polyhedron
 THINNEST = 1e-6
 """Pieces without room for a disc of this radius (object size one) hold no contact."""
 
+SAME_PLACE = 6
+"""Distances equal to so many digits (object size one) are ties, broken by the pieces' order."""
 LARGEST_INSET = 0.5
 """Most that edges are kept clear of, in radii of the piece's largest disc."""
 
@@ -108,7 +110,7 @@ def choices_near(
         most: At most so many.
     """
     ranked = [
-        sorted(shape.pieces, key=lambda piece, at=at: _outside(piece, at))[:most]
+        sorted(shape.pieces, key=lambda piece, at=at: round(_outside(piece, at), SAME_PLACE))[:most]
         for shape, at in zip(shapes, positions, strict=True)
     ]
     every = product(*(range(len(each)) for each in ranked))

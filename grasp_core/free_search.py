@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, product
 from typing import TypeAlias
 
 import numpy as np
@@ -23,7 +23,7 @@ from grasp_core.patch import RESTARTS, Absence, Undecided, place_free
 from grasp_core.placements import Placement
 from grasp_core.ranking import Attempt, ConeChoice
 from grasp_core.search import MOST_CHOICES, Search, best_first, chosen_shapes, tried
-from grasp_core.tilted_cones import widened
+from grasp_core.tilted_cones import toward, widened
 from grasp_core.true_surface import on_true_surface
 from grasp_core.values import FINGERS, FaceQuadruple, ForceCone, four
 
@@ -93,8 +93,10 @@ def search_undecided(
         search.tally["undecided"] -= 1
         search.tally["tried"] -= 1
         placed = _decide(shapes, faces, request, search, frozenset())
-        (choice,) = _cone_choices([placed] if placed else [], request) or [None]
-        found = _certified(placed, choice, request, search) if placed else None
+        found = None
+        if placed is not None:
+            (choices,) = _cone_choices([placed], request)
+            found = _certified(placed, choices, request, search)
         yield [found] if found and search.keep(found) else []
 
 
@@ -208,29 +210,40 @@ def _place(
         return Undecided(1, 1.0)
 
 
-def _cone_choices(placed: Sequence[_Placed], request: FreeRequest) -> list[ConeChoice | None]:
-    """Tilted force cones around the forces of placements, None where they are too narrow."""
+def _cone_choices(placed: Sequence[_Placed], request: FreeRequest) -> list[tuple[ConeChoice, ...]]:
+    """Tilted force cones for placements: towards foci in the middle, or around their forces."""
     if not (placed and request.upgrades):
-        return [None] * len(placed)
-    forces = np.array([each.placement.forces for each in placed])
+        return [()] * len(placed)
     normals = np.array([each.normals for each in placed])
     spreads = np.array([[piece.spread for piece in each.pieces] for each in placed])
     thetas = usable_half_angles(request.theta, spreads)
-    found = widened(forces, normals, thetas)
+    middles = np.array(
+        [[piece.point(piece.corners.mean(axis=0)) for piece in each.pieces] for each in placed]
+    )
+    placements = [each.placement for each in placed]
+    forces = np.array([p.forces if p.planned is None else p.planned for p in placements])
+    kinds = (
+        toward(middles.mean(axis=1), middles, normals, thetas),
+        toward(np.zeros((len(placed), 3)), middles, normals, thetas),
+        widened(forces, normals, thetas),
+    )
     return [
-        ConeChoice(four(ForceCone(axis, angle) for axis in axes), math.inf)
-        if (angle := BELOW_SPAN_ANGLE * float(reached)) > LEAST_SPAN_ANGLE
-        else None
-        for axes, reached in zip(found.axes, found.half_angles, strict=True)
+        tuple(
+            ConeChoice(four(ForceCone(axis, angle) for axis in kind.axes[place]), math.inf)
+            for kind in kinds
+            if (angle := BELOW_SPAN_ANGLE * float(kind.half_angles[place])) > LEAST_SPAN_ANGLE
+        )
+        for place in range(len(placed))
     ]
 
 
 def _certified(
-    placed: _Placed, choice: ConeChoice | None, request: FreeRequest, search: Search
+    placed: _Placed, choices: tuple[ConeChoice, ...], request: FreeRequest, search: Search
 ) -> Certified | None:
     """The grasp, with regions if a construction offers them."""
-    if choice and (better := _upgraded(placed, choice, request)):
-        return better
+    for construction, choice in product(request.upgrades, choices):
+        if better := _upgraded(placed, construction, choice, request.friction):
+            return better
     cones = four(ForceCone(piece.normal, request.theta) for piece in placed.pieces)
     certified = certify(
         named("f", placed.faces), placed.faces, "regulus", placed.pieces, cones, placed.placement,
@@ -241,19 +254,17 @@ def _certified(
     return certified
 
 
-def _upgraded(placed: _Placed, choice: ConeChoice, request: FreeRequest) -> Certified | None:
+def _upgraded(
+    placed: _Placed, construction: Construction, choice: ConeChoice, friction: float
+) -> Certified | None:
+    """The best of what a construction offers on the same pieces."""
     shapes = [FaceShape((piece,), piece) for piece in placed.pieces]
-    for construction in request.upgrades:
-        attempts = [Attempt(order, (choice,)) for order in construction.orders]
-        try:
-            tries = [
-                tried(
-                    construction, shapes, request.friction, placed.faces, attempt, Counter[str]()
-                )
-                for attempt in attempts
-            ]  # fmt: skip
-        except SolverError:
-            continue
-        if found := [one for one in tries if one is not None]:
-            return min(found, key=best_first)
-    return None
+    attempts = [Attempt(order, (choice,)) for order in construction.orders]
+    try:
+        tries = [
+            tried(construction, shapes, friction, placed.faces, attempt, Counter[str]())
+            for attempt in attempts
+        ]
+    except SolverError:
+        return None
+    return min((one for one in tries if one is not None), key=best_first, default=None)

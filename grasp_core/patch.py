@@ -9,14 +9,14 @@ the faces were in force closure, the patch would be too. A separating twist of t
 therefore a proof of absence; by convexity of the supports it separates every grasp on these
 faces.
 
-If the patch is closed, add its forces face by face. The sums F_i lie inside the cones and
+If the patch is closed, take the smallest forces that show it and add them face by face. The sums F_i lie inside the cones and
 balance as forces. With these forces fixed, equilibrium is linear in the positions
 x_i = o_i + T_i y_i:
 
     maximise t  subject to  sum_i (o_i + T_i y_i) x F_i = 0,    e.y_i + t <= b for all edges.
 
-Any solution inside the faces, unless all on one line, is in force closure, as far from the
-edges as these forces allow.
+Any solution inside the faces, unless all on one line, is in force closure. Of those nearly as far
+from the edges as these forces allow, the one nearest to the middles of the faces is taken.
 If there is none, the centres of pressure of the patch are tried as contacts, then patches of
 smaller random pieces of the faces, which give other forces. What is still open can be split:
 each face quadruple is cut through its longest face, parts are dropped with their proof of
@@ -48,8 +48,10 @@ from grasp_core.face_parts import (
     random_parts,
 )
 from grasp_core.face_pieces import FacePiece
+from grasp_core.least_distance import least_distance
 from grasp_core.lines import classify_lines
 from grasp_core.lp import LinearProgram, Optimum, maximize
+from grasp_core.patch_forces import smallest_forces
 from grasp_core.placements import Placement
 from grasp_core.values import FINGERS
 from grasp_core.wrenches import cross_matrix, grasp_map, normal_and_tangential
@@ -58,6 +60,14 @@ RESTARTS = 12
 """Smaller random patches that are tried, unless told otherwise."""
 LEAST_INSET = 1e-4
 """Least distance of a contact from the edges of its face, in object radii."""
+DEPTH_KEPT = 0.5
+"""Share of the patch's margin that its forces keep inside their cones."""
+ROUNDED = 1e-12
+"""Least weight of a corner."""
+INSET_KEPT = 0.9
+"""Share of the largest distance from the edges that contacts keep when they move to the middles."""
+SAME_PLANE = 1e-6
+"""Smaller moments, relative to the largest, are those of forces in a plane, but for rounding."""
 LEAST_SPREAD = 1e-3
 """Least extent of the contacts across the line they are closest to, in object radii."""
 
@@ -184,11 +194,31 @@ def place_by_forces(pieces: Sequence[FacePiece], forces: Array) -> Placement | N
     )
     if not isinstance(found, Optimum) or found.value < LEAST_INSET:
         return None
-    y = found.x[:-1].reshape(FINGERS, 2)
-    positions = np.array([piece.point(at) for piece, at in zip(pieces, y, strict=True)])
+    inset = INSET_KEPT * found.value
+    y = _nearest_to_middles(
+        pieces, found.x[:-1], A_eq[:, :-1], np.vstack(rows)[:, :-1], np.hstack(limits) - inset
+    )
+    positions = np.array(
+        [piece.point(at) for piece, at in zip(pieces, y.reshape(FINGERS, 2), strict=True)]
+    )
     if _on_one_line(positions):
         return None
-    return Placement(positions, forces, np.empty((0, 3)), np.zeros(FINGERS), found.value)
+    return Placement(positions, forces, np.empty((0, 3)), np.zeros(FINGERS), inset)
+
+
+def _nearest_to_middles(
+    pieces: Sequence[FacePiece], start: Array, A_eq: Array, rows: Array, limits: Array
+) -> Array:
+    """Of all balanced contacts with rows @ y <= limits those nearest to the pieces' middles, (8,).
+
+    They are unique, unlike those farthest from the edges: an object that is turned keeps them.
+    """
+    _, sizes, right = np.linalg.svd(A_eq)
+    free = right[int((sizes > SAME_PLANE * sizes[0]).sum()) :].T
+    middles = np.concatenate([piece.corners.mean(axis=0) for piece in pieces])
+    y = start + free @ (free.T @ (middles - start))
+    (step,) = least_distance(rows @ free, (limits - rows @ y)[None])
+    return start if np.isnan(step).any() else y + free @ step
 
 
 def _grasp(
@@ -198,14 +228,22 @@ def _grasp(
     if patch.forces is None:
         return None
     owner = np.repeat(np.arange(FINGERS), [len(corners) for corners in part])
-    forces = np.array([patch.forces[owner == i].sum(axis=0) for i in range(FINGERS)])
+    at_corners = smallest_forces(
+        [pieces[int(i)] for i in owner], patch.positions, patch.normals, friction,
+        DEPTH_KEPT * patch.margin,
+    )  # fmt: skip
+    at_corners = patch.forces if at_corners is None else at_corners
+    forces = np.array([at_corners[owner == i].sum(axis=0) for i in range(FINGERS)])
     if found := place_by_forces(pieces, forces - forces.mean(axis=0)):
         return found
-    pushes, _ = normal_and_tangential(patch.forces, patch.normals)
+    pushes, _ = normal_and_tangential(at_corners, patch.normals)
+    weights = np.maximum(pushes, ROUNDED)
     centers = np.array(
-        [np.average(patch.positions[owner == i], axis=0, weights=pushes[owner == i])
-         for i in range(FINGERS)]
-    )  # fmt: skip
+        [
+            np.average(patch.positions[owner == i], axis=0, weights=weights[owner == i])
+            for i in range(FINGERS)
+        ]
+    )
     return _held_at(pieces, centers, friction)
 
 
@@ -221,8 +259,11 @@ def of_general_type(
     if classify_lines(found.positions, found.forces) == "regulus":
         return found
     normals = np.array([piece.normal for piece in pieces])
-    _, _, right = np.linalg.svd(grasp_map(found.positions))
-    internal = (right[6:].T @ rng.normal(size=len(right) - 6)).reshape(FINGERS, 3)
+    G = grasp_map(found.positions)
+    drawn = np.concatenate(
+        [np.column_stack([piece.normal, piece.frame]) @ rng.normal(size=3) for piece in pieces]
+    )
+    internal = (drawn - np.linalg.pinv(G) @ (G @ drawn)).reshape(FINGERS, 3)
     along, across = normal_and_tangential(found.forces, normals)
     inward, sideways = normal_and_tangential(internal, normals)
     room = (friction * along - across) / (sideways + friction * np.abs(inward))
@@ -230,7 +271,7 @@ def of_general_type(
     pushes = float(np.einsum("ki,ki->", forces, normals))
     if classify_lines(found.positions, forces) != "regulus":
         return None
-    return replace(found, forces=forces / pushes)
+    return replace(found, forces=forces / pushes, planned=found.forces)
 
 
 def _held_at(pieces: Sequence[FacePiece], positions: Array, friction: float) -> Placement | None:

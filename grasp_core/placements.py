@@ -28,6 +28,8 @@ class Placement:
     """Radius of the independent disc around each contact, (4,); zeros where none is claimed."""
     merit: float
     """What the construction maximised."""
+    planned: Array | None = None
+    """Forces for which the contacts were chosen, where those of the witness are others, (4, 3)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

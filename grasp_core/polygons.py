@@ -85,7 +85,10 @@ def clip(polygon: Array, rows: Array, limits: Array) -> Array:
 
 
 def convex_hull(points: Array) -> Array:
-    """Corners of the convex hull of points (n, 2), counter-clockwise, (k, 2)."""
+    """Corners of the convex hull of points (n, 2), counter-clockwise, (k, 2).
+
+    They begin with the one that comes first among the points, however the figure is turned.
+    """
     ordered = points[np.lexsort(points.T[::-1])]
 
     def lower(run: Array) -> list[Array]:
@@ -96,7 +99,9 @@ def convex_hull(points: Array) -> Array:
             chain.append(point)
         return chain[:-1]
 
-    return np.array(lower(ordered) + lower(ordered[::-1]))
+    hull = np.array(lower(ordered) + lower(ordered[::-1]))
+    places = (points[None] == hull[:, None]).all(axis=2).argmax(axis=1)
+    return np.roll(hull, -int(places.argmin()), axis=0)
 
 
 def _turn(one: Array, two: Array, three: Array) -> float:

@@ -37,14 +37,17 @@ from grasp_core.values import FINGERS
 
 CAPS = (0.3, 0.5, 0.7, 0.9)
 """How far axes may lean while they are balanced, in friction angles."""
+TOWARD = (0.5, 0.9)
+"""How far axes may lean to meet in a point."""
 SWEEPS = 8
 MOVES = 60
 FIRST_MOVE = 0.2
 """Of the friction angle."""
 GROWTH, DECAY = 1.3, 0.9
 """Of the moves, after a success and after a failure."""
-SLIGHT = 1e-9
-"""Improvements and directions below this are rounding, which must not decide anything."""
+SLIGHT = 1e-6
+"""Improvements and directions below this must not decide anything: vertices that are off by 1e-9
+of an object turn the normals of its small faces by a hundred times that."""
 BESIDE = 0.1
 """Sine of the angle from which on another axis is beside one."""
 FLAT = 0.5
@@ -91,6 +94,31 @@ def widened(directions: Array, normals: Array, thetas: Array) -> TiltedCones:
     """
     axes = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
     return TiltedCones(*_improved(axes, normals, thetas))
+
+
+def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> TiltedCones:
+    """Force cones whose axes lean towards common points, as far as spanning lets them.
+
+    Args:
+        points: One for each quadruple, (q, 3).
+        positions: Where the axes start, (q, 4, 3).
+        normals: Unit vectors, (q, 4, 3).
+        thetas: Half-angles of the friction cones, (q, 4) [rad].
+    """
+    ways = points[:, None] - positions
+    inward = np.einsum("qfi,qfi->qf", ways, normals)
+    ways = ways * np.where(inward < 0.0, -1.0, 1.0)[..., None]  # away from points outside
+    best, half_angles = normals, np.full(len(normals), -np.inf)
+    for cap in TOWARD:
+        axes = [
+            _into_cap(ways[:, finger], normals[:, finger], cap * thetas[:, finger])
+            for finger in range(FINGERS)
+        ]
+        found, reached = _improved(np.stack(axes, axis=1), normals, thetas)
+        better = reached > half_angles + SLIGHT
+        best = np.where(better[:, None, None], found, best)
+        half_angles = np.where(better, reached, half_angles)
+    return TiltedCones(best, half_angles)
 
 
 def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
