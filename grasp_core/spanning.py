@@ -20,6 +20,7 @@ Source: Sudsang & Ponce 1995, Definition 3 and Proposition 4; the closed form is
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -58,14 +59,43 @@ def span_sines(units: Array) -> Array:
     """Sine of theta* of many quadruples of unit vectors (q, 4, 3); negative where they do not span.
 
     The negative value is how far the worst weight of a vanishing combination is from positive.
+
+    As `triple_sine`, from the cosines between the vectors: with (v x w).(w x u) = (v.w)(w.u) - u.v,
+    the largest |+-(v x w) +-(w x u) +-(u x v)| needs no cross products. A few arrays along all
+    quadruples make this ten times as fast as a formula for each.
     """
-    minors = [np.linalg.det(units[:, rest]) for rest in OTHERS]
-    signed = np.stack(minors, axis=-1) * (1.0, -1.0, 1.0, -1.0)
-    signed *= np.sign(signed.sum(axis=-1, keepdims=True))
-    worst = signed.min(axis=-1)
-    sines = np.stack([np.abs(triple_sine(*(units[:, k] for k in rest))) for rest in OTHERS])
-    least: Array = sines.min(axis=0)
+    one, two, three, four = np.ascontiguousarray(np.moveaxis(units, 0, -1))
+    front, back = _crossed(one, two), _crossed(three, four)
+    minors = (_dotted(two, back), _dotted(one, back), _dotted(four, front), _dotted(three, front))
+    signed = np.stack([minors[0], -minors[1], minors[2], -minors[3]])
+    signed *= np.sign(signed.sum(axis=0))
+    worst = signed.min(axis=0)
+    vectors = (one, two, three, four)
+    cosines = {
+        frozenset(pair): _dotted(vectors[pair[0]], vectors[pair[1]])
+        for pair in combinations(range(4), 2)
+    }
+    least = np.full(len(units), np.inf)
+    for minor, rest in zip(minors, OTHERS, strict=True):
+        g, h, k = (cosines[frozenset(pair)] for pair in combinations(rest, 2))
+        a, b, c = h * k - g, g * k - h, g * h - k
+        most = np.maximum(np.maximum(a + b + c, a - b - c), np.maximum(b - a - c, c - a - b))
+        squared = 3.0 - g * g - h * h - k * k + 2.0 * most
+        size = np.abs(minor)
+        safe = np.where(size > DEPENDENT, squared, np.inf)
+        least = np.minimum(least, size / np.sqrt(safe))
     return np.where(worst > DEPENDENT, least, np.minimum(worst, 0.0))
+
+
+def _dotted(one: Sequence[Array], two: Sequence[Array]) -> Array:
+    """Dot products of columns, (q,)."""
+    return one[0] * two[0] + one[1] * two[1] + one[2] * two[2]
+
+
+def _crossed(one: Sequence[Array], two: Sequence[Array]) -> tuple[Array, Array, Array]:
+    """Cross products of columns, three of (q,)."""
+    (x, y, z), (u, v, w) = one, two
+    return y * w - z * v, z * u - x * w, x * v - y * u
 
 
 def cones_positively_span(axes: ArrayLike, half_angles: ArrayLike) -> bool:

@@ -128,26 +128,26 @@ def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
         reached = half_angle(axes, normals, thetas)
         better = reached > half_angles + SLIGHT
         best[better], half_angles[better] = axes[better], reached[better]
-    for axes in _bent(normals, thetas):
-        reached = half_angle(axes, normals, thetas)
-        better = reached > half_angles + SLIGHT
-        best[better], half_angles[better] = axes[better], reached[better]
+    sizes = np.linalg.svd(normals, compute_uv=False)
+    flat = np.flatnonzero(sizes[:, 2] < FLAT * sizes[:, 1])
+    for axes in _bent(normals[flat], thetas[flat]):
+        reached = half_angle(axes, normals[flat], thetas[flat])
+        better = reached > half_angles[flat] + SLIGHT
+        best[flat[better]], half_angles[flat[better]] = axes[better], reached[better]
     return _improved(best, normals, thetas)
 
 
 def _bent(normals: Array, thetas: Array) -> Iterator[Array]:
     """Axes that leave a plane in which the normals nearly lie, two to either side of it."""
-    _, sizes, directions = np.linalg.svd(normals)
+    _, _, directions = np.linalg.svd(normals)
     across = directions[:, 2]
-    flat = sizes[:, 2] < FLAT * sizes[:, 1]
     turns = np.cross(normals[:, :1], normals[:, 1:])
     which = np.argmax(np.linalg.norm(turns, axis=-1) > BESIDE, axis=1)
     handed = np.einsum("qi,qi->q", turns[np.arange(len(turns)), which], across)
     across = across * np.where(handed < 0.0, -1.0, 1.0)[:, None]
     for signs, cap in product(SIDES, CAPS[:-1]):
-        lean = np.where(flat, cap, 0.0)[:, None] * thetas
         axes = [
-            _into_cap(sign * across, normals[:, finger], lean[:, finger])
+            _into_cap(sign * across, normals[:, finger], cap * thetas[:, finger])
             for finger, sign in enumerate(signs)
         ]
         yield np.stack(axes, axis=1)
@@ -188,8 +188,10 @@ def _into_cap(vectors: Array, centers: Array, angles: Array) -> Array:
 def _improved(axes: Array, normals: Array, thetas: Array) -> tuple[Array, Array]:
     reached = half_angle(axes, normals, thetas)
     steps = FIRST_MOVE * thetas.min(axis=1)
+    first, second = _aside(axes)
     for move in np.random.default_rng(0).normal(size=(MOVES, FINGERS, 2)):
-        moved = axes + steps[:, None, None] * _aside(axes, move)
+        sideways = move[:, :1] * first + move[:, 1:] * second
+        moved = axes + steps[:, None, None] * sideways
         moved /= np.linalg.norm(moved, axis=-1, keepdims=True)
         now = half_angle(moved, normals, thetas)
         better = now > reached + SLIGHT
@@ -199,14 +201,14 @@ def _improved(axes: Array, normals: Array, thetas: Array) -> tuple[Array, Array]
     return axes, reached
 
 
-def _aside(axes: Array, move: Array) -> Array:
-    """Moves (4, 2) across axes (q, 4, 3), in frames of each axis and another one beside it."""
+def _aside(axes: Array) -> tuple[Array, Array]:
+    """Two directions across each axis, (q, 4, 3), the first also across another one beside it."""
     first = np.zeros_like(axes)
     for ahead in range(FINGERS - 1, 0, -1):
         cross = np.cross(axes, np.roll(axes, -ahead, axis=1))
         length = np.linalg.norm(cross, axis=-1, keepdims=True)
         first = np.where(length > BESIDE, cross / np.maximum(length, BESIDE), first)
-    return move[:, :1] * first + move[:, 1:] * np.cross(axes, first)
+    return first, np.cross(axes, first)
 
 
 def _angles(one: Array, other: Array) -> Array:
