@@ -192,17 +192,17 @@ def place_by_forces(pieces: Sequence[FacePiece], forces: Array) -> Placement | N
     found = maximize(
         LinearProgram(objective, np.vstack(rows), np.hstack(limits), A_eq / scale, b_eq / scale)
     )
-    if not isinstance(found, Optimum) or found.value < LEAST_INSET:
+    if not isinstance(found, Optimum) or INSET_KEPT * found.value < LEAST_INSET:
         return None
-    inset = INSET_KEPT * found.value
-    y = _nearest_to_middles(
-        pieces, found.x[:-1], A_eq[:, :-1], np.vstack(rows)[:, :-1], np.hstack(limits) - inset
-    )
+    edges, ends = np.vstack(rows)[:, :-1], np.hstack(limits)
+    inside = ends - INSET_KEPT * found.value
+    y = _nearest_to_middles(pieces, found.x[:-1], A_eq[:, :-1], edges, inside)
     positions = np.array(
         [piece.point(at) for piece, at in zip(pieces, y.reshape(FINGERS, 2), strict=True)]
     )
     if _on_one_line(positions):
         return None
+    inset = float((ends - edges @ y).min())
     return Placement(positions, forces, np.empty((0, 3)), np.zeros(FINGERS), inset)
 
 

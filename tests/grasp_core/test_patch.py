@@ -385,9 +385,9 @@ def test_a_leaf_with_an_altered_twist_proves_nothing():
     assert len(cases) == 40
 
 
-def test_contacts_for_given_forces_balance_them_as_far_inside_as_any():
-    """Forces that balance at some contacts are given back contacts that are no nearer to the
-    edges than those, and are the farthest by the program's own count.
+def test_contacts_for_given_forces_balance_them_nearly_as_far_inside_as_any():
+    """Forces that balance at some contacts are given back contacts that are not much nearer to the
+    edges than those, and no nearer than they say.
     """
     rng = np.random.default_rng(8)
     tested = 0
@@ -407,7 +407,7 @@ def test_contacts_for_given_forces_balance_them_as_far_inside_as_any():
                 continue
             assert isinstance(placed, Placement)
             assert np.abs(wrench(placed.positions, forces)).max() < TOLERANCE
-            assert placed.merit >= insets(pieces, known).min() - TOLERANCE
+            assert placed.merit >= patch.INSET_KEPT * insets(pieces, known).min() - TOLERANCE
             assert insets(pieces, placed.positions).min() >= placed.merit - TOLERANCE
             tested += 1
     assert tested >= 90
