@@ -10,8 +10,8 @@ therefore a proof of absence; by convexity of the supports it separates every gr
 faces.
 
 If the patch is closed, take the smallest forces that show it and add them face by face. The sums
-F_i lie inside the cones and balance as forces. With these forces fixed, equilibrium is linear in the
-positions x_i = o_i + T_i y_i:
+F_i lie inside the cones and balance as forces. With these forces fixed, equilibrium is linear in
+the positions x_i = o_i + T_i y_i:
 
     maximise t  subject to  sum_i (o_i + T_i y_i) x F_i = 0,    e.y_i + t <= b for all edges.
 

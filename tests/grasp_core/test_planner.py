@@ -440,3 +440,16 @@ def test_a_focus_before_some_fingers_and_behind_others_gives_regions_where_nothi
                 assert gc.force_closure(np.array(points), grasp.normals, 0.5).closed
             mixed += 1
     assert mixed >= 4
+
+
+@pytest.mark.parametrize("name", ["l-bracket", "hexagonal-pyramid"])
+def test_turned_scaled_and_shaken_objects_have_the_same_faces_and_families(name):
+    """All methods, where much is symmetric and faces are not convex."""
+    rng, body = np.random.default_rng(5), example_object(name)
+    extent = np.ptp(body.vertices, axis=0).max()
+    expected = {(*sorted(g.faces), g.family) for g in gc.plan(body, 0.8).grasps}
+    for size in (1e-3, 0.03, 1.0):
+        noise, R = 1e-9 * rng.uniform(-1.0, 1.0, body.vertices.shape), random_rotation(rng)
+        there = remade(body, lambda v, n=noise, R=R, s=size: s * (v / extent + n) @ R.T + s)
+        assert {(*sorted(g.faces), g.family) for g in gc.plan(there, 0.8).grasps} == expected
+    assert len(expected) >= 35

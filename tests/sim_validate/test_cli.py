@@ -11,6 +11,7 @@ import pytest
 import scenes
 from grasp_core.requests import FAMILIES
 from sim_validate.cli import Exit, main
+from tests.grasp_core.curved import bumpy_ellipsoid
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -252,3 +253,56 @@ def _always_held(trace, *_):
     from sim_validate.verdict import HoldVerdict, Outcome
 
     return HoldVerdict(Outcome.HELD, "", 0.0, 0.0, 0.0, trace.slips_m.max(axis=0), None)
+
+
+def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface(here, capsys):
+    import trimesh
+
+    vertices, triangles = bumpy_ellipsoid(noise=0.001)
+    trimesh.Trimesh(1e3 * vertices, triangles[5:], process=False).export(here / "scan.ply")
+    flags = ["--unit", "mm", "--patches", "10", "--limit", "4", "--out", "r"]
+    fingers = [
+        "--finger-radius-m",
+        "0.004",
+        "--approach-m",
+        "0.03",
+        "--fingertip-radius-m",
+        "0.004",
+    ]
+    assert main(["run", "scan.ply", *flags, *fingers]) == Exit.GOOD
+    shown = capsys.readouterr()
+    assert "not a closed surface" in shown.err
+    assert "4 of 4 grasps held" in shown.out
+    saved = json.loads((here / "r" / "grasps.json").read_text())
+    assert saved["object"]["patches"] == {"spread_deg": 10.0, "depth": 0.01, "most": 10}
+    assert main(["validate", "r/grasps.json", "--limit", "1"]) == Exit.GOOD
+    capsys.readouterr()
+    assert main(["inspect", "scan.ply", "--unit", "mm", "--json"]) == Exit.GOOD
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["patches"]["most"] == 20
+    assert 0.0 < facts["largest_spread_deg"] <= 10.0
+
+
+@pytest.mark.usefixtures("here")
+def test_planning_flags_reach_the_planner(capsys):
+    flags = ["--friction", "0.3", "--complete", "--rank-by", "diverse", "--limit", "5"]
+    assert main(["plan", "double-wedge-bar", *flags]) == Exit.GOOD
+    assert "0 not decided" in capsys.readouterr().out
+    reach = ["--finger-radius-m", "0.006", "--approach-m", "0.05", "--edge-clearance-m", "0.001"]
+    assert main(["plan", "l-bracket", *reach, "--share-faces-m", "0.01", "--limit", "5"]) == 0
+    assert "out of reach" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"),
+    [
+        (["--approach-m", "0.1"], "--approach-m also needs --finger-radius-m"),
+        (["--finger-radius-m", "0.01"], "--finger-radius-m also needs --approach-m"),
+        (["--edge-clearance-m", "5"], "clearance must be from 0"),
+        (["--complete", "--family", "pencil"], "takes the free method"),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_flags_that_do_not_fit_are_refused(capsys, flags, said):
+    assert main(["plan", "box", *flags]) == Exit.INPUT
+    assert said in capsys.readouterr().err
