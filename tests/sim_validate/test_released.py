@@ -55,7 +55,7 @@ def test_forces_just_above_the_critical_friction_need_it_and_balance():
     along = np.einsum("ki,ki->k", forces, grasp.normals)
     across = np.linalg.norm(forces - along[:, None] * grasp.normals, axis=1)
     assert along.max() == pytest.approx(1.0)
-    assert (across / along).max() == pytest.approx(grasp.critical_friction, rel=1e-5)
+    assert (across / along).max() == pytest.approx(grasp.critical_friction, rel=1e-3)
     arms = grasp.positions - body.center_of_mass
     assert np.abs(forces.sum(axis=0)).max() < 1e-7
     assert np.abs(np.cross(arms, forces).sum(axis=0)).max() < 1e-7 * body.radius
