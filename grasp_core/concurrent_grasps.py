@@ -30,7 +30,7 @@ Source: Sudsang & Ponce 1995, section 3.1 and Proposition 5; the far side is thi
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import product
 from typing import TypeAlias
 
@@ -70,10 +70,32 @@ def place_concurrent(
     Raises:
         SolverError: A program's answer failed its check.
     """
+    widest = math.tan(max(cone.half_angle for cone in cones))
+    limits = [reach * widest for reach in _reaches(pieces, cones)]
+    return _best(pieces, cones, zip((BEFORE, BEHIND), limits, strict=True), least)
+
+
+def place_on_mixed_sides(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], *, least: float
+) -> Placement | NoPlacement:
+    """As `place_concurrent`, with the focus before some fingers and behind the others.
+
+    Fourteen patterns of sides, each with discs larger than those before: for faces on which
+    nothing else was found. On convex objects it hardly ever finds anything.
+    """
+    return _best(pieces, cones, ((sides, math.inf) for sides in MIXED_SIDES), least)
+
+
+def _best(
+    pieces: Sequence[FacePiece],
+    cones: Sequence[ForceCone],
+    patterns: Iterable[tuple[Sides, float]],
+    least: float,
+) -> Placement | NoPlacement:
+    """The largest discs over patterns of sides, each with an upper bound on its discs."""
     best: Placement | None = None
     bound = -math.inf
-    for sides, reach in zip((BEFORE, BEHIND), _reaches(pieces, cones), strict=True):
-        limit = reach * math.tan(max(cone.half_angle for cone in cones))
+    for sides, limit in patterns:
         if limit < least:
             bound = max(bound, limit)
             continue
@@ -85,27 +107,8 @@ def place_concurrent(
     return best or NoPlacement(bound)
 
 
-def place_on_mixed_sides(
-    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], *, least: float
-) -> Placement | NoPlacement:
-    """As `place_concurrent`, with the focus before some fingers and behind the others.
-
-    Fourteen patterns of sides, each with discs larger than those before: for faces on which
-    nothing else was found. On convex objects it hardly ever finds anything.
-    """
-    best: Placement | None = None
-    bound = -math.inf
-    for sides in MIXED_SIDES:
-        found = place_on_sides(pieces, cones, sides, least=least)
-        if isinstance(found, Placement):
-            best, least = found, found.merit
-        else:
-            bound = max(bound, found.bound)
-    return best or NoPlacement(bound)
-
-
 def _reaches(pieces: Sequence[FacePiece], cones: Sequence[ForceCone]) -> tuple[float, float]:
-    """How far a focus before, or behind, all fingers may be in the mean (see `ranking`)."""
+    """How far a focus before, or behind, all fingers may be in the mean (see `candidates`)."""
     heights = [
         cone.axis @ (piece.origin[:, None] + piece.frame @ piece.corners.T)
         for piece, cone in zip(pieces, cones, strict=True)
