@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import grasp_core as gc
+import scenes
 import sim_validate as sv
 from grasp_core.mesh import FORMATS
 from sim_validate.engines import available_cores, each
@@ -29,7 +30,7 @@ def examine(case):
     finger = gc.Finger(TIP * body.radius, APPROACH * body.radius)
     plan = gc.plan(body, FRICTION, limit=limit, finger=finger)
     planned = time.perf_counter() - begun
-    setup = sv.Setup(fingers=sv.FingerSettings(radius_m=finger.radius_m))
+    setup = sv.Setup(fingers=scenes.FingerSettings(radius_m=finger.radius_m))
     verdicts = [sv.validate(body, grasp, FRICTION, setup=setup) for grasp in plan.grasps]
     certified = sum(gc.force_closure(grasp, friction=FRICTION).verify() for grasp in plan.grasps)
     return (
