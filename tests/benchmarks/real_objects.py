@@ -38,7 +38,7 @@ def examine(case):
         len(plan.grasps), certified, sum(grasp.radius > 0.0 for grasp in plan.grasps),
         sum(verdict.held for verdict in verdicts),
         sum(len(verdict.controls) for verdict in verdicts),
-        sum(not trial.let_go for verdict in verdicts for trial in verdict.controls),
+        sum(not trial.failed for verdict in verdicts for trial in verdict.controls),
         sum(bool(verdict.mismatches) for verdict in verdicts),
         planned, time.perf_counter() - begun,
     )  # fmt: skip
@@ -50,7 +50,7 @@ def main():
     limit = int(sys.argv[sys.argv.index("--limit") + 1]) if "--limit" in sys.argv else 24
     paths = sorted(p for p in folder.iterdir() if p.suffix.lstrip(".").lower() in FORMATS)
     print("file                             faces       grasps certified regions held "
-          "controls held mismatches plan s  all s")  # fmt: skip
+          "controls not let go, mismatches, plan s  all s")  # fmt: skip
     bad = False
     for row in each(examine, [(path, limit) for path in paths], jobs=available_cores()):
         name, faces, grasps, certified, regions, held, controls, kept, off, planned, total = row
