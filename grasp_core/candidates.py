@@ -110,7 +110,7 @@ def candidate_blocks(
         with_room = part[(rooms[part] > 0.0).all(axis=1)]
         if len(with_room):
             yield (
-                float(rooms.max()),
+                float(rooms[with_room].min(axis=1).max()),
                 partial(_candidates, body, with_room, rooms, theta, tilted=tilted),
             )
 

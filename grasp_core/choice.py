@@ -9,8 +9,7 @@ from grasp_core.certified import Certified
 from grasp_core.critical import critical_friction
 from grasp_core.errors import UndecidedError
 from grasp_core.quality import ferrari_canny
-from grasp_core.requests import PlanRequest
-from grasp_core.search import best_first
+from grasp_core.requests import FAMILIES, PlanRequest
 
 
 def chosen(lists: Sequence[Sequence[Certified]], request: PlanRequest) -> list[Certified]:
@@ -24,16 +23,19 @@ def chosen(lists: Sequence[Sequence[Certified]], request: PlanRequest) -> list[C
         lists: What each method found, best first.
         request: How many are wanted, and what makes one better.
     """
+    every = sorted(chain.from_iterable(lists), key=_largest_first)
     if request.rank_by == "radius":
-        turns = chain.from_iterable(zip_longest(*lists))
-        kept = {found.id for found in [one for one in turns if one is not None][: request.limit]}
-        every = [found for each in lists for found in each if found.id in kept]
-        return sorted(every, key=lambda found: -float(f"{found.placement.radii.min():.6g}"))
-    every = sorted(chain.from_iterable(lists), key=best_first)
+        families = [[one for one in every if one.family == family] for family in FAMILIES]
+        turns = [one for one in chain.from_iterable(zip_longest(*families)) if one is not None]
+        return sorted(turns[: request.limit], key=_largest_first)
     if request.rank_by == "diverse":
         return _far_apart(every, request.limit)
     measure = _critical if request.rank_by == "friction-margin" else _weakness(request.friction)
     return sorted(every, key=lambda found: float(f"{measure(found):.6g}"))[: request.limit]
+
+
+def _largest_first(found: Certified) -> float:
+    return -float(f"{found.placement.radii.min():.6g}")
 
 
 def _critical(found: Certified) -> float:

@@ -43,6 +43,7 @@ class MeshRefusal(StrEnum):
     ZERO_VOLUME = "GP-MESH-ZERO-VOLUME"
     OVERLAP = "GP-MESH-OVERLAP"
     SEPARATE = "GP-MESH-SEPARATE"
+    NOT_FLAT = "GP-MESH-NOT-FLAT"
 
 
 class MeshError(InputError):

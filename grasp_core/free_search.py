@@ -203,7 +203,8 @@ def _on_triangles(
 def _place(
     pieces: Pieces, request: FreeRequest, rng: np.random.Generator, restarts: int = RESTARTS
 ) -> Placement | Absence | Undecided:
-    theta = max(request.theta - max(piece.spread for piece in pieces), LEAST_SPAN_ANGLE)
+    spread = max(piece.spread for piece in pieces)
+    theta = request.theta - spread if spread < request.theta else LEAST_SPAN_ANGLE
     try:
         return place_free(pieces, math.tan(theta), rng=rng, cells=request.cells, restarts=restarts)
     except SolverError:

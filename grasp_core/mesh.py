@@ -21,9 +21,9 @@ from grasp_core.arrays import Array, Indices, frozen
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.patches import flat_patches
 from grasp_core.planar_faces import MAX_FACES, FlatnessLimits, coplanar_groups, planar_faces
-from grasp_core.solid_checks import oriented, surface_fault, turned_out, welded
+from grasp_core.solid_checks import largest_part, oriented, surface_fault, welded
 from grasp_core.solids import Solid, hull, triangulate
-from grasp_core.values import Face, FaceKind, PatchLimits, Polyhedron
+from grasp_core.values import FINGERS, Face, FaceKind, PatchLimits, Polyhedron
 
 AnyPolyhedron = TypeVar("AnyPolyhedron", bound=Polyhedron)
 
@@ -34,6 +34,8 @@ MAX_FILE_BYTES = 64 * 2**20
 MAX_TRIANGLES = 200_000
 SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0
 """Half a millimetre to twenty metres: outside it the unit is almost surely wrong."""
+SURROUNDINGS = 1e-6
+"""How far outside the object's bounds a centre of mass may be, relative to the extent."""
 DEFAULT_FLATNESS = FlatnessLimits()
 
 
@@ -116,18 +118,28 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
     fault = surface_fault(corners)
     if fault and (limits is None or fault.reason is MeshRefusal.WINDING):
         raise fault
-    corners, flipped = turned_out(points, corners) if fault else oriented(points, corners)
-    if flipped:
-        notes.append("the mesh was inside out; its triangles were turned")
+    if fault:
+        points, corners, said = largest_part(points, corners)
+        notes += said
+    else:
+        corners, flipped = oriented(points, corners)
+        notes += ["the mesh was inside out; its triangles were turned"] if flipped else []
     if limits is not None:
         found = flat_patches(points, corners, limits)
+        if len(found) < FINGERS:
+            raise MeshError(
+                MeshRefusal.NOT_FLAT,
+                f"{len(found)} patches are within {limits.spread_deg:g} deg and {limits.depth:g} "
+                "of the extent from flat, four fingers need four; allow more (--patch-spread-deg, "
+                "--patch-depth), or refine the mesh",
+            )
         notes += _said_of_patches(found, fault)
     else:
         found = planar_faces(points, corners, groups or [], flatness, triangulate)
     solid = hull(points) if fault and fault.reason is MeshRefusal.OPEN else Solid(points, corners)
     mass: Any = _trimesh("triangles").mass_properties(
         solid.vertices[solid.triangles], density=1.0,
-        center_mass=None if center_of_mass is None else frozen(center_of_mass, (3,), "center"),
+        center_mass=_given_center(points, center_of_mass),
     )  # fmt: skip
     content = _content_hash(points, corners)
     return kind(
@@ -143,6 +155,21 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
         patches=limits,
         notes=tuple(notes),
     )
+
+
+def _given_center(points: Array, center_of_mass: ArrayLike | None) -> Array | None:
+    """A centre of mass that someone states, checked."""
+    if center_of_mass is None:
+        return None
+    center = frozen(center_of_mass, (3,), "center_of_mass")
+    low, high = points.min(axis=0), points.max(axis=0)
+    slack = SURROUNDINGS * float((high - low).max())
+    if (center < low - slack).any() or (center > high + slack).any():
+        raise InputError(
+            f"center_of_mass {center.tolist()} is outside the object, which is from {low.tolist()} "
+            f"to {high.tolist()} m"
+        )
+    return center
 
 
 def _planar_groups(

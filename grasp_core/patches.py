@@ -32,8 +32,6 @@ SMOOTHING = 10
 """Rounds in which normals are averaged with those of neighbours, to find where it is flat."""
 FITS = 3
 """How often a group is grown, and its plane fitted again."""
-LEAST_TRIANGLES = 4
-"""Smaller groups are no patches."""
 BORDER_GAP = 1e-9
 """How far polygons stay from the borders of their groups, relative to the object's extent."""
 
@@ -101,7 +99,8 @@ def _groups(surface: _Surface, spread: float, depth: float) -> list[_Group]:
     for seed in flat_first:
         if not free[seed]:
             continue
-        plane = smooth[seed], surface.corners[seed].mean(axis=0)
+        level = float(smooth[seed] @ surface.normals[seed]) >= math.cos(0.5 * spread)
+        plane = (smooth if level else surface.normals)[seed], surface.corners[seed].mean(axis=0)
         group = _Group(np.array([seed]), plane[0], 0.0)
         for _ in range(FITS):
             members = _grown(surface, int(seed), plane, spread, depth, free)
@@ -113,8 +112,7 @@ def _groups(surface: _Surface, spread: float, depth: float) -> list[_Group]:
             middle = weights @ surface.corners[members].mean(axis=1) / weights.sum()
             plane = mean / np.linalg.norm(mean), middle
         free[group.triangles] = False
-        if len(group.triangles) >= LEAST_TRIANGLES:
-            groups.append(group)
+        groups.append(group)
     return sorted(groups, key=lambda each: -each.area)
 
 

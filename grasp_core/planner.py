@@ -7,6 +7,7 @@ ones and not merely some. The free method goes through the quadruples that are l
 for the others that they hold no grasp.
 """
 
+import math
 import time
 from collections.abc import Iterator, Sequence
 
@@ -49,14 +50,16 @@ def plan(  # noqa: PLR0913 - the contract's keywords
         cones: `normal` keeps force cones around the normals, as in the paper; with `tilted` leaning
             ones are tried too.
         limit: Keep only this many grasps.
-        rank_by: Which are the best. By `radius`, families take turns, each with its largest discs.
+        rank_by: Which are the best. By `radius`, families take turns, each with its largest discs;
+            tilted cones, which are chosen for their width, are given to pencils only on faces that
+            no concurrent grasp holds.
             Reguli and free grasps have no discs; of these the first found count, and free ones
             only as far as the others do not suffice. By `friction-margin` (the least critical
             friction), `ferrari-canny` (the largest quality) and `diverse` (each next one the
             farthest from those before it) all grasps that are found compete.
         seed: For the restarts of the free method.
         cells: Into how many parts the free method may cut the faces of one quadruple.
-        complete: Cut the faces that would stay undecided until each is decided.
+        complete: Cut the faces that would stay undecided, into 20,000 parts if need be.
         finger: Keep only grasps that such fingers reach on straight free lines.
         clearance: How far contacts and their regions stay from all edges of their faces [m].
         share_faces: Let two fingers stand on one face, at least so far apart [m]; each face is cut
@@ -136,35 +139,47 @@ def _planned(body: Polyhedron, request: PlanRequest, searches: Searches) -> Plan
         seed=request.seed,
         counts=counts,
         outcomes=outcomes,
-        absence=None if grasps else _absence(body.name, counts, outcomes, request.cones),
+        absence=None if grasps else _absence(body, request, counts, outcomes),
         absences={whole(faces): proof for s in every for faces, proof in s.absences.items()},
         undecided={whole(faces): share for s in every for faces, share in s.undecided.items()},
-        unreached={whole(faces): why for s in every for faces, why in s.unreached.items()},
+        unreached={whole(faces): why for faces, why in searches.unreached().items()},
         seconds={method: search.seconds for method, search in searches.by_method.items()},
     )
 
 
-def _absence(name: str, counts: PlanCounts, outcomes: Outcomes, cones: ConeKind) -> str:
+def _absence(body: Polyhedron, request: PlanRequest, counts: PlanCounts, outcomes: Outcomes) -> str:
+    """Why there is no grasp, as a sentence."""
+    name = body.name
     if outcomes.out_of_reach:
         return (
             f"{name}: no grasp was found that the fingers reach, on {outcomes.out_of_reach} of "
             f"{counts.quadruples} face quadruples for want of room; try a smaller fingertip radius "
             "or a shorter approach"
         )
+    if "free" in counts.families and body.patches:
+        return f"{name}: no grasp was found on its patches, which proves nothing about others"
     if "free" in counts.families:
+        limits = f" at friction {math.tan(request.theta):.4g}"
+        limits += f" and {request.clearance:g} m from edges" if request.clearance else ""
         if outcomes.open:
             return (
                 f"{name}: no grasp was found; {outcomes.open} of {counts.quadruples} face "
-                "quadruples are undecided, all others are proved to hold none; try more cells"
+                f"quadruples are undecided, all others are proved to hold none{limits}; try "
+                "--complete"
             )
-        return f"{name}: each of {counts.quadruples} face quadruples is proved to hold no grasp"
-    if cones == "normal" and not counts.spanning:
+        return (
+            f"{name}: each of {counts.quadruples} face quadruples is proved to hold no "
+            f"grasp{limits}"
+        )
+    if request.cones == "normal" and not counts.spanning:
         return (
             f"{name} has no four faces whose normals keep positively spanning space when each "
             "may tilt within a force cone (P3; no box or prism has), so the paper's "
             "constructions offer no grasp; tilted cones or the free method may"
         )
-    spanning = f"{counts.spanning} face quadruples span (P3), but " if cones == "normal" else ""
+    spanning = (
+        f"{counts.spanning} face quadruples span (P3), but " if request.cones == "normal" else ""
+    )
     return (
         f"{name}: {spanning}no {' or '.join(counts.families)} grasp was found (discs below "
         f"{LEAST_RADIUS:g} object radii do not count); the free method may find others "

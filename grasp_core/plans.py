@@ -35,7 +35,7 @@ class MethodCounts:
     """No placement with discs of the least radius at the planned angle, or none on the surface of
     curved patches; for the free method, proved to have no grasp at all."""
     undecided: int = 0
-    """Free method only: neither a grasp nor a proof of absence."""
+    """Free method: neither a grasp nor a proof of absence. Others: a program was not solved."""
     duplicates: int = 0
     """Found again at the same contacts, with another pairing."""
     found: int = 0

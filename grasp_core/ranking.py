@@ -11,6 +11,9 @@ from grasp_core.candidates import LEAST_SPAN_ANGLE, NORMAL, TILTED, Candidates
 from grasp_core.constructions import LEAST_RADIUS, Construction, FingerOrder
 from grasp_core.values import FaceQuadruple, ForceCone, four
 
+SAME_PROMISE = 7
+"""Bounds equal to so many digits (object size one) are ties, broken by the faces."""
+
 
 @dataclass(frozen=True, slots=True)
 class ConeChoice:
@@ -111,7 +114,8 @@ def ranked(candidates: Candidates, construction: Construction) -> Ranking:
         bounds[spans, :, column] = np.where(admitted[:, None], bounds[spans, :, column], -np.inf)
     bounds = np.where(usable[:, :, None] & (bounds >= LEAST_RADIUS), bounds, -np.inf)
     best = bounds.max(axis=(1, 2), initial=-np.inf)
-    order = np.argsort(-(best if promise is None else promise), kind="stable")
+    promise = best if promise is None else promise
+    order = np.argsort(-np.round(promise, SAME_PROMISE), kind="stable")
     order = order[best[order] > -np.inf]
     worth = int((bounds.max(axis=1, initial=-np.inf) > -np.inf).sum())
     dropped = len(candidates) * len(construction.orders) - worth

@@ -13,6 +13,7 @@ import numpy as np
 
 from grasp_core.certified import Certified, certify, named
 from grasp_core.constructions import LEAST_RADIUS, Construction, regions_of
+from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece, FaceShape, Shapes, choices_near
 from grasp_core.placements import Placement
 from grasp_core.plans import MethodCounts, Proof
@@ -20,6 +21,7 @@ from grasp_core.ranking import Attempt, Ranking
 from grasp_core.spanning import cones_positively_span
 from grasp_core.true_surface import on_true_surface
 from grasp_core.values import (
+    ContactRegion,
     FaceQuadruple,
     ForceCone,
     four,
@@ -32,7 +34,8 @@ Found: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement]
 MOST_CHOICES = 8
 """Choices of pieces that are tried on faces that are not convex; times the cells allowed."""
 SAME_MERIT = 1e-5
-"""Merits are compared to six digits, so that ties are broken by the faces and not by rounding."""
+"""What cannot be better than the worst kept by more than this share is not looked at: symmetric
+objects hold thousands of equal grasps."""
 SAME_CONTACTS = 1e-6
 """Contacts closer than this, in object radii, are the same grasp found twice."""
 
@@ -71,7 +74,7 @@ class Search:
         if not self.full or not self.best:
             return not self.full
         worst = self.best[-1].placement.merit
-        return construction.bounds is not None and room >= worst * (1.0 - SAME_MERIT)
+        return construction.bounds is not None and room > worst * (1.0 + SAME_MERIT)
 
     def keep(self, found: Certified) -> bool:
         """Count a grasp and, if fingers reach it, sort it in; whether they do."""
@@ -156,26 +159,15 @@ def tried(
     faces = four(quadruple[finger] for finger in attempt.order)
     ordered = [shapes[finger] for finger in attempt.order]
     tally["tried"] += 1
-    placed = None
-    for choice in attempt.choices:
-        least = LEAST_RADIUS if construction.bounds else -math.inf
-        least = least if placed is None else placed[2].merit
-        if choice.bound <= least:
-            break
-        cones = four(choice.cones[finger] for finger in attempt.order)
-        placed = _best_placement(construction, cones, ordered, least, tally) or placed
-    if placed is None:
-        tally["infeasible"] += 1
+    try:
+        settled = _settled(construction, ordered, attempt, tally)
+    except SolverError:
+        tally["undecided"] += 1
         return None
-    chosen, cones, planned = placed
-    regions = regions_of(construction.region, chosen, cones, planned)
-    settled = on_true_surface(
-        ordered, chosen, cones, planned, regions, partial(_placed_on, construction, cones)
-    )
     if settled is None:
         tally["infeasible"] += 1
         return None
-    chosen, placement = settled
+    chosen, cones, placement, regions = settled
     family = construction.family
     certified = certify(
         named(family[0], faces), faces, family, chosen, cones, placement, friction, regions
@@ -186,6 +178,28 @@ def tried(
         tally["rejected"] += 1
         return None
     return certified
+
+
+def _settled(
+    construction: Construction, shapes: Sequence[FaceShape], attempt: Attempt, tally: Counter[str]
+) -> tuple[tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...]] | None:
+    """The best placement over the choices of cones, with its regions, on the true surface."""
+    placed = None
+    for choice in attempt.choices:
+        least = LEAST_RADIUS if construction.bounds else -math.inf
+        least = least if placed is None else placed[2].merit
+        if choice.bound <= least:
+            break
+        cones = four(choice.cones[finger] for finger in attempt.order)
+        placed = _best_placement(construction, cones, shapes, least, tally) or placed
+    if placed is None:
+        return None
+    chosen, cones, planned = placed
+    regions = regions_of(construction.region, chosen, cones, planned)
+    found = on_true_surface(
+        shapes, chosen, cones, planned, regions, partial(_placed_on, construction, cones)
+    )
+    return None if found is None else (found[0], cones, found[1], regions)
 
 
 def _placed_on(

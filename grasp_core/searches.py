@@ -8,7 +8,7 @@ from itertools import combinations, islice
 from typing import TypeAlias
 
 from grasp_core.candidates import Candidates, candidate_blocks
-from grasp_core.certified import Certified, named
+from grasp_core.certified import Certified
 from grasp_core.clear_of_edges import clear_of_edges
 from grasp_core.constructions import CONSTRUCTIONS, MIXED, Construction
 from grasp_core.face_pieces import face_shapes
@@ -130,7 +130,7 @@ class Searches:
         """Blocks of quadruples, as long as one may hold a grasp that is worth keeping."""
         for place, (room, make) in enumerate(self.candidate_blocks):
             if not search.may_gain(construction, room):
-                return
+                continue
             block = self.made.get(place) or make()
             if place < KEPT_BLOCKS:
                 self.made[place] = block
@@ -160,22 +160,48 @@ class Searches:
         return four(self.owners[face] for face in faces)
 
     def as_found(self, found: Certified) -> Certified:
-        """A grasp named by the object's faces."""
+        """A grasp named by the object's faces; of halves of a face by `a` and `b`."""
         faces = self.whole_faces(found.faces)
-        return replace(found, faces=faces, id=named(found.id[0], faces))
+        if faces == found.faces:
+            return found
+        first = {owner: index for index, owner in reversed(list(enumerate(self.owners)))
+                 if index != owner}  # fmt: skip
+        parts = [
+            str(face) if face == owner else f"{owner}{'a' if face == first[owner] else 'b'}"
+            for face, owner in zip(found.faces, faces, strict=True)
+        ]
+        return replace(found, faces=faces, id="-".join([found.id[0], *parts]))
 
     def outcomes(self) -> Outcomes:
         """What became of every four faces."""
         searches = list(self.by_method.values())
         held = set[FaceQuadruple]().union(*(search.held for search in searches))
         absences = set[FaceQuadruple]().union(*(search.absences for search in searches))
-        unreached = set[FaceQuadruple]().union(*(search.unreached for search in searches))
-        absent = len(absences) + sum(
-            any(self.shapes[face] is None for face in faces) for faces in self._every()
-        )
-        out_of_reach = len(unreached - held - absences)
+        absent = len(absences) + (0 if self.body.patches else self._without_room())
+        out_of_reach = len(self.unreached())
         undecided = self.quadruples - len(held) - absent - out_of_reach
         return Outcomes(len(held), absent, undecided, out_of_reach)
+
+    def unreached(self) -> dict[FaceQuadruple, str]:
+        """Faces on which contacts exist, none of which fingers reach, and why not the last ones."""
+        searches = list(self.by_method.values())
+        known = set[FaceQuadruple]().union(*(s.held for s in searches))
+        known = known.union(*(search.absences for search in searches))
+        return {
+            faces: why
+            for search in searches
+            for faces, why in search.unreached.items()
+            if faces not in known
+        }
+
+    def _without_room(self) -> int:
+        """Quadruples with a face that has no room for a contact."""
+        whole = sum(index == owner for index, owner in enumerate(self.owners))
+        roomy = sum(shape is not None for shape in self.shapes[:whole])
+        shared = sum(
+            any(self.shapes[face] is None for face in faces) for faces in self.shared.tolist()
+        )
+        return math.comb(whole, FINGERS) - math.comb(roomy, FINGERS) + shared
 
 
 def _timed(steps: Iterator[list[Certified]], search: Search) -> Iterator[list[Certified]]:

@@ -57,7 +57,10 @@ def surface_fault(corners: Indices) -> MeshError | None:
         )
         return MeshError(MeshRefusal.WINDING, message)
     if (uses == 1).any():
-        message = f"{int((uses == 1).sum())} edges belong to one triangle only; close the surface"
+        message = (
+            f"{int((uses == 1).sum())} edges belong to one triangle only; close the surface, or "
+            "take its sound parts (--faces patches)"
+        )
         return MeshError(MeshRefusal.OPEN, message)
     if (uses != SIDES).any():
         message = (
@@ -67,21 +70,25 @@ def surface_fault(corners: Indices) -> MeshError | None:
     return None
 
 
-def turned_out(points: Array, corners: Indices) -> tuple[Indices, bool]:
-    """The triangles of a surface, perhaps with holes, so wound that they enclose something.
+def largest_part(points: Array, corners: Indices) -> tuple[Array, Indices, list[str]]:
+    """The largest edge-connected part of a faulty surface, wound as it is, and what to say of it.
 
-    Returns:
-        The triangles, (t, 3), and whether they were turned.
-
-    Raises:
-        MeshError: They enclose nothing to speak of.
+    Nothing tells the outside of an open surface but its winding, so it is never turned.
     """
-    extent = float(np.ptp(points, axis=0).max())
-    total = Solid(points, corners).volume
-    if abs(total) < THINNEST * extent**3:
-        message = f"the volume is {total:.3g} m^3; a solid must have one"
-        raise MeshError(MeshRefusal.ZERO_VOLUME, message)
-    return (corners[:, ::-1], True) if total < 0.0 else (corners, False)
+    parts = _labels(points, corners)
+    crosses = np.cross(
+        points[corners[:, 1]] - points[corners[:, 0]], points[corners[:, 2]] - points[corners[:, 0]]
+    )
+    areas = np.bincount(parts, weights=0.5 * np.linalg.norm(crosses, axis=1))
+    largest, notes = int(areas.argmax()), list[str]()
+    if (areas > 0.0).sum() > 1:
+        share = 100.0 * float(areas[largest] / areas.sum())
+        notes.append(f"{len(areas)} separate parts; only the largest is used, {share:.3g} % of all")
+    kept = corners[parts == largest]
+    if Solid(points, kept).volume < 0.0:
+        notes.append("the surface may be inside out: it seems to enclose a negative volume")
+    used, local = np.unique(kept, return_inverse=True)
+    return points[used], local.reshape(-1, 3), notes
 
 
 def oriented(points: Array, corners: Indices) -> tuple[Indices, bool]:
@@ -90,11 +97,17 @@ def oriented(points: Array, corners: Indices) -> tuple[Indices, bool]:
     Raises:
         MeshError: The mesh is flat, or its parts are separate, overlap or contradict each other.
     """
-    corners, turned = turned_out(points, corners)
+    extent = float(np.ptp(points, axis=0).max())
+    total = Solid(points, corners).volume
+    if abs(total) < THINNEST * extent**3:
+        message = f"the volume is {total:.3g} m^3; a solid must have one"
+        raise MeshError(MeshRefusal.ZERO_VOLUME, message)
+    if total < 0.0:
+        corners = corners[:, ::-1]
     parts = _parts(points, corners)
     bodies = [part for part in parts if part.volume > 0.0]
     cavities = [Solid(part.vertices, part.triangles[:, ::-1]) for part in parts if part.volume <= 0]
-    slack = OVERLAP * Solid(points, corners).volume
+    slack = OVERLAP * abs(total)
     if len(bodies) > 1 and sum(body.volume for body in bodies) - union_volume(bodies) > slack:
         message = f"{len(bodies)} solids overlap; unite them into one surface first"
         raise MeshError(MeshRefusal.OVERLAP, message)
@@ -106,19 +119,25 @@ def oriented(points: Array, corners: Indices) -> tuple[Indices, bool]:
         if cavity.volume - inside > slack:
             message = "one part is inside out and not a cavity of another; turn its triangles"
             raise MeshError(MeshRefusal.WINDING, message)
-    return corners, turned
+    return corners, total < 0.0
 
 
 def _parts(points: Array, corners: Indices) -> list[Solid]:
     """The edge-connected parts of a mesh."""
+    label, parts = _labels(points, corners), list[Solid]()
+    for part in range(int(label.max()) + 1):
+        used, local = np.unique(corners[label == part], return_inverse=True)
+        parts.append(Solid(points[used], local.reshape(-1, 3)))
+    return parts
+
+
+def _labels(points: Array, corners: Indices) -> Indices:
+    """Of each triangle the number of its connected part, (t,)."""
     graph: Any = importlib.import_module("scipy.sparse")
     links = graph.coo_array(
         (np.ones(corners.size), (corners.ravel(), np.roll(corners, 1, axis=1).ravel())),
         shape=(len(points),) * 2,
     )
-    count, label = graph.csgraph.connected_components(links, directed=False)
-    parts: list[Solid] = []
-    for part in range(count):
-        used, local = np.unique(corners[label[corners[:, 0]] == part], return_inverse=True)
-        parts.append(Solid(points[used], local.reshape(-1, 3)))
-    return parts
+    _, label = graph.csgraph.connected_components(links, directed=False)
+    _, part = np.unique(label[corners[:, 0]], return_inverse=True)
+    return part

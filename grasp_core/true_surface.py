@@ -4,9 +4,9 @@ Solved: for a placement on the planes of patches, one with the same force cones 
 that the surface is made of over the contacts, each within the region of its finger.
 
 Why there is one. The planes were planned with friction cones that fit inside those of every
-triangle over them, and with contacts anywhere within `depth` of the planes, so the planned focus
-points can be aimed at from the surface too. The construction is run again on the triangles:
-what it returns has its contacts on the surface, and is certified with the true normals.
+triangle over them, and with contacts anywhere within `depth` of the planes. So a concurrent grasp's
+contacts on the surface can aim at the planned focus. Otherwise the construction is run again on the
+triangles. Either way the contacts are on the surface, and are certified with the true normals.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,12 +16,15 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.face_pieces import FacePiece, FaceShape, piece_of
-from grasp_core.placements import Placement
+from grasp_core.placements import Placement, balanced_forces
 from grasp_core.polygons import clip, edge_rows
 from grasp_core.values import ContactRegion, ForceCone
 
 LEAST_FACET = 1e-5
 """Parts of triangles without room for a disc of this radius (object size one) are left."""
+
+SAME_CORNER = 1e-9
+"""Corners closer than this are one."""
 
 OnFacets = Callable[[tuple[FacePiece, ...]], Placement | None]
 
@@ -57,9 +60,40 @@ def on_true_surface(
         if any(facet is None for facet in facets):
             continue
         chosen = tuple(facet for facet in facets if facet is not None)
-        if (found := place(chosen)) is not None:
+        found = _aimed(chosen, cones, planned, directions) or place(chosen)
+        if found is not None:
             return chosen, replace(found, radii=planned.radii, merit=planned.merit)
     return None
+
+
+def _aimed(
+    facets: Sequence[FacePiece],
+    cones: Sequence[ForceCone],
+    planned: Placement,
+    directions: Array,
+) -> Placement | None:
+    """Contacts straight over or under the planned ones whose lines meet in the planned focus."""
+    if len(planned.foci) != 1:
+        return None
+    heights = [
+        float(facet.normal @ (facet.origin - at)) / float(facet.normal @ along)
+        for facet, at, along in zip(facets, planned.positions, directions, strict=True)
+    ]
+    positions = planned.positions + np.array(heights)[:, None] * directions
+    ways = planned.foci[0] - positions
+    axes = np.array([cone.axis for cone in cones])
+    inward = np.einsum("ki,ki->k", ways, axes)
+    cosines = np.abs(inward) / np.linalg.norm(ways, axis=1)
+    if (cosines < np.cos([cone.half_angle for cone in cones])).any() or not all(
+        _holds(facet, at) for facet, at in zip(facets, positions, strict=True)
+    ):
+        return None
+    forces = balanced_forces(facets, np.sign(inward)[:, None] * ways)
+    return replace(planned, positions=positions, forces=forces)
+
+
+def _holds(facet: FacePiece, point: Array) -> bool:
+    return bool((facet.E @ (facet.frame.T @ (point - facet.origin)) <= facet.b).all())
 
 
 def _facet(
@@ -77,6 +111,8 @@ def _facet(
     E, b = edge_rows(claimed) if len(claimed) > 1 else (piece.E, piece.b)
     rows = E @ piece.frame.T
     inside = clip(facet.corners, rows @ facet.frame, b - rows @ (facet.origin - piece.origin))
+    apart = np.linalg.norm(inside - np.roll(inside, 1, axis=0), axis=1) > SAME_CORNER
+    inside = inside[apart]
     if len(inside) < 3:  # noqa: PLR2004 - not a polygon
         return None
     part = piece_of(piece.face, facet.normal, facet.origin + inside @ facet.frame.T)

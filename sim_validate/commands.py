@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -19,7 +19,7 @@ from grasp_core.spanning import spanning_quadruples
 from grasp_core.versions import versions
 from scenes.mjcf import build_scene
 from scenes.objects import example_names, example_object
-from sim_validate import cli
+from sim_validate import cli, flags
 from sim_validate.analyze_command import analyze_file
 from sim_validate.console import Reporter
 from sim_validate.files import read_text, remove_results, write_text
@@ -52,7 +52,8 @@ def execute(command: cli.Command) -> int:
 
 
 def _run(command: cli.Run, reporter: Reporter) -> int:
-    testing, planning = command.testing, command.planning
+    planning = command.planning
+    testing = _with_planned_fingers(command.testing, planning)
     setup, _ = prepared(testing, planning.seed, command.out or RESULTS)
     body, found, moves = plan_object(command.object, planning, testing.jobs, reporter)
     folder = command.out or RESULTS / _folder_name(body.name)
@@ -73,6 +74,14 @@ def _run(command: cli.Run, reporter: Reporter) -> int:
     code = simulate_grasps(saved, testing, folder, reporter)
     reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
     return code
+
+
+def _with_planned_fingers(testing: flags.Testing, planning: flags.Planning) -> flags.Testing:
+    """Fingertips of the radius that was planned for, unless another one is asked for."""
+    if planning.approach_m is None or testing.fingers.fingertip_radius_m is not None:
+        return testing
+    fingers = replace(testing.fingers, fingertip_radius_m=planning.finger_radius_m)
+    return replace(testing, fingers=fingers)
 
 
 def _folder_name(name: str) -> str:

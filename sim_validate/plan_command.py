@@ -34,6 +34,11 @@ def load_object(name: str, mesh: flags.Mesh) -> Polyhedron:
         )
     if path.suffix or len(path.parts) > 1:
         raise InputError(f"{name}: no such file, and the ending is none of {', '.join(FORMATS)}")
+    if mesh != flags.Mesh():
+        raise InputError(
+            f"{name} is built in; --unit, --faces, --patches, --patch-spread-deg, --patch-depth "
+            "and --center-of-mass-m say how mesh files are read"
+        )
     return example_object(name)
 
 
@@ -47,6 +52,7 @@ def plan_object(
     """
     if planning.ceiling is not None and not planning.optimize:
         raise InputError("--ceiling bounds what --optimize may reach; give both or neither")
+    _check_optimize(planning)
     body = load_object(name, planning.mesh)
     if planning.optimize and body.patches:
         raise InputError(
@@ -79,6 +85,15 @@ def plan_object(
         reporter=reporter,
     )  # fmt: skip
     return body, found, moves
+
+
+def _check_optimize(planning: flags.Planning) -> None:
+    kept = (planning.edge_clearance_m, planning.share_faces_m, planning.approach_m)
+    if planning.optimize and any(kept):
+        raise InputError(
+            "--optimize moves contacts without regard to --edge-clearance-m, --share-faces-m and "
+            "--approach-m; leave it out, or them"
+        )
 
 
 def _finger(planning: flags.Planning) -> Finger | None:
@@ -132,7 +147,7 @@ def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
     known = found.outcomes
     reporter.say(
         f"face quadruples: {known.held} with a certified grasp, {known.absent} proved to have "
-        f"none, {known.open} not decided"
+        f"none, {len(found.undecided)} undecided, {known.open - len(found.undecided)} not examined"
         + (f", {known.out_of_reach} out of reach" if found.unreached else "")
     )
     for method, tally in counts.families.items():
@@ -148,9 +163,15 @@ def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
                  for faces, share in found.undecided.items()]  # fmt: skip
         reporter.say(f"undecided faces: {', '.join(named[:TABLE_ROWS])}")
         say_cut(len(named), reporter)
-    reasons = Counter(re.sub(r"\d+", "N", why) for why in found.unreached.values())
+    reasons = Counter(_whoever(why) for why in found.unreached.values())
     for why, count in reasons.most_common():
         reporter.say(f"out of reach: {why}, on {count} face quadruples")
+
+
+def _whoever(why: str) -> str:
+    """A reason without the numbers of the fingers."""
+    why = re.sub(r"fingertips \d+ and \d+", "two fingertips", why)
+    return re.sub(r"(finger(?:tip)?) \d+", r"a \1", why)
 
 
 def _listed(faces: FaceQuadruple) -> str:

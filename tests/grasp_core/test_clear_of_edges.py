@@ -50,7 +50,7 @@ def test_planned_contacts_and_regions_keep_the_margin():
                 assert from_edges(point, body.faces[face]) >= margin * (1.0 - 1e-6)
                 tested += 1
     assert tested >= 500
-    assert len(plan.grasps) < len(gc.plan(body, 0.5).grasps) + 20
+    assert len(plan.grasps) >= 40
 
 
 def test_a_margin_wider_than_all_faces_leaves_nothing():
@@ -58,5 +58,6 @@ def test_a_margin_wider_than_all_faces_leaves_nothing():
     plan = gc.plan(body, 0.5, clearance=0.9 * body.radius)
     assert not plan.grasps
     assert plan.outcomes.absent == plan.counts.quadruples
+    assert "m from edges" in plan.absence
     with pytest.raises(gc.InputError, match="clearance"):
         gc.plan(body, 0.5, clearance=-1.0)

@@ -2,6 +2,7 @@ import math
 
 import numpy as np
 import pytest
+import trimesh
 
 import grasp_core as gc
 from grasp_core.errors import MeshRefusal
@@ -71,7 +72,9 @@ def test_the_centre_of_mass_can_be_given():
     vertices, triangles = bumpy_ellipsoid()
     body = gc.Polyhedron.from_mesh(vertices, triangles, center_of_mass=[0.01, 0.0, -0.01])
     np.testing.assert_array_equal(body.center_of_mass, [0.01, 0.0, -0.01])
-    with pytest.raises(gc.InputError, match="center"):
+    with pytest.raises(gc.InputError, match="outside the object"):
+        gc.Polyhedron.from_mesh(vertices, triangles, center_of_mass=[1.0, 0.0, 0.0])
+    with pytest.raises(gc.InputError, match="center_of_mass"):
         gc.Polyhedron.from_mesh(vertices, triangles, center_of_mass=[0.0, np.nan, 0.0])
 
 
@@ -98,13 +101,57 @@ def test_an_open_mesh_is_refused_where_planar_faces_are_asked_for():
     assert refused.value.reason is MeshRefusal.WINDING
 
 
-def test_an_inside_out_scan_is_turned():
+def test_a_closed_scan_that_is_inside_out_is_turned():
     vertices, triangles = bumpy_ellipsoid()
     one, two = (gc.Polyhedron.from_mesh(vertices, t) for t in (triangles, triangles[:, ::-1]))
     assert "inside out" in " ".join(two.notes)
     assert one.volume == pytest.approx(two.volume)
     for face in two.faces:
         assert face.normal @ (face.centroid - two.center_of_mass) < 0.0
+
+
+def test_of_an_open_surface_in_parts_only_the_largest_is_used_and_never_turned():
+    large, triangles = bumpy_ellipsoid()
+    small = 0.6 * large + [0.2, 0.0, 0.0]
+    both = np.vstack([triangles[3:], triangles[:-2] + len(large)])
+    body = gc.Polyhedron.from_mesh(np.vstack([large, small]), both)
+    assert "separate parts" in " ".join(body.notes)
+    assert body.vertices[:, 0].max() < 0.1
+    inward = [face.normal @ (face.centroid - body.center_of_mass) for face in body.faces]
+    assert max(inward) < 0.0
+    turned = gc.Polyhedron.from_mesh(large, triangles[3:, ::-1])
+    assert "inside out" in " ".join(turned.notes)
+    assert min(face.normal @ (face.centroid - turned.center_of_mass) for face in turned.faces) > 0.0
+
+
+@pytest.mark.parametrize("sections", [(24, 12), (48, 24)])
+def test_a_torus_is_planned(sections):
+    ring = trimesh.creation.torus(0.04, 0.012, *sections)
+    body = gc.Polyhedron.from_mesh(ring.vertices, ring.faces, patches=gc.PatchLimits(20.0, 0.02))
+    plan = gc.plan(body, 0.8, families=("concurrent", "pencil"), limit=4)
+    for grasp in plan.grasps:
+        assert gc.force_closure(grasp, friction=0.8).verify()
+    assert plan.grasps or plan.absence
+
+
+def test_a_surface_without_flat_parts_is_refused_with_advice():
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    rough = gc.PatchLimits(spread_deg=0.5, depth=1e-5)
+    body = gc.Polyhedron.from_mesh(0.05 * ball.vertices, ball.faces, patches=rough)
+    assert len(body.faces) >= 4  # single triangles
+    corners = 0.1 * np.vstack([np.zeros(3), np.eye(3)])
+    three = [[0, 2, 1], [0, 1, 3], [0, 3, 2]]
+    with pytest.raises(gc.MeshError, match="patch-spread-deg") as refused:
+        gc.Polyhedron.from_mesh(corners, three, faces="patches")
+    assert refused.value.reason is MeshRefusal.NOT_FLAT
+
+
+def test_a_box_with_a_triangle_missing_still_has_five_patches():
+    box = trimesh.creation.box(extents=(0.1, 0.08, 0.06))
+    body = gc.Polyhedron.from_mesh(box.vertices, box.faces[:-1], faces="patches")
+    assert len(body.faces) == 6
+    assert {round(math.degrees(face.spread), 6) for face in body.faces} == {0.0}
+    assert gc.plan(body, 0.5, families="concurrent", limit=1).grasps
 
 
 @pytest.mark.parametrize(

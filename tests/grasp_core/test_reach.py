@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -38,30 +40,37 @@ def test_distances_of_segments_from_triangles_are_the_least():
     assert crossing >= 5
 
 
-SAMPLES = 24
-"""Steps along each edge of a triangle."""
+STEPS = 24
+"""Along each edge of a triangle, and twice as many along a rod."""
 
 
 def least_gap(body, grasp, finger, directions):
-    """Least room left between the rods and what they may meet, by sampling, and its accuracy."""
+    """Least room left between rods and what they may meet, sampled, without the faces touched.
+
+    Beside it how far it may be above the true one.
+    """
     tips = grasp.positions - finger.radius_m * grasp.normals
-    shares = np.linspace(0.0, 1.0, 60)[:, None]
+    shares = np.linspace(0.0, 1.0, 2 * STEPS)[:, None]
     rods = [
         tip + shares * finger.approach_m * way for tip, way in zip(tips, directions, strict=True)
     ]
     corners = body.vertices[body.triangles]
-    steps = [(i, j) for i in range(SAMPLES + 1) for j in range(SAMPLES + 1 - i)]
-    grid = np.array(steps)[None] / SAMPLES
+    steps = [(i, j) for i in range(STEPS + 1) for j in range(STEPS + 1 - i)]
+    grid = np.array(steps)[None] / STEPS
     points = (
         corners[:, None, 0]
         + grid[..., :1] * (corners[:, None, 1] - corners[:, None, 0])
         + grid[..., 1:] * (corners[:, None, 2] - corners[:, None, 0])
-    ).reshape(-1, 3)
+    )
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
-    accuracy = longest / SAMPLES + finger.approach_m / 59.0
+    accuracy = longest / STEPS + finger.approach_m / (2 * STEPS - 1)
     gap = np.inf
-    for i, rod in enumerate(rods):
-        gap = min(gap, cKDTree(points).query(rod)[0].min() - finger.radius_m)
+    for i, (rod, position, normal) in enumerate(
+        zip(rods, grasp.positions, grasp.normals, strict=True)
+    ):
+        away = np.abs((corners - position) @ normal).max(axis=1) > 1e-9
+        others = points[away].reshape(-1, 3)
+        gap = min(gap, cKDTree(others).query(rod)[0].min() - finger.radius_m)
         for other in rods[:i]:
             gap = min(gap, cKDTree(other).query(rod)[0].min() - 2.0 * finger.radius_m)
     return gap, accuracy
@@ -85,7 +94,7 @@ def test_reached_contacts_have_free_rods_and_others_say_why(name, thickness):
             gap, _ = least_gap(body, grasp, finger, found.directions)
             assert gap >= -2e-6 * body.radius
             reached += 1
-    assert reached >= 10
+    assert reached >= 5
     assert reasons
 
 
@@ -104,8 +113,7 @@ def test_nothing_too_large_gets_into_a_bore():
     assert wide.directions is None
     assert "meets the object" in wide.reason
     straight = reach(body, (inner[0],), *contact, Finger(0.3 * bore, 3.0 * bore))
-    if straight.directions is not None:
-        assert straight.directions[0] @ -face.normal < 0.99
+    assert straight.directions[0] @ -face.normal < 0.99
 
 
 def test_a_plan_for_fingers_holds_only_grasps_that_they_reach():
@@ -130,10 +138,18 @@ def test_a_plan_for_fingers_holds_only_grasps_that_they_reach():
     assert "fingers reach" in nothing.absence
 
 
-def test_the_patch_that_is_touched_is_not_in_the_way():
-    body = curved_body(noise=0.002)
-    plan = gc.plan(body, 0.5, limit=6, finger=Finger(0.1 * body.radius, body.radius))
+def test_the_patch_that_is_touched_is_not_in_the_way_but_the_rest_is():
+    """A noisy surface: its neighbours on the patch stand out, so without the patch all is free."""
+    body = curved_body(noise=0.003)
+    finger = Finger(0.6 * body.radius, body.radius)
+    plan = gc.plan(body, 0.5, limit=6, finger=finger)
     assert len(plan.grasps) == 6
+    bare = replace(body, faces=tuple(replace(face, facets=[]) for face in body.faces))
+    blocked = [
+        reach(bare, grasp.faces, grasp.positions, grasp.normals, finger).directions is None
+        for grasp in plan.grasps
+    ]
+    assert sum(blocked) >= 3
 
 
 @pytest.mark.parametrize("lengths", [(0.0, 0.1), (0.01, -1.0), (np.nan, 0.1)])

@@ -3,7 +3,9 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.on_faces import check_on_faces
+from grasp_core.records import grasps_from_json, plan_to_json
 from grasp_core.shared_faces import shared_quadruples, with_halves
+from grasp_core.solids import hull
 from scenes.objects import example_object
 from tests.judges import random_rotation
 
@@ -62,6 +64,39 @@ def test_fingers_on_one_face_hold_and_keep_their_distance():
     assert plan.counts.quadruples == 90
 
 
+@pytest.mark.parametrize("name", ["prism", "box"])
+def test_grasps_with_both_halves_have_ids_of_their_own_and_survive_a_file(name):
+    body = example_object(name)
+    plan = gc.plan(body, 0.5, families="pencil", share_faces=0.005)
+    assert len({grasp.id for grasp in plan.grasps}) == len(plan.grasps) >= 20
+    saved = grasps_from_json(plan_to_json(body, plan))
+    assert [grasp.id for grasp in saved.grasps] == [grasp.id for grasp in plan.grasps]
+
+
+def test_shared_faces_are_tried_after_blocks_that_are_too_small():
+    """A box with many narrow faces: the first grasps of two fingers on a wide one are larger."""
+    body = bevelled(example_object("box"))
+    plan = gc.plan(body, 0.5, families="concurrent", limit=10, share_faces=0.004)
+    every = gc.plan(body, 0.5, families="concurrent", share_faces=0.004, limit=400)
+    radii = [sorted((g.radius for g in each.grasps), reverse=True)[:10] for each in (plan, every)]
+    np.testing.assert_allclose(*radii, rtol=1e-5)
+
+
+def bevelled(body):
+    """A body cut by many planes near its corners."""
+    rng = np.random.default_rng(0)
+    size = np.ptp(body.vertices, axis=0)
+    corners = 0.5 * size * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    points = [
+        corner * (1.0 - cut * np.eye(3)[axis])
+        for corner in corners
+        for axis in range(3)
+        for cut in rng.uniform(0.08, 0.12, 1)
+    ]
+    solid = hull(points)
+    return gc.Polyhedron.from_mesh(solid.vertices, solid.triangles, name="bevelled")
+
+
 def test_absence_is_proved_for_whole_faces_not_for_their_halves():
     """Random contacts on the whole faces of quadruples that are called absent never close."""
     body, rng, tested = example_object("wedge"), np.random.default_rng(0), 0
@@ -77,7 +112,7 @@ def test_absence_is_proved_for_whole_faces_not_for_their_halves():
             assert not gc.force_closure(points, body.normals[list(faces)], 0.2).closed
             tested += 1
     assert tested >= 60
-    assert set(plan.undecided) <= {faces for faces in plan.undecided if len(set(faces)) < 4}
+    assert all(len(set(faces)) < 4 for faces in plan.undecided)
 
 
 def test_halves_turn_with_the_object():

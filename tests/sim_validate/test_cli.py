@@ -261,18 +261,13 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
     vertices, triangles = bumpy_ellipsoid(noise=0.001)
     trimesh.Trimesh(1e3 * vertices, triangles[5:], process=False).export(here / "scan.ply")
     flags = ["--unit", "mm", "--patches", "10", "--limit", "4", "--out", "r"]
-    fingers = [
-        "--finger-radius-m",
-        "0.004",
-        "--approach-m",
-        "0.03",
-        "--fingertip-radius-m",
-        "0.004",
-    ]
+    fingers = ["--finger-radius-m", "0.004", "--approach-m", "0.03"]
     assert main(["run", "scan.ply", *flags, *fingers]) == Exit.GOOD
     shown = capsys.readouterr()
     assert "not a closed surface" in shown.err
     assert "4 of 4 grasps held" in shown.out
+    verdict = json.loads((here / "r" / "verdicts.json").read_text())["verdicts"][0]
+    assert verdict["settings"]["scene"]["fingertip_radius_m"] == 0.004
     saved = json.loads((here / "r" / "grasps.json").read_text())
     assert saved["object"]["patches"] == {"spread_deg": 10.0, "depth": 0.01, "most": 10}
     assert main(["validate", "r/grasps.json", "--limit", "1"]) == Exit.GOOD
@@ -287,7 +282,7 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
 def test_planning_flags_reach_the_planner(capsys):
     flags = ["--friction", "0.3", "--complete", "--rank-by", "diverse", "--limit", "5"]
     assert main(["plan", "double-wedge-bar", *flags]) == Exit.GOOD
-    assert "0 not decided" in capsys.readouterr().out
+    assert "0 undecided, 0 not examined" in capsys.readouterr().out
     reach = ["--finger-radius-m", "0.006", "--approach-m", "0.05", "--edge-clearance-m", "0.001"]
     assert main(["plan", "l-bracket", *reach, "--share-faces-m", "0.01", "--limit", "5"]) == 0
     assert "out of reach" in capsys.readouterr().out
@@ -300,6 +295,8 @@ def test_planning_flags_reach_the_planner(capsys):
         (["--finger-radius-m", "0.01"], "--finger-radius-m also needs --approach-m"),
         (["--edge-clearance-m", "5"], "clearance must be from 0"),
         (["--complete", "--family", "pencil"], "takes the free method"),
+        (["--optimize", "--share-faces-m", "0.01"], "leave it out, or them"),
+        (["--unit", "mm"], "box is built in"),
     ],
 )
 @pytest.mark.usefixtures("here")
