@@ -111,3 +111,24 @@ def test_wide_patches_leave_no_friction_to_plan_with():
     wide = gc.Polyhedron.from_mesh(vertices, triangles, patches=gc.PatchLimits(40.0, 0.1, 8))
     assert min(math.degrees(face.spread) for face in wide.faces[:4]) > 12.0
     assert not gc.plan(wide, 0.2, families=("concurrent", "pencil")).grasps
+
+
+def test_regions_are_those_of_the_focus_that_is_written(planned):
+    """A concurrent grasp's lines from anywhere over its regions to the focus are in the cones.
+
+    Above or below the planes by all of their depth: more than the surface has.
+    """
+    body, plan = planned
+    tested = 0
+    for grasp in plan.grasps:
+        if grasp.family != "concurrent":
+            continue
+        for face, cone, region in zip(grasp.faces, grasp.force_cones, grasp.regions, strict=True):
+            patch = body.faces[face]
+            for height in (-patch.depth, patch.depth):
+                ways = grasp.focus_points[0] - region.polygon - height * patch.normal
+                cosines = np.abs(ways @ cone.axis) / np.linalg.norm(ways, axis=1)
+                leans = np.arccos(np.minimum(cosines, 1.0))
+                assert leans.max() <= cone.half_angle + 1e-7
+                tested += 1
+    assert tested >= 60

@@ -267,7 +267,7 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
     assert "not a closed surface" in shown.err
     assert "4 of 4 grasps held" in shown.out
     verdict = json.loads((here / "r" / "verdicts.json").read_text())["verdicts"][0]
-    assert verdict["settings"]["scene"]["fingertip_radius_m"] == 0.004
+    assert verdict["settings"]["drive"]["radius_m"] == 0.004
     saved = json.loads((here / "r" / "grasps.json").read_text())
     assert saved["object"]["patches"] == {"spread_deg": 10.0, "depth": 0.01, "most": 10}
     assert main(["validate", "r/grasps.json", "--limit", "1"]) == Exit.GOOD
