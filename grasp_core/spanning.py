@@ -68,8 +68,12 @@ def span_sines(units: Array) -> Array:
     front, back = _crossed(one, two), _crossed(three, four)
     minors = (_dotted(two, back), _dotted(one, back), _dotted(four, front), _dotted(three, front))
     signed = np.stack([minors[0], -minors[1], minors[2], -minors[3]])
-    signed *= np.sign(signed.sum(axis=0))
-    worst = signed.min(axis=0)
+    total = signed.sum(axis=0)
+    worst = np.where(
+        np.abs(total) > DEPENDENT,
+        (signed * np.sign(total)).min(axis=0),
+        -np.abs(signed).max(axis=0),  # no side is the positive one, but for rounding
+    )
     vectors = (one, two, three, four)
     cosines = {
         frozenset(pair): _dotted(vectors[pair[0]], vectors[pair[1]])

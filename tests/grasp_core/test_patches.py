@@ -124,14 +124,14 @@ def test_of_an_open_surface_in_parts_only_the_largest_is_used_and_never_turned()
     assert min(face.normal @ (face.centroid - turned.center_of_mass) for face in turned.faces) > 0.0
 
 
-@pytest.mark.parametrize("sections", [(24, 12), (48, 24)])
-def test_a_torus_is_planned(sections):
-    ring = trimesh.creation.torus(0.04, 0.012, *sections)
-    body = gc.Polyhedron.from_mesh(ring.vertices, ring.faces, patches=gc.PatchLimits(20.0, 0.02))
-    plan = gc.plan(body, 0.8, families=("concurrent", "pencil"), limit=4)
+def test_a_coarse_torus_whose_triangles_meet_regions_in_their_corners_is_planned():
+    ring = trimesh.creation.torus(0.04, 0.012, 24, 12)
+    limits = gc.PatchLimits(20.0, 0.02, 10)
+    body = gc.Polyhedron.from_mesh(ring.vertices, ring.faces, patches=limits)
+    plan = gc.plan(body, 0.8, limit=4)
+    assert len(plan.grasps) == 4
     for grasp in plan.grasps:
         assert gc.force_closure(grasp, friction=0.8).verify()
-    assert plan.grasps or plan.absence
 
 
 def test_a_surface_without_flat_parts_is_refused_with_advice():

@@ -21,7 +21,7 @@ def contacts_of(body, grasp, inset=0.05):
 @pytest.fixture(scope="module")
 def wedge():
     body = example_object("wedge")
-    return body, gc.plan(body, 0.5, limit=12).grasps
+    return body, gc.plan(body, 0.5, limit=12, cones="normal").grasps
 
 
 def test_slopes_of_the_nearest_planes_predict_small_moves(wedge):
