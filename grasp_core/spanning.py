@@ -69,7 +69,7 @@ def span_sines(units: Array) -> Array:
     minors = (_dotted(two, back), _dotted(one, back), _dotted(four, front), _dotted(three, front))
     signed = np.stack([minors[0], -minors[1], minors[2], -minors[3]])
     total = signed.sum(axis=0)
-    worst = np.where(
+    worst: Array = np.where(
         np.abs(total) > DEPENDENT,
         (signed * np.sign(total)).min(axis=0),
         -np.abs(signed).max(axis=0),  # no side is the positive one, but for rounding
