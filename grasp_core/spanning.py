@@ -69,10 +69,10 @@ def span_sines(units: Array) -> Array:
     minors = (_dotted(two, back), _dotted(one, back), _dotted(four, front), _dotted(three, front))
     signed = np.stack([minors[0], -minors[1], minors[2], -minors[3]])
     total = signed.sum(axis=0)
-    worst: Array = np.where(
+    worst = np.where(
         np.abs(total) > DEPENDENT,
-        (signed * np.sign(total)).min(axis=0),
-        -np.abs(signed).max(axis=0),  # no side is the positive one, but for rounding
+        (signed * np.sign(total)).min(axis=0, initial=np.inf),
+        -np.abs(signed).max(axis=0, initial=0.0),  # no side is positive, but for rounding
     )
     vectors = (one, two, three, four)
     cosines = {
