@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_units
 from grasp_core.errors import InputError
@@ -67,13 +67,12 @@ def span_sines(units: Array) -> Array:
     one, two, three, four = np.ascontiguousarray(np.moveaxis(units, 0, -1))
     front, back = _crossed(one, two), _crossed(three, four)
     minors = (_dotted(two, back), _dotted(one, back), _dotted(four, front), _dotted(three, front))
-    signed = np.stack([minors[0], -minors[1], minors[2], -minors[3]])
-    total = signed.sum(axis=0)
-    worst = np.where(
-        np.abs(total) > DEPENDENT,
-        (signed * np.sign(total)).min(axis=0, initial=np.inf),
-        -np.abs(signed).max(axis=0, initial=0.0),  # no side is positive, but for rounding
-    )
+    signed: Array = np.stack([minors[0], -minors[1], minors[2], -minors[3]])
+    total: Array = np.sum(signed, axis=0)
+    lowest: Array = np.min(signed * np.sign(total), axis=0, initial=np.inf)
+    farthest: Array = np.max(np.abs(signed), axis=0, initial=0.0)
+    sided: NDArray[np.bool_] = np.abs(total) > DEPENDENT  # else none is positive, but for rounding
+    worst: Array = np.where(sided, lowest, -farthest)
     vectors = (one, two, three, four)
     cosines = {
         frozenset(pair): _dotted(vectors[pair[0]], vectors[pair[1]])
