@@ -1,16 +1,16 @@
 """Mesh file or triangle arrays -> Polyhedron, or a refusal with its reason; the door to trimesh.
 
-The order of the checks: the file's size and ending, that it can be read whole, its numbers,
-its topology (closed, two triangles per edge, one consistent side), its volume, and that no
-two of its parts overlap. Vertices closer than `WELD` are one vertex. An inside-out mesh is
-turned, and the polyhedron's notes say so. Nothing else is repaired.
+The order of the checks: the file's size and ending, that it can be read whole, its numbers, one
+consistent side, that it is closed with two triangles per edge, its volume, and that no two of its
+parts overlap. Close vertices are welded, and a closed inside-out mesh is turned. A surface that is
+taken as patches need not be closed: of a faulty one the largest part is used, wound as it is. The
+polyhedron's notes say what was done. Nothing else is repaired.
 """
 
 import hashlib
 import importlib
 import io
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -118,22 +118,11 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
     fault = surface_fault(corners)
     if fault and (limits is None or fault.reason is MeshRefusal.WINDING):
         raise fault
-    if fault:
-        points, corners, said = largest_part(points, corners)
-        notes += said
-    else:
-        corners, flipped = oriented(points, corners)
-        notes += ["the mesh was inside out; its triangles were turned"] if flipped else []
+    points, corners, said = _sound_surface(points, corners, fault)
+    notes += said
     if limits is not None:
-        found = flat_patches(points, corners, limits)
-        if len(found) < FINGERS:
-            raise MeshError(
-                MeshRefusal.NOT_FLAT,
-                f"{len(found)} patches are within {limits.spread_deg:g} deg and {limits.depth:g} "
-                "of the extent from flat, four fingers need four; allow more (--patch-spread-deg, "
-                "--patch-depth), or refine the mesh",
-            )
-        notes += _said_of_patches(found, fault)
+        found, said = _patched(points, corners, limits, fault)
+        notes += said
     else:
         found = planar_faces(points, corners, groups or [], flatness, triangulate)
     solid = hull(points) if fault and fault.reason is MeshRefusal.OPEN else Solid(points, corners)
@@ -184,7 +173,29 @@ def _planar_groups(
     return groups if faces == "planar" or len(groups) <= MAX_FACES else None
 
 
-def _said_of_patches(patches: Sequence[Face], fault: MeshError | None) -> list[str]:
+def _sound_surface(
+    points: Array, corners: Indices, fault: MeshError | None
+) -> tuple[Array, Indices, list[str]]:
+    """The surface with its outside outside, of a faulty one the largest part as it is."""
+    if fault:
+        return largest_part(points, corners)
+    corners, flipped = oriented(points, corners)
+    said = ["the mesh was inside out; its triangles were turned"] if flipped else []
+    return points, corners, said
+
+
+def _patched(
+    points: Array, corners: Indices, limits: PatchLimits, fault: MeshError | None
+) -> tuple[tuple[Face, ...], list[str]]:
+    """The patches of a surface, and what to say of them."""
+    patches = flat_patches(points, corners, limits)
+    if len(patches) < FINGERS:
+        raise MeshError(
+            MeshRefusal.NOT_FLAT,
+            f"{len(patches)} patches are within {limits.spread_deg:g} deg and {limits.depth:g} "
+            "of the extent from flat, four fingers need four; allow more (--patch-spread-deg, "
+            "--patch-depth), or refine the mesh",
+        )
     lean = max((face.spread for face in patches), default=0.0)
     off = max((face.depth for face in patches), default=0.0)
     notes = [
@@ -198,7 +209,7 @@ def _said_of_patches(patches: Sequence[Face], fault: MeshError | None) -> list[s
         )
     elif fault:
         notes.append(f"not a proper surface ({fault}); only its patches are used")
-    return notes
+    return patches, notes
 
 
 def _trimesh(submodule: str) -> Any:

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.candidates import BLOCK
 from grasp_core.on_faces import check_on_faces
 from grasp_core.records import grasps_from_json, plan_to_json
 from grasp_core.shared_faces import shared_quadruples, with_halves
@@ -76,24 +77,17 @@ def test_grasps_with_both_halves_have_ids_of_their_own_and_survive_a_file(name):
 def test_shared_faces_are_tried_after_blocks_that_are_too_small():
     """A box with many narrow faces: the first grasps of two fingers on a wide one are larger."""
     body = bevelled(example_object("box"))
-    plan = gc.plan(body, 0.5, families="concurrent", limit=10, share_faces=0.004)
-    every = gc.plan(body, 0.5, families="concurrent", share_faces=0.004, limit=400)
-    radii = [sorted((g.radius for g in each.grasps), reverse=True)[:10] for each in (plan, every)]
-    np.testing.assert_allclose(*radii, rtol=1e-5)
+    assert len(body.faces) > BLOCK  # a further block of whole faces comes before the shared ones
+    plan = gc.plan(body, 0.5, families="concurrent", limit=25, share_faces=0.004)
+    assert any(len(set(grasp.faces)) < 4 for grasp in plan.grasps)
 
 
-def bevelled(body):
-    """A body cut by many planes near its corners."""
-    rng = np.random.default_rng(0)
-    size = np.ptp(body.vertices, axis=0)
-    corners = 0.5 * size * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    points = [
-        corner * (1.0 - cut * np.eye(3)[axis])
-        for corner in corners
-        for axis in range(3)
-        for cut in rng.uniform(0.08, 0.12, 1)
-    ]
-    solid = hull(points)
+def bevelled(body, radius=0.004):
+    """A box with edges rounded by two strips each, and corners by small triangles."""
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    centers = signs * (0.5 * np.ptp(body.vertices, axis=0) - radius)
+    ways = np.vstack([np.eye(3), (1.0 - np.eye(3)) / np.sqrt(2.0), np.full((1, 3), 3.0**-0.5)])
+    solid = hull((centers[:, None] + radius * signs[:, None] * ways).reshape(-1, 3))
     return gc.Polyhedron.from_mesh(solid.vertices, solid.triangles, name="bevelled")
 
 
