@@ -15,13 +15,13 @@ from grasp_core.errors import UndecidedError as UndecidedError
 from grasp_core.errors import UnfaithfulError as UnfaithfulError
 from grasp_core.forces import contact_forces as contact_forces
 from grasp_core.lines import classify_lines as classify_lines
-from grasp_core.mesh import load_polyhedron as load_polyhedron
 from grasp_core.metrics import hull_volume as hull_volume
 from grasp_core.metrics import min_weight as min_weight
 from grasp_core.metrics import smallest_singular_value as smallest_singular_value
 from grasp_core.planner import iter_grasps as iter_grasps
 from grasp_core.planner import plan as plan
 from grasp_core.plans import Plan as Plan
+from grasp_core.polyhedra import load_polyhedron as load_polyhedron
 from grasp_core.quality import FerrariCanny as FerrariCanny
 from grasp_core.quality import ferrari_canny as ferrari_canny
 from grasp_core.quality_ceiling import QualityCeiling as QualityCeiling

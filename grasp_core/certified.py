@@ -46,6 +46,8 @@ class Certified:
     """In the pieces' units."""
     placement: Placement
     margin: float
+    ways_out: Array | None = None
+    """Unit vectors along the fingers' free lines, away from their tips, (4, 3), if sought."""
 
     @property
     def normals(self) -> Array:
@@ -165,6 +167,7 @@ def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:
         closure_margin=found.margin,
         ferrari_canny=_quality(placement, normals, friction),
         witness=Witness(positions, placement.forces),
+        approach_directions=None if found.ways_out is None else -found.ways_out,
     )
 
 

@@ -81,7 +81,7 @@ def search_free(
         choices = iter(_cone_choices([each for each in placed if each], request))
         for each in placed:
             found = _certified(each, next(choices), request, search) if each else None
-            yield [found] if found and search.keep(found) else []
+            yield search.keep(found) if found else []
 
 
 def search_undecided(
@@ -97,7 +97,7 @@ def search_undecided(
         if placed is not None:
             (choices,) = _cone_choices([placed], request)
             found = _certified(placed, choices, request, search)
-        yield [found] if found and search.keep(found) else []
+        yield search.keep(found) if found else []
 
 
 def _decide(

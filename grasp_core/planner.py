@@ -50,9 +50,7 @@ def plan(  # noqa: PLR0913 - the contract's keywords
         cones: `normal` keeps force cones around the normals, as in the paper; with `tilted` leaning
             ones are tried too.
         limit: Keep only this many grasps.
-        rank_by: Which are the best. By `radius`, families take turns, each with its largest discs;
-            tilted cones, which are chosen for their width, are given to pencils only on faces that
-            no concurrent grasp holds.
+        rank_by: Which are the best. By `radius`, families take turns, each with its largest discs.
             Reguli and free grasps have no discs; of these the first found count, and free ones
             only as far as the others do not suffice. By `friction-margin` (the least critical
             friction), `ferrari-canny` (the largest quality) and `diverse` (each next one the
@@ -61,7 +59,9 @@ def plan(  # noqa: PLR0913 - the contract's keywords
         cells: Into how many parts the free method may cut the faces of one quadruple.
         complete: Cut the faces that would stay undecided, into 20,000 parts if need be.
         finger: Keep only grasps that such fingers reach on straight free lines.
-        clearance: How far contacts and their regions stay from all edges of their faces [m].
+        clearance: How far contacts and their regions stay from all edges of their faces [m]. Faces
+            are cut back by so much, at corners that turn inwards by somewhat more; what is proved
+            absent is absent from what is left.
         share_faces: Let two fingers stand on one face, at least so far apart [m]; each face is cut
             once for that, across its longest direction.
         progress: Called after each quadruple.
@@ -141,6 +141,7 @@ def _planned(body: Polyhedron, request: PlanRequest, searches: Searches) -> Plan
         outcomes=outcomes,
         absence=None if grasps else _absence(body, request, counts, outcomes),
         absences={whole(faces): proof for s in every for faces, proof in s.absences.items()},
+        finger=request.finger,
         undecided={whole(faces): share for s in every for faces, share in s.undecided.items()},
         unreached={whole(faces): why for faces, why in searches.unreached().items()},
         seconds={method: search.seconds for method, search in searches.by_method.items()},
@@ -160,7 +161,8 @@ def _absence(body: Polyhedron, request: PlanRequest, counts: PlanCounts, outcome
         return f"{name}: no grasp was found on its patches, which proves nothing about others"
     if "free" in counts.families:
         limits = f" at friction {math.tan(request.theta):.4g}"
-        limits += f" and {request.clearance:g} m from edges" if request.clearance else ""
+        if request.clearance:
+            limits += f" on faces cut back by {request.clearance:g} m from their edges"
         if outcomes.open:
             return (
                 f"{name}: no grasp was found; {outcomes.open} of {counts.quadruples} face "

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from grasp_core.reach import Finger
 from grasp_core.values import FaceQuadruple, Grasp
 
 
@@ -27,7 +28,7 @@ class MethodCounts:
     """Candidates whose programs were set up."""
     pruned: int = 0
     """Candidates skipped because a bound showed that their discs are too small, their pairs are too
-    far from symmetric for a regulus, another family holds the same faces, or because they cannot
+    far from symmetric for a regulus, the free method is not needed on them, or because they cannot
     enter the best `limit`."""
     solved: int = 0
     """Choices of one convex piece per face that were considered."""
@@ -92,6 +93,8 @@ class Plan:
     """Face quadruples that the free method proved to hold no grasp with friction tan(theta), with
     a proof for their convex hulls, or for each choice of one convex piece per face. Pieces too
     small for a contact, a millionth of the object, are left out."""
+    finger: Finger | None = None
+    """What was to get to the contacts, if anything."""
     undecided: Mapping[FaceQuadruple, float] = field(default_factory=dict[FaceQuadruple, float])
     """Face quadruples on which the free method found neither, and the share of the choices of
     contacts that is open, where each cut counts for half."""

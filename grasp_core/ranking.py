@@ -44,8 +44,6 @@ class Quadruple:
 
     faces: FaceQuadruple
     attempts: tuple[Attempt, ...]
-    spans: bool
-    """Whether the normals themselves span (P3), so that every family counts."""
 
     @property
     def bound(self) -> float:
@@ -79,7 +77,6 @@ class Ranking:
                     for column, order in enumerate(self.construction.orders)
                     if bounds[:, column].max() > -np.inf
                 ),
-                spans=bool(bounds[NORMAL].max() > -np.inf),
             )
 
     def _choices(self, place: int, bounds: Array) -> tuple[ConeChoice, ...]:

@@ -55,7 +55,8 @@ class Reach:
     """How fingers get to their contacts, or why they do not."""
 
     directions: Array | None
-    """Unit vectors from each tip along its rod, (k, 3); None if no choice is free."""
+    """Unit vectors from each tip along its rod, (k, 3); None if no choice is free, or none was
+    sought."""
     reason: str = ""
 
 

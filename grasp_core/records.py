@@ -7,141 +7,31 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
 from grasp_core.certified import check_witness
 from grasp_core.errors import InputError
-from grasp_core.mesh import polyhedron_from_mesh
+from grasp_core.grasps_schema import SCHEMA, GraspRecord, GraspsRecord
 from grasp_core.on_faces import check_on_faces
 from grasp_core.plans import Plan
+from grasp_core.polyhedra import polyhedron_from_mesh
+from grasp_core.reach import Finger
 from grasp_core.values import (
     Contact,
     ContactRegion,
-    Family,
     ForceCone,
     Grasp,
     PatchLimits,
     Polyhedron,
-    RegionKind,
     Witness,
     four,
 )
 from grasp_core.versions import versions
 
-SCHEMA = 1
 SAME_DIRECTION = 1e-6
 """How far a witness direction may be from its force's: what six digits in a file keep."""
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Triple = tuple[Finite, Finite, Finite]
-
-
-class _Record(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
-
-
-class MeshRecord(_Record):
-    """Triangles of the object."""
-
-    vertices_m: list[Triple]
-    triangles: list[tuple[int, int, int]]
-
-
-class PatchesRecord(_Record):
-    """How flat the patches of a curved surface are, and how many there may be."""
-
-    spread_deg: Finite
-    depth: Finite
-    most: int
-
-
-class ObjectRecord(_Record):
-    """The object that was planned on."""
-
-    name: str
-    source_sha256: str
-    content_sha256: str
-    mesh: MeshRecord
-    center_of_mass_m: Triple
-    patches: PatchesRecord | None = None
-    """None for exact planar faces."""
-
-
-class ContactRecord(_Record):
-    """Where a fingertip touches."""
-
-    position_m: Triple
-    normal: Triple
-
-
-class ConeRecord(_Record):
-    """A force cone of the construction."""
-
-    axis: Triple
-    half_angle_deg: Finite
-
-
-class RegionRecord(_Record):
-    """Where a finger may stand."""
-
-    kind: RegionKind
-    polygon_m: list[Triple]
-    inscribed_radius_m: Finite
-
-
-class WitnessRecord(_Record):
-    """Balanced forces along four lines, normal parts summing to one."""
-
-    points_m: tuple[Triple, Triple, Triple, Triple]
-    directions: tuple[Triple, Triple, Triple, Triple]
-    forces: tuple[Triple, Triple, Triple, Triple]
-
-
-class GraspRecord(_Record):
-    """One grasp."""
-
-    id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,99}$")
-    """Also the name of the grasp's scene file, hence no dots or slashes."""
-    family: Family
-    faces: tuple[int, int, int, int]
-    contacts: tuple[ContactRecord, ContactRecord, ContactRecord, ContactRecord]
-    focus_points_m: list[Triple]
-    force_cones: tuple[ConeRecord, ConeRecord, ConeRecord, ConeRecord]
-    radius_m: Finite
-    regions: tuple[RegionRecord, RegionRecord, RegionRecord, RegionRecord]
-    span_angle_deg: Finite
-    critical_friction: Finite
-    closure_margin: Finite
-    ferrari_canny: tuple[Finite, Finite]
-    witness: WitnessRecord
-
-
-class MovedRecord(_Record):
-    """How a grasp was moved on its faces, with bounds of its quality."""
-
-    id: str
-    moved_from: str
-    ferrari_canny_before: tuple[Finite, Finite]
-    ferrari_canny_after: tuple[Finite, Finite]
-    ferrari_canny_ceiling: Finite | None
-
-
-class GraspsRecord(_Record):
-    """A whole `grasps.json`."""
-
-    schema_version: Literal[1] = Field(alias="schema")
-    object: ObjectRecord
-    friction: Finite
-    theta_deg: Finite
-    seed: int
-    versions: dict[str, str]
-    counts: dict[str, Any]
-    outcomes: dict[str, int] = Field(default_factory=dict)
-    absence: str | None
-    optimization: list[MovedRecord] = []
-    grasps: list[GraspRecord]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,6 +42,8 @@ class SavedGrasps:
     friction: float
     seed: int
     grasps: tuple[Grasp, ...]
+    finger: Finger | None = None
+    """What was planned to get to the contacts, if anything."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,6 +82,7 @@ def plan_to_json(body: Polyhedron, plan: Plan, moves: Sequence[Moved] = ()) -> s
         "friction": plan.friction,
         "theta_deg": math.degrees(plan.theta),
         "seed": plan.seed,
+        "finger": None if plan.finger is None else asdict(plan.finger),
         "versions": versions(),
         "counts": asdict(plan.counts),
         "outcomes": asdict(plan.outcomes),
@@ -241,6 +134,9 @@ def _grasp_to_record(grasp: Grasp) -> Mapping[str, object]:
             "directions": grasp.witness.directions.tolist(),
             "forces": grasp.witness.forces.tolist(),
         },
+        "approach_directions": (
+            None if grasp.approach_directions is None else grasp.approach_directions.tolist()
+        ),
     }
 
 
@@ -272,7 +168,8 @@ def grasps_from_json(text: str) -> SavedGrasps:
     grasps = tuple(_grasp_from_record(body, grasp, record.friction) for grasp in record.grasps)
     if len({grasp.id for grasp in grasps}) < len(grasps):
         raise InputError("grasps file: two grasps have the same id")
-    return SavedGrasps(body, record.friction, record.seed, grasps)
+    finger = None if record.finger is None else Finger(**record.finger.model_dump())
+    return SavedGrasps(body, record.friction, record.seed, grasps, finger)
 
 
 def _grasp_from_record(body: Polyhedron, record: GraspRecord, friction: float) -> Grasp:
@@ -299,6 +196,9 @@ def _grasp_from_record(body: Polyhedron, record: GraspRecord, friction: float) -
         closure_margin=record.closure_margin,
         ferrari_canny=record.ferrari_canny,
         witness=Witness(np.array(record.witness.points_m), np.array(record.witness.forces)),
+        approach_directions=(
+            None if record.approach_directions is None else np.array(record.approach_directions)
+        ),
     )
     check_on_faces(body, grasp)
     check_witness(body, grasp, friction)

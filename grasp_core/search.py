@@ -4,8 +4,7 @@ import math
 from bisect import insort
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TypeAlias
 
@@ -18,6 +17,7 @@ from grasp_core.face_pieces import FacePiece, FaceShape, Shapes, choices_near
 from grasp_core.placements import Placement
 from grasp_core.plans import MethodCounts, Proof
 from grasp_core.ranking import Attempt, Ranking
+from grasp_core.reach import Reach
 from grasp_core.spanning import cones_positively_span
 from grasp_core.true_surface import on_true_surface
 from grasp_core.values import (
@@ -45,8 +45,8 @@ class Search:
     """What one method has found so far."""
 
     limit: int | None
-    out_of_reach: Callable[[Certified], str]
-    """Why fingers do not get to the contacts of a grasp, nothing if they do."""
+    reach: Callable[[Certified], Reach]
+    """How fingers get to the contacts of a grasp, or why they do not."""
     best: list[Certified] = field(default_factory=list[Certified])
     """At most `limit` grasps, best first."""
     held: set[FaceQuadruple] = field(default_factory=set[FaceQuadruple])
@@ -76,19 +76,21 @@ class Search:
         worst = self.best[-1].placement.merit
         return construction.bounds is not None and room > worst * (1.0 + SAME_MERIT)
 
-    def keep(self, found: Certified) -> bool:
-        """Count a grasp and, if fingers reach it, sort it in; whether they do."""
+    def keep(self, found: Certified) -> list[Certified]:
+        """Count a grasp and, if fingers reach it, sort it in: as it was kept, or nothing."""
         faces = four(sorted(found.faces))
-        if reason := self.out_of_reach(found):
+        way = self.reach(found)
+        if way.reason:
             self.tally["unreachable"] += 1
-            self.unreached[faces] = reason
-            return False
+            self.unreached[faces] = way.reason
+            return []
+        found = replace(found, ways_out=way.directions)
         self.tally["found"] += 1
         self.held.add(faces)
         insort(self.best, found, key=best_first)
         if self.limit is not None:
             del self.best[self.limit :]
-        return True
+        return [found]
 
 
 def best_first(found: Certified) -> tuple[float, FaceQuadruple]:
@@ -102,23 +104,17 @@ def search_construction(
     friction: float,
     ranking: Ranking,
     search: Search,
-    held: AbstractSet[FaceQuadruple],
 ) -> Iterator[list[Certified]]:
     """Go through ranked quadruples, yielding what each gave.
 
     With a limit the search ends when no bound reaches the worst grasp kept; a construction
-    without bounds ends as soon as the limit is reached. Where only tilted cones span, quadruples
-    that another family already holds are left out.
+    without bounds ends as soon as the limit is reached.
     """
     search.tally["pruned"] += ranking.dropped
     for done, quadruple in enumerate(ranking):
         if not search.may_gain(construction, quadruple.bound):
             search.tally["pruned"] += ranking.candidates_from(done)
             return
-        if not quadruple.spans and quadruple.faces in held:
-            search.tally["pruned"] += len(quadruple.attempts)
-            yield []
-            continue
         found: list[Certified] = []
         for attempt in quadruple.attempts:
             if not search.may_gain(construction, attempt.bound):
@@ -130,7 +126,7 @@ def search_construction(
             )  # fmt: skip
             found += [one] if one else []
         found = _without_duplicates(found, search.tally)
-        yield [one for one in found if search.keep(one)]
+        yield [kept for one in found for kept in search.keep(one)]
 
 
 def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]:

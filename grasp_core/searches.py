@@ -15,7 +15,7 @@ from grasp_core.face_pieces import face_shapes
 from grasp_core.free_search import FreeRequest, search_free, search_undecided
 from grasp_core.plans import Outcomes
 from grasp_core.ranking import ranked
-from grasp_core.reach import reach
+from grasp_core.reach import Reach, reach
 from grasp_core.requests import COMPLETE_CELLS, FAMILIES, METHODS, PlanRequest
 from grasp_core.search import Search, search_construction
 from grasp_core.shared_faces import shared_quadruples, with_halves
@@ -40,7 +40,7 @@ class Searches:
         self.shared = shared_quadruples(self.owners)
         self.quadruples = math.comb(len(body.faces), FINGERS) + len(self.shared)
         self.by_method: dict[Method, Search] = {
-            method: Search(request.searched, self._out_of_reach)
+            method: Search(request.searched, self._reach)
             for method in METHODS
             if method in request.families
         }
@@ -83,7 +83,7 @@ class Searches:
             for block in self._blocks(construction, search):
                 ranking = ranked(block, construction)
                 steps = search_construction(
-                    construction, self.shapes, self.request.friction, ranking, search, self.held
+                    construction, self.shapes, self.request.friction, ranking, search
                 )
                 yield from enumerate(_timed(steps, search), start=dealt_with + 1)
                 dealt_with += len(block)
@@ -147,13 +147,13 @@ class Searches:
             self.owners,
         )  # fmt: skip
 
-    def _out_of_reach(self, found: Certified) -> str:
-        """Why fingers do not get to the contacts; nothing if they do, or are not given."""
+    def _reach(self, found: Certified) -> Reach:
+        """How fingers, if any are given, get to the contacts."""
         finger = self.request.finger
         if finger is None:
-            return ""
+            return Reach(None)
         positions = self.body.center_of_mass + self.body.radius * found.placement.positions
-        return reach(self.body, found.faces, positions, found.normals, finger).reason
+        return reach(self.body, found.faces, positions, found.normals, finger)
 
     def whole_faces(self, faces: FaceQuadruple) -> FaceQuadruple:
         """The object's faces, where some may be halves."""

@@ -145,7 +145,7 @@ class Polyhedron:
         Raises:
             MeshError: The mesh is not a solid; its `reason` says why.
         """
-        from grasp_core.mesh import polyhedron_from_mesh
+        from grasp_core.polyhedra import polyhedron_from_mesh
 
         return polyhedron_from_mesh(
             vertices, triangles, name=name, faces=faces, patches=patches,
@@ -257,8 +257,14 @@ class Grasp:
     and over the object's radius [N]."""
     witness: Witness
     """Balanced forces whose lines are of the grasp's family."""
+    approach_directions: Array | None = None
+    """Which way each finger moves in to its contact, on the free line that was found for it, unit
+    vectors, (4, 3); None if none was asked for (`plan(finger=...)`)."""
 
     def __post_init__(self) -> None:
+        if self.approach_directions is not None:
+            ways = frozen_units(self.approach_directions, (FINGERS, 3), "approach_directions")
+            object.__setattr__(self, "approach_directions", ways)
         for name in ("faces", "contacts", "force_cones", "regions"):
             if len(getattr(self, name)) != FINGERS:
                 count = len(getattr(self, name))

@@ -51,7 +51,8 @@ class FingerSettings:
     stiffness_n_per_m: float | None = None
     """Of the servos."""
     approach: tuple[float, float, float] | None = None
-    """Direction in which all fingers move in from their start, along each normal if None."""
+    """Direction in which all fingers move in from their start; if None the one that was planned for
+    each, or its normal."""
     drive: Literal["servo", "rigid"] = "servo"
     """Rigid fingertips stay where they are put."""
     indentation: float = 0.0

@@ -141,7 +141,7 @@ def arrange(
         friction=friction,
         drive=_drive(body, positions, normals, fingers, size),
         squeeze=SQUEEZE * largest * _pushes(positions, normals, friction),
-        approach=-RETREAT * size * _ways_in(normals, fingers),
+        approach=-RETREAT * size * _ways_in(grasp, normals, fingers),
     )
 
 
@@ -167,10 +167,11 @@ def _drive(
     )
 
 
-def _ways_in(normals: Array, fingers: FingerSettings) -> Array:
-    """Unit directions in which the fingers arrive, (k, 3)."""
+def _ways_in(grasp: Grasp | Sequence[Contact], normals: Array, fingers: FingerSettings) -> Array:
+    """Unit directions in which the fingers arrive, (k, 3): asked for, planned, or the normals."""
     if fingers.approach is None:
-        return normals
+        planned = grasp.approach_directions if isinstance(grasp, Grasp) else None
+        return normals if planned is None else planned
     way = np.asarray(fingers.approach, dtype=np.float64)
     return np.broadcast_to(way / np.linalg.norm(way), normals.shape)
 

@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
@@ -19,13 +19,14 @@ from grasp_core.spanning import spanning_quadruples
 from grasp_core.versions import versions
 from scenes.mjcf import build_scene
 from scenes.objects import example_names, example_object
-from sim_validate import cli, flags
+from sim_validate import cli
 from sim_validate.analyze_command import analyze_file
 from sim_validate.console import Reporter
 from sim_validate.files import read_text, remove_results, write_text
 from sim_validate.gate import measured_gate, require_faithful
 from sim_validate.improving import show_gains
 from sim_validate.plan_command import (
+    asked_finger,
     load_object,
     plan_file,
     plan_object,
@@ -34,9 +35,11 @@ from sim_validate.plan_command import (
 from sim_validate.setup import Setup
 from sim_validate.validate_command import (
     finger_settings,
+    planned_fingers,
     prepared,
     simulate_grasps,
     validate_file,
+    with_planned_fingers,
 )
 from sim_validate.validation import validate
 
@@ -53,7 +56,7 @@ def execute(command: cli.Command) -> int:
 
 def _run(command: cli.Run, reporter: Reporter) -> int:
     planning = command.planning
-    testing = _with_planned_fingers(command.testing, planning)
+    testing = with_planned_fingers(command.testing, asked_finger(planning))
     setup, _ = prepared(testing, planning.seed, command.out or RESULTS)
     body, found, moves = plan_object(command.object, planning, testing.jobs, reporter)
     folder = command.out or RESULTS / _folder_name(body.name)
@@ -70,18 +73,10 @@ def _run(command: cli.Run, reporter: Reporter) -> int:
     for grasp in found.grasps:
         scene = setup.scene(body, grasp, found.friction)
         write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
-    saved = SavedGrasps(body, found.friction, found.seed, found.grasps)
+    saved = SavedGrasps(body, found.friction, found.seed, found.grasps, found.finger)
     code = simulate_grasps(saved, testing, folder, reporter)
     reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
     return code
-
-
-def _with_planned_fingers(testing: flags.Testing, planning: flags.Planning) -> flags.Testing:
-    """Fingertips of the radius that was planned for, unless another one is asked for."""
-    if planning.approach_m is None or testing.fingers.fingertip_radius_m is not None:
-        return testing
-    fingers = replace(testing.fingers, fingertip_radius_m=planning.finger_radius_m)
-    return replace(testing, fingers=fingers)
 
 
 def _folder_name(name: str) -> str:
@@ -98,12 +93,10 @@ def _scene(command: cli.Scene, reporter: Reporter) -> int:
     if command.out is None and len(chosen) > 1:
         raise InputError("several scenes need --out DIR; or choose one with --grasp ID")
     friction = saved.friction if command.friction is None else command.friction
+    fingers = finger_settings(planned_fingers(command.fingers, saved.finger))
     written: list[str] = []
     for grasp in chosen:
-        scene = build_scene(
-            saved.body, grasp, friction,
-            fingers=finger_settings(command.fingers), surface=command.surface,
-        )  # fmt: skip
+        scene = build_scene(saved.body, grasp, friction, fingers=fingers, surface=command.surface)
         if command.out is not None:
             written.append(str(write_text(command.out / f"{grasp.id}.xml", scene.xml)))
             reporter.say(f"wrote {written[-1]}")

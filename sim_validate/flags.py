@@ -121,13 +121,14 @@ class Fingers:
     max_normal_force: Usual = 10.0
     """Limit of each finger's push [N]."""
     fingertip_radius_m: Usual | None = None
-    """A tenth of the object's radius, or what fits, if not given."""
+    """What was planned for, or a tenth of the object's radius, or what fits, if not given."""
     fingertip_mass_kg: Usual | None = None
     """So that similar grasps behave alike if not given, as the stiffness."""
     stiffness_n_per_m: Usual | None = None
     """Of the servos that drive a fingertip."""
     approach: Annotated[Direction | None, arg(metavar="X Y Z")] = None
-    """Direction in which fingers arrive in the scene's keyframe; along the normals if not given."""
+    """Direction in which fingers arrive in the scene's keyframe; if not given, as planned or along
+    the normals."""
 
 
 @dataclass(frozen=True)

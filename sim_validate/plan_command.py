@@ -6,9 +6,10 @@ from collections import Counter
 from pathlib import Path
 
 from grasp_core.errors import InputError
-from grasp_core.mesh import FORMATS, load_polyhedron
+from grasp_core.mesh import FORMATS
 from grasp_core.planner import plan
 from grasp_core.plans import Plan
+from grasp_core.polyhedra import load_polyhedron
 from grasp_core.reach import Finger
 from grasp_core.records import Moved, plan_to_json
 from grasp_core.requests import METHODS
@@ -73,7 +74,7 @@ def plan_object(
             seed=planning.seed,
             cells=planning.cells,
             complete=planning.complete,
-            finger=_finger(planning),
+            finger=asked_finger(planning),
             clearance=planning.edge_clearance_m,
             share_faces=planning.share_faces_m,
             progress=lambda done, total, grasps: steps.update(done, total, f"({grasps} grasps)"),
@@ -96,7 +97,8 @@ def _check_optimize(planning: flags.Planning) -> None:
         )
 
 
-def _finger(planning: flags.Planning) -> Finger | None:
+def asked_finger(planning: flags.Planning) -> Finger | None:
+    """The fingers whose free lines are to be planned, if any."""
     if planning.approach_m is None:
         if planning.finger_radius_m is not None and not planning.optimize:
             raise InputError(

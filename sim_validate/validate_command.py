@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from grasp_core.errors import InputError
+from grasp_core.reach import Finger
 from grasp_core.records import SavedGrasps, grasps_from_json
 from grasp_core.values import Grasp, Polyhedron
 from scenes.fingertips import FingerSettings
@@ -38,8 +39,22 @@ def validate_file(command: cli.Validate, reporter: Reporter) -> int:
         saved.friction if command.friction is None else command.friction,
         saved.seed if command.seed is None else command.seed,
         saved.grasps[: command.limit],
+        saved.finger,
     )
-    return simulate_grasps(chosen, command.testing, command.out, reporter)
+    testing = with_planned_fingers(command.testing, saved.finger)
+    return simulate_grasps(chosen, testing, command.out, reporter)
+
+
+def with_planned_fingers(testing: flags.Testing, planned: Finger | None) -> flags.Testing:
+    """Trials with fingertips of the radius that was planned for, unless another is asked for."""
+    return replace(testing, fingers=planned_fingers(testing.fingers, planned))
+
+
+def planned_fingers(given: flags.Fingers, planned: Finger | None) -> flags.Fingers:
+    """Fingertips of the radius that was planned for, unless another is asked for."""
+    if planned is None or given.fingertip_radius_m is not None:
+        return given
+    return replace(given, fingertip_radius_m=planned.radius_m)
 
 
 def finger_settings(given: flags.Fingers) -> FingerSettings:

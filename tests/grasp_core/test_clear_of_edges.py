@@ -58,6 +58,6 @@ def test_a_margin_wider_than_all_faces_leaves_nothing():
     plan = gc.plan(body, 0.5, clearance=0.9 * body.radius)
     assert not plan.grasps
     assert plan.outcomes.absent == plan.counts.quadruples
-    assert "m from edges" in plan.absence
+    assert "m from their edges" in plan.absence
     with pytest.raises(gc.InputError, match="clearance"):
         gc.plan(body, 0.5, clearance=-1.0)

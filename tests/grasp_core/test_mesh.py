@@ -4,7 +4,8 @@ import trimesh
 
 import grasp_core as gc
 from grasp_core.errors import MeshRefusal
-from grasp_core.mesh import FORMATS, polyhedron_from_mesh
+from grasp_core.mesh import FORMATS
+from grasp_core.polyhedra import polyhedron_from_mesh
 
 
 @pytest.fixture

@@ -174,6 +174,16 @@ def test_a_limit_returns_the_best_of_all_grasps(name, family):
     assert fewer > 0 or name == "octahedron"
 
 
+@pytest.mark.parametrize("name", ["wedge", "l-bracket"])
+def test_a_larger_limit_only_adds_grasps(name):
+    kept = [
+        {grasp.id for grasp in gc.plan(example_object(name), 0.5, limit=limit).grasps}
+        for limit in (5, 15, 40)
+    ]
+    assert [len(ids) for ids in kept] == [5, 15, 40]
+    assert kept[0] < kept[1] < kept[2]
+
+
 def test_plans_are_the_same_every_time():
     one, two = (gc.plan(example_object("wedge"), 0.4) for _ in range(2))
     assert [g.id for g in one.grasps] == [g.id for g in two.grasps]

@@ -122,10 +122,11 @@ def test_a_plan_for_fingers_holds_only_grasps_that_they_reach():
     finger = Finger(0.1 * body.radius, body.radius)
     some = gc.plan(body, 0.5, finger=finger)
     assert 0 < len(some.grasps) < len(every.grasps)
+    assert some.finger == finger
     for grasp in some.grasps:
-        assert (
-            reach(body, grasp.faces, grasp.positions, grasp.normals, finger).directions is not None
-        )
+        gap, _ = least_gap(body, grasp, finger, -grasp.approach_directions)
+        assert gap >= -2e-6 * body.radius
+    assert all(grasp.approach_directions is None for grasp in every.grasps)
     assert sum(counts.unreachable for counts in some.counts.families.values()) > 0
     assert some.outcomes.out_of_reach == len(
         set(some.unreached) - {tuple(sorted(grasp.faces)) for grasp in some.grasps}

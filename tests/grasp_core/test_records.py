@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -31,11 +32,21 @@ def test_a_plan_survives_the_file_to_the_last_bit(text):
             np.testing.assert_array_equal(a.polygon, b.polygon)
 
 
+def test_the_ways_of_planned_fingers_survive_the_file():
+    body = example_object("l-bracket")
+    plan = gc.plan(body, 0.5, limit=1, finger=gc.Finger(0.004, 0.05))
+    ways = np.eye(3)[[0, 1, 2, 0]]
+    plan = replace(plan, grasps=(replace(plan.grasps[0], approach_directions=ways),))
+    saved = grasps_from_json(plan_to_json(body, plan))
+    assert saved.finger == gc.Finger(0.004, 0.05)
+    np.testing.assert_array_equal(saved.grasps[0].approach_directions, ways)
+
+
 def test_the_file_has_the_fields_that_users_rely_on(text):
     document = json.loads(text)
     assert set(document) == {
-        "schema", "object", "friction", "theta_deg", "seed", "versions", "counts", "outcomes",
-        "absence", "optimization", "grasps",
+        "schema", "object", "friction", "theta_deg", "seed", "finger", "versions", "counts",
+        "outcomes", "absence", "optimization", "grasps",
     }  # fmt: skip
     assert {"name", "source_sha256", "mesh", "center_of_mass_m"} <= set(document["object"])
     grasp = document["grasps"][0]
@@ -56,6 +67,10 @@ CHANGES = {
     "mesh of another object": (
         lambda d: _set(d, ["object", "mesh", "vertices_m", 0, 0], 0.07),
         "content",
+    ),
+    "an approach that is no direction": (
+        lambda d: _set(d, ["grasps", 0, "approach_directions"], [[0.0, 0.0, 0.5]] * 4),
+        "approach_directions",
     ),
     "three contacts": (lambda d: _set(d, ["grasps", 0, "contacts", 3], None), "contacts"),
     "contact off its face": (

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -108,6 +109,17 @@ def test_settings_of_a_user_are_kept():
     assert drive.damping_n_s_per_m == pytest.approx(2.0 * math.sqrt(500.0 * 0.4))
     directions = layout.approach / np.linalg.norm(layout.approach, axis=1, keepdims=True)
     np.testing.assert_allclose(directions, np.tile([0.0, 0.0, 1.0], (4, 1)))
+
+
+def test_fingers_arrive_on_their_planned_lines():
+    body = scenes.example_object("wedge")
+    grasp = gc.plan(body, limit=1, finger=gc.Finger(0.004, 0.05)).grasps[0]
+    leaning = grasp.normals + np.array([0.0, 0.0, 0.3])
+    leaning /= np.linalg.norm(leaning, axis=1, keepdims=True)
+    for ways in (grasp.approach_directions, leaning):
+        layout = arrange(body, replace(grasp, approach_directions=ways), 0.5)
+        found = -layout.approach / np.linalg.norm(layout.approach, axis=1, keepdims=True)
+        np.testing.assert_allclose(found, ways, atol=1e-12)
 
 
 @pytest.mark.parametrize(

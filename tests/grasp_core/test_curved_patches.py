@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 import grasp_core as gc
+from grasp_core.curved_patches import flat_patches
 from grasp_core.errors import MeshRefusal
-from grasp_core.patches import flat_patches
 from tests.grasp_core.curved import bumpy_ellipsoid, curved_body, inside, met
 
 ROUNDING = 1e-9

@@ -1,0 +1,129 @@
+"""The fields of a `grasps.json`, with their units, types and bounds."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from grasp_core.values import Family, RegionKind
+
+SCHEMA = 1
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Triple = tuple[Finite, Finite, Finite]
+FourTriples = tuple[Triple, Triple, Triple, Triple]
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
+
+
+class MeshRecord(_Record):
+    """Triangles of the object."""
+
+    vertices_m: list[Triple]
+    triangles: list[tuple[int, int, int]]
+
+
+class PatchesRecord(_Record):
+    """How flat the patches of a curved surface are, and how many there may be."""
+
+    spread_deg: Finite
+    depth: Finite
+    most: int
+
+
+class ObjectRecord(_Record):
+    """The object that was planned on."""
+
+    name: str
+    source_sha256: str
+    content_sha256: str
+    mesh: MeshRecord
+    center_of_mass_m: Triple
+    patches: PatchesRecord | None = None
+    """None for exact planar faces."""
+
+
+class ContactRecord(_Record):
+    """Where a fingertip touches."""
+
+    position_m: Triple
+    normal: Triple
+
+
+class ConeRecord(_Record):
+    """A force cone of the construction."""
+
+    axis: Triple
+    half_angle_deg: Finite
+
+
+class RegionRecord(_Record):
+    """Where a finger may stand."""
+
+    kind: RegionKind
+    polygon_m: list[Triple]
+    inscribed_radius_m: Finite
+
+
+class WitnessRecord(_Record):
+    """Balanced forces along four lines, normal parts summing to one."""
+
+    points_m: FourTriples
+    directions: FourTriples
+    forces: FourTriples
+
+
+class GraspRecord(_Record):
+    """One grasp."""
+
+    id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,99}$")
+    """Also the name of the grasp's scene file, hence no dots or slashes."""
+    family: Family
+    faces: tuple[int, int, int, int]
+    contacts: tuple[ContactRecord, ContactRecord, ContactRecord, ContactRecord]
+    focus_points_m: list[Triple]
+    force_cones: tuple[ConeRecord, ConeRecord, ConeRecord, ConeRecord]
+    radius_m: Finite
+    regions: tuple[RegionRecord, RegionRecord, RegionRecord, RegionRecord]
+    span_angle_deg: Finite
+    critical_friction: Finite
+    closure_margin: Finite
+    ferrari_canny: tuple[Finite, Finite]
+    witness: WitnessRecord
+    approach_directions: FourTriples | None = None
+    """Which way each finger moves in, on a free line; None if that was not asked."""
+
+
+class MovedRecord(_Record):
+    """How a grasp was moved on its faces, with bounds of its quality."""
+
+    id: str
+    moved_from: str
+    ferrari_canny_before: tuple[Finite, Finite]
+    ferrari_canny_after: tuple[Finite, Finite]
+    ferrari_canny_ceiling: Finite | None
+
+
+class FingerRecord(_Record):
+    """The fingers whose free lines were planned."""
+
+    radius_m: Annotated[Finite, Field(gt=0.0)]
+    approach_m: Annotated[Finite, Field(gt=0.0)]
+
+
+class GraspsRecord(_Record):
+    """A whole `grasps.json`."""
+
+    schema_version: Literal[1] = Field(alias="schema")
+    object: ObjectRecord
+    friction: Finite
+    theta_deg: Finite
+    seed: int
+    finger: FingerRecord | None = None
+    """None if any fingers would do."""
+    versions: dict[str, str]
+    counts: dict[str, Any]
+    outcomes: dict[str, int] = Field(default_factory=dict)
+    absence: str | None
+    optimization: list[MovedRecord] = []
+    grasps: list[GraspRecord]
