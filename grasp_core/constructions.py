@@ -1,5 +1,6 @@
 """The paper's three constructions behind one interface, so that the planner treats them alike."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -51,6 +52,11 @@ class Construction:
     half-angles (q,): False only where none can be feasible."""
     region: Region
     """The region of one finger, in the pieces' units."""
+
+    @property
+    def least(self) -> float:
+        """The merit above which a placement counts."""
+        return LEAST_RADIUS if self.bounds else -math.inf
 
 
 def _always_admitted(_: Array, half_angles: Array) -> NDArray[np.bool_]:

@@ -22,7 +22,7 @@ from grasp_core.face_pieces import FacePiece, FaceShape, Shapes, choices_near
 from grasp_core.patch import RESTARTS, Absence, Undecided, place_free
 from grasp_core.placements import Placement
 from grasp_core.ranking import Attempt, ConeChoice
-from grasp_core.search import MOST_CHOICES, Search, best_first, chosen_shapes, tried
+from grasp_core.search import MOST_CHOICES, Case, Search, best_first, chosen_shapes, tried
 from grasp_core.tilted_cones import toward, widened
 from grasp_core.true_surface import on_true_surface
 from grasp_core.values import FINGERS, FaceQuadruple, ForceCone, four
@@ -261,11 +261,6 @@ def _upgraded(
     """The best of what a construction offers on the same pieces."""
     shapes = [FaceShape((piece,), piece) for piece in placed.pieces]
     attempts = [Attempt(order, (choice,)) for order in construction.orders]
-    try:
-        tries = [
-            tried(construction, shapes, friction, placed.faces, attempt, Counter[str]())
-            for attempt in attempts
-        ]
-    except SolverError:
-        return None
+    case = Case(construction, placed.faces, shapes, friction)
+    tries = [tried(case, attempt, construction.least, Counter[str]()) for attempt in attempts]
     return min((one for one in tries if one is not None), key=best_first, default=None)

@@ -33,8 +33,8 @@ class MethodCounts:
     solved: int = 0
     """Choices of one convex piece per face that were considered."""
     infeasible: int = 0
-    """No placement with discs of the least radius at the planned angle, or none on the surface of
-    curved patches; for the free method, proved to have no grasp at all."""
+    """No placement with discs of the least radius at the planned angle, with a limit none that would
+    enter the best, or none on the surface of curved patches; for the free method, proved to have no grasp at all."""
     undecided: int = 0
     """Free method: neither a grasp nor a proof of absence. Others: a program was not solved."""
     duplicates: int = 0
@@ -56,7 +56,7 @@ class Outcomes:
     absent: int
     """It is proved that there is none, or a face has no room for a contact."""
     open: int
-    """Neither: undecided by the free method, or not examined."""
+    """Neither: undecided by the free method, or, as with a limit, not asked to the end."""
     out_of_reach: int = 0
     """Certified contacts exist, but no fingers as asked for reached those that were found."""
 

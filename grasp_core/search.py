@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.certified import Certified, certify, named
-from grasp_core.constructions import LEAST_RADIUS, Construction, regions_of
+from grasp_core.constructions import Construction, regions_of
 from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece, FaceShape, Shapes, choices_near
 from grasp_core.placements import Placement
@@ -38,6 +38,18 @@ SAME_MERIT = 1e-5
 objects hold thousands of equal grasps."""
 SAME_CONTACTS = 1e-6
 """Contacts closer than this, in object radii, are the same grasp found twice."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Case:
+    """A construction on four faces."""
+
+    construction: Construction
+    faces: FaceQuadruple
+    shapes: Sequence[FaceShape]
+    """Of the four faces."""
+    friction: float
+    """Coulomb coefficient at every contact."""
 
 
 @dataclass(slots=True, eq=False)
@@ -69,12 +81,16 @@ class Search:
         """Whether another grasp would push one out."""
         return self.limit is not None and len(self.best) == self.limit
 
+    def least(self, construction: Construction) -> float:
+        """Above which merit a placement counts, and may still enter the best."""
+        if self.full and (construction.bounds is None or not self.best):
+            return math.inf
+        worst = self.best[-1].placement.merit if self.full else -math.inf
+        return max(worst * (1.0 + SAME_MERIT), construction.least)
+
     def may_gain(self, construction: Construction, room: float) -> bool:
         """Whether discs up to a radius may still enter the best."""
-        if not self.full or not self.best:
-            return not self.full
-        worst = self.best[-1].placement.merit
-        return construction.bounds is not None and room > worst * (1.0 + SAME_MERIT)
+        return room > self.least(construction)
 
     def keep(self, found: Certified) -> list[Certified]:
         """Count a grasp and, if fingers reach it, sort it in: as it was kept, or nothing."""
@@ -115,15 +131,14 @@ def search_construction(
         if not search.may_gain(construction, quadruple.bound):
             search.tally["pruned"] += ranking.candidates_from(done)
             return
+        faces = quadruple.faces
+        case = Case(construction, faces, chosen_shapes(shapes, faces), friction)
         found: list[Certified] = []
         for attempt in quadruple.attempts:
             if not search.may_gain(construction, attempt.bound):
                 search.tally["pruned"] += 1
                 continue
-            one = tried(
-                construction, chosen_shapes(shapes, quadruple.faces), friction, quadruple.faces,
-                attempt, search.tally,
-            )  # fmt: skip
+            one = tried(case, attempt, search.least(construction), search.tally)
             found += [one] if one else []
         found = _without_duplicates(found, search.tally)
         yield [kept for one in found for kept in search.keep(one)]
@@ -134,29 +149,20 @@ def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]
     return tuple(shape for face in faces if (shape := shapes[face]) is not None)
 
 
-def tried(
-    construction: Construction,
-    shapes: Sequence[FaceShape],
-    friction: float,
-    quadruple: FaceQuadruple,
-    attempt: Attempt,
-    tally: Counter[str],
-) -> Certified | None:
+def tried(case: Case, attempt: Attempt, least: float, tally: Counter[str]) -> Certified | None:
     """What a construction makes of four faces in one order of the fingers.
 
     Args:
-        construction: Of one family.
-        shapes: Of the four faces.
-        friction: Coulomb coefficient at every contact.
-        quadruple: The four faces.
-        attempt: Which of them each finger touches, and with which force cones.
+        case: The construction and the faces.
+        attempt: Which of the faces each finger touches, and with which force cones.
+        least: Placements of no larger merit are not worth having.
         tally: Where to count.
     """
-    faces = four(quadruple[finger] for finger in attempt.order)
-    ordered = [shapes[finger] for finger in attempt.order]
+    faces = four(case.faces[finger] for finger in attempt.order)
+    ordered = [case.shapes[finger] for finger in attempt.order]
     tally["tried"] += 1
     try:
-        settled = _settled(construction, ordered, attempt, tally)
+        settled = _settled(case.construction, ordered, attempt, tally, least)
     except SolverError:
         tally["undecided"] += 1
         return None
@@ -164,9 +170,9 @@ def tried(
         tally["infeasible"] += 1
         return None
     chosen, cones, placement, regions = settled
-    family = construction.family
+    family = case.construction.family
     certified = certify(
-        named(family[0], faces), faces, family, chosen, cones, placement, friction, regions
+        named(family[0], faces), faces, family, chosen, cones, placement, case.friction, regions
     )
     if certified is None or not cones_positively_span(
         [cone.axis for cone in cones], [cone.half_angle for cone in cones]
@@ -177,17 +183,20 @@ def tried(
 
 
 def _settled(
-    construction: Construction, shapes: Sequence[FaceShape], attempt: Attempt, tally: Counter[str]
+    construction: Construction,
+    shapes: Sequence[FaceShape],
+    attempt: Attempt,
+    tally: Counter[str],
+    least: float,
 ) -> tuple[tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...]] | None:
     """The best placement over the choices of cones, with its regions, on the true surface."""
     placed = None
     for choice in attempt.choices:
-        least = LEAST_RADIUS if construction.bounds else -math.inf
-        least = least if placed is None else placed[2].merit
         if choice.bound <= least:
             break
         cones = four(choice.cones[finger] for finger in attempt.order)
-        placed = _best_placement(construction, cones, shapes, least, tally) or placed
+        if found := _best_placement(construction, cones, shapes, least, tally):
+            placed, least = found, found[2].merit
     if placed is None:
         return None
     chosen, cones, planned = placed

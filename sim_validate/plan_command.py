@@ -149,7 +149,7 @@ def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
     known = found.outcomes
     reporter.say(
         f"face quadruples: {known.held} with a certified grasp, {known.absent} proved to have "
-        f"none, {len(found.undecided)} undecided, {known.open - len(found.undecided)} not examined"
+        f"none, {len(found.undecided)} undecided, {known.open - len(found.undecided)} left open"
         + (f", {known.out_of_reach} out of reach" if found.unreached else "")
     )
     for method, tally in counts.families.items():

@@ -285,7 +285,7 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
 def test_planning_flags_reach_the_planner(capsys):
     flags = ["--friction", "0.3", "--complete", "--rank-by", "diverse", "--limit", "5"]
     assert main(["plan", "double-wedge-bar", *flags]) == Exit.GOOD
-    assert "0 undecided, 0 not examined" in capsys.readouterr().out
+    assert "0 undecided, 0 left open" in capsys.readouterr().out
     reach = ["--finger-radius-m", "0.006", "--approach-m", "0.05", "--edge-clearance-m", "0.001"]
     assert main(["plan", "l-bracket", *reach, "--share-faces-m", "0.01", "--limit", "5"]) == 0
     assert "out of reach" in capsys.readouterr().out
