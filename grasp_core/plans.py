@@ -33,8 +33,9 @@ class MethodCounts:
     solved: int = 0
     """Choices of one convex piece per face that were considered."""
     infeasible: int = 0
-    """No placement with discs of the least radius at the planned angle, with a limit none that would
-    enter the best, or none on the surface of curved patches; for the free method, proved to have no grasp at all."""
+    """No placement with discs of the least radius at the planned angle, with a limit none that
+    would enter the best, or none on the surface of curved patches; for the free method, proved to
+    have no grasp at all."""
     undecided: int = 0
     """Free method: neither a grasp nor a proof of absence. Others: a program was not solved."""
     duplicates: int = 0

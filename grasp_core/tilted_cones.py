@@ -107,7 +107,7 @@ def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> Ti
     """
     ways = points[:, None] - positions
     inward = np.einsum("qfi,qfi->qf", ways, normals)
-    ways = ways * np.where(inward < 0.0, -1.0, 1.0)[..., None]  # away from points outside
+    ways = ways * np.where(inward < -SLIGHT, -1.0, 1.0)[..., None]  # away from points outside
     best, half_angles = normals, np.full(len(normals), -np.inf)
     for cap in TOWARD:
         axes = [
