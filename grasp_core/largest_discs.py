@@ -10,7 +10,15 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import SolverError
-from grasp_core.lp import RESIDUAL, LinearProgram, Optimum, maximize
+from grasp_core.lp import (
+    RESIDUAL,
+    Below,
+    Infeasible,
+    LinearProgram,
+    Optimum,
+    maximize,
+    maximize_above,
+)
 from grasp_core.placements import NoPlacement
 
 KEPT = 1e-9
@@ -39,9 +47,11 @@ def largest_discs(
     """
     n = A.shape[1]
     common = np.eye(n)[smallest]
-    first = maximize(LinearProgram(common, A, b))
-    if not isinstance(first, Optimum):
+    first = maximize_above(LinearProgram(common, A, b), least)
+    if isinstance(first, Infeasible):
         raise SolverError("a program that is feasible for small enough radii was called infeasible")
+    if isinstance(first, Below):
+        return NoPlacement(first.bound)
     if first.value < least:
         return NoPlacement(first.value)
     kept = LinearProgram(

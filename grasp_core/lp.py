@@ -1,4 +1,4 @@
-"""Linear program -> optimum or proof of infeasibility, both re-checked; the door to HiGHS.
+"""Linear program -> optimum or proof that there is none, re-checked; the door to HiGHS.
 
     maximise c.x  subject to  A x <= b,  A_eq x = b_eq,  x free.
 
@@ -6,9 +6,15 @@ An optimum comes with multipliers y >= 0, z such that c = A'y + A_eq'z, which bo
 feasible value by b.y + b_eq.z. An infeasible program comes with y >= 0, z such that
 A'y + A_eq'z = 0 and b.y + b_eq.z < 0, which no feasible x survives. Both are checked in
 plain arithmetic before they are returned; the solver's status is not believed.
+
+Programs go to a compiled dual simplex method first; it names the rows of a best vertex, and the
+vertex and its multipliers are solved for afresh. What it leaves or gets wrong goes to HiGHS, and so
+does everything where numba cannot work or the environment says `GRASPPROOF_LP=highs`.
 """
 
 import importlib
+import math
+import os
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -24,6 +30,8 @@ objects to unit size): ten times the tolerance the solver is asked for."""
 FARTHEST = 1e4
 """A proof of infeasibility excludes all points with |x|_1 up to this, at unit size."""
 
+REFERENCE = "GRASPPROOF_LP"
+"""Environment variable that may ask for HiGHS alone."""
 STRATEGIES = (1, 4)
 """HiGHS's dual and primal simplex, in the order they are tried: one program in some thousand ends
 as unknown under the one and is solved under the other."""
@@ -69,12 +77,47 @@ class Infeasible:
     """(rows + equalities,)"""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Below:
+    """No feasible value reaches the cutoff, by multipliers y >= 0, z as those of an optimum."""
+
+    bound: float
+    """b.y + b_eq.z"""
+    multipliers: Array
+    """(rows + equalities,)"""
+
+
 def maximize(program: LinearProgram) -> Optimum | Infeasible:
     """Solve a linear program, or prove that it has no feasible point.
 
     Raises:
         SolverError: The solver's answer failed our check, or the program is unbounded.
     """
+    found = maximize_above(program, -math.inf)
+    if isinstance(found, Below):
+        raise SolverError("called below minus infinity")
+    return found
+
+
+def maximize_above(program: LinearProgram, cutoff: float) -> Optimum | Infeasible | Below:
+    """As `maximize`, but a bound below a cutoff may end the search.
+
+    Args:
+        program: Its data are of order one.
+        cutoff: Smaller values are not worth having.
+
+    Raises:
+        SolverError: As `maximize`.
+    """
+    if os.environ.get(REFERENCE) != "highs" and _kernel() is not None:
+        try:
+            return _by_simplex(program, cutoff)
+        except (SolverError, np.linalg.LinAlgError):
+            pass
+    return _by_highs(program)
+
+
+def _by_highs(program: LinearProgram) -> Optimum | Infeasible:
     failure = SolverError("no way of solving was tried")
     for strategy in STRATEGIES:
         try:
@@ -102,6 +145,43 @@ def _refuted_by_least_violation(program: LinearProgram, failure: SolverError) ->
     multipliers = answer.multipliers[: len(G)].copy()
     multipliers[rows:] -= answer.multipliers[len(G) : -1]
     return _checked_ray(program, multipliers)
+
+
+def _by_simplex(program: LinearProgram, cutoff: float) -> Optimum | Infeasible | Below:
+    G, h = program.stacked()
+    count, n = G.shape
+    kernel, basis = _kernel(), np.empty(n, dtype=np.int64)
+    norms = np.maximum(np.sqrt(np.einsum("ki,ki->k", G, G)), RESIDUAL)
+    rows = kernel.Rows(np.array(G, order="C"), np.array(h), norms, count - len(program.b))
+    status, against = kernel.solve(program.c, rows, cutoff, basis)
+    if status == kernel.LOST:
+        raise SolverError("the simplex method did not end")
+    basis.sort()
+    vertex = np.vstack([G, np.repeat(np.eye(n), 2, axis=0)])[basis]
+    multipliers = np.zeros(count + 2 * n)
+    if status == kernel.INFEASIBLE:
+        row = rows.A[against]  # an equality may have been turned
+        multipliers[basis] = -np.linalg.solve(vertex.T, row)
+        as_given = (row == G[against]).all() and rows.b[against] == h[against]
+        multipliers[against] = 1.0 if as_given else -1.0
+        return _checked_ray(program, multipliers[:count])
+    multipliers[basis] = np.linalg.solve(vertex.T, program.c)
+    if status == kernel.BELOW:
+        return _checked_bound(program, multipliers[:count], cutoff)
+    if basis[-1] >= count:
+        raise SolverError("the simplex method ended at its box")
+    x = np.asarray(np.linalg.solve(vertex, h[basis]), dtype=np.float64)
+    return _checked_optimum(program, x, multipliers[:count])
+
+
+def _checked_bound(program: LinearProgram, multipliers: Array, cutoff: float) -> Below:
+    G, h = program.stacked()
+    multipliers[: len(program.b)] = np.maximum(multipliers[: len(program.b)], 0.0)
+    off = float(np.abs(program.c - G.T @ multipliers).max())
+    bound = float(h @ multipliers)
+    if off > RESIDUAL or not bound <= cutoff:
+        raise SolverError(f"called below {cutoff:.3g}, but the bound is {bound:.3g}")
+    return Below(bound, multipliers)
 
 
 def _solved(program: LinearProgram, strategy: int) -> Optimum | Infeasible:
@@ -172,6 +252,15 @@ def _run(program: LinearProgram, strategy: int) -> tuple[Any, Any]:
     solver.passModel(model)
     solver.run()
     return solver, solver.getModelStatus()
+
+
+@cache
+def _kernel() -> Any:
+    """The compiled method; None where it cannot be compiled or there is no place to keep it."""
+    try:
+        return importlib.import_module("grasp_core.simplex_kernel")
+    except (ImportError, RuntimeError):
+        return None
 
 
 @cache

@@ -4,8 +4,8 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 
 PACKAGES = (
-    "graspproof", "mujoco", "numpy", "scipy", "trimesh", "manifold3d", "highspy", "clarabel",
-    "qpsolvers", "proxsuite",
+    "graspproof", "mujoco", "numpy", "scipy", "trimesh", "manifold3d", "highspy", "numba",
+    "clarabel", "qpsolvers", "proxsuite",
 )  # fmt: skip
 
 

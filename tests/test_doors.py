@@ -12,6 +12,7 @@ DOORS = {
     "trimesh": "grasp_core/mesh.py",
     "manifold3d": "grasp_core/solids.py",
     "highspy": "grasp_core/lp.py",
+    "numba": "grasp_core/simplex_kernel.py",
     "clarabel": "grasp_core/conic.py",
     "qpsolvers": "grasp_core/forces.py",
     "scipy.optimize": "grasp_core/least_distance.py",
@@ -40,9 +41,12 @@ def test_a_package_is_imported_at_its_door_only(package):
 @pytest.mark.parametrize(
     ("module", "heavy"),
     [
-        ("grasp_core", ("mujoco", "trimesh", "scipy", "matplotlib", "highspy", "pydantic")),
-        ("scenes", ("mujoco", "trimesh", "scipy", "matplotlib")),
-        ("sim_validate.cli", ("mujoco", "trimesh", "scipy", "matplotlib")),
+        (
+            "grasp_core",
+            ("mujoco", "trimesh", "scipy", "matplotlib", "highspy", "numba", "pydantic"),
+        ),
+        ("scenes", ("mujoco", "trimesh", "scipy", "matplotlib", "numba")),
+        ("sim_validate.cli", ("mujoco", "trimesh", "scipy", "matplotlib", "numba")),
     ],
 )
 def test_importing_stays_light(module, heavy):

@@ -2,8 +2,11 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+import grasp_core as gc
+from grasp_core import lp
 from grasp_core.errors import SolverError
-from grasp_core.lp import Infeasible, LinearProgram, Optimum, maximize
+from grasp_core.lp import Below, Infeasible, LinearProgram, Optimum, maximize, maximize_above
+from scenes.objects import example_object
 
 SQUARE = np.vstack([np.eye(2), -np.eye(2)])
 
@@ -63,3 +66,104 @@ def test_verdicts_and_values_agree_with_another_route():
         if isinstance(answer, Optimum):
             assert answer.value == pytest.approx(-judge.fun, abs=1e-6)
     assert min(seen.values()) >= 150
+
+
+def answers_agree(program, answer, cutoff=-np.inf):
+    """Whether HiGHS says the same; a bound below the cutoff is one that its value respects."""
+    judge = lp._by_highs(program)
+    if isinstance(answer, Below):
+        return isinstance(judge, Infeasible) or judge.value <= answer.bound + 1e-8 <= cutoff + 2e-8
+    if isinstance(answer, Infeasible) or isinstance(judge, Infeasible):
+        return type(answer) is type(judge)
+    return abs(answer.value - judge.value) <= 1e-8 * (1.0 + abs(judge.value))
+
+
+def recorded(monkeypatch, name, friction):
+    """All programs of a plan, each with its cutoff and the compiled method's answer."""
+    asked = []
+
+    def record(program, cutoff):
+        try:
+            answer = compiled(program, cutoff)
+        except (SolverError, np.linalg.LinAlgError):
+            asked.append((program, cutoff, None))
+            raise
+        asked.append((program, cutoff, answer))
+        return answer
+
+    compiled = lp._by_simplex
+    with monkeypatch.context() as patch:
+        patch.setattr(lp, "_by_simplex", record)
+        gc.plan(example_object(name), friction, limit=60)
+    return asked
+
+
+@pytest.mark.parametrize(("name", "friction"), [("wedge", 0.3), ("tetrahedron", 0.5)])
+def test_the_planners_programs_have_the_same_answers_in_both_ways(monkeypatch, name, friction):
+    asked = recorded(monkeypatch, name, friction)
+    left = [answer for _, _, answer in asked if answer is None]
+    assert len(left) <= 0.01 * len(asked)
+    kinds = {type(answer) for _, _, answer in asked}
+    assert {Optimum, Below} <= kinds
+    for program, cutoff, answer in asked:
+        assert answer is None or answers_agree(program, answer, cutoff)
+
+
+def test_degenerate_programs_end_with_the_same_answers():
+    """Small whole numbers: rows repeat, vertices coincide, equalities contradict each other."""
+    rng = np.random.default_rng(1)
+    seen = {Optimum: 0, Infeasible: 0, None: 0}
+    for _ in range(1500):
+        n, rows, equalities = int(rng.integers(2, 7)), int(rng.integers(6, 25)), rng.integers(0, 3)
+        A = rng.integers(-1, 2, (rows, n)).astype(float)
+        A_eq = rng.integers(-1, 2, (equalities, n)).astype(float)
+        box = np.vstack([np.eye(n), -np.eye(n)])
+        program = LinearProgram(
+            rng.integers(-2, 3, n).astype(float), np.vstack([A, box]),
+            np.append(rng.integers(-1, 3, rows), np.full(2 * n, 5.0)), A_eq,
+            rng.integers(-1, 2, equalities).astype(float),
+        )  # fmt: skip
+        try:
+            answer = lp._by_simplex(program, -np.inf)
+        except (SolverError, np.linalg.LinAlgError):
+            seen[None] += 1
+            continue
+        assert answers_agree(program, answer)
+        seen[type(answer)] += 1
+    assert min(seen[Optimum], seen[Infeasible]) >= 300
+    assert seen[None] <= 15
+
+
+def test_a_cutoff_ends_the_search_with_a_bound_below_it():
+    rng, ended = np.random.default_rng(2), 0
+    for _ in range(300):
+        A = rng.normal(size=(40, 5))
+        b = rng.uniform(0.5, 1.5, 40)
+        c = rng.normal(size=5)
+        best = maximize(LinearProgram(c, A, b))
+        if not isinstance(best, Optimum):
+            continue
+        found = maximize_above(LinearProgram(c, A, b), best.value + 0.1)
+        assert isinstance(found, Below)
+        assert best.value - 1e-9 <= found.bound <= best.value + 0.1
+        np.testing.assert_allclose(A.T @ found.multipliers, c, atol=1e-9)
+        assert found.multipliers.min() >= 0.0
+        worth = maximize_above(LinearProgram(c, A, b), best.value - 0.1)
+        assert isinstance(worth, Optimum)
+        ended += 1
+    assert ended >= 250
+
+
+def test_without_compiled_code_the_answers_come_from_the_reference(monkeypatch):
+    program = LinearProgram(np.array([1.0, 2.0]), SQUARE, np.array([3.0, 4.0, 0, 0]))
+    compiled = maximize(program)
+    for patch in (
+        lambda: monkeypatch.setattr(lp, "_kernel", lambda: None),
+        lambda: monkeypatch.setenv("GRASPPROOF_LP", "highs"),
+    ):
+        patch()
+        monkeypatch.setattr(lp, "_by_simplex", None)
+        answer = maximize(program)
+        monkeypatch.undo()
+        np.testing.assert_allclose(answer.x, compiled.x)
+        np.testing.assert_allclose(answer.multipliers, compiled.multipliers)
