@@ -87,9 +87,10 @@ def place_pencil(
         SolverError: A program's answer failed its check.
     """
     u = focus_direction(np.array([cone.axis for cone in cones]))
+    discs = _discs(pieces, cones, u)
     best, bound = None, -math.inf
     for cell in cells:
-        found = _place_in_cell(pieces, cones, u, cell, least, least_gap)
+        found = _place_in_cell(pieces, cones, discs.in_cell(cell), u, cell, least, least_gap)
         if isinstance(found, Placement):
             best, least = found, found.merit
         else:
@@ -124,85 +125,103 @@ def pencil_radius_bounds(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Disc:
-    """One disc centre as a function of the variables v: depth s.v + s0, centre Q v + q."""
+class _Discs:
+    """Disc centres as functions of the variables v: depths s v + s0, centres Q v + q."""
 
+    C: Array
+    """From the variables to each finger's focus, (4, 3, VARIABLES)."""
     s: Array
-    s0: float
+    """(4, VARIABLES)"""
+    s0: Array
     Q: Array
+    """(4, 2, VARIABLES)"""
     q: Array
+    """(4, 2)"""
+
+    def in_cell(self, cell: Cell) -> "_Discs":
+        """The same, where those of cell A are given: in the other one k counts the other way."""
+        turn = np.ones(VARIABLES)
+        turn[K] = cell[0] * CELL_A[0]
+        return _Discs(self.C * turn, self.s * turn, self.s0, self.Q * turn, self.q)
 
 
-def _place_in_cell(
+def _place_in_cell(  # noqa: PLR0913, PLR0917 - a program's data
     pieces: Sequence[FacePiece],
     cones: Sequence[ForceCone],
+    discs: _Discs,
     u: Array,
     cell: Cell,
     least: float,
     least_gap: float,
 ) -> Placement | NoPlacement:
-    focus = [_focus(u, sign) for sign in cell for _ in range(2)]
-    discs = [_disc(*each) for each in zip(pieces, cones, focus, strict=True)]
-    A, b = _rows(pieces, cones, discs, u, least_gap, near=cell is CELL_B)
-    v = largest_discs(A, b, RADII, SMALLEST, least)
+    rows, limits = _rows(pieces, cones, discs)
+    limits[0] = -least_gap
+    if cell is CELL_B:
+        near, ends = _near_rows(pieces, cones, discs, u)
+        rows, limits = np.concatenate([rows, near]), np.concatenate([limits, ends])
+    v = largest_discs(rows, limits, RADII, SMALLEST, least)
     if isinstance(v, NoPlacement):
         return v
-    positions = [p.point(disc.Q @ v + disc.q) for p, disc in zip(pieces, discs, strict=True)]
+    centers = discs.Q @ v + discs.q
     return Placement(
-        positions=np.array(positions),
+        positions=np.array([p.point(y) for p, y in zip(pieces, centers, strict=True)]),
         forces=balanced_forces(pieces, np.array([cone.axis for cone in cones])),
-        foci=np.array([focus[0] @ v, focus[2] @ v]),
+        foci=discs.C[[0, 2]] @ v,
         radii=v[RADII],
         merit=float(v[RADII].min()),
     )
 
 
-def _focus(u: Array, sign: float) -> Array:
-    """Matrix from the variables to a focus, (3, VARIABLES)."""
-    C = np.zeros((3, VARIABLES))
-    C[:, X0], C[:, K] = np.eye(3), sign * u
-    return C
-
-
-def _disc(piece: FacePiece, cone: ForceCone, C: Array) -> _Disc:
-    n, a, T = piece.normal, cone.axis, piece.frame
-    s, s0 = n @ C / (n @ a), -float(n @ piece.origin) / float(n @ a)
-    Q = T.T @ (C - np.outer(a, s))
-    return _Disc(s, s0, Q, T.T @ (-s0 * a - piece.origin))
+def _discs(pieces: Sequence[FacePiece], cones: Sequence[ForceCone], u: Array) -> _Discs:
+    """Of cell A."""
+    n = np.array([piece.normal for piece in pieces])
+    o = np.array([piece.origin for piece in pieces])
+    T = np.array([piece.frame for piece in pieces])
+    a = np.array([cone.axis for cone in cones])
+    C = np.zeros((FINGERS, 3, VARIABLES))
+    C[:, :, X0] = np.eye(3)
+    C[:, :, K] = np.repeat(CELL_A, 2)[:, None] * u
+    along = np.einsum("fi,fi->f", n, a)[:, None]
+    s = np.einsum("fi,fiv->fv", n, C) / along
+    s0 = -np.einsum("fi,fi->f", n, o)[:, None] / along
+    Q = np.einsum("fit,fiv->ftv", T, C - a[:, :, None] * s[:, None, :])
+    return _Discs(C, s, s0[:, 0], Q, -np.einsum("fit,fi->ft", T, s0 * a + o))
 
 
 def _rows(
-    pieces: Sequence[FacePiece],
-    cones: Sequence[ForceCone],
-    discs: Sequence[_Disc],
-    u: Array,
-    least_gap: float,
-    *,
-    near: bool,
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], discs: _Discs
 ) -> tuple[Array, Array]:
-    radius = np.eye(VARIABLES)[RADII]
-    ball, k = np.eye(VARIABLES)[BALL], np.eye(VARIABLES)[K]
-    rows: list[Array] = [-2.0 * k]
-    limits: list[Array | float] = [-least_gap]
-    for i, (piece, cone, disc) in enumerate(zip(pieces, cones, discs, strict=True)):
-        r_i = radius[i]
-        rows += [
-            ball + _kappa(piece, cone) * r_i - math.sin(cone.half_angle) * disc.s,
-            piece.E @ disc.Q + r_i,
-            r_i - ball,
-            np.eye(VARIABLES)[SMALLEST] - r_i,
-        ]
-        limits += [
-            math.sin(cone.half_angle) * disc.s0 - piece.depth,
-            piece.b - piece.E @ disc.q,
-            -piece.depth,
-            0.0,
-        ]
-        if near:
-            toward = float(cone.axis @ u) * (1.0 if i < FINGERS // 2 else -1.0)
-            rows.append(2.0 * k + float(np.linalg.norm(piece.frame.T @ u)) * r_i - toward * disc.s)
-            limits.append(toward * disc.s0 - piece.depth * abs(float(piece.normal @ u)))
-    return np.vstack(rows), np.hstack(limits)
+    """The rows of both cells: the gap, three per finger, then the edges."""
+    depths = np.array([piece.depth for piece in pieces])
+    sines = np.sin([cone.half_angle for cone in cones])
+    fingers = np.arange(FINGERS)
+    ball, inside, below = (np.zeros((FINGERS, VARIABLES)) for _ in range(3))
+    ball[:, BALL] = 1.0
+    ball[fingers, RADII.start + fingers] = list(map(_kappa, pieces, cones))
+    ball -= sines[:, None] * discs.s
+    inside[fingers, RADII.start + fingers], inside[:, BALL] = 1.0, -1.0
+    below[fingers, RADII.start + fingers], below[:, SMALLEST] = -1.0, 1.0
+    gap = np.zeros((1, VARIABLES))
+    gap[0, K] = -2.0
+    edges = [piece.E @ Q for piece, Q in zip(pieces, discs.Q, strict=True)]
+    for finger, rows in enumerate(edges):
+        rows[:, RADII.start + finger] += 1.0
+    rooms = [piece.b - piece.E @ q for piece, q in zip(pieces, discs.q, strict=True)]
+    limits = [np.zeros(1), sines * discs.s0 - depths, -depths, np.zeros(FINGERS)]
+    return np.concatenate([gap, ball, inside, below, *edges]), np.concatenate([*limits, *rooms])
+
+
+def _near_rows(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], discs: _Discs, u: Array
+) -> tuple[Array, Array]:
+    """What keeps the foci of cell B near each other, a row per finger."""
+    toward = np.repeat(CELL_A, 2) * -np.array([float(cone.axis @ u) for cone in cones])
+    across = np.array([abs(float(piece.normal @ u)) for piece in pieces])
+    rows, fingers = -toward[:, None] * discs.s, np.arange(FINGERS)
+    rows[:, K] += 2.0
+    rows[fingers, RADII.start + fingers] += [np.linalg.norm(piece.frame.T @ u) for piece in pieces]
+    depths = np.array([piece.depth for piece in pieces])
+    return rows, toward * discs.s0 - depths * across
 
 
 def _kappa(piece: FacePiece, cone: ForceCone) -> float:
