@@ -36,6 +36,8 @@ MOST_CHOICES = 8
 SAME_MERIT = 1e-5
 """What cannot be better than the worst kept by more than this share is not looked at: symmetric
 objects hold thousands of equal grasps."""
+SAME_DIGITS = 7
+"""Merits equal to so many digits (object size one) are ties."""
 SAME_CONTACTS = 1e-6
 """Contacts closer than this, in object radii, are the same grasp found twice."""
 
@@ -111,7 +113,7 @@ class Search:
 
 def best_first(found: Certified) -> tuple[float, FaceQuadruple]:
     """Largest merit first; ties are broken by the faces, not by rounding."""
-    return -float(f"{found.placement.merit:.6g}"), found.faces
+    return -round(found.placement.merit, SAME_DIGITS), found.faces
 
 
 def search_construction(

@@ -287,7 +287,7 @@ def test_planning_flags_reach_the_planner(capsys):
     assert main(["plan", "double-wedge-bar", *flags]) == Exit.GOOD
     assert "0 undecided, 0 left open" in capsys.readouterr().out
     reach = ["--finger-radius-m", "0.006", "--approach-m", "0.05", "--edge-clearance-m", "0.001"]
-    assert main(["plan", "l-bracket", *reach, "--share-faces-m", "0.01", "--limit", "5"]) == 0
+    assert main(["plan", "l-bracket", *reach, "--share-faces-m", "0.01", "--limit", "150"]) == 0
     assert "out of reach" in capsys.readouterr().out
 
 

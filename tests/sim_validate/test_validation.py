@@ -228,7 +228,7 @@ def test_friction_at_or_below_critical_is_refused():
     body, found = grasps("chamfered-box", 0.5, 5)
     grasp = next(g for g in found if g.critical_friction > 0)
     with pytest.raises(gc.InputError, match="needs friction above"):
-        sv.validate(body, grasp, grasp.critical_friction)
+        sv.validate(body, grasp, gc.critical_friction(grasp))
 
 
 @pytest.mark.parametrize(
