@@ -92,9 +92,7 @@ def candidate_blocks(
         shared: Quadruples with such parts, (s, 4).
         tilted: Whether force cones may lean; else they surround the normals.
     """
-    rooms = np.array(
-        [max(piece.inradius for piece in shape.pieces) if shape else 0.0 for shape in shapes]
-    )
+    rooms = _rooms(shapes)
     order = np.argsort(-rooms[:whole], kind="stable")
     order = order[rooms[order] > 0.0]
     if not tilted:
@@ -113,6 +111,31 @@ def candidate_blocks(
                 float(rooms[with_room].min(axis=1).max()),
                 partial(_candidates, body, with_room, rooms, theta, tilted=tilted),
             )
+
+
+def spanning_blocks(
+    body: Polyhedron, shapes: Shapes, theta: float, whole: int
+) -> Iterator[Candidates]:
+    """The quadruples whose normals span (P3), with force cones around the normals, in blocks.
+
+    Args:
+        body: The object.
+        shapes: Its faces.
+        theta: Half-angle of the friction cones to plan with [rad].
+        whole: How many of the faces count by themselves.
+    """
+    rooms = _rooms(shapes)
+    quads = spanning_quadruples(body.normals[:whole], LEAST_SPAN_ANGLE).indices
+    quads = quads[(rooms[quads] > 0.0).all(axis=1)]
+    for part in np.array_split(quads, math.ceil(len(quads) / math.comb(BLOCK, FINGERS)) or 1):
+        yield _candidates(body, part, rooms, theta, tilted=False)
+
+
+def _rooms(shapes: Shapes) -> Array:
+    """Radius of the largest disc in each face, zero without room."""
+    return np.array(
+        [max(piece.inradius for piece in shape.pieces) if shape else 0.0 for shape in shapes]
+    )
 
 
 def _block_ends(count: int) -> list[int]:

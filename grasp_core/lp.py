@@ -109,7 +109,7 @@ def maximize_above(program: LinearProgram, cutoff: float) -> Optimum | Infeasibl
     Raises:
         SolverError: As `maximize`.
     """
-    if os.environ.get(REFERENCE) != "highs" and _kernel() is not None:
+    if _kernel() is not None:
         try:
             return _by_simplex(program, cutoff)
         except (SolverError, np.linalg.LinAlgError):
@@ -164,6 +164,8 @@ def _by_simplex(program: LinearProgram, cutoff: float) -> Optimum | Infeasible |
         multipliers[basis] = -np.linalg.solve(vertex.T, row)
         as_given = (row == G[against]).all() and rows.b[against] == h[against]
         multipliers[against] = 1.0 if as_given else -1.0
+        if np.abs(multipliers[count:]).max() > RESIDUAL:
+            raise SolverError("infeasible only inside the box of the simplex method")
         return _checked_ray(program, multipliers[:count])
     multipliers[basis] = np.linalg.solve(vertex.T, program.c)
     if status == kernel.BELOW:
@@ -204,13 +206,13 @@ def _checked_optimum(program: LinearProgram, x: Array, duals: Array) -> Optimum:
     scale = 1.0 + float(np.abs(x).max(initial=0.0))
     value = float(program.c @ x)
     failures = {
-        "a row is violated": max(-slack[:rows].min(initial=0.0), np.abs(slack[rows:]).max(initial=0.0)),  # noqa: E501
+        "a row is violated": np.max([-slack[:rows].min(initial=0.0), np.abs(slack[rows:]).max(initial=0.0)]),  # noqa: E501
         "a multiplier is negative": -duals[:rows].min(initial=0.0),
         "the multipliers do not give the objective": stationarity,
         "the bound does not meet the value": abs(float(h @ duals) - value),
     }  # fmt: skip
     for failure, size in failures.items():
-        if size > RESIDUAL * scale:
+        if not size <= RESIDUAL * scale:  # nor if it is not a number
             raise SolverError(f"{failure} by {size:.3g}, allowed {RESIDUAL * scale:.3g}")
     return Optimum(x, value, duals)
 
@@ -256,11 +258,15 @@ def _run(program: LinearProgram, strategy: int) -> tuple[Any, Any]:
 
 @cache
 def _kernel() -> Any:
-    """The compiled method; None where it cannot be compiled or there is no place to keep it."""
-    try:
-        return importlib.import_module("grasp_core.simplex_kernel")
-    except (ImportError, RuntimeError):
+    """The compiled method; None where it is not wanted, or cannot be compiled or kept."""
+    if os.environ.get(REFERENCE) == "highs":
         return None
+    try:
+        kernel: Any = importlib.import_module("grasp_core.simplex_kernel")
+        kernel.try_out()
+    except (ImportError, RuntimeError, OSError):
+        return None
+    return kernel
 
 
 @cache

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array, Indices, frozen
 from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.solids import Solid
 
@@ -26,6 +26,10 @@ class MassProperties:
     """(3,) [m]"""
     inertia: Array
     """About the centre, (3, 3) [kg m^2]."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", frozen(self.center, (3,), "center"))
+        object.__setattr__(self, "inertia", frozen(self.inertia, (3, 3), "inertia"))
 
 
 def read_triangles(path: Path) -> tuple[Array, Indices, bytes]:

@@ -154,9 +154,8 @@ def _place_in_cell(  # noqa: PLR0913, PLR0917 - a program's data
     least: float,
     least_gap: float,
 ) -> Placement | NoPlacement:
-    rows, limits = _rows(pieces, cones, discs)
-    limits[0] = -least_gap
-    if cell is CELL_B:
+    rows, limits = _rows(pieces, cones, discs, least_gap)
+    if cell == CELL_B:
         near, ends = _near_rows(pieces, cones, discs, u)
         rows, limits = np.concatenate([rows, near]), np.concatenate([limits, ends])
     v = largest_discs(rows, limits, RADII, SMALLEST, least)
@@ -189,7 +188,7 @@ def _discs(pieces: Sequence[FacePiece], cones: Sequence[ForceCone], u: Array) ->
 
 
 def _rows(
-    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], discs: _Discs
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], discs: _Discs, least_gap: float
 ) -> tuple[Array, Array]:
     """The rows of both cells: the gap, three per finger, then the edges."""
     depths = np.array([piece.depth for piece in pieces])
@@ -207,7 +206,7 @@ def _rows(
     for finger, rows in enumerate(edges):
         rows[:, RADII.start + finger] += 1.0
     rooms = [piece.b - piece.E @ q for piece, q in zip(pieces, discs.q, strict=True)]
-    limits = [np.zeros(1), sines * discs.s0 - depths, -depths, np.zeros(FINGERS)]
+    limits = [np.array([-least_gap]), sines * discs.s0 - depths, -depths, np.zeros(FINGERS)]
     return np.concatenate([gap, ball, inside, below, *edges]), np.concatenate([*limits, *rooms])
 
 

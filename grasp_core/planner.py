@@ -127,7 +127,7 @@ def _planned(body: Polyhedron, request: PlanRequest, searches: Searches) -> Plan
     counts = PlanCounts(
         len(body.faces),
         searches.quadruples,
-        sum(searches.spanning.values()),
+        searches.spanning,
         {method: search.counts for method, search in searches.by_method.items()},
     )
     outcomes, whole = searches.outcomes(), searches.whole_faces

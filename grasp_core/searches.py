@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import combinations, islice
 from typing import TypeAlias
 
-from grasp_core.candidates import Candidates, candidate_blocks
+from grasp_core.candidates import Candidates, candidate_blocks, spanning_blocks
 from grasp_core.certified import Certified
 from grasp_core.clear_of_edges import clear_of_edges
 from grasp_core.constructions import CONSTRUCTIONS, MIXED, Construction
@@ -45,14 +45,20 @@ class Searches:
             if method in request.families
         }
         tilted = request.cones == "tilted"
-        whole = len(body.faces)
+        self.whole = len(body.faces)
         self.candidate_blocks = tuple(
             candidate_blocks(
-                self.body, self.shapes, request.theta, whole, self.shared, tilted=tilted
+                self.body, self.shapes, request.theta, self.whole, self.shared, tilted=tilted
             )
         )
         self.made: dict[int, Candidates] = {}
-        self.spanning: dict[int, int] = {}
+        self.spanning_in_blocks: dict[int, int] = {}
+        self.spanning_alone = 0
+
+    @property
+    def spanning(self) -> int:
+        """How many quadruples with normals that span (P3) were come across."""
+        return max(sum(self.spanning_in_blocks.values()), self.spanning_alone)
 
     @property
     def constructions(self) -> dict[Family, Search]:
@@ -101,8 +107,7 @@ class Searches:
 
     def _every(self) -> Iterator[FaceQuadruple]:
         """All quadruples of faces, those that share one last."""
-        whole = [index for index, owner in enumerate(self.owners) if index == owner]
-        yield from combinations(whole, FINGERS)
+        yield from combinations(range(self.whole), FINGERS)
         for faces in self.shared.tolist():
             yield four(faces)
 
@@ -127,14 +132,23 @@ class Searches:
         return max(each // (place - short + 1) for short, each in enumerate(left))
 
     def _blocks(self, construction: Construction, search: Search) -> Iterator[Candidates]:
-        """Blocks of quadruples, as long as one may hold a grasp that is worth keeping."""
+        """Blocks of quadruples, as long as one may hold a grasp that is worth keeping.
+
+        Where nothing bounds discs, only cones around the normals count.
+        """
+        if construction.bounds is None and self.request.cones == "tilted":
+            blocks = spanning_blocks(self.body, self.shapes, self.request.theta, self.whole)
+            while not search.full and (block := next(blocks, None)):
+                self.spanning_alone += block.spanning
+                yield block
+            return
         for place, (room, make) in enumerate(self.candidate_blocks):
-            if not search.may_gain(construction, room):
+            if search.full and not search.may_gain(construction, room):
                 continue
             block = self.made.get(place) or make()
             if place < KEPT_BLOCKS:
                 self.made[place] = block
-            self.spanning[place] = block.spanning
+            self.spanning_in_blocks[place] = block.spanning
             yield block
 
     def _free_request(self, cells: int | None = None) -> FreeRequest:
@@ -196,12 +210,11 @@ class Searches:
 
     def _without_room(self) -> int:
         """Quadruples with a face that has no room for a contact."""
-        whole = sum(index == owner for index, owner in enumerate(self.owners))
-        roomy = sum(shape is not None for shape in self.shapes[:whole])
+        roomy = sum(shape is not None for shape in self.shapes[: self.whole])
         shared = sum(
             any(self.shapes[face] is None for face in faces) for faces in self.shared.tolist()
         )
-        return math.comb(whole, FINGERS) - math.comb(roomy, FINGERS) + shared
+        return math.comb(self.whole, FINGERS) - math.comb(roomy, FINGERS) + shared
 
 
 def _timed(steps: Iterator[list[Certified]], search: Search) -> Iterator[list[Certified]]:

@@ -1,29 +1,31 @@
 """The dual simplex method on one small dense program, compiled; the door to numba.
 
-    maximise c.x  subject to  a_k.x <= b_k (or = b_k),  |x_i| <= BOX.
+    maximise c.x  subject to  a_k.x <= b_k (or = b_k).
 
 Solved: which n rows hold with equality at a best vertex, or with which of them another row is in
 contradiction. `lp` solves for the vertex and the multipliers afresh and checks them.
 
 Method. Any n independent rows, the basis, meet in a point x and give c = y_1 a_1 + .. + y_n a_n. As
-long as y >= 0 (of any sign for equalities), c.x is at least the optimum. The corner of the box on
-the side of c is such a basis. If x violates a row r, write a_r = alpha_1 a_1 + .. + alpha_n a_n: r
-enters, and the row with the least y_j / alpha_j among positive alpha_j leaves, which keeps y >= 0
-and lowers c.x. Without a positive alpha_j no point meets both r and the basis. Of the violated rows
-the one that is violated most enters; after many steps that lower nothing the first one does, with
-which simplex methods do not go in circles (Bland's rule).
+long as y >= 0 (of any sign for equalities), c.x is at least the optimum. The corner on the side of
+c of the box |x_i| <= BOX is such a basis, with which the search begins. If x violates a row r,
+write a_r = alpha_1 a_1 + .. + alpha_n a_n: r enters, and the row with the least y_j / alpha_j among
+positive alpha_j leaves, which keeps y >= 0 and lowers c.x. Without a positive alpha_j no point
+meets both r and the basis. Of the violated rows the one that is violated most enters; after many
+steps that lower nothing the first one does, which leaves most circles. Steps are limited: a circle
+ends as LOST.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
+from numba.core.errors import NumbaError  # pyright: ignore[reportMissingTypeStubs]
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 
 BOX = 1e3
-"""Programs are of order one; what reaches the box is left to another solver."""
+"""Programs are of order one; what ends at the box is left to another solver."""
 VIOLATED = 1e-10
 """Distance from a row that counts as a violation."""
 POSITIVE = 1e-9
@@ -32,8 +34,22 @@ SAME_RATIO = 1e-12
 UNCHANGED = 1e-13
 """Steps that lower c.x by less do not count as progress."""
 PATIENCE, MOST = 3, 60
-"""Steps without progress until Bland's rule, and steps in all, per variable."""
+"""Steps without progress until the first row enters, and steps in all, per variable."""
 OPTIMAL, INFEASIBLE, BELOW, LOST = 0, 1, 2, 3
+
+
+def try_out() -> None:
+    """Solve a tiny program.
+
+    Raises:
+        RuntimeError: The method cannot be compiled here.
+    """
+    basis = np.empty(1, dtype=np.int64)
+    one = np.ones(1)
+    try:
+        solve(one, Rows(np.ones((1, 1)), one, one, 0), -np.inf, basis)
+    except NumbaError as error:
+        raise RuntimeError(f"numba: {error}") from error
 
 
 class Rows(NamedTuple):

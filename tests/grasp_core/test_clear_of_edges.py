@@ -59,5 +59,10 @@ def test_a_margin_wider_than_all_faces_leaves_nothing():
     assert not plan.grasps
     assert plan.outcomes.absent == plan.counts.quadruples
     assert "m from their edges" in plan.absence
+    structured = gc.plan(
+        body, 0.5, clearance=0.9 * body.radius, families="concurrent", cones="normal"
+    )
+    assert structured.counts.spanning == 15
+    assert "15 face quadruples span" in structured.absence
     with pytest.raises(gc.InputError, match="clearance"):
         gc.plan(body, 0.5, clearance=-1.0)

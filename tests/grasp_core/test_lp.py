@@ -1,3 +1,5 @@
+from unittest import mock
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -154,16 +156,58 @@ def test_a_cutoff_ends_the_search_with_a_bound_below_it():
     assert ended >= 250
 
 
+@pytest.fixture
+def afresh():
+    """What the environment says counts from here on, and no longer afterwards."""
+    lp._kernel.cache_clear()
+    yield
+    lp._kernel.cache_clear()
+
+
+@pytest.mark.usefixtures("afresh")
 def test_without_compiled_code_the_answers_come_from_the_reference(monkeypatch):
     program = LinearProgram(np.array([1.0, 2.0]), SQUARE, np.array([3.0, 4.0, 0, 0]))
     compiled = maximize(program)
-    for patch in (
-        lambda: monkeypatch.setattr(lp, "_kernel", lambda: None),
-        lambda: monkeypatch.setenv("GRASPPROOF_LP", "highs"),
-    ):
-        patch()
-        monkeypatch.setattr(lp, "_by_simplex", None)
-        answer = maximize(program)
-        monkeypatch.undo()
-        np.testing.assert_allclose(answer.x, compiled.x)
-        np.testing.assert_allclose(answer.multipliers, compiled.multipliers)
+    lp._kernel.cache_clear()
+    monkeypatch.setenv("GRASPPROOF_LP", "highs")
+    monkeypatch.setattr(lp, "_by_simplex", None)
+    answer = maximize(program)
+    np.testing.assert_allclose(answer.x, compiled.x)
+    np.testing.assert_allclose(answer.multipliers, compiled.multipliers)
+
+
+@pytest.mark.usefixtures("afresh")
+def test_what_cannot_be_compiled_or_kept_is_left_to_the_reference(monkeypatch):
+    kernel = lp._kernel()
+    for failure in (OSError("disk full"), RuntimeError("no place to keep it")):
+        lp._kernel.cache_clear()
+        monkeypatch.setattr(
+            kernel, "solve", lambda *_, failure=failure: (_ for _ in ()).throw(failure)
+        )
+        assert isinstance(maximize(LinearProgram(np.ones(2), SQUARE, np.ones(4))), Optimum)
+        assert lp._kernel() is None
+
+
+def test_what_the_compiled_method_gets_wrong_is_left_to_the_reference(monkeypatch):
+    wrong = mock.Mock(side_effect=SolverError("a row is violated"))
+    monkeypatch.setattr(lp, "_by_simplex", wrong)
+    answer = maximize(LinearProgram(np.ones(2), SQUARE, np.ones(4)))
+    assert wrong.called
+    assert answer.value == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("rows", "limits"),
+    [([[1.0], [-1.0]], [3e4, -2e4]), ([[1e-5], [-1e-5]], [2.0, -1.0])],
+)
+def test_programs_far_from_order_one_are_not_called_infeasible(rows, limits):
+    program = LinearProgram(np.ones(1), np.array(rows), np.array(limits))
+    assert isinstance(maximize(program), Optimum)
+
+
+def test_numbers_that_are_none_are_an_error():
+    with pytest.raises(SolverError):
+        maximize(LinearProgram(np.ones(2), SQUARE, np.array([1.0, np.nan, 1.0, 1.0])))
+    program = LinearProgram(np.ones(2), SQUARE, np.ones(4))
+    with pytest.raises(SolverError):
+        lp._checked_optimum(program, np.full(2, np.nan), np.ones(4))

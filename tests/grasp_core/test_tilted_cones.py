@@ -9,7 +9,7 @@ from grasp_core.concurrent_grasps import BEFORE, BEHIND, cone_footprint, place_o
 from grasp_core.face_pieces import unit_pieces
 from grasp_core.placements import NoPlacement, Placement
 from grasp_core.spanning import cones_positively_span, span_angle, span_sines
-from grasp_core.tilted_cones import tilted_cones, widened
+from grasp_core.tilted_cones import tilted_cones, toward, widened
 from grasp_core.values import ForceCone
 from scenes.objects import example_object
 from tests.judges import random_rotation
@@ -89,3 +89,19 @@ def test_a_bore_is_held_from_inside_with_the_focus_behind_the_fingers():
     for _ in range(60):
         points = [rng.dirichlet(np.full(len(r), 0.3)) @ r for r in regions]
         assert gc.force_closure(points, sides, friction).closed
+
+
+def test_axes_lean_the_same_way_where_the_point_is_in_a_face_but_for_rounding():
+    normals = quadruples("l-bracket")[:40]
+    rng = np.random.default_rng(3)
+    positions, thetas = rng.normal(size=normals.shape), np.full(normals.shape[:2], math.atan(0.5))
+    ahead = rng.normal(size=(len(normals), 3))
+    ahead -= np.einsum("qi,qi->q", ahead, normals[:, 0])[:, None] * normals[:, 0]
+    points = positions[:, 0] + ahead
+    above, below = (
+        toward(points + side * 1e-9 * normals[:, 0], positions, normals, thetas)
+        for side in (1.0, -1.0)
+    )
+    assert (above.half_angles > 0.0).sum() >= 20
+    np.testing.assert_allclose(above.half_angles, below.half_angles, atol=1e-6)
+    np.testing.assert_allclose(above.axes, below.axes, atol=1e-5)
