@@ -193,9 +193,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _dispatch(command: Command) -> int:
     try:
-        from sim_validate import commands
+        from sim_validate import commands, interrupts
 
-        return commands.execute(command)
+        with interrupts.noted():
+            return commands.execute(command)
     except KeyboardInterrupt:
         return _complain("interrupted", Exit.INTERRUPTED)
     except (GraspError, OSError) as error:

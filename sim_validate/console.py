@@ -20,6 +20,8 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
+from sim_validate import interrupts
+
 PLAIN_EVERY_S = 5.0
 """Without a terminal, progress is a line this often."""
 
@@ -116,7 +118,8 @@ class Steps:
             self.bar.stop()
 
     def update(self, done: int, total: int, note: str = "") -> None:
-        """Say how far things are."""
+        """Say how far things are; an interrupt that was swallowed is raised here."""
+        interrupts.check()
         if self.bar is not None:
             title = f"{self.title} {note}" if note else self.title
             self.bar.update(self.task, completed=done, total=total, description=title)

@@ -1,0 +1,43 @@
+"""Interrupts that are not lost: what a library swallows is raised again at the next step.
+
+Python raises `KeyboardInterrupt` wherever the program is. Some compiled libraries clear errors that
+are not theirs there, and the program would run on.
+"""
+
+import signal
+import threading
+from collections.abc import Generator
+from contextlib import contextmanager
+from types import FrameType
+
+_noted = threading.Event()
+
+
+@contextmanager
+def noted() -> Generator[None, None, None]:
+    """Note interrupts beside raising them, as long as the context lasts."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # Python handles signals in its main thread only
+        return
+    _noted.clear()
+    before = signal.signal(signal.SIGINT, _note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _note(_: int, __: FrameType | None) -> None:
+    _noted.set()
+    raise KeyboardInterrupt
+
+
+def check() -> None:
+    """Raise an interrupt that was noted, for where it may have been swallowed.
+
+    Raises:
+        KeyboardInterrupt: There was one.
+    """
+    if _noted.is_set():
+        _noted.clear()
+        raise KeyboardInterrupt

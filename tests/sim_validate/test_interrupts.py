@@ -1,0 +1,35 @@
+import os
+import signal
+
+import pytest
+
+from sim_validate import interrupts
+from sim_validate.console import Reporter
+
+
+def swallow():
+    """An interrupt, raised where somebody clears errors that are not theirs."""
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+        signal.sigtimedwait([], 1.0)  # lets Python run its handler
+    except KeyboardInterrupt:
+        return
+    pytest.fail("nothing was raised")
+
+
+def test_a_swallowed_interrupt_is_raised_at_the_next_step():
+    before = signal.getsignal(signal.SIGINT)
+    with interrupts.noted():
+        interrupts.check()
+        swallow()
+        with pytest.raises(KeyboardInterrupt), Reporter(True, False, False).progress("x") as steps:
+            steps.update(1, 2)
+        interrupts.check()  # raised once
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_interrupts_from_before_do_not_count():
+    with interrupts.noted():
+        swallow()
+    with interrupts.noted():
+        interrupts.check()
