@@ -181,7 +181,7 @@ def _checked_bound(program: LinearProgram, multipliers: Array, cutoff: float) ->
     multipliers[: len(program.b)] = np.maximum(multipliers[: len(program.b)], 0.0)
     off = float(np.abs(program.c - G.T @ multipliers).max())
     bound = float(h @ multipliers)
-    if off > RESIDUAL or not bound <= cutoff:
+    if not (off <= RESIDUAL and bound <= cutoff):  # nor if one is not a number
         raise SolverError(f"called below {cutoff:.3g}, but the bound is {bound:.3g}")
     return Below(bound, multipliers)
 

@@ -138,7 +138,7 @@ class Searches:
         """
         if construction.bounds is None and self.request.cones == "tilted":
             blocks = spanning_blocks(self.body, self.shapes, self.request.theta, self.whole)
-            while not search.full and (block := next(blocks, None)):
+            while not search.full and (block := next(blocks, None)) is not None:
                 self.spanning_alone += block.spanning
                 yield block
             return
