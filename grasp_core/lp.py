@@ -9,12 +9,11 @@ plain arithmetic before they are returned; the solver's status is not believed.
 
 Programs go to a compiled dual simplex method first; it names the rows of a best vertex, and the
 vertex and its multipliers are solved for afresh. What it leaves or gets wrong goes to HiGHS, and so
-does everything where numba cannot work or the environment says `GRASPPROOF_LP=highs`.
+does everything where there are no kernels (`GRASPPROOF_KERNELS=off`).
 """
 
 import importlib
 import math
-import os
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -23,6 +22,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import SolverError
+from grasp_core.kernels import compiled
 
 RESIDUAL = 1e-8
 """Largest accepted violation, for programs whose data are of order one (the planner scales
@@ -30,8 +30,7 @@ objects to unit size): ten times the tolerance the solver is asked for."""
 FARTHEST = 1e4
 """A proof of infeasibility excludes all points with |x|_1 up to this, at unit size."""
 
-REFERENCE = "GRASPPROOF_LP"
-"""Environment variable that may ask for HiGHS alone."""
+KERNEL = "simplex"
 STRATEGIES = (1, 4)
 """HiGHS's dual and primal simplex, in the order they are tried: one program in some thousand ends
 as unknown under the one and is solved under the other."""
@@ -109,7 +108,7 @@ def maximize_above(program: LinearProgram, cutoff: float) -> Optimum | Infeasibl
     Raises:
         SolverError: As `maximize`.
     """
-    if _kernel() is not None:
+    if compiled(KERNEL) is not None:
         try:
             return _by_simplex(program, cutoff)
         except (SolverError, np.linalg.LinAlgError):
@@ -150,7 +149,7 @@ def _refuted_by_least_violation(program: LinearProgram, failure: SolverError) ->
 def _by_simplex(program: LinearProgram, cutoff: float) -> Optimum | Infeasible | Below:
     G, h = program.stacked()
     count, n = G.shape
-    kernel, basis = _kernel(), np.empty(n, dtype=np.int64)
+    kernel, basis = compiled(KERNEL), np.empty(n, dtype=np.int64)
     norms = np.maximum(np.sqrt(np.einsum("ki,ki->k", G, G)), RESIDUAL)
     rows = kernel.Rows(np.array(G, order="C"), np.array(h), norms, count - len(program.b))
     status, against = kernel.solve(program.c, rows, cutoff, basis)
@@ -254,19 +253,6 @@ def _run(program: LinearProgram, strategy: int) -> tuple[Any, Any]:
     solver.passModel(model)
     solver.run()
     return solver, solver.getModelStatus()
-
-
-@cache
-def _kernel() -> Any:
-    """The compiled method; None where it is not wanted, or cannot be compiled or kept."""
-    if os.environ.get(REFERENCE) == "highs":
-        return None
-    try:
-        kernel: Any = importlib.import_module("grasp_core.simplex_kernel")
-        kernel.try_out()
-    except (ImportError, RuntimeError, OSError):
-        return None
-    return kernel
 
 
 @cache

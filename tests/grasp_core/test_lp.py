@@ -7,6 +7,7 @@ from scipy.optimize import linprog
 import grasp_core as gc
 from grasp_core import lp
 from grasp_core.errors import SolverError
+from grasp_core.kernels import compiled
 from grasp_core.lp import Below, Infeasible, LinearProgram, Optimum, maximize, maximize_above
 from scenes.objects import example_object
 
@@ -159,33 +160,33 @@ def test_a_cutoff_ends_the_search_with_a_bound_below_it():
 @pytest.fixture
 def afresh():
     """What the environment says counts from here on, and no longer afterwards."""
-    lp._kernel.cache_clear()
+    compiled.cache_clear()
     yield
-    lp._kernel.cache_clear()
+    compiled.cache_clear()
 
 
 @pytest.mark.usefixtures("afresh")
 def test_without_compiled_code_the_answers_come_from_the_reference(monkeypatch):
     program = LinearProgram(np.array([1.0, 2.0]), SQUARE, np.array([3.0, 4.0, 0, 0]))
-    compiled = maximize(program)
-    lp._kernel.cache_clear()
-    monkeypatch.setenv("GRASPPROOF_LP", "highs")
+    quick = maximize(program)
+    compiled.cache_clear()
+    monkeypatch.setenv("GRASPPROOF_KERNELS", "off")
     monkeypatch.setattr(lp, "_by_simplex", None)
     answer = maximize(program)
-    np.testing.assert_allclose(answer.x, compiled.x)
-    np.testing.assert_allclose(answer.multipliers, compiled.multipliers)
+    np.testing.assert_allclose(answer.x, quick.x)
+    np.testing.assert_allclose(answer.multipliers, quick.multipliers)
 
 
 @pytest.mark.usefixtures("afresh")
 def test_what_cannot_be_compiled_or_kept_is_left_to_the_reference(monkeypatch):
-    kernel = lp._kernel()
+    kernel = compiled(lp.KERNEL)
     for failure in (OSError("disk full"), RuntimeError("no place to keep it")):
-        lp._kernel.cache_clear()
+        compiled.cache_clear()
         monkeypatch.setattr(
             kernel, "solve", lambda *_, failure=failure: (_ for _ in ()).throw(failure)
         )
         assert isinstance(maximize(LinearProgram(np.ones(2), SQUARE, np.ones(4))), Optimum)
-        assert lp._kernel() is None
+        assert compiled(lp.KERNEL) is None
 
 
 def test_what_the_compiled_method_gets_wrong_is_left_to_the_reference(monkeypatch):

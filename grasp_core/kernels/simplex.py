@@ -1,4 +1,4 @@
-"""The dual simplex method on one small dense program, compiled; the door to numba.
+"""The dual simplex method on one small dense program.
 
     maximise c.x  subject to  a_k.x <= b_k (or = b_k).
 
