@@ -29,10 +29,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_units
 from grasp_core.errors import InputError
+from grasp_core.kernels import compiled
 
 SIGNS = np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=np.float64)
 LARGEST_SPAN_ANGLE = math.asin(1.0 / 3.0)
 """Reached by the regular tetrahedron only [rad]."""
+KERNEL = "spanning"
+GUESS = 2
+"""Room for so many quadruples per pair of directions, before they are counted."""
 OTHERS = ([1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2])
 """The other three, for each of four."""
 DEPENDENT = 1e-12
@@ -182,15 +186,60 @@ class SpanningQuadruples:
 def spanning_quadruples(normals: Array, least_angle: float) -> SpanningQuadruples:
     """All quadruples of directions whose span angle exceeds `least_angle`.
 
-    A table of signed triple sines decides each quadruple. With i < j fixed, the faces fall
-    into those to the left of the plane (i, j) and those to its right; a positively spanning
-    quadruple takes one of each, so only those pairs are tested, as one array operation.
-
     Args:
         normals: Unit vectors, (n, 3).
         least_angle: [rad]
     """
-    count, least = len(normals), math.sin(least_angle)
+    return SpanningTable(normals, least_angle).quadruples(0, len(normals))
+
+
+class SpanningTable:
+    """Quadruples of directions that span, by the last of their directions."""
+
+    def __init__(self, normals: Array, least_angle: float) -> None:
+        self.units, self.least = np.ascontiguousarray(normals), math.sin(least_angle)
+        self.kernel = compiled(KERNEL)
+        self.size = 0
+        self.bits = None if self.kernel is None else self.kernel.empty_table(len(normals))
+
+    def quadruples(self, start: int, end: int) -> SpanningQuadruples:
+        """Those whose last direction is one of start .. end - 1."""
+        if self.kernel is None:
+            every = _spanning_by_pairs(self.units[:end], self.least)
+            last = every.indices[:, 3] >= start
+            return SpanningQuadruples(every.indices[last], every.span_angles[last])
+        if self.size < end:
+            self.kernel.extend(self.bits, self.units, self.size, end, self.least)
+            self.size = end
+        indices = _sorted([self._ending_in(newest) for newest in range(start, end)], end)
+        sines = np.empty(len(indices))
+        self.kernel.least_sines(self.units, indices, sines)
+        return SpanningQuadruples(indices, np.arcsin(sines))
+
+    def _ending_in(self, newest: int) -> Indices:
+        found = np.empty((GUESS * newest * newest, 4), dtype=np.int64)
+        count = self.kernel.quadruples(self.bits, newest, found)
+        if count > len(found):
+            found = np.empty((count, 4), dtype=np.int64)
+            self.kernel.quadruples(self.bits, newest, found)
+        return found[:count].copy()
+
+
+def _sorted(parts: Sequence[Indices], count: int) -> Indices:
+    """Quadruples of `count` directions in lexicographic order, (q, 4)."""
+    places = count ** np.arange(3, -1, -1)
+    keys = np.sort(np.concatenate(parts) @ places)
+    return keys[:, None] // places % count
+
+
+def _spanning_by_pairs(normals: Array, least: float) -> SpanningQuadruples:
+    """All of them, from the least sine, without compiled code.
+
+    A table of signed triple sines decides each quadruple. With i < j fixed, the faces fall
+    into those to the left of the plane (i, j) and those to its right; a positively spanning
+    quadruple takes one of each, so only those pairs are tested, as one array operation.
+    """
+    count = len(normals)
     table = np.array([triple_sine(normal, normals[:, None], normals[None]) for normal in normals])
     found: list[Indices] = []
     sines: list[Array] = []
