@@ -25,7 +25,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.constructions import LEAST_RADIUS
 from grasp_core.face_pieces import Shapes
-from grasp_core.spanning import balancing_weights, span_sines, spanning_quadruples
+from grasp_core.spanning import SpanningTable, balancing_weights, span_sines
 from grasp_core.tilted_cones import tilted_cones
 from grasp_core.values import FINGERS, ForceCone, Polyhedron, four
 
@@ -77,7 +77,7 @@ class Candidates:
 
 
 def candidate_blocks(
-    body: Polyhedron, shapes: Shapes, theta: float, whole: int, shared: Indices, *, tilted: bool
+    body: Polyhedron, shapes: Shapes, theta: float, whole: int, shared: Indices
 ) -> Iterator[tuple[float, Callable[[], Candidates]]]:
     """The quadruples of an object in blocks, those of faces with more room first.
 
@@ -90,45 +90,43 @@ def candidate_blocks(
         theta: Half-angle of the friction cones to plan with [rad].
         whole: How many of the faces count by themselves; the others are parts of them.
         shared: Quadruples with such parts, (s, 4).
-        tilted: Whether force cones may lean; else they surround the normals.
     """
     rooms = _rooms(shapes)
-    order = np.argsort(-rooms[:whole], kind="stable")
-    order = order[rooms[order] > 0.0]
-    if not tilted:
-        quads = spanning_quadruples(body.normals[:whole], LEAST_SPAN_ANGLE).indices
-        yield float(rooms.max()), partial(_candidates, body, quads, rooms, theta, tilted=False)
-        return
-    cuts = _block_ends(len(order))
-    for start, end in zip([0, *cuts], cuts, strict=False):
-        quads = _with_a_new_one(order, start, end)
-        room = float(rooms[order[max(start, FINGERS - 1)]]) if end >= FINGERS else 0.0
-        yield room, partial(_candidates, body, quads, rooms, theta, tilted=tilted)
+    order = _roomiest_first(rooms[:whole])
+    for start, end, room in _face_blocks(rooms[order]):
+        quads = partial(_with_a_new_one, order, start, end)
+        yield room, partial(_candidates, body, quads, rooms, theta, tilted=True)
     for part in np.array_split(shared, math.ceil(len(shared) / math.comb(BLOCK, FINGERS)) or 1):
         with_room = part[(rooms[part] > 0.0).all(axis=1)]
         if len(with_room):
-            yield (
-                float(rooms[with_room].min(axis=1).max()),
-                partial(_candidates, body, with_room, rooms, theta, tilted=tilted),
-            )
+            room, quads = float(rooms[with_room].min(axis=1).max()), partial(np.copy, with_room)
+            yield room, partial(_candidates, body, quads, rooms, theta, tilted=True)
 
 
 def spanning_blocks(
     body: Polyhedron, shapes: Shapes, theta: float, whole: int
-) -> Iterator[Candidates]:
-    """The quadruples whose normals span (P3), with force cones around the normals, in blocks.
-
-    Args:
-        body: The object.
-        shapes: Its faces.
-        theta: Half-angle of the friction cones to plan with [rad].
-        whole: How many of the faces count by themselves.
-    """
+) -> Iterator[tuple[float, Callable[[], Candidates]]]:
+    """As `candidate_blocks`, for the quadruples whose normals span (P3), with cones around them."""
     rooms = _rooms(shapes)
-    quads = spanning_quadruples(body.normals[:whole], LEAST_SPAN_ANGLE).indices
-    quads = quads[(rooms[quads] > 0.0).all(axis=1)]
-    for part in np.array_split(quads, math.ceil(len(quads) / math.comb(BLOCK, FINGERS)) or 1):
-        yield _candidates(body, part, rooms, theta, tilted=False)
+    order = _roomiest_first(rooms[:whole])
+    table = SpanningTable(body.normals[order], LEAST_SPAN_ANGLE)
+    for start, end, room in _face_blocks(rooms[order]):
+        quads = partial(_spanning_with_a_new_one, table, order, start, end)
+        yield room, partial(_candidates, body, quads, rooms, theta, tilted=False)
+
+
+def _roomiest_first(rooms: Array) -> Indices:
+    """Faces with room, (f,)."""
+    order = np.argsort(-rooms, kind="stable")
+    return order[rooms[order] > 0.0]
+
+
+def _face_blocks(rooms: Array) -> Iterator[tuple[int, int, float]]:
+    """Which faces each block adds to those before, and the room of the first that matters."""
+    cuts = _block_ends(len(rooms))
+    for start, end in zip([0, *cuts], cuts, strict=False):
+        if end >= FINGERS:
+            yield start, end, float(rooms[max(start, FINGERS - 1)])
 
 
 def _rooms(shapes: Shapes) -> Array:
@@ -162,6 +160,12 @@ def _with_a_new_one(order: Indices, start: int, end: int) -> Indices:
     return quads[np.lexsort(quads.T[::-1])]
 
 
+def _spanning_with_a_new_one(table: SpanningTable, order: Indices, start: int, end: int) -> Indices:
+    """As `_with_a_new_one`, of those whose normals span."""
+    quads = np.sort(order[table.quadruples(start, end).indices], axis=1)
+    return quads[np.lexsort(quads.T[::-1])]
+
+
 def usable_half_angles(theta: float, spreads: Array) -> Array:
     """Half-angles that fit inside the friction cones wherever a curved patch leans to [rad].
 
@@ -176,8 +180,14 @@ def usable_half_angles(theta: float, spreads: Array) -> Array:
 
 
 def _candidates(
-    body: Polyhedron, quads: Indices, rooms: Array, theta: float, *, tilted: bool
+    body: Polyhedron,
+    quadruples: Callable[[], Indices],
+    rooms: Array,
+    theta: float,
+    *,
+    tilted: bool,
 ) -> Candidates:
+    quads = quadruples()
     normals = body.normals[quads].reshape(-1, FINGERS, 3)
     thetas = usable_half_angles(theta, np.array([face.spread for face in body.faces]))[quads]
     spanned = BELOW_SPAN_ANGLE * np.arcsin(np.maximum(span_sines(normals), 0.0))

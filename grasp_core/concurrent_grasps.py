@@ -31,12 +31,13 @@ Source: Sudsang & Ponce 1995, section 3.1 and Proposition 5; the far side is thi
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import cache
 from itertools import product
 from typing import TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, frozen
 from grasp_core.face_pieces import FacePiece
 from grasp_core.largest_discs import largest_discs
 from grasp_core.placements import NoPlacement, Placement, balanced_forces
@@ -168,13 +169,19 @@ def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES)
         toward: Across the axis, the direction in which the pyramid's first edge leans, (3,).
         sides: Number of facets.
     """
-    turns = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
     first = toward - (toward @ cone.axis) * cone.axis
     first = first / np.linalg.norm(first)
     frame = np.vstack([first, np.cross(cone.axis, first)])
-    across = np.column_stack([np.cos(turns), np.sin(turns)]) @ frame
+    across = facet_turns(sides) @ frame
     psi = np.arctan(np.tan(cone.half_angle) * np.cos(np.pi / sides))
     return np.sin(psi) * cone.axis - np.cos(psi) * across
+
+
+@cache
+def facet_turns(sides: int) -> Array:
+    """Cosines and sines of the directions in which a pyramid's facets lean, (sides, 2)."""
+    turns = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
+    return frozen(np.column_stack([np.cos(turns), np.sin(turns)]), (sides, 2), "turns")
 
 
 def concurrent_radius_bounds(reaches: Array, _: Array, half_angles: Array) -> Array:

@@ -151,15 +151,15 @@ def _by_simplex(program: LinearProgram, cutoff: float) -> Optimum | Infeasible |
     count, n = G.shape
     kernel, basis = compiled(KERNEL), np.empty(n, dtype=np.int64)
     norms = np.maximum(np.sqrt(np.einsum("ki,ki->k", G, G)), RESIDUAL)
-    rows = kernel.Rows(np.array(G, order="C"), np.array(h), norms, count - len(program.b))
-    status, against = kernel.solve(program.c, rows, cutoff, basis)
+    rows = kernel.Rows(np.array(G.T, order="C"), np.array(h), norms, count - len(program.b))
+    status, against = kernel.solve(program.c, rows, cutoff, basis, np.empty(n))
     if status == kernel.LOST:
         raise SolverError("the simplex method did not end")
     basis.sort()
     vertex = np.vstack([G, np.repeat(np.eye(n), 2, axis=0)])[basis]
     multipliers = np.zeros(count + 2 * n)
     if status == kernel.INFEASIBLE:
-        row = rows.A[against]  # an equality may have been turned
+        row = rows.At[:, against]  # an equality may have been turned
         multipliers[basis] = -np.linalg.solve(vertex.T, row)
         as_given = (row == G[against]).all() and rows.b[against] == h[against]
         multipliers[against] = 1.0 if as_given else -1.0

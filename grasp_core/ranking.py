@@ -1,6 +1,5 @@
 """In which order quadruples of faces are worth a program, the most promising first."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,22 +61,29 @@ class Ranking:
     """Of each choice of cones and finger order, minus infinity where it is not worth a program,
     (q, 2, orders)."""
     construction: Construction
-    dropped: int
-    """Quadruples with a finger order that were left out."""
 
     def __len__(self) -> int:
         return len(self.places)
 
-    def __iter__(self) -> Iterator[Quadruple]:
-        for place, bounds in zip(self.places, self.bounds, strict=True):
-            yield Quadruple(
-                faces=four(int(face) for face in self.candidates.faces[place]),
-                attempts=tuple(
-                    Attempt(order, self._choices(int(place), bounds[:, column]))
-                    for column, order in enumerate(self.construction.orders)
-                    if bounds[:, column].max() > -np.inf
-                ),
-            )
+    @property
+    def attempts(self) -> int:
+        """Quadruples with a finger order that are worth a program."""
+        return int((self.bounds.max(axis=1, initial=-np.inf) > -np.inf).sum())
+
+    def quadruple(self, row: int, bounds: Array) -> Quadruple:
+        """One of the quadruples with other bounds, (2, orders).
+
+        Choices of cones and finger orders with a bound of minus infinity are left out.
+        """
+        place = int(self.places[row])
+        return Quadruple(
+            faces=four(int(face) for face in self.candidates.faces[place]),
+            attempts=tuple(
+                Attempt(order, self._choices(place, bounds[:, column]))
+                for column, order in enumerate(self.construction.orders)
+                if bounds[:, column].max() > -np.inf
+            ),
+        )
 
     def _choices(self, place: int, bounds: Array) -> tuple[ConeChoice, ...]:
         return tuple(
@@ -85,10 +91,6 @@ class Ranking:
             for kind in np.argsort(-bounds, kind="stable")
             if bounds[kind] > -np.inf
         )
-
-    def candidates_from(self, place: int) -> int:
-        """How many candidates are left from a place in the order on."""
-        return int((self.bounds[place:].max(axis=1, initial=-np.inf) > -np.inf).sum())
 
 
 def ranked(candidates: Candidates, construction: Construction) -> Ranking:
@@ -114,6 +116,4 @@ def ranked(candidates: Candidates, construction: Construction) -> Ranking:
     promise = best if promise is None else promise
     order = np.argsort(-np.round(promise, SAME_PROMISE), kind="stable")
     order = order[best[order] > -np.inf]
-    worth = int((bounds.max(axis=1, initial=-np.inf) > -np.inf).sum())
-    dropped = len(candidates) * len(construction.orders) - worth
-    return Ranking(candidates, order, bounds[order], construction, dropped)
+    return Ranking(candidates, order, bounds[order], construction)

@@ -12,10 +12,12 @@ import numpy as np
 
 from grasp_core.certified import Certified, certify, named
 from grasp_core.constructions import Construction, regions_of
+from grasp_core.disc_bounds import DiscBounds
 from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece, FaceShape, Shapes, choices_near
 from grasp_core.placements import Placement
 from grasp_core.plans import MethodCounts, Proof
+from grasp_core.promising import promising
 from grasp_core.ranking import Attempt, Ranking
 from grasp_core.reach import Reach
 from grasp_core.spanning import cones_positively_span
@@ -123,27 +125,27 @@ def search_construction(
     ranking: Ranking,
     search: Search,
 ) -> Iterator[list[Certified]]:
-    """Go through ranked quadruples, yielding what each gave.
+    """Go through ranked quadruples, yielding what the promising ones gave.
 
     With a limit the search ends when no bound reaches the worst grasp kept; a construction
     without bounds ends as soon as the limit is reached.
     """
-    search.tally["pruned"] += ranking.dropped
-    for done, quadruple in enumerate(ranking):
+    before, discs = search.tally["tried"], DiscBounds(shapes)
+    for quadruple in promising(ranking, discs, search.least, search.tally):
         if not search.may_gain(construction, quadruple.bound):
-            search.tally["pruned"] += ranking.candidates_from(done)
-            return
+            break
         faces = quadruple.faces
         case = Case(construction, faces, chosen_shapes(shapes, faces), friction)
         found: list[Certified] = []
         for attempt in quadruple.attempts:
             if not search.may_gain(construction, attempt.bound):
-                search.tally["pruned"] += 1
                 continue
             one = tried(case, attempt, search.least(construction), search.tally)
             found += [one] if one else []
         found = _without_duplicates(found, search.tally)
         yield [kept for one in found for kept in search.keep(one)]
+    every = len(ranking.candidates) * len(construction.orders)
+    search.tally["pruned"] += every - (search.tally["tried"] - before)
 
 
 def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]:

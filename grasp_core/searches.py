@@ -27,6 +27,30 @@ Progress: TypeAlias = Callable[[int, int, int], None]
 """Called with quadruples done, quadruples in all, and grasps found so far."""
 
 
+class _Blocks:
+    """Blocks of quadruples, made when they are asked for; the first ones are kept."""
+
+    def __init__(self, blocks: Iterator[tuple[float, Callable[[], Candidates]]]) -> None:
+        listed = tuple(blocks)
+        self.rooms = tuple(room for room, _ in listed)
+        """No disc of each block is larger."""
+        self.makers = tuple(make for _, make in listed)
+        self.made: dict[int, Candidates] = {}
+        self.counts: dict[int, int] = {}
+
+    @property
+    def spanning(self) -> int:
+        """How many quadruples with normals that span (P3) the blocks made so far hold."""
+        return sum(self.counts.values())
+
+    def __getitem__(self, place: int) -> Candidates:
+        block = self.made.get(place) or self.makers[place]()
+        if place < KEPT_BLOCKS:
+            self.made[place] = block
+        self.counts[place] = block.spanning
+        return block
+
+
 class Searches:
     """One search per method over blocks of quadruples; the free method goes last."""
 
@@ -44,21 +68,18 @@ class Searches:
             for method in METHODS
             if method in request.families
         }
-        tilted = request.cones == "tilted"
         self.whole = len(body.faces)
-        self.candidate_blocks = tuple(
-            candidate_blocks(
-                self.body, self.shapes, request.theta, self.whole, self.shared, tilted=tilted
-            )
+        of_object = self.body, self.shapes, request.theta, self.whole
+        self.spanning_blocks = _Blocks(spanning_blocks(*of_object))
+        tilted = request.cones == "tilted"
+        self.tilted_blocks = (
+            _Blocks(candidate_blocks(*of_object, self.shared)) if tilted else self.spanning_blocks
         )
-        self.made: dict[int, Candidates] = {}
-        self.spanning_in_blocks: dict[int, int] = {}
-        self.spanning_alone = 0
 
     @property
     def spanning(self) -> int:
         """How many quadruples with normals that span (P3) were come across."""
-        return max(sum(self.spanning_in_blocks.values()), self.spanning_alone)
+        return max(self.spanning_blocks.spanning, self.tilted_blocks.spanning)
 
     @property
     def constructions(self) -> dict[Family, Search]:
@@ -136,20 +157,10 @@ class Searches:
 
         Where nothing bounds discs, only cones around the normals count.
         """
-        if construction.bounds is None and self.request.cones == "tilted":
-            blocks = spanning_blocks(self.body, self.shapes, self.request.theta, self.whole)
-            while not search.full and (block := next(blocks, None)) is not None:
-                self.spanning_alone += block.spanning
-                yield block
-            return
-        for place, (room, make) in enumerate(self.candidate_blocks):
-            if search.full and not search.may_gain(construction, room):
-                continue
-            block = self.made.get(place) or make()
-            if place < KEPT_BLOCKS:
-                self.made[place] = block
-            self.spanning_in_blocks[place] = block.spanning
-            yield block
+        blocks = self.spanning_blocks if construction.bounds is None else self.tilted_blocks
+        for place, room in enumerate(blocks.rooms):
+            if not search.full or search.may_gain(construction, room):
+                yield blocks[place]
 
     def _free_request(self, cells: int | None = None) -> FreeRequest:
         request = self.request

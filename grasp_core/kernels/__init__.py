@@ -21,8 +21,12 @@ def compiled(name: str) -> Any:
     if os.environ.get(SWITCH) == "off":
         return None
     try:
+        failures: Any = importlib.import_module("numba.core.errors")
         kernel: Any = importlib.import_module(f"grasp_core.kernels.{name}")
-        kernel.try_out()
     except (ImportError, RuntimeError, OSError):
+        return None
+    try:
+        kernel.try_out()
+    except (failures.NumbaError, RuntimeError, OSError):
         return None
     return kernel

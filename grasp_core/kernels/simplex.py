@@ -19,7 +19,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
-from numba.core.errors import NumbaError  # pyright: ignore[reportMissingTypeStubs]
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
@@ -35,28 +34,24 @@ UNCHANGED = 1e-13
 """Steps that lower c.x by less do not count as progress."""
 PATIENCE, MOST = 3, 60
 """Steps without progress until the first row enters, and steps in all, per variable."""
+REFINEMENTS = 3
+NEGLIGIBLE = 1e-12
+"""Multipliers that are zero but for rounding."""
 OPTIMAL, INFEASIBLE, BELOW, LOST = 0, 1, 2, 3
 
 
 def try_out() -> None:
-    """Solve a tiny program.
-
-    Raises:
-        RuntimeError: The method cannot be compiled here.
-    """
+    """Solve a tiny program."""
     basis = np.empty(1, dtype=np.int64)
     one = np.ones(1)
-    try:
-        solve(one, Rows(np.ones((1, 1)), one, one, 0), -np.inf, basis)
-    except NumbaError as error:
-        raise RuntimeError(f"numba: {error}") from error
+    solve(one, Rows(np.ones((1, 1)), one, one, 0), -np.inf, basis, np.empty(1))
 
 
 class Rows(NamedTuple):
     """The rows of a program; those of equalities come last, and may be turned around."""
 
-    A: Array
-    """(rows, n), contiguous."""
+    At: Array
+    """A transposed, (n, rows): the loops over all rows then run over neighbours in memory."""
     b: Array
     """(rows,)"""
     norms: Array
@@ -65,7 +60,7 @@ class Rows(NamedTuple):
 
 
 @njit(cache=True)
-def solve(c: Array, rows: Rows, cutoff: float, basis: Indices) -> tuple[int, int]:
+def solve(c: Array, rows: Rows, cutoff: float, basis: Indices, y: Array) -> tuple[int, int]:
     """Find a best vertex.
 
     Args:
@@ -74,28 +69,34 @@ def solve(c: Array, rows: Rows, cutoff: float, basis: Indices) -> tuple[int, int
         cutoff: Stop as soon as the optimum is known to be smaller.
         basis: Filled with the rows of the basis, (n,); rows + 2 i and rows + 2 i + 1 are the upper
             and the lower side of the box.
+        y: Filled with their multipliers, (n,).
 
     Returns:
         How it ended, and the row that contradicts the basis, if one does.
     """
     n, count, idle = len(c), len(rows.b), 0
-    inverse, x, y, value = _corner(c, count, basis)
-    alpha, inside = np.empty(n), np.zeros(count, dtype=np.bool_)
+    inverse, x, value = _corner(c, count, basis, y)
+    alpha, excess, inside = np.empty(n), np.empty(count), np.zeros(count, dtype=np.bool_)
     for _ in range(MOST * n):
         if value < cutoff and not _leans_on_box(y, basis, count):
+            _refine(c, rows, basis, inverse, y)
             return BELOW, -1
-        entering = _violated(x, rows, inside, idle > PATIENCE * n)
+        _exceeded(x, rows, excess)
+        entering = _violated(excess, rows, inside, idle > PATIENCE * n)
         if entering < 0:
+            _refine(c, rows, basis, inverse, y)
             return OPTIMAL, -1
-        excess = _turned(x, rows, entering)
-        _combined(rows.A[entering], inverse, alpha)
+        if excess[entering] < 0.0:
+            _turn(rows, entering)
+        beyond = abs(excess[entering])
+        _combined(rows, entering, inverse, alpha)
         leaving = _leaving(y, alpha, basis, rows)
         if leaving < 0:
             return INFEASIBLE, entering
         drop = max(y[leaving] / alpha[leaving], 0.0)
-        idle = idle + 1 if drop * excess < UNCHANGED else 0
-        value -= drop * excess
-        _exchange(inverse, x, alpha, leaving, excess)
+        idle = idle + 1 if drop * beyond < UNCHANGED else 0
+        value -= drop * beyond
+        _exchange(inverse, x, alpha, leaving, beyond)
         for j in range(n):
             y[j] -= drop * alpha[j]
         y[leaving] = drop
@@ -107,16 +108,32 @@ def solve(c: Array, rows: Rows, cutoff: float, basis: Indices) -> tuple[int, int
 
 
 @njit(cache=True)
-def _corner(c: Array, count: int, basis: Indices) -> tuple[Array, Array, Array, float]:
-    """The corner of the box on the side of c: inverse of its basis, x, y and c.x."""
+def proved_bound(c: Array, rows: Rows, basis: Indices, y: Array, accuracy: float) -> float:
+    """No feasible value is larger: y.b, if y >= 0 gives c to within an accuracy; else infinity."""
+    bound, left = 0.0, c.copy()
+    for j in range(len(c)):
+        k = basis[j]
+        if abs(y[j]) <= NEGLIGIBLE:
+            continue
+        if k >= len(rows.b) or y[j] < 0.0:
+            return np.inf
+        bound += y[j] * rows.b[k]
+        for i in range(len(c)):
+            left[i] -= y[j] * rows.At[i, k]
+    return bound if np.abs(left).max() <= accuracy else np.inf
+
+
+@njit(cache=True)
+def _corner(c: Array, count: int, basis: Indices, y: Array) -> tuple[Array, Array, float]:
+    """The corner of the box on the side of c: inverse of its basis, x and c.x."""
     n = len(c)
-    inverse, x, y, value = np.zeros((n, n)), np.empty(n), np.empty(n), 0.0
+    inverse, x, value = np.zeros((n, n)), np.empty(n), 0.0
     for i in range(n):
         side = 1.0 if c[i] >= 0.0 else -1.0
         basis[i] = count + 2 * i + (0 if side > 0.0 else 1)
         inverse[i, i], x[i], y[i] = side, side * BOX, abs(c[i])
         value += c[i] * x[i]
-    return inverse, x, y, value
+    return inverse, x, value
 
 
 @njit(cache=True)
@@ -128,48 +145,70 @@ def _leans_on_box(y: Array, basis: Indices, count: int) -> bool:
 
 
 @njit(cache=True)
-def _violated(x: Array, rows: Rows, inside: NDArray[np.bool_], first: bool) -> int:
-    """The row that x violates most, or the first one; -1 if it violates none."""
-    worst, found = VIOLATED, -1
-    for k in range(len(rows.b)):
-        if inside[k]:
-            continue
-        excess = _excess(x, rows, k)
-        if k >= len(rows.b) - rows.equalities:
-            excess = abs(excess)
-        if excess > worst * rows.norms[k]:
-            worst, found = excess / rows.norms[k], k
+def _exceeded(x: Array, rows: Rows, excess: Array) -> None:
+    """How far x is beyond each row."""
+    for k in range(len(excess)):
+        excess[k] = -rows.b[k]
+    for i in range(len(x)):
+        at, column = x[i], rows.At[i]
+        for k in range(len(excess)):
+            excess[k] += column[k] * at
+
+
+@njit(cache=True)
+def _violated(excess: Array, rows: Rows, inside: NDArray[np.bool_], first: bool) -> int:
+    """The row that is violated most, or the first one; -1 if none is."""
+    worst, found, inequalities = VIOLATED, -1, len(excess) - rows.equalities
+    for k in range(len(excess)):
+        beyond = excess[k] if k < inequalities else abs(excess[k])
+        if beyond > worst * rows.norms[k] and not inside[k]:
+            worst, found = beyond / rows.norms[k], k
             if first:
                 break
     return found
 
 
 @njit(cache=True)
-def _excess(x: Array, rows: Rows, k: int) -> float:
-    excess = -rows.b[k]
-    for i in range(len(x)):
-        excess += rows.A[k, i] * x[i]
-    return excess
+def _turn(rows: Rows, k: int) -> None:
+    """Turn an equality, so that what was beneath it is beyond."""
+    rows.b[k] = -rows.b[k]
+    for i in range(len(rows.At)):
+        rows.At[i, k] = -rows.At[i, k]
 
 
 @njit(cache=True)
-def _turned(x: Array, rows: Rows, k: int) -> float:
-    """How far x is beyond a row, where an equality is turned so that it is beyond."""
-    excess = _excess(x, rows, k)
-    if excess < 0.0:
-        rows.b[k] = -rows.b[k]
-        for i in range(len(x)):
-            rows.A[k, i] = -rows.A[k, i]
-    return abs(excess)
-
-
-@njit(cache=True)
-def _combined(row: Array, inverse: Array, alpha: Array) -> None:
+def _combined(rows: Rows, entering: int, inverse: Array, alpha: Array) -> None:
     """Write a row as a combination of those of the basis."""
-    for j in range(len(row)):
-        alpha[j] = 0.0
-        for i in range(len(row)):
-            alpha[j] += row[i] * inverse[i, j]
+    alpha[:] = 0.0
+    for i in range(len(alpha)):
+        share = rows.At[i, entering]
+        if share != 0.0:
+            for j in range(len(alpha)):
+                alpha[j] += share * inverse[i, j]
+
+
+@njit(cache=True)
+def _refine(c: Array, rows: Rows, basis: Indices, inverse: Array, y: Array) -> None:
+    """Multipliers afresh: their rounding errors have added up over the steps."""
+    y[:] = 0.0
+    for _ in range(REFINEMENTS):
+        left = c.copy()
+        for j in range(len(c)):
+            _subtract(left, y[j], rows, basis[j])
+        for i in range(len(c)):
+            for j in range(len(c)):
+                y[j] += left[i] * inverse[i, j]
+
+
+@njit(cache=True)
+def _subtract(left: Array, share: float, rows: Rows, k: int) -> None:
+    """Take a share of a row away, which may be a side of the box."""
+    side = k - len(rows.b)
+    if side >= 0:
+        left[side // 2] -= share if side % 2 == 0 else -share
+        return
+    for i in range(len(left)):
+        left[i] -= share * rows.At[i, k]
 
 
 @njit(cache=True)

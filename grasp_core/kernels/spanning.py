@@ -2,15 +2,14 @@
 
 With s(i, j, k) the signed sine of the angle at which three cones first touch one plane (see
 `grasp_core.spanning`), four directions i, j, k < l span at an angle if the three others go around
--l in a circle, s(i, j, l), s(j, k, l) and s(k, i, l) of one sign, s(i, j, k) of the other, and all larger
-in size than the sine of that angle. The table keeps for each ordered pair the set of third
+-l in a circle, s(i, j, l), s(j, k, l) and s(k, i, l) of one sign, s(i, j, k) of the other, and all
+larger in size than the sine of that angle. The table keeps for each ordered pair the set of third
 directions with a positive s, one bit each; what completes a pair is common to three of its rows,
 and is found 64 directions at a time.
 """
 
 import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
-from numba.core.errors import NumbaError  # pyright: ignore[reportMissingTypeStubs]
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
@@ -21,19 +20,12 @@ DEPENDENT = 1e-12
 
 
 def try_out() -> None:
-    """Fill a tiny table.
-
-    Raises:
-        RuntimeError: The kernel cannot be compiled here.
-    """
-    try:
-        table = empty_table(4)
-        extend(table, np.eye(4, 3), 0, 4, 0.5)
-        found = np.empty((1, 4), dtype=np.int64)
-        quadruples(table, 3, found)
-        least_sines(np.eye(4, 3), np.zeros_like(found), np.empty(1))
-    except NumbaError as error:
-        raise RuntimeError(f"numba: {error}") from error
+    """Fill a tiny table."""
+    table = empty_table(4)
+    extend(table, np.eye(4, 3), 0, 4, 0.5)
+    found = np.empty((1, 4), dtype=np.int64)
+    quadruples(table, 3, found)
+    least_sines(np.eye(4, 3), np.zeros_like(found), np.empty(1))
 
 
 def empty_table(count: int) -> NDArray[np.uint64]:

@@ -1,0 +1,83 @@
+"""What the programs for discs have in common: the faces, the attempts and the room for rows.
+
+The programs of `concurrent_grasps` and `pencil_grasps` grow four discs and maximise the smallest.
+That smallest radius alone is found with all four equal: rows only get tighter as a radius grows.
+With one radius, the last variable, every program is feasible for small enough ones, so that
+the multipliers alone, checked here, bound every radius.
+"""
+
+import numpy as np
+from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
+
+from grasp_core.arrays import Array
+from grasp_core.kernels.simplex import LOST, Rows, proved_bound, solve
+from grasp_core.kernels.tables import Attempts, FaceTable
+
+FINGERS = 4
+ACCURACY = 1e-9
+"""How far multipliers may be from giving the objective; variables are of order one."""
+
+
+def tilted_faces() -> tuple[FaceTable, Attempts]:
+    """Four squares and an attempt on them, to try kernels out."""
+    square = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+    n = np.array([[0.0, 0.0, 1.0], [0.9, 0.0, -0.4], [-0.5, 0.8, -0.4], [-0.5, -0.8, -0.4]])
+    frames = np.repeat(np.eye(3, 2)[None], 4, axis=0)
+    faces = FaceTable(
+        n,
+        -n,
+        frames,
+        np.repeat(square[None], 4, axis=0),
+        np.ones((4, 4)),
+        np.full(4, 4),
+        np.zeros(4),
+    )
+    return faces, Attempts(np.arange(4)[None], n[None].copy(), np.full(1, 0.1))
+
+
+@njit(cache=True)
+def edges_of(faces: FaceTable, attempts: Attempts, a: int) -> int:
+    """How many edges the faces of an attempt have."""
+    count = 0
+    for finger in range(FINGERS):
+        count += int(faces.edges[attempts.faces[a, finger]])
+    return count
+
+
+@njit(cache=True)
+def room_for(room: Array, n: int, count: int) -> Rows:
+    """So many empty rows, in memory that is used again and again."""
+    At = room[: n * count].reshape(n, count)
+    At[:] = 0.0
+    b, norms = room[n * count : (n + 1) * count], room[(n + 1) * count : (n + 2) * count]
+    return Rows(At, b, norms, 0)
+
+
+@njit(cache=True)
+def bounded(rows: Rows, least: float) -> float:
+    """An upper bound on the radius; the best one where it is above the least."""
+    n = len(rows.At)
+    basis, y, c = np.empty(n, dtype=np.int64), np.empty(n), np.zeros(n)
+    c[-1] = 1.0
+    rows.norms[:] = 0.0
+    for i in range(n):
+        for k in range(len(rows.norms)):
+            rows.norms[k] += rows.At[i, k] * rows.At[i, k]
+    for k in range(len(rows.norms)):
+        rows.norms[k] = np.sqrt(rows.norms[k])
+    status, _ = solve(c, rows, least, basis, y)
+    return np.inf if status == LOST else proved_bound(c, rows, basis, y, ACCURACY)
+
+
+@njit(cache=True)
+def dotted(u: Array, v: Array) -> float:
+    """Dot product of two vectors."""
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
+@njit(cache=True)
+def cross(u: Array, v: Array, crossed: Array) -> None:
+    """Fill in the cross product of two vectors."""
+    crossed[0] = u[1] * v[2] - u[2] * v[1]
+    crossed[1] = u[2] * v[0] - u[0] * v[2]
+    crossed[2] = u[0] * v[1] - u[1] * v[0]

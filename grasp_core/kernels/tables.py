@@ -1,0 +1,35 @@
+"""What kernels are given, as plain arrays; numba is not needed to fill them."""
+
+from typing import NamedTuple
+
+from grasp_core.arrays import Array, Indices
+
+
+class FaceTable(NamedTuple):
+    """Convex faces at unit size, in the letters of `FacePiece`."""
+
+    normals: Array
+    """(f, 3)"""
+    origins: Array
+    """(f, 3)"""
+    frames: Array
+    """(f, 3, 2)"""
+    E: Array
+    """(f, e, 2), as many rows of each face as it has edges."""
+    b: Array
+    """(f, e)"""
+    edges: Indices
+    """(f,)"""
+    depths: Array
+    """(f,)"""
+
+
+class Attempts(NamedTuple):
+    """Ordered faces with a force cone each."""
+
+    faces: Indices
+    """(a, 4)"""
+    axes: Array
+    """(a, 4, 3)"""
+    half_angles: Array
+    """(a,) [rad]"""
