@@ -3,15 +3,6 @@
 Around the normals, as in the paper, each is planned at theta_plan = min(theta, just below its span
 angle theta*): the smaller cones lie inside the real ones, so what holds there holds at the friction
 asked for. Tilted cones are an alternative, and for most quadruples the only one.
-
-Reach. With positive weights w of sum w_i a_i = 0 for the axes, and contacts c_i on the faces,
-sum w_i a_i.(x0 - c_i) = -sum w_i a_i.c_i wherever the focus x0 is: the weighted mean of the
-distances along the axes is at most -sum w_i min a_i.c_i over the corners of each face, and for a
-focus behind the fingers at most sum w_i max a_i.c_i.
-
-Width. If two axes lead from one focus back to their contacts, c_i = x - s_i a_i and
-c_j = x - s_j a_j, then d = (a_i - a_j) / (1 - a_i.a_j) has d.a_i = 1 and d.a_j = -1, and so
-s_i + s_j = d.(c_j - c_i), which the corners of the two faces bound.
 """
 
 import math
@@ -25,7 +16,8 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.constructions import LEAST_RADIUS
 from grasp_core.face_pieces import Shapes
-from grasp_core.spanning import SpanningTable, balancing_weights, span_sines
+from grasp_core.reaches import corners_of, reaches_and_widths
+from grasp_core.spanning import SpanningTable, span_sines
 from grasp_core.tilted_cones import tilted_cones
 from grasp_core.values import FINGERS, ForceCone, Polyhedron, four
 
@@ -35,12 +27,14 @@ BELOW_SPAN_ANGLE = 0.999
 """Share of theta* to plan with: P3 is strict."""
 INSIDE_FRICTION = 1.0 - 1e-6
 """Share of the friction angle to plan with, so that equilibrium is not marginal."""
-BLOCK = 30
-"""Faces of the first block: 27,405 quadruples, whose cones are tilted in some seconds."""
+FIRST_FACES = 14
+"""Faces of the first block: 1,001 quadruples."""
+LARGEST_BLOCK = 30_000
+"""Quadruples of one block: their cones are tilted in a second or two."""
+SPANNING_SHARE = 0.125
+"""Of four random directions, the share that positively spans."""
 NORMAL, TILTED = 0, 1
 """The two choices of force cones."""
-PARALLEL = 1e-6
-"""Axes whose 1 - a_i.a_j is below this bound no width."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,11 +86,12 @@ def candidate_blocks(
         shared: Quadruples with such parts, (s, 4).
     """
     rooms = _rooms(shapes)
-    order = _roomiest_first(rooms[:whole])
-    for start, end, room in _face_blocks(rooms[order]):
+    order = np.argsort(-rooms[:whole], kind="stable")
+    order = order[rooms[order] > 0.0]
+    for start, end, room in _face_blocks(rooms[order], LARGEST_BLOCK):
         quads = partial(_with_a_new_one, order, start, end)
         yield room, partial(_candidates, body, quads, rooms, theta, tilted=True)
-    for part in np.array_split(shared, math.ceil(len(shared) / math.comb(BLOCK, FINGERS)) or 1):
+    for part in np.array_split(shared, math.ceil(len(shared) / LARGEST_BLOCK) or 1):
         with_room = part[(rooms[part] > 0.0).all(axis=1)]
         if len(with_room):
             room, quads = float(rooms[with_room].min(axis=1).max()), partial(np.copy, with_room)
@@ -108,22 +103,16 @@ def spanning_blocks(
 ) -> Iterator[tuple[float, Callable[[], Candidates]]]:
     """As `candidate_blocks`, for the quadruples whose normals span (P3), with cones around them."""
     rooms = _rooms(shapes)
-    order = _roomiest_first(rooms[:whole])
+    order = np.argsort(-rooms[:whole], kind="stable")
     table = SpanningTable(body.normals[order], LEAST_SPAN_ANGLE)
-    for start, end, room in _face_blocks(rooms[order]):
+    for start, end, room in _face_blocks(rooms[order], int(LARGEST_BLOCK / SPANNING_SHARE)):
         quads = partial(_spanning_with_a_new_one, table, order, start, end)
         yield room, partial(_candidates, body, quads, rooms, theta, tilted=False)
 
 
-def _roomiest_first(rooms: Array) -> Indices:
-    """Faces with room, (f,)."""
-    order = np.argsort(-rooms, kind="stable")
-    return order[rooms[order] > 0.0]
-
-
-def _face_blocks(rooms: Array) -> Iterator[tuple[int, int, float]]:
+def _face_blocks(rooms: Array, largest: int) -> Iterator[tuple[int, int, float]]:
     """Which faces each block adds to those before, and the room of the first that matters."""
-    cuts = _block_ends(len(rooms))
+    cuts = _block_ends(len(rooms), largest)
     for start, end in zip([0, *cuts], cuts, strict=False):
         if end >= FINGERS:
             yield start, end, float(rooms[max(start, FINGERS - 1)])
@@ -136,12 +125,12 @@ def _rooms(shapes: Shapes) -> Array:
     )
 
 
-def _block_ends(count: int) -> list[int]:
-    """How many faces each block reaches to: about as many new quadruples in each."""
-    ends, size = [min(BLOCK, count)], math.comb(BLOCK, FINGERS)
+def _block_ends(count: int, largest: int) -> list[int]:
+    """How many faces each block reaches to: as many new quadruples as before, up to a size."""
+    ends = [min(FIRST_FACES, count)]
     while ends[-1] < count:
         before = math.comb(ends[-1], FINGERS)
-        end = ends[-1] + 1
+        size, end = min(before, largest), ends[-1] + 1
         while end < count and math.comb(end + 1, FINGERS) - before <= size:
             end += 1
         ends.append(end)
@@ -197,46 +186,13 @@ def _candidates(
         leaning = tilted_cones(normals, thetas)
         axes[TILTED] = leaning.axes
         half_angles[TILTED] = BELOW_SPAN_ANGLE * leaning.half_angles
-    corners = _corners(body)[quads]
+    bounds = [reaches_and_widths(corners_of(body), quads, each) for each in axes[: 1 + tilted]]
     return Candidates(
         faces=quads,
         normals=normals,
         axes=np.stack(axes, axis=1),
         half_angles=np.stack(half_angles, axis=1),
-        reaches=np.stack([_reaches(corners, each) for each in axes], axis=1),
-        widths=np.stack([_widths(corners, each) for each in axes], axis=1),
+        reaches=np.stack([bounds[NORMAL][0], bounds[-1][0]], axis=1),
+        widths=np.stack([bounds[NORMAL][1], bounds[-1][1]], axis=1),
         rooms=rooms[quads].min(axis=1, initial=np.inf),
     )
-
-
-def _corners(body: Polyhedron) -> Array:
-    """Corners of each face about the centre of mass over the radius, some repeated, (f, k, 3)."""
-    corners = [
-        (np.vstack([face.polygon, *face.holes]) - body.center_of_mass) / body.radius
-        for face in body.faces
-    ]
-    most = max(len(each) for each in corners)
-    return np.array([np.vstack([each, np.repeat(each[:1], most - len(each), axis=0)])
-                     for each in corners])  # fmt: skip
-
-
-def _reaches(corners: Array, axes: Array) -> Array:
-    """Upper bounds on the mean distance of a focus before or behind its contacts, (q,)."""
-    heights = np.einsum("qfki,qfi->qfk", corners, axes)
-    weights = balancing_weights(axes)
-    before = -np.einsum("qf,qf->q", weights, heights.min(axis=2, initial=np.inf))
-    behind = np.einsum("qf,qf->q", weights, heights.max(axis=2, initial=-np.inf))
-    return np.maximum(before, behind)
-
-
-def _widths(corners: Array, axes: Array) -> Array:
-    """Upper bounds on s_i + s_j for contacts i and j of one focus, (q, 4, 4)."""
-    widths = np.full((len(axes), FINGERS, FINGERS), np.inf)
-    for i, j in combinations(range(FINGERS), 2):
-        apart = axes[:, i] - axes[:, j]
-        low = np.einsum("qki,qi->qk", corners[:, i], apart).min(axis=1, initial=np.inf)
-        high = np.einsum("qki,qi->qk", corners[:, j], apart).max(axis=1, initial=-np.inf)
-        share = 0.5 * np.einsum("qi,qi->q", apart, apart)
-        bound = np.where(share > PARALLEL, (high - low) / np.maximum(share, PARALLEL), np.inf)
-        widths[:, i, j] = widths[:, j, i] = bound
-    return widths

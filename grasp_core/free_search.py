@@ -75,7 +75,6 @@ def search_free(
     """Go through the quadruples of faces that no family holds, until a limit is reached."""
     while batch := list(islice(quadruples, BATCH)):
         if search.full:
-            search.tally["pruned"] += len(batch) + sum(1 for _ in quadruples)
             return
         placed = [_decide(shapes, faces, request, search, held) for faces in batch]
         choices = iter(_cone_choices([each for each in placed if each], request))
@@ -110,7 +109,6 @@ def _decide(
     """Contacts on four faces; where there are none, the proof or the doubt is noted."""
     chosen = chosen_shapes(shapes, faces)
     if faces in held or len(chosen) < FINGERS:
-        search.tally["pruned"] += 1
         return None
     search.tally["tried"] += 1
     answers = _answers(faces, chosen, request, search)

@@ -96,6 +96,7 @@ class Ranking:
 def ranked(candidates: Candidates, construction: Construction) -> Ranking:
     """In the order of an upper bound on the radius; for reguli, widest force cones first."""
     usable: NDArray[np.bool_] = candidates.half_angles > LEAST_SPAN_ANGLE
+    usable &= candidates.rooms[:, None] > 0.0
     spans = usable[:, NORMAL].copy()
     if construction.bounds is None:
         usable[:, TILTED] = False  # no region to gain: the free method finds such grasps

@@ -118,8 +118,10 @@ class Searches:
             search = self.by_method["free"]
             search.limit = self._left()
             dealt_with = len(self.constructions) * self.quadruples
-            steps = search_free(self.shapes, self._every(), self._free_request(), search, self.held)
+            request = self._free_request()
+            steps = search_free(self.shapes, self._every(), request, search, self.held)
             yield from enumerate(_timed(steps, search), start=dealt_with + 1)
+            search.tally["pruned"] = self.quadruples - search.tally["tried"]
             if self.request.complete:
                 request = self._free_request(COMPLETE_CELLS)
                 steps = search_undecided(self.shapes, request, search)

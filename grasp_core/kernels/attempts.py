@@ -67,17 +67,3 @@ def bounded(rows: Rows, least: float) -> float:
         rows.norms[k] = np.sqrt(rows.norms[k])
     status, _ = solve(c, rows, least, basis, y)
     return np.inf if status == LOST else proved_bound(c, rows, basis, y, ACCURACY)
-
-
-@njit(cache=True)
-def dotted(u: Array, v: Array) -> float:
-    """Dot product of two vectors."""
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
-
-
-@njit(cache=True)
-def cross(u: Array, v: Array, crossed: Array) -> None:
-    """Fill in the cross product of two vectors."""
-    crossed[0] = u[1] * v[2] - u[2] * v[1]
-    crossed[1] = u[2] * v[0] - u[0] * v[2]
-    crossed[2] = u[0] * v[1] - u[1] * v[0]

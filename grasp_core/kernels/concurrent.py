@@ -11,14 +11,13 @@ from grasp_core.arrays import Array
 from grasp_core.kernels.attempts import (
     FINGERS,
     bounded,
-    cross,
-    dotted,
     edges_of,
     room_for,
     tilted_faces,
 )
 from grasp_core.kernels.simplex import Rows
 from grasp_core.kernels.tables import Attempts, FaceTable
+from grasp_core.kernels.vectors import cross, dotted
 
 VARIABLES = 12
 

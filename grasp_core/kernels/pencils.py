@@ -12,14 +12,13 @@ from grasp_core.arrays import Array
 from grasp_core.kernels.attempts import (
     FINGERS,
     bounded,
-    cross,
-    dotted,
     edges_of,
     room_for,
     tilted_faces,
 )
 from grasp_core.kernels.simplex import Rows
 from grasp_core.kernels.tables import Attempts, FaceTable
+from grasp_core.kernels.vectors import balancing_weights, dotted
 
 VARIABLES, K = 5, 3
 """How many there are, and where half the distance of the foci is among them."""
@@ -154,14 +153,11 @@ def _near_row(
 @njit(cache=True)
 def _focus_direction(axes: Array) -> Array:
     """As `focus_direction` of `grasp_core.placements`."""
-    one, two, u = np.empty(3), np.empty(3), np.empty(3)
-    cross(axes[2], axes[3], one)
-    cross(axes[0], axes[1], two)
-    first, second = dotted(one, axes[1]), -dotted(one, axes[0])
-    total = first + second + dotted(two, axes[3]) - dotted(two, axes[2])
+    weights, u = np.empty(FINGERS), np.empty(3)
+    balancing_weights(axes, weights)
     for j in range(3):
-        u[j] = first * axes[0, j] + second * axes[1, j]
-    length = np.sqrt(dotted(u, u)) * np.sign(total)
+        u[j] = weights[0] * axes[0, j] + weights[1] * axes[1, j]
+    length = np.sqrt(dotted(u, u))
     for j in range(3):
         u[j] /= length
     return u

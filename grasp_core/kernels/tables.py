@@ -33,3 +33,12 @@ class Attempts(NamedTuple):
     """(a, 4, 3)"""
     half_angles: Array
     """(a,) [rad]"""
+
+
+class Corners(NamedTuple):
+    """Corners of faces."""
+
+    points: Array
+    """(f, c, 3), as many of each face as it has."""
+    counts: Indices
+    """(f,)"""

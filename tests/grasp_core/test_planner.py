@@ -311,7 +311,7 @@ def test_grasps_are_streamed_as_they_are_found():
 def test_radii_stay_below_the_bounds_that_prune():
     body, theta = example_object("random-12-1"), math.radians(8.0)
     ((room, block),) = candidate_blocks(
-        body, face_shapes(body), theta, len(body.faces), np.empty((0, 4), dtype=int), tilted=True
+        body, face_shapes(body), theta, len(body.faces), np.empty((0, 4), dtype=int)
     )
     candidates, tested = block(), 0
     for family in DISCS:

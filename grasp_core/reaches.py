@@ -1,0 +1,80 @@
+"""Upper bounds on how far a focus can be from contacts on faces, from the faces' corners alone.
+
+Reach. With positive weights w of sum w_i a_i = 0 for the axes, and contacts c_i on the faces,
+sum w_i a_i.(x0 - c_i) = -sum w_i a_i.c_i wherever the focus x0 is: the weighted mean of the
+distances along the axes is at most -sum w_i min a_i.c_i over the corners of each face, and for a
+focus behind the fingers at most sum w_i max a_i.c_i.
+
+Width. If two axes lead from one focus back to their contacts, c_i = x - s_i a_i and
+c_j = x - s_j a_j, then d = (a_i - a_j) / (1 - a_i.a_j) has d.a_i = 1 and d.a_j = -1, and so
+s_i + s_j = d.(c_j - c_i), which the corners of the two faces bound.
+"""
+
+from itertools import combinations
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.kernels import compiled
+from grasp_core.kernels.tables import Corners
+from grasp_core.spanning import balancing_weights
+from grasp_core.values import FINGERS, Polyhedron
+
+KERNEL = "reaches"
+PARALLEL = 1e-6
+"""Axes whose 1 - a_i.a_j is below this bound no width."""
+
+
+def corners_of(body: Polyhedron) -> Corners:
+    """Corners of each face about the centre of mass over the radius, the first one repeated."""
+    corners = [
+        (np.vstack([face.polygon, *face.holes]) - body.center_of_mass) / body.radius
+        for face in body.faces
+    ]
+    counts = np.array([len(each) for each in corners])
+    most = int(counts.max(initial=0))
+    padded = [np.vstack([each, np.repeat(each[:1], most - len(each), axis=0)]) for each in corners]
+    return Corners(np.array(padded), counts)
+
+
+def reaches_and_widths(corners: Corners, faces: Indices, axes: Array) -> tuple[Array, Array]:
+    """Bounds for many quadruples.
+
+    Args:
+        corners: Of all faces.
+        faces: (q, 4)
+        axes: Of force cones that positively span, (q, 4, 3).
+
+    Returns:
+        Upper bounds on the mean distance of a focus before or behind its contacts, (q,), and on
+        s_i + s_j for contacts i and j of one focus, (q, 4, 4).
+    """
+    kernel = compiled(KERNEL)
+    if kernel is None:
+        points = corners.points[faces]
+        return _reaches(points, axes), _widths(points, axes)
+    reaches, widths = np.empty(len(faces)), np.empty((len(faces), FINGERS, FINGERS))
+    kernel.fill(corners, np.ascontiguousarray(faces), np.ascontiguousarray(axes), reaches, widths)
+    return reaches, widths
+
+
+def _reaches(corners: Array, axes: Array) -> Array:
+    """Upper bounds on the mean distance of a focus before or behind its contacts, (q,)."""
+    heights = np.einsum("qfki,qfi->qfk", corners, axes)
+    weights = balancing_weights(axes)
+    before = -np.einsum("qf,qf->q", weights, heights.min(axis=2, initial=np.inf))
+    behind = np.einsum("qf,qf->q", weights, heights.max(axis=2, initial=-np.inf))
+    return np.maximum(before, behind)
+
+
+def _widths(corners: Array, axes: Array) -> Array:
+    """Upper bounds on s_i + s_j for contacts i and j of one focus, (q, 4, 4)."""
+    widths = np.full((len(axes), FINGERS, FINGERS), np.inf)
+    for i, j in combinations(range(FINGERS), 2):
+        apart = axes[:, i] - axes[:, j]
+        low = np.einsum("qki,qi->qk", corners[:, i], apart).min(axis=1, initial=np.inf)
+        high = np.einsum("qki,qi->qk", corners[:, j], apart).max(axis=1, initial=-np.inf)
+        share = 0.5 * np.einsum("qi,qi->q", apart, apart)
+        bound = np.where(share > PARALLEL, (high - low) / np.maximum(share, PARALLEL), np.inf)
+        widths[:, i, j] = widths[:, j, i] = bound
+    return widths
