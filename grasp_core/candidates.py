@@ -7,7 +7,7 @@ asked for. Tilted cones are an alternative, and for most quadruples the only one
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
 from itertools import combinations
 
@@ -58,6 +58,10 @@ class Candidates:
 
     def __len__(self) -> int:
         return len(self.faces)
+
+    def some(self, places: Indices) -> "Candidates":
+        """The quadruples at some places, in that order."""
+        return Candidates(*(getattr(self, each.name)[places] for each in fields(self)))
 
     @property
     def spanning(self) -> int:

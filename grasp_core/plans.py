@@ -70,7 +70,8 @@ class PlanCounts:
     quadruples: int
     """All sets of four faces."""
     spanning: int
-    """Those whose normals positively span at the least planned angle (P3)."""
+    """Those whose normals positively span at the least planned angle (P3), as far as the search
+    went: with a limit it stops early."""
     families: Mapping[str, MethodCounts] = field(default_factory=dict[str, MethodCounts])
     """By method, the three families and perhaps `free`."""
 

@@ -1,13 +1,18 @@
-"""Ranked quadruples with tight bounds, best first, as far as they are asked for.
+"""Quadruples with tight bounds, best first over all blocks, as far as they are asked for.
 
-A ranking comes with bounds that cost next to nothing. They are tightened by small programs, some
-dozens of quadruples at a time; a quadruple is handed out when its tight bound is no smaller than
-the cheap bounds of all that have no other yet.
+Three kinds of things wait in one queue: blocks that nobody made yet, bounded by the room of their
+faces; made ones, by the cheap bounds of their rankings; and single quadruples, by small programs.
+What has the largest bound comes first: a block is made, the bounds of some dozens of quadruples are
+tightened, or a quadruple is handed out. So none with larger discs can follow, and hardly a
+program is solved that was not needed to know this.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator
-from heapq import heappop, heappush
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from heapq import heapify, heappop, heappush
+from typing import TypeAlias
 
 import numpy as np
 
@@ -15,14 +20,44 @@ from grasp_core.arrays import Array
 from grasp_core.constructions import Construction
 from grasp_core.disc_bounds import DiscBounds
 from grasp_core.ranking import SAME_PROMISE, Quadruple, Ranking
-from grasp_core.values import FaceQuadruple
 
-FIRST_CHUNK, LARGEST_CHUNK = 64, 2048
+SMALLEST_CHUNK, LARGEST_CHUNK = 32, 2048
 """Quadruples whose bounds are tightened together."""
 
 
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Quadruples that are ranked when they are needed."""
+
+    room: float
+    """No disc is larger."""
+    rank: Callable[[], Ranking]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rest:
+    """What is left of a ranking from a row on."""
+
+    ranking: Ranking
+    best: Array
+    """The cheap bounds of its quadruples, falling."""
+    start: int
+
+    def until(self, bound: float) -> int:
+        """Where those end that are worth being tightened before what else has a bound."""
+        larger = int(np.searchsorted(-self.best[self.start :], -bound))
+        count = min(max(larger, SMALLEST_CHUNK), LARGEST_CHUNK)
+        return min(self.start + count, len(self.best))
+
+
+_Waiting: TypeAlias = tuple[float, int, tuple[int, ...], Block | _Rest | Callable[[], Quadruple]]
+"""Minus the bound to so many digits, then what makes ties go by kind and by faces."""
+BLOCK, REST, QUADRUPLE = range(3)
+
+
 def promising(
-    ranking: Ranking,
+    construction: Construction,
+    blocks: Sequence[Block],
     discs: DiscBounds,
     least: Callable[[Construction], float],
     tally: Counter[str],
@@ -30,35 +65,52 @@ def promising(
     """Quadruples that may be worth having, with tight bounds, best first.
 
     Args:
-        ranking: Of one block of quadruples.
+        construction: With discs.
+        blocks: Of all quadruples.
         discs: Of the object's faces.
-        least: The radius above which discs of a construction are worth having at present.
+        least: The radius above which discs are worth having at present.
         tally: Where to count attempts whose bound proves that they have none at all.
     """
-    if ranking.construction.bounds is None:
-        yield from (ranking.quadruple(row, ranking.bounds[row]) for row in range(len(ranking)))
-        return
-    best = ranking.bounds.max(axis=(1, 2), initial=-np.inf)
-    waiting: list[tuple[float, FaceQuadruple, Quadruple]] = []
-    start, size = 0, FIRST_CHUNK
-    while start < len(ranking) and best[start] > (worth := least(ranking.construction)):
-        end = min(start + size, len(ranking))
-        bounds = _tightened(ranking, slice(start, end), discs, worth, tally)
-        for row in np.flatnonzero(bounds.max(axis=(1, 2)) > -np.inf):
-            one = ranking.quadruple(start + int(row), bounds[row])
-            heappush(waiting, (-round(one.bound, SAME_PROMISE), one.faces, one))
-        following = round(float(best[end]), SAME_PROMISE) if end < len(ranking) else -np.inf
-        while waiting and -waiting[0][0] >= following:
-            yield heappop(waiting)[2]
-        start, size = end, min(2 * size, LARGEST_CHUNK)
+    waiting: list[_Waiting] = [
+        (-round(block.room, SAME_PROMISE), BLOCK, (place,), block)
+        for place, block in enumerate(blocks)
+    ]
+    heapify(waiting)
     while waiting:
-        yield heappop(waiting)[2]
+        bound, _, place, item = heappop(waiting)
+        worth = least(construction)
+        if -bound <= worth:
+            return
+        match item:
+            case Block():
+                item = _opened(item.rank(), worth)
+                _put_back(waiting, item, place)
+            case _Rest():
+                end = item.until(-waiting[0][0] if waiting else worth)
+                for one in _tightened(item.ranking, slice(item.start, end), discs, worth, tally):
+                    heappush(waiting, one)
+                _put_back(waiting, _Rest(item.ranking, item.best, end), place)
+            case _:
+                yield item()
+
+
+def _opened(ranking: Ranking, worth: float) -> _Rest:
+    """A ranking without what is not worth having: the rest of the block can be forgotten."""
+    best = ranking.bounds.max(axis=(1, 2), initial=-np.inf)
+    count = int((best > worth).sum())
+    return _Rest(ranking.first(count), best[:count], 0)
+
+
+def _put_back(waiting: list[_Waiting], rest: _Rest, place: tuple[int, ...]) -> None:
+    if rest.start < len(rest.best):
+        bound = round(float(rest.best[rest.start]), SAME_PROMISE)
+        heappush(waiting, (-bound, REST, place, rest))
 
 
 def _tightened(
     ranking: Ranking, rows: slice, discs: DiscBounds, worth: float, tally: Counter[str]
-) -> Array:
-    """Tight bounds of some rows, minus infinity where they are not worth having."""
+) -> Iterator[_Waiting]:
+    """Some quadruples, those of them that are worth having, with tight bounds."""
     construction, candidates = ranking.construction, ranking.candidates
     cheap = ranking.bounds[rows]
     row, kind, column = np.nonzero(cheap > worth)
@@ -77,4 +129,9 @@ def _tightened(
     tally["tried"] += int(none.sum())
     tally["infeasible"] += int(none.sum())
     tally["solved"] += int((cheap > worth).transpose(0, 2, 1)[none].sum())
-    return np.where(bounds > worth, bounds, -np.inf)
+    bounds[bounds <= worth] = -np.inf
+    best: Array = np.round(bounds.reshape(len(bounds), -1).max(axis=1), SAME_PROMISE)
+    faces = candidates.faces[ranking.places[rows]].tolist()
+    for each in np.flatnonzero(best > -np.inf).tolist():
+        make = partial(ranking.quadruple, rows.start + each, bounds[each])
+        yield -float(best[each]), QUADRUPLE, tuple(faces[each]), make

@@ -65,10 +65,10 @@ class Ranking:
     def __len__(self) -> int:
         return len(self.places)
 
-    @property
-    def attempts(self) -> int:
-        """Quadruples with a finger order that are worth a program."""
-        return int((self.bounds.max(axis=1, initial=-np.inf) > -np.inf).sum())
+    def first(self, count: int) -> "Ranking":
+        """The most promising ones alone, without the candidates of the others."""
+        some = self.candidates.some(self.places[:count])
+        return Ranking(some, np.arange(count), self.bounds[:count].copy(), self.construction)
 
     def quadruple(self, row: int, bounds: Array) -> Quadruple:
         """One of the quadruples with other bounds, (2, orders).

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import takewhile
 from typing import TypeAlias
 
 import numpy as np
@@ -17,8 +18,8 @@ from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece, FaceShape, Shapes, choices_near
 from grasp_core.placements import Placement
 from grasp_core.plans import MethodCounts, Proof
-from grasp_core.promising import promising
-from grasp_core.ranking import Attempt, Ranking
+from grasp_core.promising import Block, promising
+from grasp_core.ranking import Attempt, Quadruple
 from grasp_core.reach import Reach
 from grasp_core.spanning import cones_positively_span
 from grasp_core.true_surface import on_true_surface
@@ -122,18 +123,15 @@ def search_construction(
     construction: Construction,
     shapes: Shapes,
     friction: float,
-    ranking: Ranking,
+    blocks: Sequence[Block],
     search: Search,
 ) -> Iterator[list[Certified]]:
-    """Go through ranked quadruples, yielding what the promising ones gave.
+    """Go through blocks of quadruples, yielding what each promising one gave.
 
     With a limit the search ends when no bound reaches the worst grasp kept; a construction
     without bounds ends as soon as the limit is reached.
     """
-    before, discs = search.tally["tried"], DiscBounds(shapes)
-    for quadruple in promising(ranking, discs, search.least, search.tally):
-        if not search.may_gain(construction, quadruple.bound):
-            break
+    for quadruple in _in_order(construction, DiscBounds(shapes), blocks, search):
         faces = quadruple.faces
         case = Case(construction, faces, chosen_shapes(shapes, faces), friction)
         found: list[Certified] = []
@@ -144,8 +142,23 @@ def search_construction(
             found += [one] if one else []
         found = _without_duplicates(found, search.tally)
         yield [kept for one in found for kept in search.keep(one)]
-    every = len(ranking.candidates) * len(construction.orders)
-    search.tally["pruned"] += every - (search.tally["tried"] - before)
+
+
+def _in_order(
+    construction: Construction, discs: DiscBounds, blocks: Sequence[Block], search: Search
+) -> Iterator[Quadruple]:
+    """Quadruples to try: with a limit best first over all blocks, else block by block."""
+    if construction.bounds is not None:
+        together = [blocks] if search.limit is not None else [[block] for block in blocks]
+        for some in together:
+            yield from promising(construction, some, discs, search.least, search.tally)
+        return
+    for block in blocks:
+        if search.full:
+            return
+        ranking = block.rank()
+        rows = takewhile(lambda _: not search.full, range(len(ranking)))
+        yield from (ranking.quadruple(row, ranking.bounds[row]) for row in rows)
 
 
 def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]:

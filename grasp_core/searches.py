@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import combinations, islice
 from typing import TypeAlias
 
@@ -14,7 +15,8 @@ from grasp_core.constructions import CONSTRUCTIONS, MIXED, Construction
 from grasp_core.face_pieces import face_shapes
 from grasp_core.free_search import FreeRequest, search_free, search_undecided
 from grasp_core.plans import Outcomes
-from grasp_core.ranking import ranked
+from grasp_core.promising import Block
+from grasp_core.ranking import Ranking, ranked
 from grasp_core.reach import Reach, reach
 from grasp_core.requests import COMPLETE_CELLS, FAMILIES, METHODS, PlanRequest
 from grasp_core.search import Search, search_construction
@@ -107,13 +109,12 @@ class Searches:
         for place, (method, search) in enumerate(self.constructions.items()):
             construction, dealt_with = CONSTRUCTIONS[method], place * self.quadruples
             search.limit = self._share(place)
-            for block in self._blocks(construction, search):
-                ranking = ranked(block, construction)
-                steps = search_construction(
-                    construction, self.shapes, self.request.friction, ranking, search
-                )
-                yield from enumerate(_timed(steps, search), start=dealt_with + 1)
-                dealt_with += len(block)
+            steps = search_construction(
+                construction, self.shapes, self.request.friction,
+                self._blocks(construction, search), search,
+            )  # fmt: skip
+            yield from enumerate(_timed(steps, search), start=dealt_with + 1)
+            search.tally["pruned"] -= search.tally["tried"]
         if "free" in self.by_method:
             search = self.by_method["free"]
             search.limit = self._left()
@@ -154,15 +155,19 @@ class Searches:
         left = [limit - sum(found[:short]) for short in range(place + 1)]
         return max(each // (place - short + 1) for short, each in enumerate(left))
 
-    def _blocks(self, construction: Construction, search: Search) -> Iterator[Candidates]:
-        """Blocks of quadruples, as long as one may hold a grasp that is worth keeping.
+    def _blocks(self, construction: Construction, search: Search) -> tuple[Block, ...]:
+        """Blocks of quadruples for one construction.
 
         Where nothing bounds discs, only cones around the normals count.
         """
         blocks = self.spanning_blocks if construction.bounds is None else self.tilted_blocks
-        for place, room in enumerate(blocks.rooms):
-            if not search.full or search.may_gain(construction, room):
-                yield blocks[place]
+
+        def rank(place: int) -> Ranking:
+            candidates = blocks[place]
+            search.tally["pruned"] += len(candidates) * len(construction.orders)
+            return ranked(candidates, construction)
+
+        return tuple(Block(room, partial(rank, place)) for place, room in enumerate(blocks.rooms))
 
     def _free_request(self, cells: int | None = None) -> FreeRequest:
         request = self.request

@@ -77,9 +77,7 @@ def test_grasps_with_both_halves_have_ids_of_their_own_and_survive_a_file(name):
 def test_shared_faces_are_tried_after_blocks_that_are_too_small():
     """A box with many narrow faces: the first grasps of two fingers on a wide one are larger."""
     body = bevelled(example_object("box"))
-    assert (
-        len(body.faces) > FIRST_FACES
-    )  # a further block of whole faces comes before the shared ones
+    assert len(body.faces) > FIRST_FACES  # a second block comes before the shared faces
     plan = gc.plan(body, 0.5, families="concurrent", limit=25, share_faces=0.004)
     assert any(len(set(grasp.faces)) < 4 for grasp in plan.grasps)
 
