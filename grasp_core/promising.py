@@ -130,7 +130,7 @@ def _tightened(
     tally["infeasible"] += int(none.sum())
     tally["solved"] += int((cheap > worth).transpose(0, 2, 1)[none].sum())
     bounds[bounds <= worth] = -np.inf
-    best: Array = np.round(bounds.reshape(len(bounds), -1).max(axis=1), SAME_PROMISE)
+    best = np.asarray(np.max(bounds, axis=(1, 2)), dtype=np.float64).round(SAME_PROMISE)
     faces = candidates.faces[ranking.places[rows]].tolist()
     for each in np.flatnonzero(best > -np.inf).tolist():
         make = partial(ranking.quadruple, rows.start + each, bounds[each])
