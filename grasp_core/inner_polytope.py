@@ -67,7 +67,7 @@ class InnerPolytope:
         for start in range(0, count, step):
             block = slice(start, start + step)
             heights = points @ _units(self.normals[block]).T
-            each = np.arange(heights.shape[1])
+            each = np.arange(len(heights.T))
             corners = [heights[corner, each] for corner in self.corners[block].T]
             np.minimum.reduce(corners, out=lowest[block])
             heights.max(axis=0, out=highest[block])

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, SolverError
 from grasp_core.growing_hull import ABOVE, FLAT, MOST_POINTS, GrowingHull, spread_simplex
 from grasp_core.inner_polytope import InnerPolytope
 from grasp_core.kernels import compiled
@@ -147,14 +147,17 @@ def _by_kernel(wrenches: WrenchSet, gap: float) -> FerrariCanny | None:
     cones = kernel.Cones(np.array(wrenches.G, order="C"), np.array(wrenches.friction), linf)
     limits = kernel.Limits(gap, MOST_SIMPLICES, MOST_POINTS, FLAT, ABOVE)
     status, forces, corners, normals, weakest = kernel.grow(cones, wrenches.edges(), limits)
+    slack = ROUNDING * wrenches.size
     if status == kernel.GROWN:
         polytope = InnerPolytope(forces, corners, normals)
         radius = polytope.proved_radius(wrenches)
-        if radius > ROUNDING * wrenches.size:
+        if radius > slack:
             return _inside(wrenches, weakest, polytope, radius)
-    if status == kernel.OUTSIDE and wrenches.support(weakest)[0] <= 0.0:
-        return _outside(wrenches, weakest)
-    return None
+    try:
+        outside = _outside(wrenches, weakest if weakest.any() else None)
+    except SolverError:
+        return None
+    return outside if outside.upper <= slack else None
 
 
 def _grown(wrenches: WrenchSet, gap: float) -> tuple[Array | None, InnerPolytope | None]:

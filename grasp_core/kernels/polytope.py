@@ -102,9 +102,7 @@ def try_out() -> None:
 
 
 @njit(cache=True)
-def grow(
-    cones: Cones, edges: Array, limits: Limits
-) -> tuple[int, Array, Indices, Array, Array]:
+def grow(cones: Cones, edges: Array, limits: Limits) -> tuple[int, Array, Indices, Array, Array]:
     """Grow the polytope.
 
     Args:
@@ -129,7 +127,7 @@ def grow(
             upper = support
             weakest[:] = hull.normals[lowest]
         full = count + 1 == limits.points or hull.counts[0] > limits.simplices
-        if upper <= 0.0 or full or upper - hull.offsets[lowest] <= limits.gap * upper:
+        if upper <= slack or full or upper - hull.offsets[lowest] <= limits.gap * upper:
             break
         _wrench(cones.G, forces[count], points[count])
         seen, ridges = _look(hull, points[count], lowest, slack, count)
@@ -142,7 +140,7 @@ def grow(
             return LOST, forces[:0], hull.corners[:0], hull.normals[:0], weakest
         _bury(hull, hull.seen[:seen])
         count += 1
-    inside = upper > 0.0 and hull.offsets[_lowest(hull)] > 0.0
+    inside = upper > slack and hull.offsets[_lowest(hull)] > 0.0
     live = np.flatnonzero(hull.offsets[: hull.counts[0]] < DEAD)
     return (
         GROWN if inside else OUTSIDE, forces[:count].copy(), hull.corners[live],
@@ -215,16 +213,8 @@ def _first(hull: Hull, points: Array) -> bool:
     A = np.zeros((n, 2 * n))
     for i in range(n):
         A[:D, i], A[D, i], A[i, n + i] = points[i], 1.0, 1.0
-    for i in range(n):
-        best = i + np.abs(A[i:, i]).argmax()
-        if abs(A[best, i]) <= SINGULAR:
-            return False
-        for j in range(2 * n):
-            A[i, j], A[best, j] = A[best, j], A[i, j]
-        A[i] /= A[i, i]
-        for k in range(n):
-            if k != i:
-                A[k] -= A[k, i] * A[i]
+    if not _eliminate(A):
+        return False
     for i in range(n):
         length = np.sqrt((A[i, n : n + D] ** 2).sum())
         hull.normals[i] = -A[i, n : n + D] / length
@@ -233,6 +223,22 @@ def _first(hull: Hull, points: Array) -> bool:
         for j in range(D):
             hull.corners[i, j] = hull.neighbors[i, j] = j if j < i else j + 1
     hull.counts[0] = n
+    return True
+
+
+@njit(cache=True)
+def _eliminate(A: Array) -> bool:
+    """Turn (A, 1) into (1, inv(A)); false if A is nearly singular."""
+    for i in range(len(A)):
+        best = i + np.abs(A[i:, i]).argmax()
+        if abs(A[best, i]) <= SINGULAR:
+            return False
+        for j in range(A.shape[1]):
+            A[i, j], A[best, j] = A[best, j], A[i, j]
+        A[i] /= A[i, i]
+        for k in range(len(A)):
+            if k != i:
+                A[k] -= A[k, i] * A[i]
     return True
 
 
@@ -345,7 +351,7 @@ def _vacant(free: Indices, counts: Indices) -> int:
     """A place for a new simplex: of a dead one, or at the end."""
     if counts[1] > 0:
         counts[1] -= 1
-        return free[counts[1]]
+        return int(free[counts[1]])
     counts[0] += 1
     return counts[0] - 1
 
