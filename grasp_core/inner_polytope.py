@@ -27,6 +27,8 @@ ROUNDED = 1e-9
 """How much farther than computed a ray may cross a simplex."""
 BLOCK = 2**15
 """Heights that are compared at a time: as many as stay in a cache."""
+TINY = 1e-300
+"""Stands in where a normal of length zero would lead to a division by zero."""
 LARGEST_KEY = 2**62
 """Of a ridge, as an integer with one digit per corner."""
 
@@ -51,7 +53,7 @@ class InnerPolytope:
 
     def proved_radius(self, wrenches: WrenchSet) -> float:
         """The radius, if the simplices enclose zero; otherwise minus infinity."""
-        if len(self.normals) != len(self.corners) or not self._even():
+        if not 0 < len(self.normals) == len(self.corners) or not self._even():
             return -np.inf
         points = self.forces @ wrenches.G.T
         lowest, highest = self._heights(points)
@@ -109,4 +111,5 @@ class InnerPolytope:
 
 
 def _units(normals: Array) -> Array:
-    return normals / np.sqrt(np.einsum("mj,mj->m", normals, normals))[:, None]
+    squares = np.einsum("mj,mj->m", normals, normals)
+    return normals / np.sqrt(np.maximum(squares, TINY))[:, None]

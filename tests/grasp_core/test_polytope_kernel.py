@@ -182,7 +182,9 @@ def test_what_a_cross_polytope_proves_and_what_its_spoiled_forms_do_not():
         replace(polytope, corners=np.tile(corners, (2, 1)), normals=np.tile(normals, (2, 1))),
         replace(polytope, corners=corners - 6),
         replace(polytope, corners=corners + 1),
+        replace(polytope, corners=corners[:0], normals=normals[:0]),
         replace(polytope, normals=-normals),
+        replace(polytope, normals=0.0 * normals),
         replace(polytope, forces=np.nan * polytope.forces),
     ]
     for each in spoiled_forms:
