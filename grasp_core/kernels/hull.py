@@ -10,11 +10,11 @@ That new simplex adjoins
                                  the corner that has been common to the last two, until what
                                  lies across is not seen.
 
-Turning needs no look-up of ridges, and makes neighbours of the right ones where a ridge has more
-than two simplices. A corner is found by the sums of corners, which are exact.
+Turning needs no look-up of ridges, and pairs the right ones where a ridge has more than two
+simplices. A corner is found by the sums of corners, which are exact.
 
-Functions take the arrays they use out of the hull once: in loops that would cost more than the
-arithmetic. What numba keeps of `polytope` does not notice a change here; touch that file as well.
+Functions take arrays out of the hull once: in loops that would cost more than the arithmetic. What
+numba keeps of `polytope` does not notice a change here; touch that file as well.
 """
 
 from typing import Any, NamedTuple
@@ -25,7 +25,7 @@ from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissi
 from grasp_core.arrays import Array, Indices
 
 D = 6
-"""Wrenches have six components."""
+"""Coordinates of a point."""
 DEAD = 1e300
 """Offset of a simplex that is no longer there."""
 SINGULAR = 1e-13
@@ -62,7 +62,7 @@ class Hull(NamedTuple):
 
 @njit(cache=True)
 def vacant_hull(room: int) -> Hull:
-    """A hull with room for so many simplices."""
+    """With room for so many simplices."""
     return Hull(
         np.empty((room, D)), np.empty(room), np.empty((room, D), np.int64),
         np.empty((room, D), np.int64), np.empty(room, np.int64), np.empty(room),
@@ -191,10 +191,10 @@ def look(hull: Hull, point: Array, first: int, slack: float, now: int) -> tuple[
 
 @njit(cache=True)
 def _height(normals: Array, offsets: Array, i: int, point: Array) -> float:
-    height = -offsets[i]
+    along = 0.0
     for j in range(D):
-        height += normals[i, j] * point[j]
-    return height
+        along += normals[i, j] * point[j]
+    return along - offsets[i]
 
 
 @njit(cache=True)
@@ -222,8 +222,7 @@ def _raise(hull: Hull, seen: Indices, point: int, slack: float) -> None:
             e, u = heights[f], heights[outer]
             for i in range(D):
                 normals[new, i] = e * normals[outer, i] - u * normals[f, i]
-                corners[new, i] = corners[f, i]
-                neighbors[new, i] = -1
+                corners[new, i], neighbors[new, i] = corners[f, i], -1
             offsets[new] = e * offsets[outer] - u * offsets[f]
             _normalize(normals, offsets, new)
             beyond = sums[outer] - sums[f] + corners[f, j]
