@@ -3,7 +3,9 @@
 Solved: minimise |x| subject to C x <= d, for every row d of D.
 
 A point x is nearest iff C x <= d and x = -C'u for some u >= 0 that vanishes off the active rows,
-those with equality. Least squares find such u (Lawson & Hanson): with the residual (y, s) of
+those with equality. A compiled dual active-set method finds x and u; what it leaves, or what does
+not meet these conditions, is found as it all is where there are no kernels
+(`GRASPPROOF_KERNELS=off`). Least squares give u (Lawson & Hanson): with the residual (y, s) of
 
     minimise |C'v|^2 + (1 + d.v)^2  over  v >= 0
 
@@ -22,7 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.kernels import compiled
 
+KERNEL = "distance"
 EXACT = 1e-11
 """Violation of the conditions that is accepted, relative to x: some thousand times the rounding of
 such numbers, a hundred times less than any use can tell apart."""
@@ -41,24 +45,49 @@ def least_distance(C: Array, D: Array) -> Array:
         C: (m, v)
         D: (n, m)
     """
+    X = np.zeros((len(D), C.shape[1]))
+    outside = np.flatnonzero(D.min(axis=1) < 0.0)
+    sizes = -D[outside].min(axis=1)[:, None]
+    alike = D[outside] / sizes
+    near, proved = np.zeros((len(alike), C.shape[1])), np.zeros(len(alike), dtype=bool)
+    if compiled(KERNEL) is not None:
+        near, proved = _by_kernel(C, alike)
+    if not proved.all():
+        near[~proved] = _by_least_squares(C, alike[~proved])
+    X[outside] = sizes * near
+    return X
+
+
+def _by_kernel(C: Array, D: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Points of the compiled method, (n, v), and which are proved to be nearest."""
+    X, U = np.zeros((len(D), C.shape[1])), np.zeros(D.shape)
+    compiled(KERNEL).solve(np.array(C, order="C"), np.array(D, order="C"), X, U)
+    slack = D - X @ C.T
+    unmet = np.abs(X + U @ C).max(axis=1, initial=0.0)
+    np.maximum(unmet, -slack.min(axis=1), out=unmet)
+    np.maximum(unmet, np.where(U != 0.0, slack, 0.0).max(axis=1), out=unmet)
+    np.maximum(unmet, -U.min(axis=1), out=unmet)
+    return X, unmet <= _allowed(X)
+
+
+def _by_least_squares(C: Array, D: Array) -> Array:
+    """Nearest points, (n, v), where every row of D has a negative entry."""
     X, V = np.zeros((len(D), C.shape[1])), np.zeros(D.shape)
-    waiting = D.min(axis=1) < 0.0
-    sizes = np.where(waiting, -D.min(axis=1), 1.0)[:, None]
-    alike = D / sizes
-    solved, pause, wait = np.zeros(len(D), dtype=bool), 1, 0
-    for i in np.flatnonzero(waiting):
+    waiting, solved = np.ones(len(D), dtype=bool), np.zeros(len(D), dtype=bool)
+    pause, wait = 1, 0
+    for i in range(len(D)):
         if not waiting[i]:
             continue
-        V[i] = _weights(C, alike[i])
+        V[i] = _weights(C, D[i])
         solved[i], waiting[i], wait = True, False, wait - 1
         others = np.flatnonzero(waiting[i : i + TRIED]) + i
         if others.size and wait < 0:
-            near, proved = _on_rows(C, alike[others], np.flatnonzero(V[i]))
+            near, proved = _on_rows(C, D[others], np.flatnonzero(V[i]))
             X[others[proved]], waiting[others[proved]] = near[proved], False
             pause = 1 if np.count_nonzero(proved) > WORTH else 2 * pause
             wait = pause - 1
-    X[solved] = _from_weights(C, alike[solved], V[solved])
-    return sizes * X
+    X[solved] = _from_weights(C, D[solved], V[solved])
+    return X
 
 
 def _weights(C: Array, d: Array) -> Array:

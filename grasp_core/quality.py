@@ -12,10 +12,9 @@ a cone program; its forces bound the distance from above, its direction from bel
 
 Without closure, Q of `l1` is negative; that of `linf` is zero, since fingers may then rest.
 
-Both proofs are kept and can be checked again in plain arithmetic. That a ball of radius `lower`
-lies inside the polytope: every ridge belongs to an even number of simplices and one generic ray
-from zero crosses an odd number of them, so every ray crosses some simplex, at a combination of its
-corners; and no corner is lower than `lower` along the normal of its simplex.
+Both proofs are kept and can be checked again in plain arithmetic; how, `inner_polytope` says for
+the lower bound. Polytopes are grown by a compiled kernel, and those that it leaves, or whose proof
+does not check, by `growing_hull`; so are all where there are no kernels (`GRASPPROOF_KERNELS=off`).
 
 Source: Ferrari & Canny 1992; the growing polytope is the expanding-polytope algorithm of
 collision detection in six dimensions (also Zheng 2013 for this metric).
@@ -26,9 +25,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices
-from grasp_core.errors import InputError
-from grasp_core.growing_hull import MOST_POINTS, GrowingHull, spread_simplex
+from grasp_core.arrays import Array
+from grasp_core.errors import InputError, SolverError
+from grasp_core.growing_hull import ABOVE, FLAT, MOST_POINTS, GrowingHull, spread_simplex
+from grasp_core.inner_polytope import InnerPolytope
+from grasp_core.kernels import compiled
 from grasp_core.nearest_wrench import nearest_wrench
 from grasp_core.values import Grasp
 from grasp_core.wrench_sets import Norm, WrenchSet
@@ -41,53 +42,7 @@ MOST_SIMPLICES = 60_000
 """The polytope stops growing here; its bounds hold all the same, a little farther apart."""
 ROUNDING = 1e-12
 """Slack of the plain-arithmetic checks, relative to the longest wrench."""
-ON_RIDGE = 1e-9
-"""A ray that passes a ridge at less than this share of the simplex is no proof."""
-SAME_RAY = 1e-6
-"""A flat simplex, which no generic ray crosses, misses the ray by more than this."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class InnerPolytope:
-    """A polytope inside a wrench set whose planes bound the quality from below."""
-
-    forces: Array
-    """Local contact forces whose wrenches are the points, (n, 3k)."""
-    corners: Indices
-    """Points of each simplex of the boundary, (m, 6)."""
-    normals: Array
-    """Outward unit normals of the simplices, (m, 6)."""
-
-    def radius(self, wrenches: WrenchSet) -> float:
-        """Least height of a corner along the normal of its simplex."""
-        if len(self.normals) != len(self.corners):
-            return -np.inf
-        points = self.forces @ wrenches.G.T
-        units = self.normals / np.linalg.norm(self.normals, axis=1, keepdims=True)
-        return float(np.einsum("mcj,mj->mc", points[self.corners], units).min())
-
-    def surrounds_zero(self, wrenches: WrenchSet) -> bool:
-        """Whether simplices meet evenly at ridges, and a ray from zero crosses an odd number."""
-        ordered = np.sort(self.corners, axis=1)
-        d = self.corners.shape[1]
-        others = [[i for i in range(d) if i != j] for j in range(d)]
-        ridges = ordered[:, others].reshape(-1, d - 1)
-        _, counts = np.unique(ridges, axis=0, return_counts=True)
-        if (counts % 2).any():
-            return False
-        points: Array = self.forces @ wrenches.G.T
-        cells = points[self.corners].transpose(0, 2, 1)
-        ray = np.cos(np.arange(1, d + 1, dtype=np.float64))
-        solid = np.abs(np.linalg.det(cells)) > np.finfo(np.float64).tiny
-        cells = cells[solid]  # no generic ray crosses a flat one
-        shares = np.asarray(np.linalg.solve(cells, ray[:, None])[:, :, 0], dtype=np.float64)
-        doubtful = ON_RIDGE * np.abs(shares).max(axis=1)
-        lowest = shares.min(axis=1)
-        if (np.abs(lowest) <= doubtful).any():
-            return False  # the ray is not generic: it may meet a ridge
-        reached = np.asarray(np.einsum("mjc,mc->mj", cells, shares), dtype=np.float64)
-        hit = np.linalg.norm(reached - ray, axis=1) < SAME_RAY
-        return int((hit & (shares > 0.0).all(axis=1)).sum()) % 2 == 1
+KERNEL = "polytope"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,8 +71,7 @@ class FerrariCanny:
         if self.polytope is not None:
             return (
                 self.wrenches.holds(self.polytope.forces, ROUNDING)
-                and self.polytope.radius(self.wrenches) >= self.lower - slack
-                and self.polytope.surrounds_zero(self.wrenches)
+                and self.polytope.proved_radius(self.wrenches) >= self.lower - slack
             )
         return (
             self.forces is not None
@@ -167,13 +121,43 @@ def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
 
 def wrench_set_quality(wrenches: WrenchSet, gap: float = GAP) -> FerrariCanny:
     """Signed distance of zero from the boundary of a wrench set, with its proof."""
+    found = _by_kernel(wrenches, gap) if compiled(KERNEL) is not None else None
+    if found is not None:
+        return found
     direction, polytope = _grown(wrenches, gap)
-    slack = ROUNDING * wrenches.size
     if direction is not None and polytope is not None:
-        lower, upper = polytope.radius(wrenches) - slack, wrenches.support(direction)[0]
-        if lower > 0.0:
-            return FerrariCanny(min(lower, upper), upper, wrenches, direction, polytope, None)
+        radius = polytope.radius(wrenches)
+        if radius > ROUNDING * wrenches.size:
+            return _inside(wrenches, direction, polytope, radius)
     return _outside(wrenches, direction)
+
+
+def _inside(
+    wrenches: WrenchSet, direction: Array, polytope: InnerPolytope, radius: float
+) -> FerrariCanny:
+    upper = wrenches.support(direction)[0]
+    lower = min(radius - ROUNDING * wrenches.size, upper)
+    return FerrariCanny(lower, upper, wrenches, direction, polytope, None)
+
+
+def _by_kernel(wrenches: WrenchSet, gap: float) -> FerrariCanny | None:
+    """Bounds by the compiled polytope; None where they are not proved."""
+    kernel = compiled(KERNEL)
+    linf = wrenches.norm == "linf"
+    cones = kernel.Cones(np.array(wrenches.G, order="C"), np.array(wrenches.friction), linf)
+    limits = kernel.Limits(gap, MOST_SIMPLICES, MOST_POINTS, FLAT, ABOVE)
+    status, forces, corners, normals, weakest = kernel.grow(cones, wrenches.edges(), limits)
+    slack = ROUNDING * wrenches.size
+    if status == kernel.GROWN:
+        polytope = InnerPolytope(forces, corners, normals)
+        radius = polytope.proved_radius(wrenches)
+        if radius > slack:
+            return _inside(wrenches, weakest, polytope, radius)
+    try:
+        outside = _outside(wrenches, weakest if weakest.any() else None)
+    except SolverError:
+        return None
+    return outside if outside.upper <= slack else None
 
 
 def _grown(wrenches: WrenchSet, gap: float) -> tuple[Array | None, InnerPolytope | None]:

@@ -1,0 +1,243 @@
+"""The dual active-set method for the nearest points of polyhedra with equal normals.
+
+    minimise |x|  subject to  C x <= d,  for every row d of D.
+
+Solved: x and multipliers u >= 0 with x = -C'u, which `least_distance` checks.
+
+Method. With the rows a_1 .. a_q active, x is the nearest point of where these hold with equality,
+and their multipliers are not negative: x = 0 without any. If x violates a row a, write
+a = r_1 a_1 + .. + r_q a_q + z with z orthogonal to the active rows: a step t along -z lowers
+the multipliers by t r and gives a itself the multiplier t. It ends where a holds with equality,
+and a becomes active, or before, where a multiplier vanishes, whose row then leaves. |x| grows with
+every full step, so no active rows recur. Where z = 0 and no multiplier falls, nothing is feasible.
+The row that is violated most comes first. In the end x is computed afresh from its active rows.
+
+Source: Goldfarb & Idnani, "A numerically stable dual method for solving strictly convex quadratic
+programs", Mathematical Programming 27, 1983.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
+from numba.core.errors import NumbaError  # pyright: ignore[reportMissingTypeStubs]
+from numpy.typing import NDArray
+
+from grasp_core.arrays import Array, Indices
+
+VIOLATED = 1e-13
+"""Distance from a row, relative to x or one, that counts as a violation."""
+DEPENDENT = 1e-9
+"""A row that leaves less of its length orthogonal to the active ones depends on them."""
+TINY = 1e-300
+"""Stands in for a length of zero, by which would be divided."""
+MOST = 20
+"""Steps per variable."""
+
+
+class Active(NamedTuple):
+    """Active rows A, with A = R'Q."""
+
+    rows: Indices
+    """Which they are, (v + 1,), and after them the one that enters."""
+    inside: NDArray[np.bool_]
+    """Whether a row is active, (m,)."""
+    Q: Array
+    """Orthonormal rows, (v, v)."""
+    R: Array
+    """Upper triangle, (v, v + 1); the last column is that of the row that enters."""
+    u: Array
+    """Multipliers, (v + 1,)."""
+    z: Array
+    """What the entering row leaves orthogonal to the active ones, (v,)."""
+    r: Array
+    """Its shares of the active rows, (v,)."""
+
+
+def try_out() -> None:
+    """Solve a tiny program.
+
+    Raises:
+        RuntimeError: The method cannot be compiled here.
+    """
+    one = np.ones((1, 1))
+    try:
+        solve(one, -one, np.zeros((1, 1)), np.zeros((1, 1)))
+    except NumbaError as error:
+        raise RuntimeError(f"numba: {error}") from error
+
+
+@njit(cache=True)
+def solve(C: Array, D: Array, X: Array, U: Array) -> None:
+    """Find nearest points.
+
+    Args:
+        C: (m, v), contiguous like all of these.
+        D: (n, m)
+        X: Filled with the points, (n, v); with zeros where none was found.
+        U: Zeros, filled with their multipliers, (n, m).
+    """
+    m, v = C.shape
+    norms = np.empty(m)
+    for k in range(m):
+        norms[k] = max(np.sqrt(_dot(C[k], C[k])), TINY)
+    active = Active(
+        np.empty(v + 1, np.int64), np.empty(m, np.bool_), np.empty((v, v)),
+        np.empty((v, v + 1)), np.empty(v + 1), np.empty(v), np.empty(v),
+    )  # fmt: skip
+    for i in range(len(D)):
+        count = _solve(C, D[i], norms, active, X[i])
+        if count < 0:
+            X[i].fill(0.0)
+            continue
+        _recompute(D[i], active, count, X[i])
+        for j in range(count):
+            U[i, active.rows[j]] = active.u[j]
+
+
+@njit(cache=True)
+def _solve(C: Array, d: Array, norms: Array, active: Active, x: Array) -> int:
+    """How many rows are active at the nearest point; -1 if none was found."""
+    count = 0
+    x.fill(0.0)
+    active.inside.fill(False)
+    for _ in range(MOST * (len(x) + 1)):
+        entering, excess = _violated(C, d, norms, active.inside, x)
+        if entering < 0:
+            return count
+        active.rows[count], active.u[count] = entering, 0.0
+        count = _enter(C, active, count, excess, DEPENDENT * norms[entering], x)
+        if count < 0:
+            break
+    return -1
+
+
+@njit(cache=True)
+def _enter(C: Array, active: Active, count: int, excess: float, least: float, x: Array) -> int:
+    """Step until the row after the active ones is active: how many then are; -1 if it cannot be.
+
+    `least` is the length of a rest that does not count.
+    """
+    entering, z = active.rows[count], active.z
+    for _ in range(count + 1):
+        square = _split(C[entering], active, count)
+        whole = excess / square if square > least * least else np.inf
+        leaving, part = _leaving(active, count)
+        step = min(whole, part)
+        if step == np.inf:
+            break
+        _move(active, count, step)
+        if whole < np.inf:
+            for j in range(len(x)):
+                x[j] -= step * z[j]
+            excess -= step * square
+        if whole <= part:
+            _append(active, count, square)
+            active.inside[entering] = True
+            return count + 1
+        count = _drop(C, active, count, leaving)
+    return -1
+
+
+@njit(cache=True)
+def _violated(
+    C: Array, d: Array, norms: Array, inside: NDArray[np.bool_], x: Array
+) -> tuple[int, float]:
+    """The row that x violates most, -1 if none, and its excess."""
+    size = 1.0
+    for j in range(len(x)):
+        size = max(size, abs(x[j]))
+    found, worst, most = -1, VIOLATED * size, 0.0
+    for k in range(len(d)):
+        excess = _dot(C[k], x) - d[k]
+        if excess > worst * norms[k] and not inside[k]:
+            found, worst, most = k, excess / norms[k], excess
+    return found, most
+
+
+@njit(cache=True)
+def _split(row: Array, active: Active, count: int) -> float:
+    """Write a row as R[:, count] on Q and a rest z orthogonal to it; the square of the rest.
+
+    Twice, as once leaves rounding of the size of the row.
+    """
+    Q, R, z = active.Q, active.R, active.z
+    for j in range(len(row)):
+        z[j] = row[j]
+    for again in range(2):
+        for i in range(count):
+            along = _dot(Q[i], z)
+            R[i, count] = R[i, count] + along if again else along
+            for j in range(len(row)):
+                z[j] -= along * Q[i, j]
+    return _dot(z, z)
+
+
+@njit(cache=True)
+def _append(active: Active, count: int, square: float) -> None:
+    """Add the rest z, with its square, to the orthonormal rows."""
+    length = max(np.sqrt(square), TINY)
+    active.R[count, count] = length
+    for j in range(len(active.z)):
+        active.Q[count, j] = active.z[j] / length
+
+
+@njit(cache=True)
+def _leaving(active: Active, count: int) -> tuple[int, float]:
+    """The active row whose multiplier vanishes first, and after which step; r is filled in."""
+    R, r, u, found, least = active.R, active.r, active.u, -1, np.inf
+    for i in range(count - 1, -1, -1):
+        r[i] = R[i, count]
+        for j in range(i + 1, count):
+            r[i] -= R[i, j] * r[j]
+        r[i] /= R[i, i]
+    for i in range(count):
+        if r[i] > 0.0 and u[i] < least * r[i]:
+            found, least = i, u[i] / r[i]
+    return found, least
+
+
+@njit(cache=True)
+def _move(active: Active, count: int, step: float) -> None:
+    """Change the multipliers of the active rows and of the one that enters."""
+    for j in range(count):
+        active.u[j] = max(active.u[j] - step * active.r[j], 0.0)
+    active.u[count] += step
+
+
+@njit(cache=True)
+def _drop(C: Array, active: Active, count: int, leaving: int) -> int:
+    """Take a row from the active ones; how many are left."""
+    active.inside[active.rows[leaving]] = False
+    for j in range(leaving, count):
+        active.rows[j], active.u[j] = active.rows[j + 1], active.u[j + 1]
+    for j in range(leaving, count - 1):
+        _append(active, j, _split(C[active.rows[j]], active, j))
+    return count - 1
+
+
+@njit(cache=True)
+def _recompute(d: Array, active: Active, count: int, x: Array) -> None:
+    """The nearest point where the active rows hold with equality: Q'y with R'y = d, R u = -y."""
+    rows, Q, R, u = active.rows, active.Q, active.R, active.u
+    x.fill(0.0)
+    for i in range(count):
+        u[i] = d[rows[i]]
+        for j in range(i):
+            u[i] -= R[j, i] * u[j]
+        u[i] /= R[i, i]
+        for j in range(len(x)):
+            x[j] += u[i] * Q[i, j]
+    for i in range(count - 1, -1, -1):
+        u[i] = -u[i]
+        for j in range(i + 1, count):
+            u[i] -= R[i, j] * u[j]
+        u[i] /= R[i, i]
+
+
+@njit(cache=True)
+def _dot(a: Array, b: Array) -> float:
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total

@@ -1,0 +1,300 @@
+"""The growing hull of `growing_hull`, compiled, for points with six coordinates.
+
+A point sees simplices, first the lowest one, then neighbours of those it sees. Across each corner
+j of a seen simplex f lies a neighbour: if it is not seen, the point takes the place of corner j.
+That new simplex adjoins
+
+    across the point             the neighbour that is not seen,
+    across another corner c      the new simplex found by turning around the corners that both
+                                 keep: from f across c into the next seen simplex, then across
+                                 the corner that has been common to the last two, until what
+                                 lies across is not seen.
+
+Turning needs no look-up of ridges, and pairs the right ones where a ridge has more than two
+simplices. A corner is found by the sums of corners, which are exact.
+
+Functions take arrays out of the hull once: in loops that would cost more than the arithmetic. What
+numba keeps of `polytope` does not notice a change here; touch that file as well.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
+
+from grasp_core.arrays import Array, Indices
+
+D = 6
+"""Coordinates of a point."""
+DEAD = 1e300
+"""Offset of a simplex that is no longer there."""
+SINGULAR = 1e-13
+"""Least pivot of the first simplex, whose points are widely spread."""
+TINY = 1e-300
+"""Stands in where a simplex folded flat would lead to a division by zero."""
+
+
+class Hull(NamedTuple):
+    """Simplices, live and dead, and what is known about the latest point."""
+
+    normals: Array
+    """Outward unit normals, (room, 6)."""
+    offsets: Array
+    corners: Indices
+    """Points of each simplex, (room, 6)."""
+    neighbors: Indices
+    """Neighbour across the ridge without each corner, (room, 6)."""
+    sums: Indices
+    """Of the corners."""
+    heights: Array
+    """Of the latest point that was compared with a simplex, above its plane."""
+    rounds: Indices
+    """Which point that was."""
+    made: Indices
+    """New simplex without each corner, (room, 6)."""
+    seen: Indices
+    """Simplices that the point sees."""
+    free: Indices
+    """Places of dead simplices."""
+    counts: Indices
+    """How many places were ever used, and how many of them are free."""
+
+
+@njit(cache=True)
+def vacant_hull(room: int) -> Hull:
+    """With room for so many simplices."""
+    return Hull(
+        np.empty((room, D)), np.empty(room), np.empty((room, D), np.int64),
+        np.empty((room, D), np.int64), np.empty(room, np.int64), np.empty(room),
+        np.empty(room, np.int64), np.empty((room, D), np.int64), np.empty(room, np.int64),
+        np.empty(room, np.int64), np.zeros(2, np.int64),
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def larger(hull: Hull) -> Hull:
+    """The same with room for whatever one point can add, and for twice as many simplices."""
+    room = 2 * len(hull.offsets) + D * hull.counts[0]
+    return Hull(
+        _wider(hull.normals, room), _longer(hull.offsets, room), _wider(hull.corners, room),
+        _wider(hull.neighbors, room), _longer(hull.sums, room), _longer(hull.heights, room),
+        _longer(hull.rounds, room), _wider(hull.made, room), _longer(hull.seen, room),
+        _longer(hull.free, room), hull.counts,
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def _wider(table: Any, room: int) -> Any:
+    larger = np.empty((room, D), table.dtype)
+    for i in range(len(table)):
+        for j in range(D):
+            larger[i, j] = table[i, j]
+    return larger
+
+
+@njit(cache=True)
+def _longer(column: Any, room: int) -> Any:
+    larger = np.empty(room, column.dtype)
+    for i in range(len(column)):
+        larger[i] = column[i]
+    return larger
+
+
+@njit(cache=True)
+def enclose(hull: Hull, points: Array) -> bool:
+    """Put the seven simplices around the first points: false if these are nearly flat.
+
+    With A the points as columns over ones, row i of inv(A) is the affine function that is one at
+    point i and zero at the others.
+    """
+    n = D + 1
+    A = np.zeros((n, 2 * n))
+    for i in range(n):
+        A[D, i] = A[i, n + i] = 1.0
+        for j in range(D):
+            A[j, i] = points[i, j]
+    if not _eliminate(A):
+        return False
+    for i in range(n):
+        for j in range(D):
+            hull.normals[i, j] = -A[i, n + j]
+            hull.corners[i, j] = hull.neighbors[i, j] = j if j < i else j + 1
+        hull.offsets[i] = A[i, n + D]
+        _normalize(hull.normals, hull.offsets, i)
+        hull.sums[i], hull.rounds[i] = D * n // 2 - i, 0
+    hull.counts[0] = n
+    return True
+
+
+@njit(cache=True)
+def _eliminate(A: Array) -> bool:
+    """Turn (A, 1) into (1, inv(A)); false if A is nearly singular."""
+    for i in range(len(A)):
+        best = i
+        for k in range(i, len(A)):
+            if abs(A[k, i]) > abs(A[best, i]):
+                best = k
+        pivot = A[best, i]
+        if abs(pivot) <= SINGULAR:
+            return False
+        for j in range(A.shape[1]):
+            A[i, j], A[best, j] = A[best, j], A[i, j]
+            A[i, j] /= pivot
+        _clear(A, i)
+    return True
+
+
+@njit(cache=True)
+def _clear(A: Array, i: int) -> None:
+    """Take multiples of row i from the others, so that column i is zero there."""
+    for k in range(len(A)):
+        share = A[k, i]
+        if k != i:
+            for j in range(A.shape[1]):
+                A[k, j] -= share * A[i, j]
+
+
+@njit(cache=True)
+def lowest(hull: Hull) -> int:
+    """The simplex with the least offset."""
+    offsets, found = hull.offsets, 0
+    for i in range(hull.counts[0]):
+        if offsets[i] < offsets[found]:
+            found = i
+    return found
+
+
+@njit(cache=True)
+def look(hull: Hull, point: Array, first: int, slack: float, now: int) -> tuple[int, int]:
+    """Fill in what the point sees: how many simplices, and how many ridges around them."""
+    normals, offsets, neighbors = hull.normals, hull.offsets, hull.neighbors
+    heights, rounds, seen = hull.heights, hull.rounds, hull.seen
+    count, ridges, at = 0, 0, 0
+    heights[first], rounds[first] = _height(normals, offsets, first, point), now
+    if heights[first] > slack:
+        seen[0] = first
+        count = 1
+    while at < count:
+        for j in range(D):
+            other = neighbors[seen[at], j]
+            new = rounds[other] != now
+            if new:
+                heights[other], rounds[other] = _height(normals, offsets, other, point), now
+            if heights[other] <= slack:
+                ridges += 1
+            elif new:
+                seen[count] = other
+                count += 1
+        at += 1
+    return count, ridges
+
+
+@njit(cache=True)
+def _height(normals: Array, offsets: Array, i: int, point: Array) -> float:
+    along = 0.0
+    for j in range(D):
+        along += normals[i, j] * point[j]
+    return along - offsets[i]
+
+
+@njit(cache=True)
+def extend(hull: Hull, count: int, point: int, slack: float) -> bool:
+    """Replace the seen simplices, the first `count`, by new ones with the point; if it worked."""
+    seen = hull.seen[:count]
+    _raise(hull, seen, point, slack)
+    joined = _join(hull, seen, slack)
+    _bury(hull, seen)
+    return joined
+
+
+@njit(cache=True)
+def _raise(hull: Hull, seen: Indices, point: int, slack: float) -> None:
+    """Make a new simplex wherever a seen one has a neighbour that is not seen."""
+    normals, offsets, corners, neighbors = hull.normals, hull.offsets, hull.corners, hull.neighbors
+    sums, heights, free, counts = hull.sums, hull.heights, hull.free, hull.counts
+    for f in seen:
+        for j in range(D):
+            outer = neighbors[f, j]
+            if heights[outer] > slack:
+                continue
+            new = _vacant(free, counts)
+            hull.made[f, j] = new
+            e, u = heights[f], heights[outer]
+            for i in range(D):
+                normals[new, i] = e * normals[outer, i] - u * normals[f, i]
+                corners[new, i], neighbors[new, i] = corners[f, i], -1
+            offsets[new] = e * offsets[outer] - u * offsets[f]
+            _normalize(normals, offsets, new)
+            beyond = sums[outer] - sums[f] + corners[f, j]
+            neighbors[outer, _place(corners, outer, beyond)] = new
+            neighbors[new, j] = outer
+            sums[new] = sums[f] - corners[f, j] + point
+            corners[new, j], hull.rounds[new] = point, 0
+
+
+@njit(cache=True)
+def _vacant(free: Indices, counts: Indices) -> int:
+    """A place for a new simplex: of a dead one, or at the end."""
+    if counts[1] > 0:
+        counts[1] -= 1
+        return int(free[counts[1]])
+    counts[0] += 1
+    return counts[0] - 1
+
+
+@njit(cache=True)
+def _normalize(normals: Array, offsets: Array, i: int) -> None:
+    square = 0.0
+    for j in range(D):
+        square += normals[i, j] * normals[i, j]
+    shrink = 1.0 / np.sqrt(max(square, TINY))
+    for j in range(D):
+        normals[i, j] *= shrink
+    offsets[i] *= shrink
+
+
+@njit(cache=True)
+def _join(hull: Hull, seen: Indices, slack: float) -> bool:
+    """Make new simplices neighbours: false if one of them has none."""
+    corners, neighbors, made = hull.corners, hull.neighbors, hull.made
+    sums, heights = hull.sums, hull.heights
+    for f in seen:
+        for j in range(D):
+            if heights[neighbors[f, j]] > slack:
+                continue
+            new = made[f, j]
+            for c in range(D):
+                if neighbors[new, c] >= 0:
+                    continue
+                here, i, kept, steps = f, c, corners[f, j], 0
+                there = neighbors[here, i]
+                while heights[there] > slack:
+                    beyond = sums[there] - sums[here] + corners[here, i]
+                    here, i, kept = there, _place(corners, there, kept), beyond
+                    there = neighbors[here, i]
+                    steps += 1
+                    if steps > len(seen):
+                        return False
+                other = made[here, i]
+                neighbors[new, c] = other
+                neighbors[other, _place(corners, here, kept)] = new
+    return True
+
+
+@njit(cache=True)
+def _bury(hull: Hull, seen: Indices) -> None:
+    """Free the places of simplices."""
+    for f in seen:
+        hull.offsets[f] = DEAD
+        hull.free[hull.counts[1]] = f
+        hull.counts[1] += 1
+
+
+@njit(cache=True)
+def _place(corners: Indices, i: int, corner: int) -> int:
+    """Where a simplex has a corner; 0 if it has not, which the checks of the answer find out."""
+    place = 0
+    for j in range(D):  # without a way out, which would be predicted wrongly most of the time
+        if corners[i, j] == corner:
+            place = j
+    return place
