@@ -20,7 +20,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
-from numba.core.errors import NumbaError  # pyright: ignore[reportMissingTypeStubs]
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
@@ -55,16 +54,9 @@ class Active(NamedTuple):
 
 
 def try_out() -> None:
-    """Solve a tiny program.
-
-    Raises:
-        RuntimeError: The method cannot be compiled here.
-    """
+    """Solve a tiny program."""
     one = np.ones((1, 1))
-    try:
-        solve(one, -one, np.zeros((1, 1)), np.zeros((1, 1)))
-    except NumbaError as error:
-        raise RuntimeError(f"numba: {error}") from error
+    solve(one, -one, np.zeros((1, 1)), np.zeros((1, 1)))
 
 
 @njit(cache=True)

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
-from numba.core.errors import NumbaError  # pyright: ignore[reportMissingTypeStubs]
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.kernels.hull import DEAD, D, enclose, extend, larger, look, lowest, vacant_hull
@@ -45,16 +44,9 @@ class Limits(NamedTuple):
 
 
 def try_out() -> None:
-    """Grow a tiny polytope.
-
-    Raises:
-        RuntimeError: The method cannot be compiled here.
-    """
+    """Grow a tiny polytope."""
     limits = Limits(0.5, 100, 100, 1e-9, 1e-12)
-    try:
-        grow(Cones(np.eye(D), np.ones(2), False), np.ones((1, D)), limits)
-    except NumbaError as error:
-        raise RuntimeError(f"numba: {error}") from error
+    grow(Cones(np.eye(D), np.ones(2), False), np.ones((1, D)), limits)
 
 
 @njit(cache=True)
