@@ -11,7 +11,7 @@ from grasp_core.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """What a value must be, to be put into a type: `Annotated[int, at_least(1)]`."""
+    """What a value must be; to be put into a type: `Annotated[int, at_least(1)]`."""
 
     says: str
     holds: Callable[[Any], bool]
@@ -21,22 +21,22 @@ class Bound:
         return self.says
 
 
-FINITE = Bound("finite", math.isfinite)
+FINITE = Bound("must be finite", math.isfinite)
 
 
 def more_than(least: float, *, up_to: float = math.inf) -> Bound:
     """Numbers above one, up to and with another."""
-    return Bound(f"more than {least:g}{_end(up_to)}", lambda value: least < value <= up_to)
+    return Bound(f"must be more than {least:g}{_end(up_to)}", lambda value: least < value <= up_to)
 
 
 def at_least(least: float, *, up_to: float = math.inf) -> Bound:
     """Numbers from one to another, both with them."""
-    return Bound(f"at least {least:g}{_end(up_to)}", lambda value: least <= value <= up_to)
+    return Bound(f"must be at least {least:g}{_end(up_to)}", lambda value: least <= value <= up_to)
 
 
 def not_zero(least: float, most: float) -> Bound:
     """Vectors, by the size of their largest part."""
-    says = f"not zero, and its largest part from {least:g} to {most:g}"
+    says = f"must not be zero: the largest part is from {least:g} to {most:g}"
     return Bound(says, lambda vector: least <= max(abs(part) for part in vector) <= most)
 
 
@@ -57,7 +57,7 @@ def check(flags: object) -> None:
         for bound, part in _bounded(kind, value):
             if not bound.holds(part):
                 flag = "--" + name.replace("_", "-")
-                raise InputError(f"{flag} must be {bound.says}, got {part}")
+                raise InputError(f"{flag} {bound.says}, got {part}")
 
 
 def _bounded(kind: Any, value: Any) -> Iterator[tuple[Bound, Any]]:
