@@ -1,42 +1,8 @@
-"""Four-finger force-closure grasps of polyhedra: planning, and proofs either way."""
+"""Four-finger force-closure grasps of polyhedra: planning, and proofs either way.
 
-from grasp_core.best_contacts import Improvement as Improvement
-from grasp_core.best_contacts import optimize_contacts as optimize_contacts
-from grasp_core.closure import ClosureCertificate as ClosureCertificate
-from grasp_core.closure import force_closure as force_closure
-from grasp_core.critical import critical_friction as critical_friction
-from grasp_core.errors import GraspError as GraspError
-from grasp_core.errors import InputError as InputError
-from grasp_core.errors import MeshError as MeshError
-from grasp_core.errors import MeshRefusal as MeshRefusal
-from grasp_core.errors import NoForcesError as NoForcesError
-from grasp_core.errors import SolverError as SolverError
-from grasp_core.errors import UndecidedError as UndecidedError
-from grasp_core.errors import UnfaithfulError as UnfaithfulError
-from grasp_core.forces import contact_forces as contact_forces
-from grasp_core.lines import classify_lines as classify_lines
-from grasp_core.metrics import hull_volume as hull_volume
-from grasp_core.metrics import min_weight as min_weight
-from grasp_core.metrics import smallest_singular_value as smallest_singular_value
-from grasp_core.planner import iter_grasps as iter_grasps
-from grasp_core.planner import plan as plan
-from grasp_core.plans import Plan as Plan
-from grasp_core.polyhedra import load_polyhedron as load_polyhedron
-from grasp_core.quality import FerrariCanny as FerrariCanny
-from grasp_core.quality import ferrari_canny as ferrari_canny
-from grasp_core.quality_ceiling import QualityCeiling as QualityCeiling
-from grasp_core.quality_ceiling import quality_ceiling as quality_ceiling
-from grasp_core.reach import Finger as Finger
-from grasp_core.resisted_wrenches import WrenchLimit as WrenchLimit
-from grasp_core.resisted_wrenches import max_resisted_wrench as max_resisted_wrench
-from grasp_core.resisted_wrenches import wrench_limits as wrench_limits
-from grasp_core.spanning import cones_positively_span as cones_positively_span
-from grasp_core.spanning import span_angle as span_angle
-from grasp_core.values import Contact as Contact
-from grasp_core.values import ContactRegion as ContactRegion
-from grasp_core.values import Face as Face
-from grasp_core.values import ForceCone as ForceCone
-from grasp_core.values import Grasp as Grasp
-from grasp_core.values import PatchLimits as PatchLimits
-from grasp_core.values import Polyhedron as Polyhedron
-from grasp_core.values import Witness as Witness
+Names are imported on first use; the stub beside this file says where from.
+"""
+
+from grasp_core.first_use import names_in_stub
+
+__getattr__, __dir__, __all__ = names_in_stub(__name__, __file__)

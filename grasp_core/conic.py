@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Indices
 from grasp_core.errors import SolverError
 
 RESIDUAL = 1e-7
@@ -76,7 +76,7 @@ def minimize(program: ConicProgram) -> ConicSolution:
 
 
 def _solved(program: ConicProgram, change: tuple[str, float] | None) -> ConicSolution:
-    clarabel, _ = _modules()
+    clarabel = _clarabel()
     kinds: list[Any] = []
     if program.zeros:
         kinds.append(clarabel.ZeroConeT(program.zeros))
@@ -123,28 +123,43 @@ def _outside(program: ConicProgram, rows: Array, *, dual: bool) -> float:
     return float(worst)
 
 
-def _columns(A: Array) -> Any:
-    """The matrix as compressed columns, without the detour through coordinates."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Columns:
+    """A matrix as compressed columns, with the attributes that Clarabel reads.
+
+    A matrix of scipy has them too, but checks what is known to be in order, and takes longer to
+    import than a small object to plan on.
+    """
+
+    data: Array
+    indices: Indices
+    indptr: Indices
+    shape: tuple[int, ...]
+    has_canonical_format: bool = True
+
+
+def _columns(A: Array) -> _Columns:
+    """The matrix without its zeros."""
     columns = A.T
     filled = columns != 0.0
     starts = np.concatenate([[0], filled.sum(axis=1).cumsum()])
     places = filled.nonzero()[1]
-    return _modules()[1].csc_matrix((columns[filled], places, starts), shape=A.shape)
+    return _Columns(columns[filled], places, starts, A.shape)
 
 
 @cache
-def _no_squares(n: int) -> Any:
-    return _modules()[1].csc_matrix((n, n))
+def _no_squares(n: int) -> _Columns:
+    return _columns(np.zeros((n, n)))
 
 
 @cache
-def _modules() -> tuple[Any, Any]:
-    return importlib.import_module("clarabel"), importlib.import_module("scipy.sparse")
+def _clarabel() -> Any:
+    return importlib.import_module("clarabel")
 
 
 @cache
 def _settings(change: tuple[str, float] | None) -> Any:
-    settings = _modules()[0].DefaultSettings()
+    settings = _clarabel().DefaultSettings()
     settings.verbose = False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = REQUESTED
     settings.max_threads = 1

@@ -6,7 +6,6 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from grasp_core.values import Family, RegionKind
 
-SCHEMA = 1
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Triple = tuple[Finite, Finite, Finite]
 FourTriples = tuple[Triple, Triple, Triple, Triple]

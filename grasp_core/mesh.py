@@ -1,35 +1,17 @@
-"""The door to trimesh: mesh files read whole or refused, mass properties, nearest points."""
+"""The door to trimesh: mesh files read whole or refused, nearest points."""
 
 import importlib
 import io
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, frozen
+from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.solids import Solid
 
 FORMATS = ("obj", "stl", "ply", "off", "glb")
 MAX_FILE_BYTES = 64 * 2**20
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MassProperties:
-    """Of a solid at density 1 kg/m^3."""
-
-    volume: float
-    """[m^3]"""
-    center: Array
-    """(3,) [m]"""
-    inertia: Array
-    """About the centre, (3, 3) [kg m^2]."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "center", frozen(self.center, (3,), "center"))
-        object.__setattr__(self, "inertia", frozen(self.inertia, (3, 3), "inertia"))
 
 
 def read_triangles(path: Path) -> tuple[Array, Indices, bytes]:
@@ -101,21 +83,6 @@ def _obj_triangle_count(name: str, data: bytes) -> int:
             raise MeshError(MeshRefusal.INDEX, message)
         triangles += max(len(corners) - 2, 0)
     return triangles
-
-
-def mass_properties(solid: Solid, center: Array | None = None) -> MassProperties:
-    """Mass properties of uniform density.
-
-    Args:
-        solid: A closed surface.
-        center: Where the centre of mass is known to be, (3,) [m].
-    """
-    found: Any = _trimesh("triangles").mass_properties(
-        solid.vertices[solid.triangles], density=1.0, center_mass=center
-    )
-    return MassProperties(
-        float(found.volume), np.asarray(found.center_mass), np.asarray(found.inertia)
-    )
 
 
 def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Array:

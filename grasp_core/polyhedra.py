@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, Indices, frozen
 from grasp_core.curved_patches import flat_patches
 from grasp_core.errors import InputError, MeshError, MeshRefusal
-from grasp_core.mesh import mass_properties, read_triangles
+from grasp_core.mass import mass_properties
+from grasp_core.mesh import read_triangles
 from grasp_core.planar_faces import MAX_FACES, FlatnessLimits, coplanar_groups, planar_faces
 from grasp_core.solid_checks import largest_part, oriented, surface_fault, welded
 from grasp_core.solids import Solid, hull, triangulate

@@ -1,19 +1,19 @@
 """Grasps <-> JSON text, with units in the keys; what is read is checked field by field.
 
-The file holds the object's mesh, so that grasps can be validated from it alone.
+The file holds the object's mesh, so that grasps can be validated from it alone. The schema it is
+checked against is imported where a file is read: plans are written without it.
 """
 
 import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import ValidationError
 
 from grasp_core.certified import check_witness
 from grasp_core.errors import InputError
-from grasp_core.grasps_schema import SCHEMA, GraspRecord, GraspsRecord
 from grasp_core.on_faces import check_on_faces
 from grasp_core.plans import Plan
 from grasp_core.polyhedra import polyhedron_from_mesh
@@ -30,6 +30,10 @@ from grasp_core.values import (
 )
 from grasp_core.versions import versions
 
+if TYPE_CHECKING:
+    from grasp_core.grasps_schema import GraspRecord
+
+SCHEMA = 1
 SAME_DIRECTION = 1e-6
 """How far a witness direction may be from its force's: what six digits in a file keep."""
 
@@ -147,6 +151,10 @@ def grasps_from_json(text: str) -> SavedGrasps:
         InputError: The text is not such a file; the message names the field.
         MeshError: Its mesh is not a solid.
     """
+    from pydantic import ValidationError
+
+    from grasp_core.grasps_schema import GraspsRecord
+
     try:
         record = GraspsRecord.model_validate_json(text)
     except ValidationError as error:
@@ -172,7 +180,7 @@ def grasps_from_json(text: str) -> SavedGrasps:
     return SavedGrasps(body, record.friction, record.seed, grasps, finger)
 
 
-def _grasp_from_record(body: Polyhedron, record: GraspRecord, friction: float) -> Grasp:
+def _grasp_from_record(body: Polyhedron, record: "GraspRecord", friction: float) -> Grasp:
     grasp = Grasp(
         id=record.id,
         family=record.family,

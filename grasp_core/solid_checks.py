@@ -1,12 +1,10 @@
 """Whether triangles bound one solid: welding, closure, winding, separate and overlapping parts."""
 
-import importlib
-from typing import Any
-
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
+from grasp_core.linked import close_pairs, components
 from grasp_core.planar_faces import SIDES
 from grasp_core.solids import Solid, intersection_volume, union_volume
 
@@ -22,14 +20,10 @@ only touch share what rounding leaves."""
 
 def welded(points: Array, corners: Indices) -> tuple[Array, Indices, int]:
     """Join vertices closer than WELD, drop unused ones and collapsed triangles."""
-    spatial: Any = importlib.import_module("scipy.spatial")
-    graph: Any = importlib.import_module("scipy.sparse")
     used, corners = np.unique(corners, return_inverse=True)
     points, corners = points[used], corners.reshape(-1, 3)
     reach = WELD * float(np.ptp(points, axis=0).max())
-    pairs = spatial.cKDTree(points).query_pairs(reach, output_type="ndarray")
-    links = graph.coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
-    _, label = graph.csgraph.connected_components(links, directed=False)
+    label = components(len(points), close_pairs(points, reach))
     _, first, order = np.unique(label, return_index=True, return_inverse=True)
     rank = np.argsort(np.argsort(first))
     points, corners = points[np.sort(first)], rank[order][corners]
@@ -133,11 +127,7 @@ def _parts(points: Array, corners: Indices) -> list[Solid]:
 
 def _labels(points: Array, corners: Indices) -> Indices:
     """Of each triangle the number of its connected part, (t,)."""
-    graph: Any = importlib.import_module("scipy.sparse")
-    links = graph.coo_array(
-        (np.ones(corners.size), (corners.ravel(), np.roll(corners, 1, axis=1).ravel())),
-        shape=(len(points),) * 2,
-    )
-    _, label = graph.csgraph.connected_components(links, directed=False)
+    sides = np.column_stack([corners.ravel(), np.roll(corners, 1, axis=1).ravel()])
+    label = components(len(points), sides)
     _, part = np.unique(label[corners[:, 0]], return_inverse=True)
     return part

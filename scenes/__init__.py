@@ -1,10 +1,8 @@
-"""A grasp becomes a MuJoCo scene; the built-in example objects."""
+"""A grasp becomes a MuJoCo scene; the built-in example objects.
 
-from scenes.fingertips import FingerSettings as FingerSettings
-from scenes.layout import Layout as Layout
-from scenes.mjcf import Scene as Scene
-from scenes.mjcf import build_scene as build_scene
-from scenes.mjcf import write_scene as write_scene
-from scenes.objects import example_names as example_names
-from scenes.objects import example_object as example_object
-from scenes.physics import PhysicsSettings as PhysicsSettings
+Names are imported on first use; the stub beside this file says where from.
+"""
+
+from grasp_core.first_use import names_in_stub
+
+__getattr__, __dir__, __all__ = names_in_stub(__name__, __file__)

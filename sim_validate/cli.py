@@ -6,16 +6,17 @@ Nothing heavy is imported here, so that help and usage errors answer at once.
 import sys
 import traceback
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from enum import IntEnum
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
-from pydantic.dataclasses import dataclass
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError, UnfaithfulError
+from sim_validate.bounds import check
 from sim_validate.config_file import with_config
 from sim_validate.engines import available_cores
 from sim_validate.flags import (
@@ -51,34 +52,34 @@ class Exit(IntEnum):
     INTERRUPTED = 130
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Run:
     """Plan grasps, test each with its negative controls in MuJoCo, and write everything."""
 
     object: Positional[str]
     """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
-    planning: OmitArgPrefixes[Planning] = Planning(limit=RUN_LIMIT)
+    planning: OmitArgPrefixes[Planning] = field(default_factory=partial(Planning, limit=RUN_LIMIT))
     testing: OmitArgPrefixes[Testing] = field(default_factory=Testing)
-    speech: OmitArgPrefixes[Speech] = Speech()
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for the results; graspproof-out/OBJECT if not given."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Plan:
     """Find force-closure grasps, each with its certificate checked."""
 
     object: Positional[str]
     """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
-    planning: OmitArgPrefixes[Planning] = Planning()
+    planning: OmitArgPrefixes[Planning] = field(default_factory=Planning)
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes for --optimize; results do not depend on it."""
-    speech: OmitArgPrefixes[Speech] = Speech()
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for grasps.json; nothing is written if not given."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Validate:
     """Test the grasps of a file, with negative controls, in MuJoCo."""
 
@@ -91,12 +92,12 @@ class Validate:
     seed: Seed | None = None
     """For random wrenches and moved contacts; the plan's if not given."""
     testing: OmitArgPrefixes[Testing] = field(default_factory=Testing)
-    speech: OmitArgPrefixes[Speech] = Speech()
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for verdicts.json; nothing is written if not given."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Scene:
     """Write grasps as MuJoCo scenes that open in its own viewer."""
 
@@ -106,15 +107,15 @@ class Scene:
     """Id of one grasp; all of them if not given."""
     friction: Positive | None = None
     """Coulomb coefficient; the one planned for if not given."""
-    fingers: OmitArgPrefixes[Fingers] = Fingers()
+    fingers: OmitArgPrefixes[Fingers] = field(default_factory=Fingers)
     surface: Literal["pads", "mesh"] = "pads"
     """What fingertips touch: a pad each, exact on any object, or a convex object's own mesh."""
-    speech: OmitArgPrefixes[Speech] = Speech()
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for the scenes; a single scene is printed if not given."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Analyze:
     """Judge contacts from elsewhere: closure with its certificate, quality, wrench limits."""
 
@@ -134,31 +135,31 @@ class Analyze:
     """Of the pyramids that stand for friction cones in min-weight and hull volume."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes; results do not depend on it."""
-    speech: OmitArgPrefixes[Speech] = Speech()
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Inspect:
     """Show what a mesh is as a polyhedron: faces, mass properties, spanning quadruples."""
 
     object: Positional[str]
     """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
-    mesh: OmitArgPrefixes[Mesh] = Mesh()
-    speech: OmitArgPrefixes[Speech] = Speech()
+    mesh: OmitArgPrefixes[Mesh] = field(default_factory=Mesh)
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Objects:
     """List the built-in objects."""
 
-    speech: OmitArgPrefixes[Speech] = Speech()
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Doctor:
     """Check this installation: versions, solvers, simulator."""
 
-    speech: OmitArgPrefixes[Speech] = Speech()
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 Command = Run | Plan | Validate | Scene | Analyze | Inspect | Objects | Doctor
@@ -184,6 +185,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             ),
             args=with_config(arguments),
         )
+        check(command)
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else Exit.USAGE
     except InputError as error:

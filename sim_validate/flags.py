@@ -3,41 +3,33 @@
 Nothing heavy is imported here, so that help and usage errors answer at once.
 """
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
-from pydantic.dataclasses import dataclass
 from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 
+from sim_validate.bounds import FINITE, at_least, more_than, not_zero
 from sim_validate.engines import available_cores
 
 SMALLEST, LARGEST = 1e-9, 1e9
 
-
-def _not_zero(values: tuple[float, ...]) -> tuple[float, ...]:
-    if not SMALLEST <= max(abs(value) for value in values) <= LARGEST:
-        raise ValueError(f"must not be zero: the largest part is from {SMALLEST:g} to {LARGEST:g}")
-    return values
-
-
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-Usual = Annotated[float, Field(ge=SMALLEST, le=LARGEST, allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=1)]
-Seed = Annotated[int, Field(ge=0, lt=2**64)]
-Edges = Annotated[int, Field(ge=3)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Wrench = Annotated[
-    tuple[Finite, Finite, Finite, Finite, Finite, Finite],
-    AfterValidator(_not_zero),
-]
+Finite = Annotated[float, FINITE]
+Positive = Annotated[float, FINITE, more_than(0.0)]
+NotNegative = Annotated[float, FINITE, at_least(0.0)]
+Usual = Annotated[float, at_least(SMALLEST, up_to=LARGEST)]
+Count = Annotated[int, at_least(1)]
+Seed = Annotated[int, at_least(0, up_to=2**64 - 1)]
+Edges = Annotated[int, at_least(3)]
 Point = tuple[Finite, Finite, Finite]
-Direction = Annotated[tuple[Finite, Finite, Finite], AfterValidator(_not_zero)]
+Direction = Annotated[Point, not_zero(SMALLEST, LARGEST)]
+Wrench = Annotated[
+    tuple[Finite, Finite, Finite, Finite, Finite, Finite], not_zero(SMALLEST, LARGEST)
+]
 RuleName = Literal["5cm-15deg", "contact-remains", "2cm", "3cm", "six-forces"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Speech:
     """How much to say, and in which form."""
 
@@ -49,7 +41,7 @@ class Speech:
     """Say more."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Mesh:
     """How a mesh file is to be read."""
 
@@ -58,18 +50,18 @@ class Mesh:
     faces: Literal["auto", "planar", "patches"] = "auto"
     """Exact planar faces, or nearly flat patches of a curved or scanned surface, which may have
     holes; auto takes patches where there are more than 200 planar faces."""
-    patches: Annotated[int, Field(ge=4, le=200)] = 20
+    patches: Annotated[int, at_least(4, up_to=200)] = 20
     """So many patches at most, those with the largest discs."""
-    patch_spread_deg: Annotated[float, Field(gt=0.0, le=45.0)] = 10.0
+    patch_spread_deg: Annotated[float, more_than(0.0, up_to=45.0)] = 10.0
     """Largest angle between the surface and a patch's plane [deg]; friction loses it."""
-    patch_depth: Annotated[float, Field(gt=0.0, le=0.1)] = 0.01
+    patch_depth: Annotated[float, more_than(0.0, up_to=0.1)] = 0.01
     """Largest distance of the surface from a patch's plane, relative to the object's extent."""
     center_of_mass_m: Annotated[Point | None, arg(metavar="X Y Z")] = None
     """In the file's frame, in metres; that of uniform density if not given, or of the convex hull
     where the surface has holes."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Planning:
     """What to plan."""
 
@@ -97,9 +89,9 @@ class Planning:
     approach_m: Positive | None = None
     """With --finger-radius-m: keep only grasps that fingers of that radius reach on straight free
     lines of this length [m]."""
-    edge_clearance_m: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] = 0.0
+    edge_clearance_m: NotNegative = 0.0
     """How far contacts and their regions stay from the edges of their faces [m]."""
-    share_faces_m: Annotated[float | None, Field(ge=0.0, allow_inf_nan=False)] = None
+    share_faces_m: NotNegative | None = None
     """Let two fingers stand on one face, at least so far apart [m]."""
     optimize: bool = False
     """Move the contacts of each grasp on their faces to raise its Ferrari-Canny quality."""
@@ -114,7 +106,7 @@ class Planning:
     """For everything random."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Fingers:
     """How fingertips are built; what is not given suits the grasp."""
 
@@ -131,12 +123,12 @@ class Fingers:
     the normals."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Testing:
     """What to simulate, and how."""
 
     fingers: OmitArgPrefixes[Fingers] = Fingers()
-    random_wrenches: Annotated[int, Field(ge=0, le=10_000)] = 0
+    random_wrenches: Annotated[int, at_least(0, up_to=10_000)] = 0
     """Also hold so many random wrenches, each at a share of what the analysis says is resisted."""
     wrenches: Path | None = None
     """A file of wrenches to hold as they are (see README)."""

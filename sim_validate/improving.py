@@ -7,7 +7,7 @@ import numpy as np
 
 from grasp_core.best_contacts import Improvement, optimize_contacts
 from grasp_core.plans import Plan
-from grasp_core.quality_ceiling import quality_ceiling
+from grasp_core.quality_ceilings import quality_ceiling
 from grasp_core.records import Moved
 from grasp_core.values import Grasp, Polyhedron
 from sim_validate.console import TABLE_ROWS, Reporter

@@ -1,11 +1,17 @@
 """Each outside package is known to one module, and light imports stay light."""
 
+import os
 import re
 import subprocess
 import sys
 from pathlib import Path
+from pkgutil import resolve_name
+from typing import get_args
 
 import pytest
+
+from sim_validate.cli import Command
+from sim_validate.commands import ACTIONS
 
 ROOT = Path(__file__).parent.parent
 DOORS = {
@@ -39,21 +45,66 @@ def test_a_package_is_imported_at_its_door_only(package):
     assert all(user.startswith(DOORS[package]) for user in users)
 
 
-@pytest.mark.parametrize(
-    ("module", "heavy"),
-    [
-        (
-            "grasp_core",
-            ("mujoco", "trimesh", "scipy", "matplotlib", "highspy", "numba", "pydantic"),
-        ),
-        ("scenes", ("mujoco", "trimesh", "scipy", "matplotlib", "numba")),
-        ("sim_validate.cli", ("mujoco", "trimesh", "scipy", "matplotlib", "numba")),
-    ],
-)
-def test_importing_stays_light(module, heavy):
-    code = f"import sys, {module}; print([m for m in {heavy!r} if m in sys.modules])"
+HEAVY = (
+    "numpy", "scipy", "numba", "highspy", "clarabel", "qpsolvers", "manifold3d", "trimesh",
+    "mujoco", "pydantic", "matplotlib",
+)  # fmt: skip
+NOT_TO_PLAN = ("mujoco", "trimesh", "qpsolvers", "pydantic", "scipy.spatial", "scipy.optimize",
+              "scipy.sparse")  # fmt: skip
+
+
+def imported(code, among, **environment):
+    """Which packages a program imports."""
+    code = f"import sys; {code}; print('IMPORTED', *(m for m in {among!r} if m in sys.modules))"
     answer = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
-    )
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False,
+        env=os.environ | environment,
+    )  # fmt: skip
     assert answer.returncode == 0, answer.stderr
-    assert answer.stdout.strip() == "[]"
+    said, _, names = answer.stdout.rpartition("IMPORTED")
+    return names.split(), said.strip()
+
+
+@pytest.mark.parametrize(
+    "module", ["grasp_core", "scenes", "sim_validate", "sim_validate.cli", "sim_validate.flags"]
+)
+def test_importing_a_package_imports_nothing_heavy(module):
+    assert imported(f"import {module}", HEAVY) == ([], "")
+
+
+@pytest.mark.parametrize(
+    "name", ["grasp_core.plan", "scenes.build_scene", "sim_validate.HoldProtocol"]
+)
+def test_using_a_name_imports_no_more_than_it_needs(name):
+    package, _, _ = name.partition(".")
+    assert imported(f"import {package}; {name}", (*NOT_TO_PLAN, "scipy", "numba"))[0] == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "heavy", "said"),
+    [
+        (["--help"], HEAVY, "inspect"),
+        (["plan", "--help"], HEAVY, "--friction"),
+        (["plan", "wedge", "--friction", "0"], HEAVY, ""),
+        (["objects"], (*NOT_TO_PLAN, "numba"), "tetrahedron"),
+        (["plan", "tetrahedron"], NOT_TO_PLAN, "5 grasps"),
+        (["inspect", "box"], (*NOT_TO_PLAN, "numba"), "volume"),
+    ],
+)  # fmt: skip
+def test_a_command_imports_no_more_than_it_needs(arguments, heavy, said):
+    names, shown = imported(f"from sim_validate.cli import main; main({arguments!r})", heavy)
+    assert names == []
+    assert said in shown
+
+
+def test_planning_without_kernels_needs_no_scipy():
+    """With them numba imports it."""
+    code = "from sim_validate.cli import main; main(['plan', 'tetrahedron'])"
+    names, shown = imported(code, (*NOT_TO_PLAN, "scipy", "numba"), GRASPPROOF_KERNELS="off")
+    assert names == []
+    assert "5 grasps" in shown
+
+
+def test_every_command_has_its_function():
+    assert set(ACTIONS) == set(get_args(Command))
+    assert all(callable(resolve_name(f"sim_validate.{place}")) for place in ACTIONS.values())

@@ -325,8 +325,8 @@ def test_a_file_that_is_missing_or_asks_too_much_is_refused(tmp_path, monkeypatc
         ("--wrench 0 0 1 0 0 inf", "finite"),
         ("--edges 2", "edges"),
         ("--friction 0", "friction"),
-        ("--max-normal-force -1", "max_normal_force"),
-        ("--torque-scale-m 0", "torque_scale_m"),
+        ("--max-normal-force -1", "--max-normal-force must be"),
+        ("--torque-scale-m 0", "--torque-scale-m must be"),
     ],
 )
 def test_flags_without_sense_are_usage_errors(capsys, flags, words):

@@ -236,19 +236,6 @@ def test_an_interrupted_run_keeps_what_is_done(here):
     assert 0 < len(verdicts["verdicts"]) < 420
 
 
-def test_help_answers_without_loading_a_simulator():
-    code = (
-        "import sys; from sim_validate.cli import main; main(['--help']); "
-        "print('HEAVY', [m for m in ('mujoco', 'trimesh', 'scipy') if m in sys.modules])"
-    )
-    answer = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert answer.returncode == 0, answer.stderr
-    assert "HEAVY []" in answer.stdout
-    assert "validate" in answer.stdout
-
-
 def _always_held(trace, *_):
     from sim_validate.verdict import HoldVerdict, Outcome
 

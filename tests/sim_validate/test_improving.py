@@ -60,7 +60,7 @@ def test_optimised_grasps_hold_in_simulation(tmp_path):
     ("flags", "code", "message"),
     [
         (["--ceiling", "10"], Exit.INPUT, "give both or neither"),
-        (["--optimize", "--finger-radius-m", "-1"], Exit.USAGE, "finger_radius_m"),
+        (["--optimize", "--finger-radius-m", "-1"], Exit.USAGE, "--finger-radius-m must be"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(flags, code, message, capsys):

@@ -1,0 +1,32 @@
+"""Names of a package that are imported when they are first used: what is not used costs nothing.
+
+The stub beside a package's `__init__.py` lists the names, for type checkers and for this module.
+"""
+
+import ast
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+Surface = tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]
+"""`__getattr__`, `__dir__` and `__all__` of a package."""
+
+
+def names_in_stub(package: str, file: str) -> Surface:
+    """What a package needs in order to offer the names that its stub imports.
+
+    Args:
+        package: Its `__name__`.
+        file: Its `__file__`.
+    """
+    stub = ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8"))
+    imports = [part for part in stub.body if isinstance(part, ast.ImportFrom)]
+    homes = {alias.name: str(part.module) for part in imports for alias in part.names}
+
+    def find(name: str) -> Any:
+        if name not in homes:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        return getattr(importlib.import_module(homes[name]), name)
+
+    return find, lambda: sorted(homes), sorted(homes)

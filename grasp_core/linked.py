@@ -1,0 +1,55 @@
+"""Points that are close to each other, and what hangs together through links.
+
+With numpy alone: a library for graphs takes longer to import than a small object to plan on.
+"""
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+
+GENERAL = np.array([0.41421, 0.56714, 0.69315])
+"""A direction square to no face that anyone builds, where shadows would crowd; shorter than one, so
+that shadows are closer than points."""
+
+
+def close_pairs(points: Array, reach: float) -> Indices:
+    """Links between points within a distance of each other, (k, 2).
+
+    Close points have close shadows on a line, so only neighbours there are compared. Equal points
+    are linked in a row, and compared with others only once.
+
+    Args:
+        points: (n, 3)
+        reach: In the same unit.
+    """
+    shadows = ((points - points[0]) * GENERAL).sum(axis=1)
+    order = np.argsort(shadows, kind="stable")
+    equal = (points[order[1:]] == points[order[:-1]]).all(axis=1)
+    links = [np.column_stack([order[:-1], order[1:]])[equal]]
+    order = order[np.append(True, ~equal)]
+    for step in range(1, len(order)):
+        near = shadows[order[step:]] - shadows[order[:-step]] <= reach
+        if not near.any():
+            break
+        pairs = np.column_stack([order[:-step][near], order[step:][near]])
+        apart = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+        links.append(pairs[apart <= reach])
+    return np.concatenate(links)
+
+
+def components(count: int, links: Indices) -> Indices:
+    """Of each of so many things the least one that it hangs together with, (count,).
+
+    Labels only fall: along links, then to the label of a label, until all links are between equals.
+
+    Args:
+        count: Of things.
+        links: Pairs of them, (k, 2).
+    """
+    label = np.arange(count)
+    while (label[links[:, 0]] != label[links[:, 1]]).any():
+        ends = label[links]
+        np.minimum.at(label, ends, ends.min(axis=1, keepdims=True))
+        while (label[label] != label).any():
+            label = label[label]
+    return label

@@ -1,0 +1,77 @@
+"""Which values a flag takes: bounds written into its type, and the check of all flags at once."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, is_dataclass
+from itertools import repeat
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+from grasp_core.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """What a value must be; to be put into a type: `Annotated[int, at_least(1)]`."""
+
+    says: str
+    holds: Callable[[Any], bool]
+
+    def __repr__(self) -> str:
+        """What messages about types show."""
+        return self.says
+
+
+FINITE = Bound("must be finite", math.isfinite)
+
+
+def more_than(least: float, *, up_to: float = math.inf) -> Bound:
+    """Numbers above one, up to and with another."""
+    return Bound(f"must be more than {least:g}{_end(up_to)}", lambda value: least < value <= up_to)
+
+
+def at_least(least: float, *, up_to: float = math.inf) -> Bound:
+    """Numbers from one to another, both with them."""
+    return Bound(f"must be at least {least:g}{_end(up_to)}", lambda value: least <= value <= up_to)
+
+
+def not_zero(least: float, most: float) -> Bound:
+    """Vectors, by the size of their largest part."""
+    says = f"must not be zero: the largest part is from {least:g} to {most:g}"
+    return Bound(says, lambda vector: least <= max(abs(part) for part in vector) <= most)
+
+
+def _end(up_to: float) -> str:
+    return "" if math.isinf(up_to) else f", at most {up_to:g}"
+
+
+def check(flags: object) -> None:
+    """Check the flags of a command, and those of its groups.
+
+    Raises:
+        InputError: A value is refused; the message names the flag.
+    """
+    for name, kind in get_type_hints(type(flags), include_extras=True).items():
+        value = getattr(flags, name)
+        if is_dataclass(value):
+            check(value)
+        for bound, part in _bounded(kind, value):
+            if not bound.holds(part):
+                flag = "--" + name.replace("_", "-")
+                raise InputError(f"{flag} {bound.says}, got {part}")
+
+
+def _bounded(kind: Any, value: Any) -> Iterator[tuple[Bound, Any]]:
+    """The bounds in a type, each with the part of a value that it is for."""
+    inner = get_args(kind)
+    if value is None:
+        return
+    if get_origin(kind) is Annotated:
+        yield from _bounded(inner[0], value)
+        yield from ((bound, value) for bound in inner[1:] if isinstance(bound, Bound))
+    elif get_origin(kind) is tuple:
+        kinds = repeat(inner[0]) if inner[-1] is Ellipsis else inner
+        for part_kind, part in zip(kinds, value, strict=False):
+            yield from _bounded(part_kind, part)
+    else:
+        for choice in inner:
+            yield from _bounded(choice, value)

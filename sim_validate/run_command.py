@@ -1,0 +1,47 @@
+"""The command that plans and simulates: from an object to grasps, scenes and verdicts."""
+
+import re
+from pathlib import Path
+
+from grasp_core.records import SavedGrasps, plan_to_json
+from sim_validate import cli
+from sim_validate.console import Reporter
+from sim_validate.files import remove_results, write_text
+from sim_validate.gate import require_faithful
+from sim_validate.improving import show_gains
+from sim_validate.plan_command import asked_finger, plan_object, say_counts
+from sim_validate.validate_command import prepared, simulate_grasps, with_planned_fingers
+
+RESULTS = Path("graspproof-out")
+"""Where results go, a folder for each object, if not told otherwise."""
+
+
+def run_object(command: cli.Run, reporter: Reporter) -> int:
+    """Plan on an object, simulate its grasps, write and show everything."""
+    planning = command.planning
+    testing = with_planned_fingers(command.testing, asked_finger(planning))
+    setup, _ = prepared(testing, planning.seed, command.out or RESULTS)
+    body, found, moves = plan_object(command.object, planning, testing.jobs, reporter)
+    folder = command.out or RESULTS / _folder_name(body.name)
+    require_faithful(setup, found.friction, body.radius)
+    remove_results(folder)
+    write_text(folder / "grasps.json", plan_to_json(body, found, moves))
+    say_counts(body, found, reporter)
+    if found.absence:
+        reporter.say(found.absence)
+        reporter.document({"absence": found.absence, "out": str(folder)})
+        return cli.Exit.NONE
+    if moves:
+        show_gains(moves, reporter)
+    for grasp in found.grasps:
+        scene = setup.scene(body, grasp, found.friction)
+        write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
+    saved = SavedGrasps(body, found.friction, found.seed, found.grasps, found.finger)
+    code = simulate_grasps(saved, testing, folder, reporter)
+    reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
+    return code
+
+
+def _folder_name(name: str) -> str:
+    """A file name that is one plain part of a path."""
+    return re.sub(r"[^\w-]+", "_", name) or "object"
