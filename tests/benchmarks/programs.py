@@ -98,11 +98,13 @@ def by_linprog(program):
     )  # fmt: skip
 
 
+COMPILED = "compiled, checked"
 CONTENDERS = {
-    "compiled, checked": lp.maximize,
+    COMPILED: lp.maximize,
     "HiGHS, checked": lp._by_highs,
     "scipy.linprog": by_linprog,
     "qpsolvers, clarabel": by_qpsolvers("clarabel"),
+    "qpsolvers, proxqp": by_qpsolvers("proxqp"),
 }
 
 
