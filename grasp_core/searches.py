@@ -45,6 +45,12 @@ class _Blocks:
         """How many quadruples with normals that span (P3) the blocks made so far hold."""
         return sum(self.counts.values())
 
+    def make_all(self) -> None:
+        """Make the blocks that nobody asked for, to know what is in them."""
+        for place in range(len(self.rooms)):
+            if place not in self.counts:
+                self[place]
+
     def __getitem__(self, place: int) -> Candidates:
         block = self.made.get(place) or self.makers[place]()
         if place < KEPT_BLOCKS:
@@ -80,7 +86,13 @@ class Searches:
 
     @property
     def spanning(self) -> int:
-        """How many quadruples with normals that span (P3) were come across."""
+        """How many quadruples with normals that span (P3) were come across.
+
+        Where nothing but they could have held a grasp, and none did, these are all of them.
+        """
+        found = any(search.best for search in self.by_method.values())
+        if self.request.cones == "normal" and not found:
+            self.spanning_blocks.make_all()
         return max(self.spanning_blocks.spanning, self.tilted_blocks.spanning)
 
     @property

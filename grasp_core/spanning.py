@@ -35,6 +35,8 @@ SIGNS = np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=np.float
 LARGEST_SPAN_ANGLE = math.asin(1.0 / 3.0)
 """Reached by the regular tetrahedron only [rad]."""
 KERNEL = "spanning"
+FEW = 30
+"""So many directions are enumerated in less time than it takes to load compiled code."""
 GUESS = 2
 """Room for so many quadruples per pair of directions, before they are counted."""
 OTHERS = ([1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2])
@@ -190,6 +192,8 @@ def spanning_quadruples(normals: Array, least_angle: float) -> SpanningQuadruple
         normals: Unit vectors, (n, 3).
         least_angle: [rad]
     """
+    if len(normals) <= FEW:
+        return _spanning_by_pairs(normals, math.sin(least_angle))
     return SpanningTable(normals, least_angle).quadruples(0, len(normals))
 
 

@@ -1,4 +1,4 @@
-"""All quadruples of directions that positively span (P3): compiled, in NumPy, and by the formula."""
+"""Quadruples of directions that positively span (P3): compiled, in NumPy, and by the formula."""
 
 import math
 from itertools import combinations
@@ -35,15 +35,16 @@ def rows():
     """The three ways, after they agreed on every size."""
     found = []
     for count in SIZES:
-        ways = {f"spanning quadruples of {count}, compiled": by_table, "  NumPy, by pairs": by_pairs}
-        if count <= 30:  # noqa: PLR2004 - all quadruples of 100 do not fit
+        ours = f"spanning quadruples of {count}, compiled"
+        ways = {ours: by_table, "  NumPy, by pairs": by_pairs}
+        if count <= 30:
             ways["  NumPy, closed form on each"] = by_formula
         units = directions(count)
         answers = [way(units) for way in ways.values()]
         assert all(np.array_equal(answers[0], other) for other in answers[1:])
         runs = {name: lambda block, way=way: len([way(each) for each in block])
                 for name, way in ways.items()}  # fmt: skip
-        remark = {next(iter(ways)): f"{len(answers[0])} of {math.comb(count, 4)}"}
+        remark = {ours: f"{len(answers[0])} of {math.comb(count, 4)}"}
         found += compared("enumeration", runs, [[units]] * BLOCKS, remark)
     for count in LARGE:
         what = f"spanning quadruples of {count}, compiled"

@@ -1,12 +1,10 @@
 """Metrics of one grasp beside qhull, scipy's linear programs and a bisection with Clarabel.
 
 Every contender first has to agree on every grasp (see the asserts); then all take turns on the
-same grasps in one process, so that a busy machine slows all of them alike. Ratios are of medians,
-to the first row of each group, which is this project's.
+same grasps. Ratios are to the first row of each group, which is this project's.
 """
 
 import math
-import time
 
 import clarabel
 import numpy as np
@@ -16,13 +14,14 @@ from scipy.spatial import ConvexHull
 
 import grasp_core as gc
 from scenes.objects import example_object
+from tests.benchmarks.timing import compared
 from tests.judges import pyramid_wrenches
 
 FRICTIONS = (math.tan(math.radians(10.0)), 0.5)
 OBJECTS = ("wedge", "random-20-7", "random-14-1")
 GRASPS = 8
 """Of each object at each friction."""
-ROUNDS = 3
+ROUNDS = 7
 BISECTIONS = 30
 WRENCHES = 24
 MAX_FORCE = 1.0
@@ -197,23 +196,13 @@ def rows():
     contenders = {name: run for group in GROUPS.values() for name, run in group.items()}
     found = {name: [run(case) for case in every] for name, run in contenders.items()}
     said = accuracy(found)
-    seconds = {name: [] for name in contenders}
-    for _ in range(ROUNDS):
-        for case in every:
-            for name, run in contenders.items():
-                run(case)  # who went before has emptied the caches
-                start = time.perf_counter()
-                run(case)
-                seconds[name].append((time.perf_counter() - start) / PER_WRENCH.get(name, 1))
-    medians = {name: float(np.median(times)) for name, times in seconds.items()}
-    return [
-        {
-            "group": group, "what": name, "cases": len(every),
-            "median_us": 1e6 * medians[name], "mean_us": 1e6 * float(np.mean(seconds[name])),
-            "ratio": medians[name] / medians[first] if name != first else None,
-            "accuracy": said[name],
-        }
-        for group, members in GROUPS.items()
-        for first in [next(iter(members))]
-        for name in members
-    ]  # fmt: skip
+    listed = []
+    for group in GROUPS.values():
+        runs = {name: counted(run, PER_WRENCH.get(name, 1)) for name, run in group.items()}
+        listed += compared("metrics", runs, [every] * ROUNDS, said)
+    return listed
+
+
+def counted(run, share):
+    """Answer every case of a block; each counts as many."""
+    return lambda block: share * len([run(case) for case in block])

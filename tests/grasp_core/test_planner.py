@@ -315,7 +315,9 @@ def test_radii_stay_below_the_bounds_that_prune():
     )
     candidates, tested = block(), 0
     for family in DISCS:
-        bounds = {q.faces: q.bound for q in ranked(candidates, CONSTRUCTIONS[family])}
+        ranking = ranked(candidates, CONSTRUCTIONS[family])
+        ordered = (ranking.quadruple(row, ranking.bounds[row]) for row in range(len(ranking)))
+        bounds = {each.faces: each.bound for each in ordered}
         assert max(bounds.values()) <= room
         for grasp in gc.plan(body, 1.0, theta_deg=8.0, families=family, cones="tilted").grasps:
             assert grasp.radius <= bounds[tuple(sorted(grasp.faces))] * body.radius * (1 + 1e-6)
