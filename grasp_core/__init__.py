@@ -5,6 +5,7 @@ from grasp_core.best_contacts import optimize_contacts as optimize_contacts
 from grasp_core.closure import ClosureCertificate as ClosureCertificate
 from grasp_core.closure import force_closure as force_closure
 from grasp_core.critical import critical_friction as critical_friction
+from grasp_core.critical import critical_frictions as critical_frictions
 from grasp_core.errors import GraspError as GraspError
 from grasp_core.errors import InputError as InputError
 from grasp_core.errors import MeshError as MeshError
