@@ -59,6 +59,9 @@ and by this multiple of the error of Newton's method, the step's square over the
 HALVING = 6
 """Every so many trials the bracket is halved, whatever Newton's method says."""
 KERNEL = "critical"
+WIDTHS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+"""Multiples of the accuracy within which closure is proved above the separating friction: where two
+contacts carry nearly everything, the others are deep in their cones only a little above it."""
 NO_FORCE = 1e-100
 """Stands in where a contact does not push: no friction is enough there."""
 SEARCHED = 0.95
@@ -135,15 +138,20 @@ def _at_once(points: Array, normals: Array) -> Array:
     forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))
     bounds = np.zeros((len(arms), 2))
     kernel.search(arms, units, SEARCHED * FRICTION_ACCURACY, forces, twists, bounds)
-    along, across = normal_and_tangential(forces, units)
-    steepest = (across / np.maximum(along, NO_FORCE)).max(axis=1)
-    lower, widest = bounds[:, 0], bounds[:, 0] * (1.0 + FRICTION_ACCURACY)
-    bounded = (lower > FRICTIONLESS) & (widest < LARGEST_FRICTION)
+    lower = bounds[:, 0]
+    bounded = (lower > FRICTIONLESS) & (lower < 0.5 * LARGEST_FRICTION)
     bounded &= many_refute_closure(twists, arms, units, lower)
-    for enough in (steepest * (1.0 + 0.1 * FRICTION_ACCURACY), widest):
-        left = np.flatnonzero(bounded & np.isnan(found) & (enough <= widest))
-        proved = left[many_prove_closure(forces[left], arms[left], units[left], enough[left])]
-        found[proved] = enough[proved]
+    along, across = normal_and_tangential(forces, units)
+    enough = (across / np.maximum(along, NO_FORCE)).max(axis=1) * (1.0 + 0.1 * FRICTION_ACCURACY)
+    left = np.flatnonzero(bounded & (enough <= lower * (1.0 + FRICTION_ACCURACY)))
+    proved = left[many_prove_closure(forces[left], arms[left], units[left], enough[left])]
+    found[proved] = enough[proved]
+    for width in WIDTHS:
+        left = np.flatnonzero(bounded & np.isnan(found))
+        enough, deep = lower[left] * (1.0 + width * FRICTION_ACCURACY), np.zeros_like(arms[left])
+        kernel.deepest(arms[left], units[left], enough, deep)
+        proved = many_prove_closure(deep, arms[left], units[left], enough)
+        found[left[proved]] = enough[proved]
     return found
 
 

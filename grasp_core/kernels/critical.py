@@ -18,7 +18,7 @@ from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissi
 from numba.core.errors import NumbaError  # pyright: ignore[reportMissingTypeStubs]
 
 from grasp_core.arrays import Array
-from grasp_core.kernels.margin import WRENCH, Point, least_cone_sum
+from grasp_core.kernels.margin import WRENCH, least_cone_sum
 
 FIRST_TRIAL = 0.5
 MOST_TRIALS = 30
@@ -47,11 +47,12 @@ def try_out() -> None:
     forces, twists, bounds = np.empty_like(corners), np.empty((1, WRENCH)), np.empty((1, 2))
     try:
         search(-corners, corners, 1e-3, forces, twists, bounds)
+        deepest(-corners, corners, np.ones(1), forces)
     except NumbaError as error:
         raise RuntimeError(f"numba: {error}") from error
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def search(
     arms: Array, normals: Array, width: float, forces: Array, twists: Array, bounds: Array
 ) -> None:
@@ -69,33 +70,54 @@ def search(
     k = arms.shape[1]
     axes, rows, columns = np.empty((k, 3, 3)), np.empty((k, 3, WRENCH)), np.empty((k, 3, WRENCH))
     mean, twist, span = np.empty(WRENCH), np.empty(WRENCH), np.empty((WRENCH, WRENCH))
-    point = Point(np.empty((k, 3)), np.empty((k, 3)), np.empty(WRENCH))
+    pair, y = np.empty((2, k, 3)), np.empty(WRENCH)
     for g in range(len(arms)):
         _set_up(arms[g], normals[g], axes, rows, mean)
         lower, upper, friction = 0.0, np.inf, FIRST_TRIAL
         for _ in range(MOST_TRIALS):
             _at_friction(rows, mean, friction, columns)
-            primal, dual = least_cone_sum(columns, mean, point)
-            needed = _needed(point, primal, friction)
+            primal, dual = least_cone_sum(columns, mean, pair, y)
+            needed = _needed(pair, primal, friction)
             if primal < 1.0 - EVEN and needed < upper:
                 upper = needed
-                _in_space(point, primal, friction, axes, forces[g])
+                _in_space(pair, primal, friction, axes, forces[g])
             if dual > 1.0 + EVEN and friction > lower:
                 lower = friction
-                twists[g] = point.y
-            separates = _separates(rows, point, span, twist)
+                _copy(y, twists[g])
+            _copy(y, twist)
+            separates = _separates(rows, pair[1], span, twist)
             if separates > lower:
                 lower = separates
-                twists[g] = twist
+                _copy(twist, twists[g])
             if upper - lower <= width * lower:
                 break
-            friction = _next(point, 0.5 * (primal + dual), friction, lower, upper, width)
+            friction = _next(pair, 0.5 * (primal + dual), friction, lower, upper, width)
             if not SMALLEST <= friction <= LARGEST:
                 break
         bounds[g, 0], bounds[g, 1] = lower, upper
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def deepest(arms: Array, normals: Array, frictions: Array, forces: Array) -> None:
+    """Balance each of many sets of contacts as deep inside its cones as can be.
+
+    Args:
+        arms: Contacts at unit size, (g, k, 3).
+        normals: (g, k, 3)
+        frictions: Of each set, (g,).
+        forces: Filled with the forces, (g, k, 3).
+    """
+    k = arms.shape[1]
+    axes, rows, columns = np.empty((k, 3, 3)), np.empty((k, 3, WRENCH)), np.empty((k, 3, WRENCH))
+    mean, pair, y = np.empty(WRENCH), np.empty((2, k, 3)), np.empty(WRENCH)
+    for g in range(len(arms)):
+        _set_up(arms[g], normals[g], axes, rows, mean)
+        _at_friction(rows, mean, frictions[g], columns)
+        primal, _ = least_cone_sum(columns, mean, pair, y)
+        _in_space(pair, primal, frictions[g], axes, forces[g])
+
+
+@njit(cache=True, error_model="numpy")
 def _set_up(arms: Array, normals: Array, axes: Array, rows: Array, mean: Array) -> None:
     """Axes of the contacts, their wrenches, (k, 3, 6), and the mean of those of the normals."""
     for w in range(WRENCH):
@@ -111,7 +133,7 @@ def _set_up(arms: Array, normals: Array, axes: Array, rows: Array, mean: Array) 
             mean[w] += rows[i, 0, w] / len(arms)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _orthonormal(normal: Array, axes: Array) -> None:
     """A normal and two tangents, (3, 3)."""
     far = 0
@@ -126,7 +148,7 @@ def _orthonormal(normal: Array, axes: Array) -> None:
         axes[2, j] = axes[0, u] * axes[1, v] - axes[0, v] * axes[1, u]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _at_friction(rows: Array, mean: Array, friction: float, columns: Array) -> None:
     for i in range(len(rows)):
         for w in range(WRENCH):
@@ -134,52 +156,50 @@ def _at_friction(rows: Array, mean: Array, friction: float, columns: Array) -> N
             columns[i, 1, w], columns[i, 2, w] = friction * rows[i, 1, w], friction * rows[i, 2, w]
 
 
-@njit(cache=True)
-def _needed(point: Point, primal: float, friction: float) -> float:
+@njit(cache=True, error_model="numpy")
+def _needed(pair: Array, primal: float, friction: float) -> float:
     """The most friction that any of the forces needs; infinite if one of them pulls."""
-    share, needed = (1.0 - primal) / len(point.s), 0.0
-    for i in range(len(point.s)):
-        along = point.s[i, 0] + share
+    share, needed = (1.0 - primal) / pair.shape[1], 0.0
+    for i in range(pair.shape[1]):
+        along = pair[0, i, 0] + share
         if not along > 0.0:
             return np.inf
-        needed = max(needed, friction * math.hypot(point.s[i, 1], point.s[i, 2]) / along)
+        needed = max(needed, friction * math.hypot(pair[0, i, 1], pair[0, i, 2]) / along)
     return needed
 
 
-@njit(cache=True)
-def _in_space(point: Point, primal: float, friction: float, axes: Array, forces: Array) -> None:
+@njit(cache=True, error_model="numpy")
+def _in_space(pair: Array, primal: float, friction: float, axes: Array, forces: Array) -> None:
     share = (1.0 - primal) / len(axes)
     for i in range(len(axes)):
         for j in range(3):
-            forces[i, j] = (point.s[i, 0] + share) * axes[i, 0, j] + friction * (
-                point.s[i, 1] * axes[i, 1, j] + point.s[i, 2] * axes[i, 2, j]
+            forces[i, j] = (pair[0, i, 0] + share) * axes[i, 0, j] + friction * (
+                pair[0, i, 1] * axes[i, 1, j] + pair[0, i, 2] * axes[i, 2, j]
             )
 
 
-@njit(cache=True)
-def _separates(rows: Array, point: Point, span: Array, twist: Array) -> float:
+@njit(cache=True, error_model="numpy")
+def _separates(rows: Array, z: Array, span: Array, twist: Array) -> float:
     """Up to which friction the twist separates, once contacts nearly at rest are at rest."""
     still = 0.0
     for i in range(len(rows)):
-        still = max(still, AT_REST * point.z[i, 0])
+        still = max(still, AT_REST * z[i, 0])
     spanned = 0
     for i in range(len(rows)):
         for a in range(3):
-            if point.z[i, 0] <= still:
+            if z[i, 0] <= still:
                 spanned = _add(rows[i, a], span, spanned)
-    for w in range(WRENCH):
-        twist[w] = point.y[w]
     for a in range(spanned):
         _take_off(twist, span[a])
-    return _least_ratio(rows, point, still, twist) if spanned < WRENCH else 0.0
+    return _least_ratio(rows, z, still, twist) if spanned < WRENCH else 0.0
 
 
-@njit(cache=True)
-def _least_ratio(rows: Array, point: Point, still: float, twist: Array) -> float:
+@njit(cache=True, error_model="numpy")
+def _least_ratio(rows: Array, z: Array, still: float, twist: Array) -> float:
     """Of leaving to sliding, over the contacts that are not at rest."""
     least = LARGEST
     for i in range(len(rows)):
-        if point.z[i, 0] > still:
+        if z[i, 0] > still:
             along, across = -_dot(rows[i, 0], twist), 0.0
             for a in range(1, 3):
                 across += _dot(rows[i, a], twist) ** 2
@@ -189,7 +209,7 @@ def _least_ratio(rows: Array, point: Point, still: float, twist: Array) -> float
     return least
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _add(row: Array, span: Array, spanned: int) -> int:
     """Add a row to an orthonormal basis, unless it is in its span already; their new number."""
     if spanned == WRENCH:
@@ -208,14 +228,20 @@ def _add(row: Array, span: Array, spanned: int) -> int:
     return spanned + 1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _take_off(vector: Array, unit: Array) -> None:
     share = _dot(vector, unit)
     for w in range(WRENCH):
         vector[w] -= share * unit[w]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _copy(source: Array, target: Array) -> None:
+    for w in range(WRENCH):
+        target[w] = source[w]
+
+
+@njit(cache=True, error_model="numpy")
 def _dot(a: Array, b: Array) -> float:
     total = 0.0
     for w in range(WRENCH):
@@ -223,9 +249,9 @@ def _dot(a: Array, b: Array) -> float:
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _next(
-    point: Point, value: float, friction: float, lower: float, upper: float, width: float
+    pair: Array, value: float, friction: float, lower: float, upper: float, width: float
 ) -> float:
     """Where 1 / V becomes one if it goes on like this, a little to the wider side.
 
@@ -234,8 +260,8 @@ def _next(
     s_i2 z_i2.
     """
     slope = 0.0
-    for i in range(len(point.s)):
-        slope += point.s[i, 1] * point.z[i, 1] + point.s[i, 2] * point.z[i, 2]
+    for i in range(pair.shape[1]):
+        slope += pair[0, i, 1] * pair[1, i, 1] + pair[0, i, 2] * pair[1, i, 2]
     if abs(value - 1.0) <= EVEN:
         return lower * (1.0 + ABOVE * width) if lower > friction else 0.0
     root = friction * (1.0 - value * (value - 1.0) / slope) if slope < 0.0 else np.nan
