@@ -18,6 +18,7 @@ from grasp_core.forces import contact_forces as contact_forces
 from grasp_core.lines import classify_lines as classify_lines
 from grasp_core.metrics import hull_volume as hull_volume
 from grasp_core.metrics import min_weight as min_weight
+from grasp_core.metrics import min_weights as min_weights
 from grasp_core.metrics import smallest_singular_value as smallest_singular_value
 from grasp_core.planner import iter_grasps as iter_grasps
 from grasp_core.planner import plan as plan

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen, frozen_units
 from grasp_core.errors import InputError
-from grasp_core.values import FINGERS, Grasp, contact_arrays
+from grasp_core.values import FINGERS, Grasp, contact_arrays, contact_frictions
 
 FEWEST = 2
 
@@ -32,6 +32,35 @@ def many_contact_arrays(
     if points.shape[1] < FEWEST:
         raise InputError(f"at least two contacts are needed, got {points.shape[1]}")
     return points, units
+
+
+def many_frictions(friction: ArrayLike, shape: tuple[int, int]) -> Array:
+    """One checked Coulomb coefficient for each of (g, k) contacts.
+
+    Args:
+        friction: One for all contacts, or one each, (k,) or (g, k).
+        shape: (g, k)
+
+    Raises:
+        InputError: The shape differs, or a coefficient is negative or too large.
+    """
+    values = np.asarray(friction, dtype=np.float64)
+    if values.ndim < len(shape):
+        return np.broadcast_to(contact_frictions(values, shape[1]), shape)
+    return contact_frictions(frozen(values, shape, "friction").ravel(), values.size).reshape(shape)
+
+
+def many_frames(normals: Array) -> Array:
+    """As `contact_frames`, of many sets (g, k, 3): columns (normal, tangent, tangent)."""
+    x, y, z = np.moveaxis(normals, -1, 0)
+    nothing, least = np.zeros_like(x), np.abs(normals).min(axis=-1)
+    crossed = np.stack([-y, x, nothing], axis=-1)
+    crossed[np.abs(y) == least] = np.stack([z, nothing, -x], axis=-1)[np.abs(y) == least]
+    crossed[np.abs(x) == least] = np.stack([nothing, -z, y], axis=-1)[np.abs(x) == least]
+    first = crossed / np.linalg.norm(crossed, axis=-1, keepdims=True)
+    frames = np.empty((*normals.shape, 3))
+    frames[..., 0], frames[..., 1], frames[..., 2] = normals, first, np.cross(normals, first)
+    return frames
 
 
 def unit_sizes(points: Array) -> tuple[Array, Array, Array]:
