@@ -148,6 +148,8 @@ def _at_once(points: Array, normals: Array) -> Array:
     found[proved] = enough[proved]
     for width in WIDTHS:
         left = np.flatnonzero(bounded & np.isnan(found))
+        if not left.size:
+            break
         enough, deep = lower[left] * (1.0 + width * FRICTION_ACCURACY), np.zeros_like(arms[left])
         kernel.deepest(arms[left], units[left], enough, deep)
         proved = many_prove_closure(deep, arms[left], units[left], enough)
