@@ -3,6 +3,7 @@ from grasp_core.best_contacts import optimize_contacts as optimize_contacts
 from grasp_core.closure import ClosureCertificate as ClosureCertificate
 from grasp_core.closure import force_closure as force_closure
 from grasp_core.critical import critical_friction as critical_friction
+from grasp_core.critical import critical_frictions as critical_frictions
 from grasp_core.errors import GraspError as GraspError
 from grasp_core.errors import InputError as InputError
 from grasp_core.errors import MeshError as MeshError
@@ -15,6 +16,7 @@ from grasp_core.forces import contact_forces as contact_forces
 from grasp_core.lines import classify_lines as classify_lines
 from grasp_core.metrics import hull_volume as hull_volume
 from grasp_core.metrics import min_weight as min_weight
+from grasp_core.metrics import min_weights as min_weights
 from grasp_core.metrics import smallest_singular_value as smallest_singular_value
 from grasp_core.planner import iter_grasps as iter_grasps
 from grasp_core.planner import plan as plan

@@ -119,6 +119,51 @@ def proves_closure(forces: Array, arms: Array, normals: Array, friction: Array) 
     return bool((depth > reach).all())
 
 
+def many_refute_closure(
+    twists: Array, arms: Array, normals: Array, friction: Array
+) -> NDArray[np.bool_]:
+    """As `refutes_closure`, for many sets of contacts with one friction each.
+
+    Args:
+        twists: (g, 6)
+        arms: (g, k, 3)
+        normals: (g, k, 3)
+        friction: (g,)
+
+    Returns:
+        Truth values, (g,).
+    """
+    lengths = np.linalg.norm(twists, axis=1)
+    velocities = twists[:, None, :3] + np.cross(twists[:, None, 3:], arms)
+    along, across = normal_and_tangential(velocities, normals)
+    excess = (along + friction[:, None] * across).max(axis=1) / np.sqrt(1.0 + friction**2)
+    return (lengths > 0.0) & (excess <= ROUNDING * lengths)
+
+
+def many_prove_closure(
+    forces: Array, arms: Array, normals: Array, friction: Array
+) -> NDArray[np.bool_]:
+    """As `proves_closure`, for many sets of contacts with one positive friction each.
+
+    Args:
+        forces: (g, k, 3)
+        arms: (g, k, 3)
+        normals: (g, k, 3)
+        friction: (g,)
+
+    Returns:
+        Truth values, (g,).
+    """
+    along, across = normal_and_tangential(forces, normals)
+    depths = (friction[:, None] * along - across).min(axis=1)
+    maps = grasp_map(arms)
+    stacked = forces.reshape(len(maps), maps.shape[2])
+    imbalance = np.linalg.norm(np.einsum("gwj,gj->gw", maps, stacked), axis=1)
+    least = np.linalg.svd(maps, compute_uv=False)[:, WRENCH - 1]
+    reach = np.sqrt(1.0 + friction**2) * (imbalance + ROUNDING) / np.maximum(least, RANK)
+    return (least > RANK) & (depths > reach)
+
+
 def _touching_twist(twist: Array, arms: Array, normals: Array, friction: Array) -> Array:
     """A twist at which the supports that are nearly zero are so to within rounding.
 

@@ -12,9 +12,14 @@ program only through the balance, whose multiplier is the twist, so that
     d tau / d mu = sum v_i . (tangential part of f_i) / mu,
 
 v_i being the velocity of contact i under the twist. Newton's method says where to try next.
+
+A compiled search of the same kind comes first (see `kernels.critical`). The forces and the twist
+that it finds are checked like all others; where there are none, or their bracket is not narrow, the
+search is made here, program by program.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,10 +27,19 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
 from grasp_core.closure import unit_size
-from grasp_core.closure_margin import RANK, Answer, decide, proves_closure
+from grasp_core.closure_margin import (
+    RANK,
+    Answer,
+    decide,
+    many_prove_closure,
+    many_refute_closure,
+    proves_closure,
+)
 from grasp_core.errors import UndecidedError
+from grasp_core.kernels import compiled
+from grasp_core.many_contacts import many_contact_arrays, unit_sizes
 from grasp_core.values import LARGEST_FRICTION, Grasp, contact_arrays
-from grasp_core.wrenches import normal_and_tangential
+from grasp_core.wrenches import WRENCH, normal_and_tangential
 
 FRICTION_ACCURACY = 5e-8
 """Relative width of the final bracket of a critical friction."""
@@ -44,6 +58,14 @@ OVERSHOOT = 1.0
 and by this multiple of the error of Newton's method, the step's square over the friction."""
 HALVING = 6
 """Every so many trials the bracket is halved, whatever Newton's method says."""
+KERNEL = "critical"
+WIDTHS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+"""Multiples of the accuracy within which closure is proved above the separating friction: where two
+contacts carry nearly everything, the others are deep in their cones only a little above it."""
+NO_FORCE = 1e-100
+"""Stands in where a contact does not push: no friction is enough there."""
+SEARCHED = 0.95
+"""Of the accuracy, how narrow a bracket the compiled search is asked for; the rest is rounding."""
 
 
 def critical_friction(
@@ -69,6 +91,79 @@ def critical_friction(
         SolverError: A program's answer failed its check.
     """
     points, units = contact_arrays(positions, normals)
+    found = float(_at_once(points[None], units[None])[0])
+    return _bracketed(points, units) if math.isnan(found) else found
+
+
+def critical_frictions(
+    positions: ArrayLike | Iterable[Grasp],
+    normals: ArrayLike | None = None,
+) -> Array:
+    """Critical friction of each of many sets of contacts, as `critical_friction` finds it.
+
+    Args:
+        positions: Contact points, (g, k, 3) [m], k >= 2; or grasps.
+        normals: Unit vectors into the object, (g, k, 3).
+
+    Returns:
+        Upper ends of the brackets, (g,); NaN where nothing can be proved, which is where
+        `critical_friction` raises an UndecidedError.
+
+    Raises:
+        InputError: Shapes or lengths are wrong.
+        SolverError: A program's answer failed its check.
+    """
+    points, units = many_contact_arrays(positions, normals)
+    found = _at_once(points, units)
+    for i in np.flatnonzero(np.isnan(found)):
+        try:
+            found[i] = _bracketed(points[i], units[i])
+        except UndecidedError:
+            continue
+    return found
+
+
+def _at_once(points: Array, normals: Array) -> Array:
+    """Upper ends of narrow brackets that the compiled search finds, both of their ends proved here.
+
+    Returns:
+        (g,); NaN where there is none.
+    """
+    found = np.full(len(points), math.nan)
+    kernel = compiled(KERNEL)
+    if kernel is None:
+        return found
+    arms, _, _ = unit_sizes(points)
+    units = np.array(normals)  # writable, like all that the search is compiled for
+    forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))
+    bounds = np.zeros((len(arms), 2))
+    kernel.search(arms, units, SEARCHED * FRICTION_ACCURACY, forces, twists, bounds)
+    lower = bounds[:, 0]
+    bounded = (lower > FRICTIONLESS) & (lower < 0.5 * LARGEST_FRICTION)
+    bounded &= many_refute_closure(twists, arms, units, lower)
+    along, across = normal_and_tangential(forces, units)
+    enough = (across / np.maximum(along, NO_FORCE)).max(axis=1) * (1.0 + 0.1 * FRICTION_ACCURACY)
+    left = np.flatnonzero(bounded & (enough <= lower * (1.0 + FRICTION_ACCURACY)))
+    proved = left[many_prove_closure(forces[left], arms[left], units[left], enough[left])]
+    found[proved] = enough[proved]
+    for width in WIDTHS:
+        left = np.flatnonzero(bounded & np.isnan(found))
+        if not left.size:
+            break
+        enough, deep = lower[left] * (1.0 + width * FRICTION_ACCURACY), np.zeros_like(arms[left])
+        kernel.deepest(arms[left], units[left], enough, deep)
+        proved = many_prove_closure(deep, arms[left], units[left], enough)
+        found[left[proved]] = enough[proved]
+    return found
+
+
+def _bracketed(points: Array, units: Array) -> float:
+    """The upper end of the bracket, program by program.
+
+    Raises:
+        UndecidedError: Nothing can be proved.
+        SolverError: A program's answer failed its check.
+    """
     arms, _, _ = unit_size(points)
     if _close_without_friction(arms, units):
         return 0.0

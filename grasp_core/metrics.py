@@ -7,6 +7,7 @@ How the pyramids are turned changes the second digit. For a quality without pyra
 
 import importlib
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,15 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, frozen, positive
 from grasp_core.closure import unit_size
 from grasp_core.errors import InputError
-from grasp_core.lp import LinearProgram, Optimum, maximize
+from grasp_core.kernels import compiled
+from grasp_core.lp import RESIDUAL, LinearProgram, Optimum, maximize
+from grasp_core.many_contacts import many_contact_arrays, many_frames, many_frictions, unit_sizes
 from grasp_core.values import Grasp, contact_arrays
 from grasp_core.wrench_sets import WrenchSet
 from grasp_core.wrenches import WRENCH, grasp_map
 
 FEWEST_EDGES = 3
+KERNEL = "weights"
 RANK = 1e-9
 """Singular values below this share of the largest count as zero."""
 UNREACHABLE = 1e-9
@@ -33,14 +37,23 @@ def pyramid_wrenches(wrenches: WrenchSet, edges: int) -> Array:
     Raises:
         InputError: Fewer than three edges.
     """
-    if edges < FEWEST_EDGES:
-        raise InputError(f"edges must be at least {FEWEST_EDGES}, got {edges}")
-    turns = 2.0 * np.pi * np.arange(edges) / edges
-    circle = np.column_stack([np.ones(edges), np.cos(turns), np.sin(turns)])
+    circle = _circle(edges)
     slopes = wrenches.friction
     each = circle * np.array([np.ones_like(slopes), slopes, slopes]).T[:, None]
     G = wrenches.G.reshape(len(wrenches.G), -1, 3)
     return np.einsum("kej,wkj->kew", each, G).reshape(-1, len(wrenches.G))
+
+
+def _circle(edges: int) -> Array:
+    """Edges of a pyramid of friction one, (normal, tangent, tangent), (edges, 3).
+
+    Raises:
+        InputError: Fewer than three edges.
+    """
+    if edges < FEWEST_EDGES:
+        raise InputError(f"edges must be at least {FEWEST_EDGES}, got {edges}")
+    turns = 2.0 * np.pi * np.arange(edges) / edges
+    return np.column_stack([np.ones(edges), np.cos(turns), np.sin(turns)])
 
 
 def min_weight(
@@ -77,7 +90,80 @@ def min_weight(
     points, units = contact_arrays(positions, normals)
     _, center, size = unit_size(points)
     wrenches = WrenchSet.of(points, units, friction, center=center, torque_scale=size)
-    W = pyramid_wrenches(wrenches, edges)
+    return _min_weight(pyramid_wrenches(wrenches, edges))
+
+
+def min_weights(
+    positions: ArrayLike | Iterable[Grasp],
+    normals: ArrayLike | None = None,
+    friction: ArrayLike = 0.5,
+    *,
+    edges: int = 8,
+) -> Array:
+    """The min-weight metric of each of many sets of contacts (see `min_weight`).
+
+    A compiled search names the vertex of each program; what does not pass the check of `lp` is
+    solved on its own.
+
+    Args:
+        positions: Contact points, (g, k, 3) [m]; or grasps.
+        normals: Unit vectors into the object, (g, k, 3).
+        friction: Coulomb coefficient, one for all contacts, or one each, (k,) or (g, k).
+        edges: Of each pyramid.
+
+    Returns:
+        (g,)
+
+    Raises:
+        InputError: Shapes, lengths or signs are wrong.
+        SolverError: A program's answer failed its check.
+    """
+    points, units = many_contact_arrays(positions, normals)
+    W = _many_pyramid_wrenches(points, units, many_frictions(friction, points.shape[:2]), edges)
+    found = _at_once(W)
+    for i in np.flatnonzero(np.isnan(found)):
+        found[i] = _min_weight(W[i])
+    return found
+
+
+def _many_pyramid_wrenches(points: Array, normals: Array, friction: Array, edges: int) -> Array:
+    """Wrenches of the pyramids' edges, (g, k edges, 6), about the centres and at unit size."""
+    circle, (arms, _, _) = _circle(edges), unit_sizes(points)
+    frames = many_frames(normals)
+    forces = np.matmul(circle[:, 1:], frames[..., 1:].swapaxes(-1, -2)) * friction[..., None, None]
+    forces += normals[..., None, :]
+    W = np.empty((*forces.shape[:-1], WRENCH))
+    W[..., :3], W[..., 3:] = forces, np.cross(arms[..., None, :], forces)
+    return W.reshape(len(points), edges * points.shape[1], WRENCH)
+
+
+def _at_once(W: Array) -> Array:
+    """Metrics of wrenches (g, N, 6) by the compiled search, (g,); NaN where an answer fails."""
+    found = np.full(len(W), math.nan)
+    kernel = compiled(KERNEL)
+    if kernel is None:
+        return found
+    (count, N), y = W.shape[:2], np.empty((len(W), WRENCH))
+    multipliers, rows = np.empty((count, WRENCH)), np.empty((count, WRENCH), dtype=np.int64)
+    kernel.vertices(W, y, multipliers, rows)
+    c = W.sum(axis=1)
+    values = np.einsum("gw,gw->g", c, y)
+    reached = values[:, None] - N * np.einsum("gnw,gw->gn", W, y)
+    met = c[:, None] - N * np.take_along_axis(W, rows[..., None], axis=1)
+    failures = [
+        (reached - 1.0).max(axis=1),
+        -multipliers.min(axis=1),
+        np.abs(c - np.einsum("gr,grw->gw", multipliers, met)).max(axis=1),
+        np.abs(multipliers.sum(axis=1) - values),
+    ]
+    scale = 1.0 + np.abs(y).max(axis=1)
+    good = (np.array(failures) <= RESIDUAL * scale).all(axis=0)  # not if one is not a number
+    found[good] = (1.0 - values[good]) / N
+    return found
+
+
+def _min_weight(W: Array) -> float:
+    """Of wrenches (N, 6)."""
     N, mean = len(W), W.mean(axis=0)
     if not _balanced_by_any_weights(W):
         return -math.inf

@@ -14,20 +14,20 @@ WRENCH = 6
 
 
 def grasp_map(positions: Array, center: Array | None = None) -> Array:
-    """Matrix from stacked contact forces (3k,) to their wrench about `center`, (6, 3k).
+    """Matrix from stacked contact forces (3k,) to their wrench about `center`, (..., 6, 3k).
 
     Args:
-        positions: Contact points, (k, 3) [m].
+        positions: Contact points, (..., k, 3) [m].
         center: (3,) [m]; the origin when None.
     """
     arms = positions if center is None else positions - center
-    x, y, z = arms.T
-    G = np.zeros((WRENCH, len(arms), 3))
-    G[0, :, 0] = G[1, :, 1] = G[2, :, 2] = 1.0
-    G[3, :, 1], G[3, :, 2] = -z, y
-    G[4, :, 0], G[4, :, 2] = z, -x
-    G[5, :, 0], G[5, :, 1] = -y, x
-    return G.reshape(WRENCH, -1)
+    x, y, z = np.moveaxis(arms, -1, 0)
+    G = np.zeros((*arms.shape[:-2], WRENCH, arms.shape[-2], 3))
+    G[..., 0, :, 0] = G[..., 1, :, 1] = G[..., 2, :, 2] = 1.0
+    G[..., 3, :, 1], G[..., 3, :, 2] = -z, y
+    G[..., 4, :, 0], G[..., 4, :, 2] = z, -x
+    G[..., 5, :, 0], G[..., 5, :, 1] = -y, x
+    return G.reshape(*arms.shape[:-2], WRENCH, 3 * arms.shape[-2])
 
 
 def in_frames(G: Array, frames: Array) -> Array:

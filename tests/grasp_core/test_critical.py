@@ -5,7 +5,11 @@ import pytest
 
 import grasp_core as gc
 from grasp_core import critical
+from grasp_core.kernels import compiled
+from grasp_core.many_contacts import unit_sizes
 from scenes.objects import example_object
+from tests.grasp_core.bodies import BODIES
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
 
 BOX_SIDES = (
     np.array(
@@ -39,7 +43,7 @@ def test_pushes_that_balance_without_friction_need_no_search(monkeypatch):
     assert gc.critical_friction(grasp) == 0.0
     moved = grasp.positions + 1e-3 * np.cross(grasp.normals, np.roll(grasp.normals, 1, axis=0))
     with pytest.raises(TypeError):
-        gc.critical_friction(moved, grasp.normals)
+        critical._bracketed(moved, grasp.normals)
 
 
 def test_few_programs_are_needed(monkeypatch):
@@ -55,6 +59,172 @@ def test_few_programs_are_needed(monkeypatch):
     monkeypatch.setattr(critical, "decide", counted)
     for grasp in grasps:
         counts.append(0)
-        assert gc.critical_friction(grasp) < math.inf
+        assert critical._bracketed(grasp.positions, grasp.normals) < math.inf
     assert len(counts) >= 30
     assert np.mean(counts) < 9
+
+
+def contact_sets(count=4):
+    """Contacts of planned grasps, if four, on bodies and about a point, (g, k, 3) each."""
+    rng, both = np.random.default_rng(count), []
+    if count == 4:
+        for name in ("random-12-1", "octahedron", "hex-nut"):
+            grasps = gc.plan(example_object(name), 0.5, limit=30).grasps
+            both += [(grasp.positions, grasp.normals) for grasp in grasps]
+    for body in BODIES:
+        both += [BODIES[body][0](rng, count) for _ in range(20)]
+    both += [random_contacts(rng, count, spread=spread) for spread in (0.3, 1.5) for _ in range(30)]
+    positions, normals = zip(*both, strict=True)
+    return np.array(positions), np.array(normals)
+
+
+def reference(monkeypatch, positions, normals):
+    """Bracket of the critical friction, program by program."""
+    brackets = []
+
+    def kept():
+        brackets.append(bracket())
+        return brackets[-1]
+
+    bracket = critical._Bracket
+    with monkeypatch.context() as patch:
+        patch.setattr(critical, "_Bracket", kept)
+        upper = critical._bracketed(positions, normals)
+    return brackets[-1].lower if brackets else 0.0, upper
+
+
+@pytest.mark.parametrize("count", [4, 3, 6])
+def test_many_at_once_and_one_by_one_give_brackets_that_overlap(monkeypatch, count):
+    """The compiled search ends at most `WIDTHS` of the accuracy above where a twist separates."""
+    positions, normals = contact_sets(count)
+    quick = critical._at_once(positions, normals)
+    every = gc.critical_frictions(positions, normals)
+    width = 1.0 + 1.1 * critical.WIDTHS[-1] * critical.FRICTION_ACCURACY
+    for i, (points, units) in enumerate(zip(positions, normals, strict=True)):
+        lower, upper = reference(monkeypatch, points, units)
+        if np.isnan(quick[i]):
+            assert every[i] == upper
+        else:
+            assert every[i] == quick[i] > 0.0
+            assert lower <= quick[i] <= width * upper
+    assert np.isfinite(quick).mean() >= 0.6
+    assert len(quick) >= 140
+
+
+def test_what_the_search_finds_proves_both_ends():
+    """Unit twists miss the cones, and forces lie in them and balance, all but for rounding."""
+    positions, normals = contact_sets()
+    arms, _, _ = unit_sizes(positions)
+    forces, twists, bounds = np.zeros_like(arms), np.zeros((len(arms), 6)), np.zeros((len(arms), 2))
+    compiled(critical.KERNEL).search(arms, normals, 5e-8, forces, twists, bounds)
+    proved = 0
+    for i in np.flatnonzero(np.isfinite(critical._at_once(positions, normals))):
+        lower, upper = bounds[i]
+        if upper - lower > 5e-8 * lower:
+            continue
+        twist = twists[i] / np.linalg.norm(twists[i])
+        for arm, normal in zip(arms[i], normals[i], strict=True):
+            velocity = twist[:3] + np.cross(twist[3:], arm)
+            leaving = velocity @ normal
+            assert leaving + lower * np.linalg.norm(velocity - leaving * normal) <= 1e-12
+        for normal, force in zip(normals[i], forces[i], strict=True):
+            along = force @ normal
+            assert along > 0.0
+            assert np.linalg.norm(force - along * normal) <= upper * (1.0 + 1e-9) * along
+        assert np.abs(forces[i].sum(axis=0)).max() <= 1e-9
+        assert np.abs(np.cross(arms[i], forces[i]).sum(axis=0)).max() <= 1e-9
+        proved += 1
+    assert proved >= 100
+
+
+def test_one_set_of_contacts_is_treated_like_many():
+    positions, normals = contact_sets()
+    every = gc.critical_frictions(positions, normals)
+    for i in range(0, len(every), 7):
+        assert gc.critical_friction(positions[i], normals[i]) == every[i]
+
+
+def test_grasps_are_taken_as_they_are():
+    grasps = gc.plan(example_object("random-12-1"), 0.5, limit=8).grasps
+    arrays = np.array([grasp.positions for grasp in grasps]), [grasp.normals for grasp in grasps]
+    assert (gc.critical_frictions(grasps) == gc.critical_frictions(*arrays)).all()
+    assert len(gc.critical_frictions([])) == 0
+
+
+@pytest.fixture
+def afresh():
+    """What the environment says counts from here on, and no longer afterwards."""
+    compiled.cache_clear()
+    yield
+    compiled.cache_clear()
+
+
+@pytest.mark.usefixtures("afresh")
+def test_without_compiled_code_the_search_is_made_program_by_program(monkeypatch):
+    positions, normals = (array[::20] for array in contact_sets())
+    quick = gc.critical_frictions(positions, normals)
+    compiled.cache_clear()
+    monkeypatch.setenv("GRASPPROOF_KERNELS", "off")
+    slow = gc.critical_frictions(positions, normals)
+    assert np.isnan(critical._at_once(positions, normals)).all()
+    np.testing.assert_allclose(slow, quick, rtol=1e-5)
+    assert len(slow) >= 8
+
+
+@pytest.mark.parametrize("spoil", ["forces", "twists", "lower", "numbers"])
+def test_what_the_search_gets_wrong_is_made_program_by_program(monkeypatch, spoil):
+    """Forces that pull, twists that separate nothing, a lower end too high, and no numbers."""
+
+    def search(arms, normals, width, forces, twists, bounds):
+        honest(arms, normals, width, forces, twists, bounds)
+        if spoil == "forces":
+            forces *= -1.0
+        elif spoil == "twists":
+            twists *= -1.0
+        elif spoil == "lower":
+            bounds *= 1.001
+        else:
+            forces[:], twists[:] = np.nan, np.nan
+
+    def deepest(arms, _, __, forces):
+        forces[:] = np.nan if spoil == "numbers" else -arms
+
+    kernel = compiled(critical.KERNEL)
+    honest = kernel.search
+    positions, normals = (array[:12] for array in contact_sets())
+    right = gc.critical_frictions(positions, normals)
+    monkeypatch.setattr(kernel, "search", search)
+    monkeypatch.setattr(kernel, "deepest", deepest)
+    assert np.isnan(critical._at_once(positions, normals)).all()
+    np.testing.assert_allclose(gc.critical_frictions(positions, normals), right, rtol=1e-5)
+
+
+def test_hopeless_frictionless_and_undecided_sets_are_left_to_the_reference():
+    grasp = gc.plan(example_object("wedge"), 0.5, families="pencil", cones="normal").grasps[0]
+    parallel = np.tile([0.0, 0, 1], (4, 1))
+    positions = np.array([grasp.positions, TETRA_CENTERS, TETRA_CENTERS])
+    normals = np.array([grasp.normals, parallel, TETRA_NORMALS])
+    found = gc.critical_frictions(positions, normals)
+    assert found[:2].tolist() == [0.0, math.inf]
+    assert found[2] == gc.critical_friction(TETRA_CENTERS, TETRA_NORMALS) == 0.0
+    assert np.isnan(critical._at_once(positions, normals)).all()
+
+
+def test_sets_that_cannot_be_decided_are_nan(monkeypatch):
+    def undecided(*_):
+        raise gc.UndecidedError("too close")
+
+    monkeypatch.setattr(critical, "_at_once", lambda points, _: np.full(len(points), math.nan))
+    monkeypatch.setattr(critical, "_bracketed", undecided)
+    assert np.isnan(gc.critical_frictions(TETRA_CENTERS[None], TETRA_NORMALS[None])).all()
+    with pytest.raises(gc.UndecidedError):
+        gc.critical_friction(TETRA_CENTERS, TETRA_NORMALS)
+
+
+def test_bad_sets_are_refused():
+    with pytest.raises(gc.InputError, match="positions must have shape"):
+        gc.critical_frictions(TETRA_CENTERS, TETRA_NORMALS)
+    with pytest.raises(gc.InputError, match="at least two contacts"):
+        gc.critical_frictions(np.zeros((3, 1, 3)), np.tile([0.0, 0, 1], (3, 1, 1)))
+    with pytest.raises(gc.InputError, match="normals are missing"):
+        gc.critical_frictions(TETRA_CENTERS[None])

@@ -1,0 +1,304 @@
+"""The margin program of force closure at one friction, by an interior-point method.
+
+Solved (see `closure`): how deep inside their friction cones k contacts can balance each other. In
+coordinates (normal, tangent, tangent) with tangential forces in units of the friction, each cone is
+K = {s : s_0 >= |(s_1, s_2)|}. Write the forces as s_i + t e with e = (1, 0, 0) and t their common
+depth. As their normal parts sum to one, t = (1 - sum s_i0) / k, and what is left is
+
+    minimise  sum s_i0  subject to  sum A_i s_i = -m,  s_i in K,
+
+the columns of A_i being the wrenches of contact i's three axes, with the mean m of the wrenches of
+all normals taken off the first. Its dual
+
+    maximise  -m.y      subject to  z_i = e - A_i'y in K
+
+is over twists y. The optimum V is below one for force closure and above one if some y separates:
+z_i in K means that the support of cone i in direction y is at most (1 + m.y) / k.
+
+Method. As sum A_i e = 0, the points s_i = e, y = 0, z_i = e are in the middle of the cones, and the
+dual one is exact. From there Newton's method follows the points where the products of s_i and z_i
+in the algebra of K are equal multiples of e, with Mehrotra's predictor and corrector, in the
+coordinates of Nesterov and Todd in which s_i and z_i are the same vector. Each step is found by
+reflections: the squares of a Cholesky factorisation would leave an imbalance where two contacts
+carry nearly everything. Divisions by zero give what is no number, with which the search ends.
+
+Source: Vandenberghe, "The CVXOPT linear and quadratic cone program solvers" (2010), sections 4-7.
+"""
+
+import math
+
+import numpy as np
+from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
+
+from grasp_core.arrays import Array
+
+WRENCH = 6
+MOST_STEPS = 40
+"""Ten are usual."""
+SHARE = 0.1
+"""The gap between primal and dual that is left, relative to the distance of V from one."""
+SMALLEST_GAP = 1e-11
+"""Smaller ones are rounding, in programs of order one."""
+BALANCED = 1e-10
+"""Largest imbalance of the last point; usual is 1e-15."""
+SHORTER = 0.99
+"""Share of the way to the border of the cones that a step may take."""
+
+
+@njit(cache=True, error_model="numpy")
+def least_cone_sum(columns: Array, mean: Array, pair: Array, y: Array) -> tuple[float, float]:
+    """Solve the program, as far as it takes to tell on which side of one its value is.
+
+    Args:
+        columns: Those of A_i, as rows, (k, 3, 6).
+        mean: m, (6,).
+        pair: Filled with s and z, (2, k, 3).
+        y: Filled with the twist, (6,).
+
+    Returns:
+        Values of the primal and of the dual program. The optimum lies between them where the
+        forces balance.
+    """
+    k = len(columns)
+    W, middle, V = np.empty((2, k, 3, 3)), np.empty((k, 3)), np.empty((WRENCH, k, 3))
+    R, missing, wanted = np.empty((WRENCH, WRENCH)), np.empty(WRENCH), np.empty((k, 3))
+    step, turn = np.empty((2, k, 3)), np.empty(WRENCH)
+    _start(pair, y)
+    primal = dual = 0.0
+    for _ in range(MOST_STEPS):
+        primal, dual, gap = _values(mean, pair, y)
+        off = _missing(columns, mean, pair, missing)
+        if off <= BALANCED and gap <= max(SHARE * abs(1.0 - primal), SMALLEST_GAP):
+            break
+        if not (_scale(pair, W, middle) and _factor(columns, W, V, R)):
+            break
+        _towards_the_border(middle, wanted)
+        _direct(V, R, missing, wanted, step, turn)
+        reach = min(1.0, _longest(middle, step))
+        _towards_the_middle(middle, step, (1.0 - reach) ** 3 * gap / k, wanted)
+        _direct(V, R, missing, wanted, step, turn)
+        reach = min(1.0, SHORTER * _longest(middle, step))
+        _move(pair, W, step, reach)
+        for w in range(WRENCH):
+            y[w] += reach * turn[w]
+    return primal, dual
+
+
+@njit(cache=True, error_model="numpy")
+def _start(pair: Array, y: Array) -> None:
+    for i in range(pair.shape[1]):
+        for j in range(3):
+            pair[0, i, j] = pair[1, i, j] = 1.0 if j == 0 else 0.0
+    for w in range(WRENCH):
+        y[w] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _values(mean: Array, pair: Array, y: Array) -> tuple[float, float, float]:
+    """Values of the primal and the dual program, and the sum of s_i.z_i."""
+    primal = dual = gap = 0.0
+    for i in range(pair.shape[1]):
+        primal += pair[0, i, 0]
+        for j in range(3):
+            gap += pair[0, i, j] * pair[1, i, j]
+    for w in range(WRENCH):
+        dual -= mean[w] * y[w]
+    return primal, dual, gap
+
+
+@njit(cache=True, error_model="numpy")
+def _missing(columns: Array, mean: Array, pair: Array, missing: Array) -> float:
+    """What the forces lack to balance, and its largest part."""
+    for w in range(WRENCH):
+        missing[w] = -mean[w]
+    for i in range(len(columns)):
+        for j in range(3):
+            for w in range(WRENCH):
+                missing[w] -= columns[i, j, w] * pair[0, i, j]
+    largest = 0.0
+    for w in range(WRENCH):
+        largest = max(largest, abs(missing[w]))
+    return largest
+
+
+@njit(cache=True, error_model="numpy")
+def _depth(v: Array, i: int) -> float:
+    """v_0^2 - |(v_1, v_2)|^2 of the i-th vector; not positive outside the cone."""
+    across = math.sqrt(v[i, 1] ** 2 + v[i, 2] ** 2)
+    return (v[i, 0] - across) * (v[i, 0] + across) if v[i, 0] > 0.0 else -1.0
+
+
+@njit(cache=True, error_model="numpy")
+def _scale(pair: Array, W: Array, middle: Array) -> bool:
+    """The symmetric maps W_i of K, and their inverses, with W_i z_i = inverse(W_i) s_i = middle_i.
+
+    False if rounding has put the point outside the cones.
+    """
+    s, z = pair[0], pair[1]
+    for i in range(len(s)):
+        deep_s, deep_z = _depth(s, i), _depth(z, i)
+        if not (deep_s > 0.0 and deep_z > 0.0):
+            return False
+        a, b = 1.0 / math.sqrt(deep_s), 1.0 / math.sqrt(deep_z)
+        dot = a * b * (s[i, 0] * z[i, 0] + s[i, 1] * z[i, 1] + s[i, 2] * z[i, 2])
+        half = 0.5 / math.sqrt(0.5 + 0.5 * dot)
+        w0 = half * (a * s[i, 0] + b * z[i, 0])
+        w1, w2 = half * (a * s[i, 1] - b * z[i, 1]), half * (a * s[i, 2] - b * z[i, 2])
+        bend, size = 1.0 / (1.0 + w0), math.sqrt(b / a)
+        for side in range(2):
+            turned = size if side == 0 else -1.0 / size
+            size_here = abs(turned)
+            W[side, i, 0, 0] = size_here * w0
+            W[side, i, 0, 1] = W[side, i, 1, 0] = turned * w1
+            W[side, i, 0, 2] = W[side, i, 2, 0] = turned * w2
+            W[side, i, 1, 1] = size_here * (1.0 + bend * w1 * w1)
+            W[side, i, 2, 2] = size_here * (1.0 + bend * w2 * w2)
+            W[side, i, 1, 2] = W[side, i, 2, 1] = size_here * bend * w1 * w2
+        for j in range(3):
+            middle[i, j] = (
+                W[0, i, j, 0] * z[i, 0] + W[0, i, j, 1] * z[i, 1] + W[0, i, j, 2] * z[i, 2]
+            )
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _factor(columns: Array, W: Array, V: Array, R: Array) -> bool:
+    """Reflections 1 - v v' that bring all A_i W_i, side by side, to the triangle R.
+
+    False if the wrenches do not span all six dimensions.
+    """
+    for w in range(WRENCH):
+        for i in range(len(columns)):
+            for j in range(3):
+                V[w, i, j] = (
+                    W[0, i, j, 0] * columns[i, 0, w]
+                    + W[0, i, j, 1] * columns[i, 1, w]
+                    + W[0, i, j, 2] * columns[i, 2, w]
+                )
+        for v in range(w):
+            _reflect(V, v, V, w)
+            R[v, w] = V[w, v // 3, v % 3]
+            V[w, v // 3, v % 3] = 0.0
+        rest = _dot(V, w, V, w)
+        if not rest > 0.0:
+            return False
+        first = V[w, w // 3, w % 3]
+        R[w, w] = -math.copysign(math.sqrt(rest), first)
+        V[w, w // 3, w % 3] = first - R[w, w]
+        size = 1.0 / math.sqrt(R[w, w] * (R[w, w] - first))
+        for i in range(len(columns)):
+            for j in range(3):
+                V[w, i, j] *= size
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _reflect(V: Array, v: int, X: Array, x: int) -> None:
+    """Reflect the x-th of some vectors by the v-th reflection."""
+    share = _dot(V, v, X, x)
+    for i in range(V.shape[1]):
+        for j in range(3):
+            X[x, i, j] -= share * V[v, i, j]
+
+
+@njit(cache=True, error_model="numpy")
+def _dot(V: Array, v: int, X: Array, x: int) -> float:
+    total = 0.0
+    for i in range(V.shape[1]):
+        total += V[v, i, 0] * X[x, i, 0] + V[v, i, 1] * X[x, i, 1] + V[v, i, 2] * X[x, i, 2]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _direct(V: Array, R: Array, missing: Array, wanted: Array, step: Array, turn: Array) -> None:
+    """The step whose parts for s and z, scaled, sum to what is wanted, and its part for y.
+
+    It supplies what is missing.
+    """
+    for i in range(len(wanted)):
+        for j in range(3):
+            step[0, i, j], step[1, i, j] = wanted[i, j], 0.0
+    for v in range(WRENCH):
+        _reflect(V, v, step, 0)
+    _solve_lower(R, missing, turn)
+    for w in range(WRENCH):
+        turn[w] -= step[0, w // 3, w % 3]
+        step[1, w // 3, w % 3] = -turn[w]
+    for v in range(WRENCH - 1, -1, -1):
+        _reflect(V, v, step, 1)
+    for i in range(len(wanted)):
+        for j in range(3):
+            step[0, i, j] = wanted[i, j] - step[1, i, j]
+    _solve_upper(R, turn)
+
+
+@njit(cache=True, error_model="numpy")
+def _solve_lower(R: Array, b: Array, x: Array) -> None:
+    """Solve R'x = b."""
+    for w in range(WRENCH):
+        x[w] = b[w]
+        for v in range(w):
+            x[w] -= R[v, w] * x[v]
+        x[w] /= R[w, w]
+
+
+@njit(cache=True, error_model="numpy")
+def _solve_upper(R: Array, x: Array) -> None:
+    """Solve R x = b in place."""
+    for w in range(WRENCH - 1, -1, -1):
+        for v in range(w + 1, WRENCH):
+            x[w] -= R[w, v] * x[v]
+        x[w] /= R[w, w]
+
+
+@njit(cache=True, error_model="numpy")
+def _towards_the_border(middle: Array, wanted: Array) -> None:
+    for i in range(len(wanted)):
+        for j in range(3):
+            wanted[i, j] = -middle[i, j]
+
+
+@njit(cache=True, error_model="numpy")
+def _towards_the_middle(middle: Array, ahead: Array, product: float, wanted: Array) -> None:
+    """Where the products become `product` e, with those of the step ahead taken into account."""
+    s, z = ahead[0], ahead[1]
+    for i in range(len(wanted)):
+        m0, m1, m2 = middle[i, 0], middle[i, 1], middle[i, 2]
+        d0 = product - m0 * m0 - m1 * m1 - m2 * m2
+        d0 -= s[i, 0] * z[i, 0] + s[i, 1] * z[i, 1] + s[i, 2] * z[i, 2]
+        d1 = -2.0 * m0 * m1 - s[i, 0] * z[i, 1] - z[i, 0] * s[i, 1]
+        d2 = -2.0 * m0 * m2 - s[i, 0] * z[i, 2] - z[i, 0] * s[i, 2]
+        x = (m0 * d0 - m1 * d1 - m2 * d2) / _depth(middle, i)
+        wanted[i, 0], wanted[i, 1], wanted[i, 2] = x, (d1 - x * m1) / m0, (d2 - x * m2) / m0
+
+
+@njit(cache=True, error_model="numpy")
+def _longest(middle: Array, step: Array) -> float:
+    """How many times a step can be taken before s or z leaves the cones."""
+    longest = np.inf
+    for side in range(2):
+        p, d = middle, step[side]
+        for i in range(len(p)):
+            a = d[i, 0] ** 2 - d[i, 1] ** 2 - d[i, 2] ** 2
+            b = p[i, 0] * d[i, 0] - p[i, 1] * d[i, 1] - p[i, 2] * d[i, 2]
+            c = _depth(p, i)
+            if d[i, 0] < 0.0:
+                longest = min(longest, -p[i, 0] / d[i, 0])
+            if b * b < a * c:
+                continue
+            root = math.sqrt(b * b - a * c)
+            q = -b - root if b > 0.0 else root - b  # a x^2 + 2 b x + c vanishes at c / q and q / a
+            if c / q > 0.0:
+                longest = min(longest, c / q)
+            if q / a > 0.0:
+                longest = min(longest, q / a)
+    return longest
+
+
+@njit(cache=True, error_model="numpy")
+def _move(pair: Array, W: Array, step: Array, share: float) -> None:
+    for side in range(2):
+        for i in range(pair.shape[1]):
+            for j in range(3):
+                for h in range(3):
+                    pair[side, i, j] += share * W[side, i, j, h] * step[side, i, h]
