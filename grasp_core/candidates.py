@@ -15,8 +15,8 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.constructions import LEAST_RADIUS
+from grasp_core.disc_limits import corners_of, disc_limits
 from grasp_core.face_pieces import Shapes
-from grasp_core.reaches import corners_of, reaches_and_widths
 from grasp_core.spanning import SpanningTable, span_sines
 from grasp_core.tilted_cones import tilted_cones
 from grasp_core.values import FINGERS, ForceCone, Polyhedron, four
@@ -49,10 +49,8 @@ class Candidates:
     """Of both choices, around the normals and tilted, (q, 2, 4, 3)."""
     half_angles: Array
     """(q, 2) [rad]; not positive where there is no such choice."""
-    reaches: Array
-    """Upper bounds on the mean distance of a focus from its contacts, (q, 2), in object radii."""
-    widths: Array
-    """Upper bounds on the distances of two contacts from a common focus, added, (q, 2, 4, 4)."""
+    limits: Array
+    """Upper bounds on the discs of each choice (see `disc_limits`), (q, 2, 4), in object radii."""
     rooms: Array
     """Radius of the largest disc that fits in each of the four faces, (q,)."""
 
@@ -190,13 +188,16 @@ def _candidates(
         leaning = tilted_cones(normals, thetas)
         axes[TILTED] = leaning.axes
         half_angles[TILTED] = BELOW_SPAN_ANGLE * leaning.half_angles
-    bounds = [reaches_and_widths(corners_of(body), quads, each) for each in axes[: 1 + tilted]]
+    corners = corners_of(body)
+    limits = [
+        disc_limits(corners, body.normals, quads, *choice)
+        for choice in list(zip(axes, half_angles, strict=True))[: 1 + tilted]
+    ]
     return Candidates(
         faces=quads,
         normals=normals,
         axes=np.stack(axes, axis=1),
         half_angles=np.stack(half_angles, axis=1),
-        reaches=np.stack([bounds[NORMAL][0], bounds[-1][0]], axis=1),
-        widths=np.stack([bounds[NORMAL][1], bounds[-1][1]], axis=1),
+        limits=np.stack([limits[NORMAL], limits[-1]], axis=1),
         rooms=rooms[quads].min(axis=1, initial=np.inf),
     )

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -11,13 +10,12 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.concurrent_grasps import (
-    concurrent_radius_bounds,
     cone_footprint,
     place_concurrent,
     place_on_mixed_sides,
 )
 from grasp_core.face_pieces import FacePiece, inscribed_disc_radius
-from grasp_core.pencil_grasps import pencil_radius_bounds, place_pencil
+from grasp_core.pencil_grasps import place_pencil
 from grasp_core.placements import NoPlacement, Placement
 from grasp_core.regulus_grasps import nearly_symmetric, place_regulus
 from grasp_core.values import ContactRegion, Family, ForceCone
@@ -44,9 +42,9 @@ class Construction:
     """Finger orders that give different grasps of the same faces."""
     place: Callable[[Sequence[FacePiece], Sequence[ForceCone], float], Placement | NoPlacement]
     """From pieces, force cones and the least merit worth having."""
-    bounds: Callable[[Array, Array, Array], Array] | None
-    """Upper bounds on the radius for each finger order, from reaches, widths and half-angles (see
-    `candidates`); None where no disc is claimed."""
+    limits: slice | None
+    """Which of a quadruple's `disc_limits` are those of its finger orders; None where no disc is
+    claimed."""
     admits: Callable[[Array, Array], NDArray[np.bool_]]
     """Whether quadruples are worth a program, from their normals in finger order, (q, 4, 3), and
     half-angles (q,): False only where none can be feasible."""
@@ -56,7 +54,7 @@ class Construction:
     @property
     def least(self) -> float:
         """The merit above which a placement counts."""
-        return LEAST_RADIUS if self.bounds else -math.inf
+        return LEAST_RADIUS if self.limits else -math.inf
 
 
 def _always_admitted(_: Array, half_angles: Array) -> NDArray[np.bool_]:
@@ -96,7 +94,7 @@ MIXED = Construction(
     "concurrent",
     AS_LISTED,
     lambda pieces, cones, least: place_on_mixed_sides(pieces, cones, least=least),
-    concurrent_radius_bounds,
+    slice(0, 1),
     _always_admitted,
     _cone_region,
 )
@@ -107,7 +105,7 @@ CONSTRUCTIONS: dict[Family, Construction] = {
         "concurrent",
         AS_LISTED,
         lambda pieces, cones, least: place_concurrent(pieces, cones, least=least),
-        concurrent_radius_bounds,
+        slice(0, 1),
         _always_admitted,
         _cone_region,
     ),
@@ -117,7 +115,7 @@ CONSTRUCTIONS: dict[Family, Construction] = {
         lambda pieces, cones, least: place_pencil(
             pieces, cones, least=least, least_gap=LEAST_RADIUS
         ),
-        partial(pencil_radius_bounds, orders=PAIRINGS),
+        slice(1, 4),
         _always_admitted,
         _disc_region,
     ),

@@ -98,13 +98,12 @@ def ranked(candidates: Candidates, construction: Construction) -> Ranking:
     usable: NDArray[np.bool_] = candidates.half_angles > LEAST_SPAN_ANGLE
     usable &= candidates.rooms[:, None] > 0.0
     spans = usable[:, NORMAL].copy()
-    if construction.bounds is None:
+    if construction.limits is None:
         usable[:, TILTED] = False  # no region to gain: the free method finds such grasps
         bounds = np.full((*usable.shape, len(construction.orders)), np.inf)
         promise = candidates.half_angles[:, NORMAL]
     else:
-        half_angles = np.maximum(candidates.half_angles, 0.0)
-        bounds = construction.bounds(candidates.reaches, candidates.widths, half_angles)
+        bounds = candidates.limits[:, :, construction.limits]
         bounds = np.minimum(bounds, candidates.rooms[:, None, None])
         promise = None
     for column, order in enumerate(construction.orders):

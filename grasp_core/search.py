@@ -88,7 +88,7 @@ class Search:
 
     def least(self, construction: Construction) -> float:
         """Above which merit a placement counts, and may still enter the best."""
-        if self.full and (construction.bounds is None or not self.best):
+        if self.full and (construction.limits is None or not self.best):
             return math.inf
         worst = self.best[-1].placement.merit if self.full else -math.inf
         return max(worst * (1.0 + SAME_MERIT), construction.least)
@@ -148,7 +148,7 @@ def _in_order(
     construction: Construction, discs: DiscBounds, blocks: Sequence[Block], search: Search
 ) -> Iterator[Quadruple]:
     """Quadruples to try: with a limit best first over all blocks, else block by block."""
-    if construction.bounds is not None:
+    if construction.limits is not None:
         together = [blocks] if search.limit is not None else [[block] for block in blocks]
         for some in together:
             yield from promising(construction, some, discs, search.least, search.tally)
@@ -228,7 +228,7 @@ def _placed_on(
     construction: Construction, cones: Cones, pieces: tuple[FacePiece, ...]
 ) -> Placement | None:
     """Any placement on pieces, however small its discs."""
-    placed = construction.place(pieces, cones, 0.0 if construction.bounds else -math.inf)
+    placed = construction.place(pieces, cones, 0.0 if construction.limits else -math.inf)
     return placed if isinstance(placed, Placement) else None
 
 
@@ -254,7 +254,7 @@ def _best_placement(
     best = None
     for chosen in choices_near(shapes, whole.positions, MOST_CHOICES):
         tally["solved"] += 1
-        if construction.bounds is not None and min(piece.inradius for piece in chosen) < least:
+        if construction.limits is not None and min(piece.inradius for piece in chosen) < least:
             continue
         placed = construction.place(chosen, cones, least)
         if isinstance(placed, Placement) and placed.merit > least:

@@ -172,7 +172,7 @@ class Searches:
 
         Where nothing bounds discs, only cones around the normals count.
         """
-        blocks = self.spanning_blocks if construction.bounds is None else self.tilted_blocks
+        blocks = self.spanning_blocks if construction.limits is None else self.tilted_blocks
 
         def rank(place: int) -> Ranking:
             candidates = blocks[place]
@@ -184,7 +184,7 @@ class Searches:
     def _free_request(self, cells: int | None = None) -> FreeRequest:
         request = self.request
         structured = [CONSTRUCTIONS[method] for method in self.constructions]
-        upgrades = [each for each in structured if each.bounds and request.cones == "tilted"]
+        upgrades = [each for each in structured if each.limits and request.cones == "tilted"]
         upgrades += [MIXED for each in upgrades if each.family == MIXED.family]
         return FreeRequest(
             request.friction, request.theta, request.seed, cells or request.cells, upgrades,

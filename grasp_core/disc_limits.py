@@ -1,4 +1,4 @@
-"""Upper bounds on how far a focus can be from contacts on faces, from the faces' corners alone.
+"""Upper bounds on discs from the faces' corners alone, at next to no cost.
 
 Reach. With positive weights w of sum w_i a_i = 0 for the axes, and contacts c_i on the faces,
 sum w_i a_i.(x0 - c_i) = -sum w_i a_i.c_i wherever the focus x0 is: the weighted mean of the
@@ -8,6 +8,17 @@ focus behind the fingers at most sum w_i max a_i.c_i.
 Width. If two axes lead from one focus back to their contacts, c_i = x - s_i a_i and
 c_j = x - s_j a_j, then d = (a_i - a_j) / (1 - a_i.a_j) has d.a_i = 1 and d.a_j = -1, and so
 s_i + s_j = d.(c_j - c_i), which the corners of the two faces bound.
+
+What these mean for discs is said in `concurrent_radius_bounds` and `pencil_radius_bounds`.
+
+Across. Let N be the unit vector across both axes of one pair of a pencil. It is across the line of
+the foci too, so both foci c have the same height h = N.c, and so have the disc centres q_i and q_j
+of that pair. As a disc of radius r reaches r |T'N| to either side, the heights of the corners, from
+lo_i to hi_i, leave r |T_i'N| <= hi_i - h and r |T_j'N| <= h - lo_j, or
+r (|T_i'N| + |T_j'N|) <= hi_i - lo_j. A finger m of the other pair is at
+N.q_m = h - s_m N.a_m with s_m >= r / tan(psi / 2), which makes the left side larger by
+r |N.a_m| / tan(psi / 2). Only compiled code asks for these: they decide nothing but how many
+programs are solved.
 """
 
 from itertools import combinations
@@ -15,12 +26,15 @@ from itertools import combinations
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.concurrent_grasps import concurrent_radius_bounds
+from grasp_core.constructions import PAIRINGS
 from grasp_core.kernels import compiled
 from grasp_core.kernels.tables import Corners
+from grasp_core.pencil_grasps import pencil_radius_bounds
 from grasp_core.spanning import balancing_weights
 from grasp_core.values import FINGERS, Polyhedron
 
-KERNEL = "reaches"
+KERNEL = "limits"
 PARALLEL = 1e-6
 """Axes whose 1 - a_i.a_j is below this bound no width."""
 
@@ -37,25 +51,34 @@ def corners_of(body: Polyhedron) -> Corners:
     return Corners(np.array(padded), counts)
 
 
-def reaches_and_widths(corners: Corners, faces: Indices, axes: Array) -> tuple[Array, Array]:
-    """Bounds for many quadruples.
+def disc_limits(
+    corners: Corners, normals: Array, faces: Indices, axes: Array, half_angles: Array
+) -> Array:
+    """Limits for many quadruples.
 
     Args:
         corners: Of all faces.
+        normals: Likewise, (f, 3).
         faces: (q, 4)
         axes: Of force cones that positively span, (q, 4, 3).
+        half_angles: One for all four, (q,) [rad]; not positive where there are no such cones.
 
     Returns:
-        Upper bounds on the mean distance of a focus before or behind its contacts, (q,), and on
-        s_i + s_j for contacts i and j of one focus, (q, 4, 4).
+        Upper bounds on the smallest of four discs, (q, 4): in a concurrent grasp, then in a pencil
+        in each of the `PAIRINGS`. In units of the corners.
     """
     kernel = compiled(KERNEL)
     if kernel is None:
-        points = corners.points[faces]
-        return _reaches(points, axes), _widths(points, axes)
-    reaches, widths = np.empty(len(faces)), np.empty((len(faces), FINGERS, FINGERS))
-    kernel.fill(corners, np.ascontiguousarray(faces), np.ascontiguousarray(axes), reaches, widths)
-    return reaches, widths
+        points, angles = corners.points[faces], np.maximum(half_angles, 0.0)
+        reaches, widths = _reaches(points, axes), _widths(points, axes)
+        concurrent = concurrent_radius_bounds(reaches, widths, angles)
+        return np.hstack([concurrent, pencil_radius_bounds(reaches, widths, angles, PAIRINGS)])
+    limits = np.empty((len(faces), 1 + len(PAIRINGS)))
+    kernel.fill(
+        corners, np.ascontiguousarray(normals), np.ascontiguousarray(faces),
+        np.ascontiguousarray(axes), np.ascontiguousarray(half_angles), limits,
+    )  # fmt: skip
+    return limits
 
 
 def _reaches(corners: Array, axes: Array) -> Array:
