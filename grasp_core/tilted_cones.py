@@ -32,9 +32,11 @@ from itertools import pairwise, product
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.kernels import compiled
 from grasp_core.spanning import OTHERS, span_sines
 from grasp_core.values import FINGERS
 
+KERNEL = "tilting"
 CAPS = (0.3, 0.5, 0.7, 0.9)
 """How far axes may lean while they are balanced, in friction angles."""
 TOWARD = (0.5, 0.9)
@@ -48,6 +50,7 @@ GROWTH, DECAY = 1.3, 0.9
 SLIGHT = 1e-6
 """Improvements and directions below this must not decide anything: vertices that are off by 1e-9
 of an object turn the normals of its small faces by a hundred times that."""
+PACE = (FIRST_MOVE, GROWTH, DECAY, SLIGHT)
 BESIDE = 0.1
 """Sine of the angle from which on another axis is beside one."""
 FLAT = 0.5
@@ -155,6 +158,10 @@ def _bent(normals: Array, thetas: Array) -> Iterator[Array]:
 
 def half_angle(axes: Array, normals: Array, thetas: Array) -> Array:
     """The largest psi that axes allow, (q,) [rad]; negative where they do not span."""
+    if kernel := compiled(KERNEL):
+        reached = np.empty(len(axes))
+        kernel.half_angles(*map(np.ascontiguousarray, (axes, normals, thetas)), reached)
+        return reached
     sines = span_sines(axes)
     spans = np.where(sines > 0.0, np.arcsin(np.clip(sines, 0.0, 1.0)), sines)
     return np.minimum(spans, (thetas - _angles(axes, normals)).min(axis=1))
@@ -162,7 +169,10 @@ def half_angle(axes: Array, normals: Array, thetas: Array) -> Array:
 
 def _balanced(normals: Array, caps: Array) -> Array:
     """Unit vectors within caps around the normals, each pointed against the sum of the others."""
-    axes = normals.copy()
+    axes = np.array(normals, order="C")
+    if kernel := compiled(KERNEL):
+        kernel.balance(axes, axes.copy(), np.ascontiguousarray(caps), SWEEPS, SLIGHT)
+        return axes
     for _ in range(SWEEPS):
         for finger, others in enumerate(OTHERS):
             against = -axes[:, others].sum(axis=1)
@@ -186,10 +196,16 @@ def _into_cap(vectors: Array, centers: Array, angles: Array) -> Array:
 
 
 def _improved(axes: Array, normals: Array, thetas: Array) -> tuple[Array, Array]:
+    moves = np.random.default_rng(0).normal(size=(MOVES, FINGERS, 2))
+    first, second = _aside(axes)
+    if kernel := compiled(KERNEL):
+        axes, reached = np.array(axes, order="C"), np.empty(len(axes))
+        given = map(np.ascontiguousarray, (normals, thetas, np.stack([first, second])))
+        kernel.improve((axes, reached), *given, moves, np.array(PACE))
+        return axes, reached
     reached = half_angle(axes, normals, thetas)
     steps = FIRST_MOVE * thetas.min(axis=1)
-    first, second = _aside(axes)
-    for move in np.random.default_rng(0).normal(size=(MOVES, FINGERS, 2)):
+    for move in moves:
         sideways = move[:, :1] * first + move[:, 1:] * second
         moved = axes + steps[:, None, None] * sideways
         moved /= np.linalg.norm(moved, axis=-1, keepdims=True)

@@ -59,7 +59,7 @@ class Rows(NamedTuple):
     equalities: int
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def solve(c: Array, rows: Rows, cutoff: float, basis: Indices, y: Array) -> tuple[int, int]:
     """Find a best vertex.
 
@@ -107,7 +107,7 @@ def solve(c: Array, rows: Rows, cutoff: float, basis: Indices, y: Array) -> tupl
     return LOST, -1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def proved_bound(c: Array, rows: Rows, basis: Indices, y: Array, accuracy: float) -> float:
     """No feasible value is larger: y.b, if y >= 0 gives c to within an accuracy; else infinity."""
     bound, left = 0.0, c.copy()
@@ -123,7 +123,7 @@ def proved_bound(c: Array, rows: Rows, basis: Indices, y: Array, accuracy: float
     return bound if np.abs(left).max() <= accuracy else np.inf
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _corner(c: Array, count: int, basis: Indices, y: Array) -> tuple[Array, Array, float]:
     """The corner of the box on the side of c: inverse of its basis, x and c.x."""
     n = len(c)
@@ -136,7 +136,7 @@ def _corner(c: Array, count: int, basis: Indices, y: Array) -> tuple[Array, Arra
     return inverse, x, value
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _leans_on_box(y: Array, basis: Indices, count: int) -> bool:
     leans = False
     for j in range(len(y)):
@@ -144,7 +144,7 @@ def _leans_on_box(y: Array, basis: Indices, count: int) -> bool:
     return leans
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _exceeded(x: Array, rows: Rows, excess: Array) -> None:
     """How far x is beyond each row."""
     for k in range(len(excess)):
@@ -155,7 +155,7 @@ def _exceeded(x: Array, rows: Rows, excess: Array) -> None:
             excess[k] += column[k] * at
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _violated(excess: Array, rows: Rows, inside: NDArray[np.bool_], first: bool) -> int:
     """The row that is violated most, or the first one; -1 if none is."""
     worst, found, inequalities = VIOLATED, -1, len(excess) - rows.equalities
@@ -168,7 +168,7 @@ def _violated(excess: Array, rows: Rows, inside: NDArray[np.bool_], first: bool)
     return found
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _turn(rows: Rows, k: int) -> None:
     """Turn an equality, so that what was beneath it is beyond."""
     rows.b[k] = -rows.b[k]
@@ -176,7 +176,7 @@ def _turn(rows: Rows, k: int) -> None:
         rows.At[i, k] = -rows.At[i, k]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _combined(rows: Rows, entering: int, inverse: Array, alpha: Array) -> None:
     """Write a row as a combination of those of the basis."""
     alpha[:] = 0.0
@@ -187,7 +187,7 @@ def _combined(rows: Rows, entering: int, inverse: Array, alpha: Array) -> None:
                 alpha[j] += share * inverse[i, j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _refine(c: Array, rows: Rows, basis: Indices, inverse: Array, y: Array) -> None:
     """Multipliers afresh: their rounding errors have added up over the steps."""
     y[:] = 0.0
@@ -200,7 +200,7 @@ def _refine(c: Array, rows: Rows, basis: Indices, inverse: Array, y: Array) -> N
                 y[j] += left[i] * inverse[i, j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _subtract(left: Array, share: float, rows: Rows, k: int) -> None:
     """Take a share of a row away, which may be a side of the box."""
     side = k - len(rows.b)
@@ -211,7 +211,7 @@ def _subtract(left: Array, share: float, rows: Rows, k: int) -> None:
         left[i] -= share * rows.At[i, k]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _leaving(y: Array, alpha: Array, basis: Indices, rows: Rows) -> int:
     """Of the least ratios y / alpha the one with the largest alpha; -1 if no alpha is positive.
 
@@ -228,7 +228,7 @@ def _leaving(y: Array, alpha: Array, basis: Indices, rows: Rows) -> int:
     return found
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _exchange(inverse: Array, x: Array, alpha: Array, leaving: int, excess: float) -> None:
     """Put a row in the place of another: the point moves onto it along the others."""
     n = len(x)

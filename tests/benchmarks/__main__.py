@@ -34,7 +34,8 @@ def main():
 
 def line(row):
     ratio = f"{row.ratio:.1f} ({row.low:.1f} .. {row.high:.1f})" if row.ratio else ""
-    return f"{duration(row.median_us):>12s}  {ratio:>22s}  {row.what}  {row.remark}".rstrip()
+    took = duration(row.median_us) if row.median_us else ""
+    return f"{took:>12s}  {ratio:>22s}  {row.what}  {row.remark}".rstrip()
 
 
 def duration(microseconds):

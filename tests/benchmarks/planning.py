@@ -4,20 +4,31 @@ The hull of points on a sphere has as many triangular faces as wanted. A plan wi
 hold the largest discs of a plan without one, where that is affordable; that is checked first.
 """
 
-import gc as garbage
-import resource
+import subprocess
+import sys
 
 import numpy as np
 import trimesh
 
 import grasp_core as gc
 from scenes.objects import example_object
-from tests.benchmarks.timing import once
+from tests.benchmarks.timing import Row, once
 
 LIMIT = 100
 FACES = (12, 30, 100, 200, 400, 800)
+MEMORY = ((200, "normal"), (800, "normal"), (800, "tilted"))
 PAPER = ("concurrent", "pencil", "regulus")
 TEN_DEGREES = 0.1763
+MEASURED = """
+import resource
+import grasp_core as gc
+from tests.benchmarks.planning import PAPER, TEN_DEGREES, sphere_hull
+body = sphere_hull({faces})
+gc.plan(sphere_hull(8), TEN_DEGREES, limit=4)
+if {limit}:
+    gc.plan(body, TEN_DEGREES, families=PAPER, limit={limit}, cones={cones!r})
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
 ALL = ("tetrahedron", "octahedron", "wedge", "dodecahedron")
 CHECKED = "random-14-1"
 
@@ -40,8 +51,16 @@ def check():
         assert np.allclose(best, every[-len(best) :], rtol=2e-5)
 
 
-def megabytes():
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+def megabytes(faces, cones):
+    """Peak of a process that makes one such plan, and of one that only imports and loads."""
+    peaks = []
+    for limit in (0, LIMIT):
+        code = MEASURED.format(faces=faces, cones=cones, limit=limit)
+        answer = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        )
+        peaks.append(int(answer.stdout) / 1024)
+    return peaks
 
 
 def rows():
@@ -55,7 +74,6 @@ def rows():
     for faces in FACES:
         body = sphere_hull(faces)
         for cones in ("normal", "tilted"):
-            garbage.collect()
             what = f"best {LIMIT} of {body.name}, {cones} cones"
             row, plan = once(
                 "planning", what,
@@ -64,6 +82,10 @@ def rows():
                 ),
             )  # fmt: skip
             tried = sum(counts.tried for counts in plan.counts.families.values())
-            remark = f"{len(plan.grasps)} grasps, {tried} tried, peak {megabytes():.0f} MB"
-            found.append(row.with_remark(remark))
+            found.append(row.with_remark(f"{len(plan.grasps)} grasps, {tried} tried"))
+    for faces, cones in MEMORY:
+        without, with_plan = megabytes(faces, cones)
+        what = f"memory of the best {LIMIT} of {faces} faces, {cones} cones"
+        remark = f"peak {with_plan:.0f} MB, {without:.0f} MB without the plan"
+        found.append(Row("planning", what, 1, 0.0, remark=remark))
     return found

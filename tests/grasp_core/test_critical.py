@@ -151,20 +151,10 @@ def test_grasps_are_taken_as_they_are():
     assert len(gc.critical_frictions([])) == 0
 
 
-@pytest.fixture
-def afresh():
-    """What the environment says counts from here on, and no longer afterwards."""
-    compiled.cache_clear()
-    yield
-    compiled.cache_clear()
-
-
-@pytest.mark.usefixtures("afresh")
-def test_without_compiled_code_the_search_is_made_program_by_program(monkeypatch):
+def test_without_compiled_code_the_search_is_made_program_by_program(without_kernels):
     positions, normals = (array[::20] for array in contact_sets())
     quick = gc.critical_frictions(positions, normals)
-    compiled.cache_clear()
-    monkeypatch.setenv("GRASPPROOF_KERNELS", "off")
+    without_kernels()
     slow = gc.critical_frictions(positions, normals)
     assert np.isnan(critical._at_once(positions, normals)).all()
     np.testing.assert_allclose(slow, quick, rtol=1e-5)

@@ -10,7 +10,6 @@ from grasp_core.candidates import LEAST_SPAN_ANGLE, NORMAL, TILTED, candidate_bl
 from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS
 from grasp_core.disc_bounds import KERNELS, DiscBounds
 from grasp_core.face_pieces import face_shapes
-from grasp_core.kernels import compiled
 from scenes.objects import example_object
 from tests.grasp_core.curved import curved_body
 
@@ -20,14 +19,6 @@ BODIES = {
     "curved": curved_body,
 }
 NONE = np.empty((0, 4), dtype=np.int64)
-
-
-@pytest.fixture
-def afresh():
-    """What the environment says counts from here on, and no longer afterwards."""
-    compiled.cache_clear()
-    yield
-    compiled.cache_clear()
 
 
 def attempts(body, kind, order, count=60):
@@ -75,13 +66,11 @@ def test_with_a_larger_least_radius_bounds_above_it_stay_and_others_stay_below()
         assert (few[~larger] <= least + 2e-6).all()
 
 
-@pytest.mark.usefixtures("afresh")
 @pytest.mark.parametrize(("name", "friction"), [("tetrahedron", 0.4), ("wedge", 0.3)])
-def test_without_compiled_code_a_plan_is_the_same(monkeypatch, name, friction):
+def test_without_compiled_code_a_plan_is_the_same(without_kernels, name, friction):
     body = example_object(name)
     quick = gc.plan(body, friction, limit=12).grasps
-    monkeypatch.setenv("GRASPPROOF_KERNELS", "off")
-    compiled.cache_clear()
+    without_kernels()
     slow = gc.plan(body, friction, limit=12).grasps
     assert len(quick) >= 3
     assert [grasp.id for grasp in slow] == [grasp.id for grasp in quick]

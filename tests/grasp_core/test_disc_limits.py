@@ -9,19 +9,10 @@ from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS, PAIRINGS
 from grasp_core.disc_bounds import DiscBounds
 from grasp_core.disc_limits import _reaches, _widths, corners_of, disc_limits
 from grasp_core.face_pieces import face_shapes
-from grasp_core.kernels import compiled
 from grasp_core.spanning import span_sines, spanning_quadruples
 from scenes.objects import example_object
 
 BODIES = ("random-14-1", "chamfered-box", "double-wedge-bar")
-
-
-@pytest.fixture
-def afresh():
-    """What the environment says counts from here on, and no longer afterwards."""
-    compiled.cache_clear()
-    yield
-    compiled.cache_clear()
 
 
 def quadruples(body, seed=0):
@@ -40,12 +31,10 @@ def limits_on(body, *quads):
     return disc_limits(corners_of(body), body.normals, *quads)
 
 
-@pytest.mark.usefixtures("afresh")
-def test_compiled_limits_are_those_of_the_formulas_or_sharper(monkeypatch):
+def test_compiled_limits_are_those_of_the_formulas_or_sharper(without_kernels):
     quick = {name: limits_on(example_object(name), *quadruples(example_object(name)))
              for name in BODIES}  # fmt: skip
-    monkeypatch.setenv("GRASPPROOF_KERNELS", "off")
-    compiled.cache_clear()
+    without_kernels()
     tested = sharper = 0
     for name, found in quick.items():
         slow = limits_on(example_object(name), *quadruples(example_object(name)))

@@ -157,20 +157,10 @@ def test_a_cutoff_ends_the_search_with_a_bound_below_it():
     assert ended >= 250
 
 
-@pytest.fixture
-def afresh():
-    """What the environment says counts from here on, and no longer afterwards."""
-    compiled.cache_clear()
-    yield
-    compiled.cache_clear()
-
-
-@pytest.mark.usefixtures("afresh")
-def test_without_compiled_code_the_answers_come_from_the_reference(monkeypatch):
+def test_without_compiled_code_the_answers_come_from_the_reference(without_kernels, monkeypatch):
     program = LinearProgram(np.array([1.0, 2.0]), SQUARE, np.array([3.0, 4.0, 0, 0]))
     quick = maximize(program)
-    compiled.cache_clear()
-    monkeypatch.setenv("GRASPPROOF_KERNELS", "off")
+    without_kernels()
     monkeypatch.setattr(lp, "_by_simplex", None)
     answer = maximize(program)
     np.testing.assert_allclose(answer.x, quick.x)

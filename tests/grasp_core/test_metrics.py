@@ -138,20 +138,10 @@ def test_weights_of_degenerate_sets_are_left_to_the_reference():
     assert found[1] == pytest.approx(gc.min_weight(TETRA_CENTERS, TETRA_NORMALS), abs=1e-12)
 
 
-@pytest.fixture
-def afresh():
-    """What the environment says counts from here on, and no longer afterwards."""
-    compiled.cache_clear()
-    yield
-    compiled.cache_clear()
-
-
-@pytest.mark.usefixtures("afresh")
-def test_without_compiled_code_weights_come_from_the_reference(monkeypatch):
+def test_without_compiled_code_weights_come_from_the_reference(without_kernels):
     positions, normals = contact_sets(np.random.default_rng(6), 20)
     quick = gc.min_weights(positions, normals)
-    compiled.cache_clear()
-    monkeypatch.setenv("GRASPPROOF_KERNELS", "off")
+    without_kernels()
     W = metrics._many_pyramid_wrenches(positions, normals, np.full((20, 4), 0.5), 8)
     assert np.isnan(metrics._at_once(W)).all()
     np.testing.assert_allclose(gc.min_weights(positions, normals), quick, atol=1e-9)

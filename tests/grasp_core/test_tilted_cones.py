@@ -105,3 +105,18 @@ def test_axes_lean_the_same_way_where_the_point_is_in_a_face_but_for_rounding():
     assert (above.half_angles > 0.0).sum() >= 20
     np.testing.assert_allclose(above.half_angles, below.half_angles, atol=1e-6)
     np.testing.assert_allclose(above.axes, below.axes, atol=1e-5)
+
+
+def test_compiled_cones_are_those_of_the_arrays(without_kernels):
+    rng = np.random.default_rng(3)
+    normals = rng.normal(size=(600, 4, 3))
+    normals[:200, :, 2] *= 0.05  # nearly in a plane, as the sides of a box
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    thetas = rng.uniform(0.1, 0.7, size=(600, 4))
+    quick = tilted_cones(normals, thetas)
+    without_kernels()
+    slow = tilted_cones(normals, thetas)
+    np.testing.assert_allclose(quick.half_angles, slow.half_angles, atol=1e-12)
+    np.testing.assert_allclose(quick.axes, slow.axes, atol=1e-10)
+    assert (slow.half_angles > 0.01).sum() >= 300
+    assert (slow.half_angles < 0.0).sum() >= 20
