@@ -97,11 +97,13 @@ class DiscBounds:
             E=np.zeros((count, most, 2)),
             b=np.zeros((count, most)),
             edges=np.zeros(count, dtype=np.int64),
+            corners=np.zeros((count, most, 3)),
             depths=np.zeros(count),
         )
         for face, hull in hulls.items():
             table.normals[face], table.origins[face] = hull.normal, hull.origin
             table.frames[face], table.depths[face] = hull.frame, hull.depth
             table.edges[face] = len(hull.E)
+            table.corners[face, : len(hull.E)] = hull.origin + hull.corners @ hull.frame.T
             table.E[face, : len(hull.E)], table.b[face, : len(hull.b)] = hull.E, hull.b
         return table

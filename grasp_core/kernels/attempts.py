@@ -23,15 +23,9 @@ def tilted_faces() -> tuple[FaceTable, Attempts]:
     square = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
     n = np.array([[0.0, 0.0, 1.0], [0.9, 0.0, -0.4], [-0.5, 0.8, -0.4], [-0.5, -0.8, -0.4]])
     frames = np.repeat(np.eye(3, 2)[None], 4, axis=0)
-    faces = FaceTable(
-        n,
-        -n,
-        frames,
-        np.repeat(square[None], 4, axis=0),
-        np.ones((4, 4)),
-        np.full(4, 4),
-        np.zeros(4),
-    )
+    squares, ones = np.repeat(square[None], 4, axis=0), np.ones((4, 4))
+    corners = np.zeros((4, 4, 3))
+    faces = FaceTable(n, -n, frames, squares, ones, np.full(4, 4), corners, np.zeros(4))
     return faces, Attempts(np.arange(4)[None], n[None].copy(), np.full(1, 0.1))
 
 

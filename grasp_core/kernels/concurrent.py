@@ -15,8 +15,9 @@ from grasp_core.kernels.attempts import (
     room_for,
     tilted_faces,
 )
+from grasp_core.kernels.limits import reaches
 from grasp_core.kernels.simplex import Rows
-from grasp_core.kernels.tables import Attempts, FaceTable
+from grasp_core.kernels.tables import Attempts, Corners, FaceTable
 from grasp_core.kernels.vectors import cross, dotted
 
 VARIABLES = 12
@@ -40,11 +41,17 @@ def concurrent_bounds(
         least: Smaller discs do not matter: their bounds may be anything up to this.
         bounds: Filled with the bounds, (a,); infinite where none was proved.
     """
+    corners = Corners(faces.corners, faces.edges)
     room = np.empty((VARIABLES + 2) * FINGERS * (len(turns) + faces.E.shape[1]))
     for a in range(len(bounds)):
         rows = room_for(room, VARIABLES, FINGERS * len(turns) + edges_of(faces, attempts, a))
+        before, behind = reaches(corners, attempts.faces[a], attempts.axes[a])
         bounds[a] = -np.inf
-        for side in (1.0, -1.0):
+        for side, reach in ((1.0, before), (-1.0, behind)):
+            limit = reach * np.tan(attempts.half_angles[a])
+            if limit <= max(least, bounds[a]):
+                bounds[a] = max(bounds[a], limit)
+                continue
             row = 0
             for finger in range(FINGERS):
                 row = _aim_rows(faces, attempts, (a, finger), (turns, side), rows, row)

@@ -43,7 +43,8 @@ def fill(
         if half_angles[q] <= 0.0:
             limits[q] = 0.0
             continue
-        reach, half = _reach(corners, faces[q], axes[q]), np.tan(0.5 * half_angles[q])
+        before, behind = reaches(corners, faces[q], axes[q])
+        reach, half = max(before, behind), np.tan(0.5 * half_angles[q])
         limits[q, 0] = reach * np.tan(half_angles[q])
         for pairing, (i, j, k, m) in enumerate(PAIRINGS):
             limit = 2.0 * reach * half
@@ -57,14 +58,14 @@ def fill(
 
 
 @njit(cache=True)
-def _reach(corners: Corners, faces: Indices, axes: Array) -> float:
-    """Upper bound on the mean distance of a focus before or behind its contacts."""
+def reaches(corners: Corners, faces: Indices, axes: Array) -> tuple[float, float]:
+    """Upper bounds on the mean distance of a focus before, and behind, its contacts."""
     weights, before, behind = np.empty(FINGERS), 0.0, 0.0
     balancing_weights(axes, weights)
     for i in range(FINGERS):
         low, high = _extent(corners, faces[i], axes[i])
         before, behind = before - weights[i] * low, behind + weights[i] * high
-    return max(before, behind)
+    return before, behind
 
 
 @njit(cache=True)

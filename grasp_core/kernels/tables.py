@@ -20,6 +20,8 @@ class FaceTable(NamedTuple):
     """(f, e)"""
     edges: Indices
     """(f,)"""
+    corners: Array
+    """In space, (f, e, 3), as many of each face."""
     depths: Array
     """(f,)"""
 
