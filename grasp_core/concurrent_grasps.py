@@ -109,7 +109,7 @@ def _best(
 
 
 def _reaches(pieces: Sequence[FacePiece], cones: Sequence[ForceCone]) -> tuple[float, float]:
-    """How far a focus before, or behind, all fingers may be in the mean (see `candidates`)."""
+    """How far a focus before, or behind, all fingers may be in the mean (see `disc_limits`)."""
     heights = [
         cone.axis @ (piece.origin[:, None] + piece.frame @ piece.corners.T)
         for piece, cone in zip(pieces, cones, strict=True)

@@ -14,6 +14,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.concurrent_grasps import PYRAMID_SIDES, facet_turns
 from grasp_core.constructions import LEAST_RADIUS, Construction
+from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece, Shapes
 from grasp_core.kernels import compiled
 from grasp_core.kernels.tables import Attempts, FaceTable
@@ -38,7 +39,7 @@ class DiscBounds:
         half_angles: Array,
         least: float,
     ) -> Array:
-        """Upper bounds on the smallest radius, (a,), in object radii.
+        """Upper bounds on the smallest radius, (a,), in object radii; infinite if none is proved.
 
         Args:
             construction: With discs.
@@ -59,7 +60,7 @@ class DiscBounds:
         if construction.family == "pencil":
             kernel.pencil_bounds(self._table, attempts, LEAST_RADIUS, least, bounds)
         else:
-            turns = facet_turns(PYRAMID_SIDES)
+            turns = np.array(facet_turns(PYRAMID_SIDES))
             kernel.concurrent_bounds(self._table, attempts, turns, least, bounds)
         return bounds + RESIDUAL
 
@@ -75,7 +76,11 @@ class DiscBounds:
         for place, (own_axes, half_angle) in enumerate(zip(axes, half_angles, strict=True)):
             hulls = [self._hull(int(face)) for face in faces[place]]
             cones = four(ForceCone(axis, float(half_angle)) for axis in own_axes)
-            found = construction.place(hulls, cones, least)
+            try:
+                found = construction.place(hulls, cones, least)
+            except SolverError:
+                bounds[place] = np.inf
+                continue
             bounds[place] = found.merit if isinstance(found, Placement) else found.bound
         return bounds + RESIDUAL
 

@@ -17,8 +17,8 @@ of that pair. As a disc of radius r reaches r |T'N| to either side, the heights 
 lo_i to hi_i, leave r |T_i'N| <= hi_i - h and r |T_j'N| <= h - lo_j, or
 r (|T_i'N| + |T_j'N|) <= hi_i - lo_j. A finger m of the other pair is at
 N.q_m = h - s_m N.a_m with s_m >= r / tan(psi / 2), which makes the left side larger by
-r |N.a_m| / tan(psi / 2). Only compiled code asks for these: they decide nothing but how many
-programs are solved.
+r |N.a_m| / tan(psi / 2). Only compiled code asks for these: they spare programs
+that would find discs below the least radius, or below those already found.
 """
 
 from itertools import combinations

@@ -64,7 +64,7 @@ def plan(  # noqa: PLR0913 - the contract's keywords
             absent is absent from what is left.
         share_faces: Let two fingers stand on one face, at least so far apart [m]; each face is cut
             once for that, across its longest direction.
-        progress: Called after each quadruple.
+        progress: Called after each quadruple that is tried.
 
     Returns:
         The certified grasps, the best first, or the reason why there are none.
@@ -127,7 +127,7 @@ def _planned(body: Polyhedron, request: PlanRequest, searches: Searches) -> Plan
     counts = PlanCounts(
         len(body.faces),
         searches.quadruples,
-        searches.spanning,
+        searches.count_spanning(),
         {method: search.counts for method, search in searches.by_method.items()},
     )
     outcomes, whole = searches.outcomes(), searches.whole_faces

@@ -1,4 +1,4 @@
-"""Quadruples with tight bounds, best first over all blocks, as far as they are asked for.
+"""Quadruples with tight bounds, best first over several blocks, as far as they are asked for.
 
 Three kinds of things wait in one queue: blocks that nobody made yet, bounded by the room of their
 faces; made ones, by the cheap bounds of their rankings; and single quadruples, by small programs.

@@ -103,7 +103,8 @@ def ranked(candidates: Candidates, construction: Construction) -> Ranking:
         bounds = np.full((*usable.shape, len(construction.orders)), np.inf)
         promise = candidates.half_angles[:, NORMAL]
     else:
-        bounds = candidates.limits[:, :, construction.limits]
+        limits = candidates.limits[:, :, construction.limits]
+        bounds = np.where(np.isnan(limits), np.inf, limits)
         bounds = np.minimum(bounds, candidates.rooms[:, None, None])
         promise = None
     for column, order in enumerate(construction.orders):

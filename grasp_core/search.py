@@ -36,6 +36,8 @@ Found: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement]
 
 MOST_CHOICES = 8
 """Choices of pieces that are tried on faces that are not convex; times the cells allowed."""
+TOGETHER = 32
+"""Blocks that are open at once: a million quadruples, some hundred megabytes."""
 SAME_MERIT = 1e-5
 """What cannot be better than the worst kept by more than this share is not looked at: symmetric
 objects hold thousands of equal grasps."""
@@ -114,9 +116,9 @@ class Search:
         return [found]
 
 
-def best_first(found: Certified) -> tuple[float, FaceQuadruple]:
-    """Largest merit first; ties are broken by the faces, not by rounding."""
-    return -round(found.placement.merit, SAME_DIGITS), found.faces
+def best_first(found: Certified) -> tuple[float, FaceQuadruple, FaceQuadruple]:
+    """Largest merit first; ties are broken by the faces, then by the fingers, not by rounding."""
+    return -round(found.placement.merit, SAME_DIGITS), four(sorted(found.faces)), found.faces
 
 
 def search_construction(
@@ -147,10 +149,11 @@ def search_construction(
 def _in_order(
     construction: Construction, discs: DiscBounds, blocks: Sequence[Block], search: Search
 ) -> Iterator[Quadruple]:
-    """Quadruples to try: with a limit best first over all blocks, else block by block."""
+    """Quadruples to try: with a limit best first over many blocks, else block by block."""
     if construction.limits is not None:
-        together = [blocks] if search.limit is not None else [[block] for block in blocks]
-        for some in together:
+        size = 1 if search.limit is None else TOGETHER
+        for start in range(0, len(blocks), size):
+            some = blocks[start : start + size]
             yield from promising(construction, some, discs, search.least, search.tally)
         return
     for block in blocks:

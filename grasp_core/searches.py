@@ -26,7 +26,7 @@ from grasp_core.values import FINGERS, FaceQuadruple, Family, Method, Polyhedron
 KEPT_BLOCKS = 8
 """Blocks of quadruples that are made once for all families: some hundred megabytes."""
 Progress: TypeAlias = Callable[[int, int, int], None]
-"""Called with quadruples done, quadruples in all, and grasps found so far."""
+"""Called with a count of quadruples that rises to that of all, the latter, and grasps so far."""
 
 
 class _Blocks:
@@ -52,7 +52,9 @@ class _Blocks:
                 self[place]
 
     def __getitem__(self, place: int) -> Candidates:
-        block = self.made.get(place) or self.makers[place]()
+        if place in self.made:
+            return self.made[place]
+        block = self.makers[place]()
         if place < KEPT_BLOCKS:
             self.made[place] = block
         self.counts[place] = block.spanning
@@ -84,8 +86,7 @@ class Searches:
             _Blocks(candidate_blocks(*of_object, self.shared)) if tilted else self.spanning_blocks
         )
 
-    @property
-    def spanning(self) -> int:
+    def count_spanning(self) -> int:
         """How many quadruples with normals that span (P3) were come across.
 
         Where nothing but they could have held a grasp, and none did, these are all of them.
@@ -117,7 +118,7 @@ class Searches:
             progress(total, total, found)
 
     def _steps(self) -> Iterator[tuple[int, list[Certified]]]:
-        """What each quadruple gives, and how many have been dealt with."""
+        """What each quadruple gives that is tried, and how many were before it, at least."""
         for place, (method, search) in enumerate(self.constructions.items()):
             construction, dealt_with = CONSTRUCTIONS[method], place * self.quadruples
             search.limit = self._share(place)

@@ -1,9 +1,15 @@
 """Compiled inner loops, and the only place that knows numba.
 
-A kernel is plain arithmetic on arrays of programs, directions or contacts. It decides nothing
-alone: the module that asks for it checks what comes back, and has a slower way of its own, the
-reference, for what fails the check. The reference does everything where numba cannot compile or
-keep kernels, or the environment says `GRASPPROOF_KERNELS=off`.
+A kernel is plain arithmetic on arrays of programs, directions or contacts. What makes a claim, such
+as a placement, a closure or a quality, is checked by the module that asks for it, which has a
+slower way of its own, the reference, for what fails the check. What only says where to search is
+not: spanning quadruples, tilted cones, and bounds on discs, whose multipliers are checked in
+compiled code. Tests hold these against the reference. The reference does everything where numba
+cannot compile or keep kernels, or the environment says `GRASPPROOF_KERNELS=off`.
+
+Numba keeps a compiled module together with what it calls from others, and looks only at the file
+of that module to see whether it changed: after a change of one kernel remove what it kept of the
+others (`*.nbi` and `*.nbc` in `__pycache__`).
 """
 
 import importlib

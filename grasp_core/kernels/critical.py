@@ -9,9 +9,6 @@ contact that carries a force inside its cone is at rest under the best twist, of
 leaves something; it is put to rest exactly before the twist is judged by the others. The optimum V
 of the program falls through one at the critical friction, and 1 / V is nearly linear there;
 Newton's method says where to try next, first on the one side and then on the other.
-
-Numba keeps this module together with what it calls: after a change of `margin` alone, remove the
-files that it keeps (`__pycache__`).
 """
 
 import math

@@ -120,7 +120,8 @@ def proved_bound(c: Array, rows: Rows, basis: Indices, y: Array, accuracy: float
         bound += y[j] * rows.b[k]
         for i in range(len(c)):
             left[i] -= y[j] * rows.At[i, k]
-    return bound if np.abs(left).max() <= accuracy else np.inf
+    proved = np.abs(left).max() <= accuracy and bound < np.inf  # which no bound is that is none
+    return bound if proved else np.inf
 
 
 @njit(cache=True, error_model="numpy")

@@ -6,9 +6,6 @@ Solved: for each grasp, with its N wrenches w_j and their mean m, a best vertex 
 
 and the multipliers of the six rows that meet there. The dual simplex method names the rows; the
 vertex and the multipliers are solved for afresh, by elimination.
-
-Numba keeps this module together with what it calls: after a change of `simplex` alone, remove the
-files that it keeps (`__pycache__`).
 """
 
 import numpy as np

@@ -184,7 +184,7 @@ def test_plans_are_the_same_every_time():
         np.testing.assert_array_equal(a.positions, b.positions)
 
 
-def test_progress_is_reported_for_each_quadruple():
+def test_progress_is_reported_as_quadruples_are_tried():
     seen = []
     gc.plan(example_object("wedge"), progress=lambda *numbers: seen.append(numbers))
     done = [each for each, _, _ in seen]
