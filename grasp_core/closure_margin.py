@@ -34,6 +34,8 @@ as carrying an interior force: far above what the solver leaves on a boundary.""
 TOUCHING = 1e-9
 """Supports of a unit twist above minus this are taken for zero by its solver's tolerance."""
 NEWTON_STEPS = 3
+GIANT = 1e100
+"""Compiled searches may end with such numbers, or with none, where contacts are degenerate."""
 RANK = 1e-9
 """Smallest singular value of the unit-size grasp map that counts as full rank."""
 
@@ -99,7 +101,7 @@ def refutes_closure(twist: Array, arms: Array, normals: Array, friction: Array) 
     """Whether no contact force within its cone works along a twist."""
     length = float(np.linalg.norm(twist))
     excess = supports(twist, arms, normals, friction) / np.sqrt(1.0 + friction**2)
-    return length > 0.0 and float(excess.max()) <= ROUNDING * length
+    return 0.0 < length < math.inf and float(excess.max()) <= ROUNDING * length
 
 
 def proves_closure(forces: Array, arms: Array, normals: Array, friction: Array) -> bool:
@@ -133,6 +135,7 @@ def many_refute_closure(
     Returns:
         Truth values, (g,).
     """
+    twists = _without_giants(twists)
     lengths = np.linalg.norm(twists, axis=1)
     velocities = twists[:, None, :3] + np.cross(twists[:, None, 3:], arms)
     along, across = normal_and_tangential(velocities, normals)
@@ -154,6 +157,7 @@ def many_prove_closure(
     Returns:
         Truth values, (g,).
     """
+    forces = _without_giants(forces)
     along, across = normal_and_tangential(forces, normals)
     depths = (friction[:, None] * along - across).min(axis=1)
     maps = grasp_map(arms)
@@ -162,6 +166,13 @@ def many_prove_closure(
     least = np.linalg.svd(maps, compute_uv=False)[:, WRENCH - 1]
     reach = np.sqrt(1.0 + friction**2) * (imbalance + ROUNDING) / np.maximum(least, RANK)
     return (least > RANK) & (depths > reach)
+
+
+def _without_giants(vectors: Array) -> Array:
+    """Zeros, which prove nothing, for sets with numbers whose squares are none."""
+    axes = tuple(range(1, vectors.ndim))
+    sizes = np.max(np.abs(vectors), axis=axes, keepdims=True, initial=0.0)
+    return np.where(sizes < GIANT, vectors, 0.0)
 
 
 def _touching_twist(twist: Array, arms: Array, normals: Array, friction: Array) -> Array:

@@ -141,7 +141,8 @@ def _at_once(points: Array, normals: Array) -> Array:
     lower = bounds[:, 0]
     bounded = (lower > FRICTIONLESS) & (lower < 0.5 * LARGEST_FRICTION)
     bounded &= many_refute_closure(twists, arms, units, lower)
-    along, across = normal_and_tangential(forces, units)
+    with np.errstate(over="ignore", invalid="ignore"):  # degenerate contacts, proved nothing below
+        along, across = normal_and_tangential(forces, units)
     enough = (across / np.maximum(along, NO_FORCE)).max(axis=1) * (1.0 + 0.1 * FRICTION_ACCURACY)
     left = np.flatnonzero(bounded & (enough <= lower * (1.0 + FRICTION_ACCURACY)))
     proved = left[many_prove_closure(forces[left], arms[left], units[left], enough[left])]
