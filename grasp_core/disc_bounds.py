@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array
 from grasp_core.concurrent_grasps import PYRAMID_SIDES, facet_turns
 from grasp_core.constructions import LEAST_RADIUS, Construction
 from grasp_core.errors import SolverError
@@ -31,32 +31,23 @@ class DiscBounds:
 
     shapes: Shapes
 
-    def of(
-        self,
-        construction: Construction,
-        faces: Indices,
-        axes: Array,
-        half_angles: Array,
-        least: float,
-    ) -> Array:
+    def of(self, construction: Construction, attempts: Attempts, least: float) -> Array:
         """Upper bounds on the smallest radius, (a,), in object radii; infinite if none is proved.
 
         Args:
             construction: With discs.
-            faces: In finger order, (a, 4); all have room.
-            axes: Of their force cones, which must positively span (P3), (a, 4, 3).
-            half_angles: One for all four cones of an attempt, (a,) [rad].
+            attempts: On faces with room, in finger order, with cones that positively span (P3).
             least: Smaller discs do not matter; their bounds are the best ones or this at most.
         """
         kernel = compiled(KERNELS[construction.family])
         if kernel is None:
-            return self._by_constructions(construction, faces, axes, half_angles, least)
+            return self._by_constructions(construction, attempts, least)
         attempts = Attempts(
-            np.ascontiguousarray(faces),
-            np.ascontiguousarray(axes),
-            np.ascontiguousarray(half_angles),
+            np.ascontiguousarray(attempts.faces),
+            np.ascontiguousarray(attempts.axes),
+            np.ascontiguousarray(attempts.half_angles),
         )
-        bounds = np.empty(len(faces))
+        bounds = np.empty(len(attempts.faces))
         if construction.family == "pencil":
             kernel.pencil_bounds(self._table, attempts, LEAST_RADIUS, least, bounds)
         else:
@@ -65,17 +56,12 @@ class DiscBounds:
         return bounds + RESIDUAL
 
     def _by_constructions(
-        self,
-        construction: Construction,
-        faces: Indices,
-        axes: Array,
-        half_angles: Array,
-        least: float,
+        self, construction: Construction, attempts: Attempts, least: float
     ) -> Array:
-        bounds = np.empty(len(faces))
-        for place, (own_axes, half_angle) in enumerate(zip(axes, half_angles, strict=True)):
-            hulls = [self._hull(int(face)) for face in faces[place]]
-            cones = four(ForceCone(axis, float(half_angle)) for axis in own_axes)
+        bounds = np.empty(len(attempts.faces))
+        for place, (faces, axes, half_angle) in enumerate(zip(*attempts, strict=True)):
+            hulls = [self._hull(int(face)) for face in faces]
+            cones = four(ForceCone(axis, float(half_angle)) for axis in axes)
             try:
                 found = construction.place(hulls, cones, least)
             except SolverError:

@@ -19,6 +19,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.constructions import Construction
 from grasp_core.disc_bounds import DiscBounds
+from grasp_core.kernels.tables import Attempts
 from grasp_core.ranking import SAME_PROMISE, Quadruple, Ranking
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 32, 2048
@@ -117,13 +118,12 @@ def _tightened(
     place = ranking.places[rows][row]
     order = np.array(construction.orders)[column]
     bounds = np.full(cheap.shape, -np.inf)
-    bounds[row, kind, column] = discs.of(
-        construction,
+    attempts = Attempts(
         np.take_along_axis(candidates.faces[place], order, axis=1),
         np.take_along_axis(candidates.axes[place, kind], order[:, :, None], axis=1),
         candidates.half_angles[place, kind],
-        worth,
     )
+    bounds[row, kind, column] = discs.of(construction, attempts, worth)
     bounds = np.minimum(bounds, cheap)
     none = (cheap > worth).any(axis=1) & (bounds.max(axis=1) <= construction.least)
     tally["tried"] += int(none.sum())

@@ -15,6 +15,7 @@ from grasp_core.concurrent_grasps import _rows as concurrent_rows
 from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS
 from grasp_core.disc_bounds import KERNELS, DiscBounds
 from grasp_core.face_pieces import face_shapes
+from grasp_core.kernels.tables import Attempts
 from grasp_core.lp import LinearProgram, _by_highs
 from grasp_core.pencil_grasps import CELL_A, CELL_B, _discs, _near_rows
 from grasp_core.pencil_grasps import _rows as pencil_rows
@@ -42,12 +43,14 @@ class Programs:
         self.construction, self.discs = CONSTRUCTIONS[family], DiscBounds(shapes)
         parts = [make() for _, make in spanning_blocks(body, shapes, THETA, len(body.faces))]
         orders = [list(order) for order in self.construction.orders]
-        self.attempts = tuple(
-            np.concatenate([pick(part, order) for part in parts for order in orders])
-            for pick in (
-                lambda part, order: part.faces[:, order],
-                lambda part, order: part.axes[:, NORMAL][:, order],
-                lambda part, _: part.half_angles[:, NORMAL],
+        self.attempts = Attempts(
+            *(
+                np.concatenate([pick(part, order) for part in parts for order in orders])
+                for pick in (
+                    lambda part, order: part.faces[:, order],
+                    lambda part, order: part.axes[:, NORMAL][:, order],
+                    lambda part, _: part.half_angles[:, NORMAL],
+                )
             )
         )
         self.programs = [self._programs(shapes, family, *each)
@@ -72,7 +75,7 @@ class Programs:
         return found
 
     def bounds(self, _=None):
-        return self.discs.of(self.construction, *self.attempts, -np.inf)
+        return self.discs.of(self.construction, self.attempts, -np.inf)
 
     def values(self):
         """By HiGHS."""

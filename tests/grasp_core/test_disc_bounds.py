@@ -10,6 +10,7 @@ from grasp_core.candidates import LEAST_SPAN_ANGLE, NORMAL, TILTED, candidate_bl
 from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS
 from grasp_core.disc_bounds import KERNELS, DiscBounds
 from grasp_core.face_pieces import face_shapes
+from grasp_core.kernels.tables import Attempts
 from scenes.objects import example_object
 from tests.grasp_core.curved import curved_body
 
@@ -30,7 +31,7 @@ def attempts(body, kind, order, count=60):
     some = np.random.default_rng(0).permutation(usable)[:count]
     order = list(order)
     axes = found.axes[some, kind][:, order]
-    return found.faces[some][:, order], axes, found.half_angles[some, kind]
+    return Attempts(found.faces[some][:, order], axes, found.half_angles[some, kind])
 
 
 @pytest.mark.parametrize("family", KERNELS)
@@ -42,8 +43,8 @@ def test_bounds_are_the_merits_that_the_constructions_reach(name, family):
     for kind in (NORMAL, TILTED):
         for order in construction.orders:
             some = attempts(body, kind, order)
-            quick = discs.of(construction, *some, LEAST_RADIUS)
-            slow = discs._by_constructions(construction, *some, LEAST_RADIUS)
+            quick = discs.of(construction, some, LEAST_RADIUS)
+            slow = discs._by_constructions(construction, some, LEAST_RADIUS)
             held = slow > LEAST_RADIUS
             np.testing.assert_allclose(quick[held], slow[held], atol=2e-8)
             assert (quick[~held] <= LEAST_RADIUS + 2e-8).all()
@@ -57,9 +58,9 @@ def test_with_a_larger_least_radius_bounds_above_it_stay_and_others_stay_below()
     discs = DiscBounds(face_shapes(body))
     for family in KERNELS:
         some = attempts(body, TILTED, (0, 1, 2, 3), 200)
-        every = discs.of(CONSTRUCTIONS[family], *some, -np.inf)
+        every = discs.of(CONSTRUCTIONS[family], some, -np.inf)
         least = float(np.median(every))
-        few = discs.of(CONSTRUCTIONS[family], *some, least)
+        few = discs.of(CONSTRUCTIONS[family], some, least)
         larger = every > least + 1e-6
         assert larger.sum() >= 50
         np.testing.assert_allclose(few[larger], every[larger], atol=1e-9)

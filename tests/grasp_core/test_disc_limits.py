@@ -9,6 +9,7 @@ from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS, PAIRINGS
 from grasp_core.disc_bounds import DiscBounds
 from grasp_core.disc_limits import _reaches, _widths, corners_of, disc_limits
 from grasp_core.face_pieces import face_shapes
+from grasp_core.kernels.tables import Attempts
 from grasp_core.spanning import span_sines, spanning_quadruples
 from scenes.objects import example_object
 
@@ -58,9 +59,8 @@ def test_no_program_reaches_beyond_its_limit(name):
     for family in ("concurrent", "pencil"):
         construction = CONSTRUCTIONS[family]
         for order, limit in zip(construction.orders, limits[:, construction.limits].T, strict=True):
-            found = discs.of(
-                construction, faces[:, order], axes[:, order], half_angles, LEAST_RADIUS
-            )
+            attempts = Attempts(faces[:, order], axes[:, order], half_angles)
+            found = discs.of(construction, attempts, LEAST_RADIUS)
             larger = found > LEAST_RADIUS + 1e-6
             assert (found[larger] <= limit[larger] + 1e-7).all()
             held += int(larger.sum())
