@@ -150,9 +150,10 @@ def _by_simplex(program: LinearProgram, cutoff: float) -> Optimum | Infeasible |
     G, h = program.stacked()
     count, n = G.shape
     kernel, basis = compiled(KERNEL), np.empty(n, dtype=np.int64)
+    ended = kernel.Vertex(basis, np.empty(n), np.empty(n))
     norms = np.maximum(np.sqrt(np.einsum("ki,ki->k", G, G)), RESIDUAL)
     rows = kernel.Rows(np.array(G.T, order="C"), np.array(h), norms, count - len(program.b))
-    status, against = kernel.solve(program.c, rows, cutoff, basis, np.empty(n))
+    status, against = kernel.solve(program.c, rows, cutoff, ended)
     if status == kernel.LOST:
         raise SolverError("the simplex method did not end")
     basis.sort()

@@ -17,8 +17,8 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.attempt_bounds import AttemptBounds
 from grasp_core.constructions import Construction
-from grasp_core.disc_bounds import DiscBounds
 from grasp_core.kernels.tables import Attempts
 from grasp_core.ranking import SAME_PROMISE, Quadruple, Ranking
 
@@ -59,7 +59,7 @@ BLOCK, REST, QUADRUPLE = range(3)
 def promising(
     construction: Construction,
     blocks: Sequence[Block],
-    discs: DiscBounds,
+    discs: AttemptBounds,
     least: Callable[[Construction], float],
     tally: Counter[str],
 ) -> Iterator[Quadruple]:
@@ -108,9 +108,26 @@ def _put_back(waiting: list[_Waiting], rest: _Rest, place: tuple[int, ...]) -> N
         heappush(waiting, (-bound, REST, place, rest))
 
 
+def in_rows(
+    ranking: Ranking, discs: AttemptBounds, worth: float, tally: Counter[str]
+) -> Iterator[Quadruple]:
+    """The quadruples of a ranking that may be worth having, in its order.
+
+    Args:
+        ranking: Of one block.
+        discs: Of the object's faces.
+        worth: The merit above which grasps are worth having.
+        tally: Where to count attempts whose bound proves that they have none.
+    """
+    for start in range(0, len(ranking), SMALLEST_CHUNK):
+        rows = slice(start, min(start + SMALLEST_CHUNK, len(ranking)))
+        for _, _, _, make in _tightened(ranking, rows, discs, worth, tally):
+            yield make()
+
+
 def _tightened(
-    ranking: Ranking, rows: slice, discs: DiscBounds, worth: float, tally: Counter[str]
-) -> Iterator[_Waiting]:
+    ranking: Ranking, rows: slice, discs: AttemptBounds, worth: float, tally: Counter[str]
+) -> Iterator[tuple[float, int, tuple[int, ...], Callable[[], Quadruple]]]:
     """Some quadruples, those of them that are worth having, with tight bounds."""
     construction, candidates = ranking.construction, ranking.candidates
     cheap = ranking.bounds[rows]
@@ -125,10 +142,11 @@ def _tightened(
     )
     bounds[row, kind, column] = discs.of(construction, attempts, worth)
     bounds = np.minimum(bounds, cheap)
-    none = (cheap > worth).any(axis=1) & (bounds.max(axis=1) <= construction.least)
+    solved = cheap > worth
+    none = solved.any(axis=1) & (bounds.max(axis=1) <= construction.least)
     tally["tried"] += int(none.sum())
     tally["infeasible"] += int(none.sum())
-    tally["solved"] += int((cheap > worth).transpose(0, 2, 1)[none].sum())
+    tally["solved"] += int(solved.transpose(0, 2, 1)[none].sum())
     bounds[bounds <= worth] = -np.inf
     best = np.asarray(np.max(bounds, axis=(1, 2)), dtype=np.float64).round(SAME_PROMISE)
     faces = candidates.faces[ranking.places[rows]].tolist()

@@ -38,17 +38,21 @@ Source: Sudsang & Ponce 1995, section 3.3; the pitch equation and its use are th
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array
-from grasp_core.concurrent_grasps import inscribed_facets
+from grasp_core.arrays import Array, Indices
+from grasp_core.concurrent_grasps import PYRAMID_SIDES, facet_turns, inscribed_facets
 from grasp_core.face_pieces import FacePiece
-from grasp_core.lp import Infeasible, LinearProgram, Optimum, maximize
+from grasp_core.face_tables import face_table
+from grasp_core.kernels import compiled
+from grasp_core.kernels.tables import Attempts, FaceTable, RegulusTerms
+from grasp_core.lp import RESIDUAL, LinearProgram, Optimum, maximize
 from grasp_core.placements import (
     NoPlacement,
     Placement,
@@ -65,9 +69,20 @@ LEAST_INSET = 1e-3
 """Least distance of a contact from the edges of its face, in object radii."""
 LEAST_GAP = 0.01
 """Least distance l_i, along N_i, at which a line passes the focus line, in object radii."""
+SAME_OFFSET = 1e-9
+"""Offsets that differ by no more are equal: the slopes tried first win."""
 X0, K, P, X, Z, T = slice(0, 3), 3, 4, slice(5, 7), slice(7, 9), 9
 """Where the variables are."""
 VARIABLES = 10
+
+KERNEL = "reguli"
+SIDES = (1.0, -1.0)
+"""Of the focus line, on which the lines of the first finger pass it."""
+Choice: TypeAlias = tuple[int, int, int]
+"""Which of the `SLOPES` the pairs have, and on which of the `SIDES` the lines pass."""
+CHOICES: tuple[Choice, ...] = tuple(
+    product(range(len(SLOPES)), range(len(SLOPES)), range(len(SIDES)))
+)
 
 
 def place_regulus(
@@ -86,22 +101,68 @@ def place_regulus(
     Raises:
         SolverError: A program's answer failed its check.
     """
+    known = _best_choice(pieces, cones)
+    if known is not None:
+        merit, choices = known
+        best = _best_of(pieces, cones, choices)
+        if _merit(best) == merit or abs(_merit(best) - merit) <= RESIDUAL:
+            return best
+    return _best_of(pieces, cones, CHOICES)
+
+
+def regulus_bounds(table: FaceTable, attempts: Attempts) -> tuple[Array, Indices] | None:
+    """How good reguli can be, in compiled code, or None where there is none.
+
+    Args:
+        table: Of the faces.
+        attempts: Which of them, in finger order, with cones that positively span (P3).
+
+    Returns:
+        The merits of the best choices, (a,): minus infinity where a proof excludes each, infinity
+        where one was not decided; and these choices, (a, 3), -1 where there is none.
+    """
+    kernel = compiled(KERNEL)
+    if kernel is None:
+        return None
+    turns, shares = np.array(facet_turns(PYRAMID_SIDES)), np.array(SLOPES)
+    terms = RegulusTerms(turns, shares, LEAST_DEPTH, LEAST_INSET, LEAST_GAP, SAME_OFFSET)
+    bounds = np.empty(len(attempts.faces))
+    chosen = np.empty((len(bounds), 3), dtype=np.int64)
+    kernel.regulus_bounds(table, attempts, terms, bounds, chosen)
+    return bounds, chosen
+
+
+def _best_choice(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone]
+) -> tuple[float, tuple[Choice, ...]] | None:
+    """The best choice, if there is any, and its merit; None where this is not known."""
+    half_angle = cones[0].half_angle
+    if any(cone.half_angle != half_angle for cone in cones):
+        return None
+    attempt = Attempts(
+        np.arange(FINGERS)[None], np.array([[cone.axis for cone in cones]]), np.array([half_angle])
+    )
+    known = regulus_bounds(face_table(pieces), attempt)
+    if known is None:
+        return None
+    (merit,), (chosen,) = known
+    first, second, side = (int(each) for each in chosen)
+    return float(merit), ((first, second, side),) if first >= 0 else ()
+
+
+def _best_of(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], choices: Iterable[Choice]
+) -> Placement | NoPlacement:
     pairs = _pairs(cones)
-    facets = [inscribed_facets(c, p.frame[:, 0]) for c, p in zip(cones, pieces, strict=True)]
     best: Placement | NoPlacement = NoPlacement(-math.inf)
-    for slopes in product(*(_slopes(pair) for pair in pairs)):
+    if any(pair.largest_angle <= pair.least_angle for pair in pairs):
+        return best  # too far from symmetric
+    facets = [inscribed_facets(c, p.frame[:, 0]) for c, p in zip(cones, pieces, strict=True)]
+    for *which, side in choices:
+        slopes = [_slope(pair, SLOPES[each]) for pair, each in zip(pairs, which, strict=True)]
         lines = [_line(pairs, slopes, finger) for finger in range(FINGERS)]
-        A, b, A_eq, b_eq = _rows(pieces, facets, lines)
-        for side in (1.0, -1.0):
-            gap = np.zeros(VARIABLES)
-            gap[P] = -side
-            far = -LEAST_GAP / min(abs(slope) for slope in slopes)
-            program = LinearProgram(
-                -np.eye(VARIABLES)[T], np.vstack([A, gap]), np.append(b, far), A_eq, b_eq
-            )
-            found = maximize(program)
-            if isinstance(found, Infeasible) or found.value <= _merit(best):
-                continue
+        found = maximize(_program(pieces, facets, lines, slopes, SIDES[side]))
+        if isinstance(found, Optimum) and found.value > _merit(best) + SAME_OFFSET:
             best = _placement(pieces, lines, found)
     return best
 
@@ -167,12 +228,10 @@ def _pairs(cones: Sequence[ForceCone]) -> list[_Pair]:
     return pairs
 
 
-def _slopes(pair: _Pair) -> list[float]:
-    """Values of y / x to try; none where the pair is too far from symmetric."""
+def _slope(pair: _Pair, share: float) -> float:
+    """Value of y / x somewhere in its interval."""
     width = pair.largest_angle - pair.least_angle
-    if width <= 0.0:
-        return []
-    return [pair.resultant * math.tan(pair.least_angle + share * width) for share in SLOPES]
+    return pair.resultant * math.tan(pair.least_angle + share * width)
 
 
 def _line(pairs: Sequence[_Pair], slopes: Sequence[float], finger: int) -> _Line:
@@ -187,12 +246,18 @@ def _line(pairs: Sequence[_Pair], slopes: Sequence[float], finger: int) -> _Line
     return _Line(D, F)
 
 
-def _rows(
-    pieces: Sequence[FacePiece], facets: Sequence[Array], lines: Sequence[_Line]
-) -> tuple[Array, Array, Array, Array]:
+def _program(
+    pieces: Sequence[FacePiece],
+    facets: Sequence[Array],
+    lines: Sequence[_Line],
+    slopes: Sequence[float],
+    side: float,
+) -> LinearProgram:
+    """The least offset t for given slopes, with the lines on one side of the focus line."""
     offset = np.eye(VARIABLES)[T]
-    rows: list[Array] = []
-    limits: list[Array | float] = []
+    gap = -side * np.eye(VARIABLES)[P]
+    rows: list[Array] = [gap[None]]
+    limits: list[Array | float] = [-LEAST_GAP / min(abs(slope) for slope in slopes)]
     for piece, G, line in zip(pieces, facets, lines, strict=True):
         flat, middle = piece.frame.T @ (line.D - line.F), piece.frame.T @ piece.origin
         rows += [
@@ -212,7 +277,7 @@ def _rows(
     normals = np.array([piece.normal for piece in pieces])
     A_eq = np.array([n @ (line.D - line.F) for n, line in zip(normals, lines, strict=True)])
     b_eq = np.array([piece.normal @ piece.origin for piece in pieces])
-    return np.vstack(rows), np.hstack(limits), A_eq, b_eq
+    return LinearProgram(-offset, np.vstack(rows), np.hstack(limits), A_eq, b_eq)
 
 
 def _placement(pieces: Sequence[FacePiece], lines: Sequence[_Line], found: Optimum) -> Placement:

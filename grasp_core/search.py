@@ -11,14 +11,14 @@ from typing import TypeAlias
 
 import numpy as np
 
+from grasp_core.attempt_bounds import AttemptBounds
 from grasp_core.certified import Certified, certify, named
 from grasp_core.constructions import Construction, regions_of
-from grasp_core.disc_bounds import DiscBounds
 from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece, FaceShape, Shapes, choices_near
 from grasp_core.placements import Placement
 from grasp_core.plans import MethodCounts, Proof
-from grasp_core.promising import Block, promising
+from grasp_core.promising import Block, in_rows, promising
 from grasp_core.ranking import Attempt, Quadruple
 from grasp_core.reach import Reach
 from grasp_core.spanning import cones_positively_span
@@ -133,7 +133,7 @@ def search_construction(
     With a limit the search ends when no bound reaches the worst grasp kept; a construction
     without bounds ends as soon as the limit is reached.
     """
-    for quadruple in _in_order(construction, DiscBounds(shapes), blocks, search):
+    for quadruple in _in_order(construction, AttemptBounds(shapes), blocks, search):
         faces = quadruple.faces
         case = Case(construction, faces, chosen_shapes(shapes, faces), friction)
         found: list[Certified] = []
@@ -147,7 +147,7 @@ def search_construction(
 
 
 def _in_order(
-    construction: Construction, discs: DiscBounds, blocks: Sequence[Block], search: Search
+    construction: Construction, discs: AttemptBounds, blocks: Sequence[Block], search: Search
 ) -> Iterator[Quadruple]:
     """Quadruples to try: with a limit best first over many blocks, else block by block."""
     if construction.limits is not None:
@@ -159,9 +159,8 @@ def _in_order(
     for block in blocks:
         if search.full:
             return
-        ranking = block.rank()
-        rows = takewhile(lambda _: not search.full, range(len(ranking)))
-        yield from (ranking.quadruple(row, ranking.bounds[row]) for row in rows)
+        some = in_rows(block.rank(), discs, construction.least, search.tally)
+        yield from takewhile(lambda _: not search.full, some)
 
 
 def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]:

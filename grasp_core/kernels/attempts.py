@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array
-from grasp_core.kernels.simplex import LOST, Rows, proved_bound, solve
+from grasp_core.kernels.simplex import LOST, Rows, Vertex, proved_bound, solve
 from grasp_core.kernels.tables import Attempts, FaceTable
 
 FINGERS = 4
@@ -40,6 +40,13 @@ def edges_of(faces: FaceTable, attempts: Attempts, a: int) -> int:
 
 
 @njit(cache=True)
+def facet_sines(half_angle: float, sides: int) -> tuple[float, float]:
+    """Sine and cosine of the half-angle of the cone that an inscribed pyramid's facets touch."""
+    tangent = np.tan(half_angle) * np.cos(np.pi / sides)
+    return tangent / np.hypot(1.0, tangent), 1.0 / np.hypot(1.0, tangent)
+
+
+@njit(cache=True)
 def room_for(room: Array, n: int, count: int) -> Rows:
     """So many empty rows, in memory that is used again and again."""
     At = room[: n * count].reshape(n, count)
@@ -51,14 +58,25 @@ def room_for(room: Array, n: int, count: int) -> Rows:
 @njit(cache=True)
 def bounded(rows: Rows, least: float) -> float:
     """An upper bound on the radius; the best one where it is above the least."""
-    n = len(rows.At)
-    basis, y, c = np.empty(n, dtype=np.int64), np.empty(n), np.zeros(n)
+    c, vertex = np.zeros(len(rows.At)), vertex_of(len(rows.At))
     c[-1] = 1.0
+    measure(rows)
+    status, _ = solve(c, rows, least, vertex)
+    return np.inf if status == LOST else proved_bound(c, rows, vertex, ACCURACY)
+
+
+@njit(cache=True)
+def vertex_of(n: int) -> Vertex:
+    """Room for one of a program with so many variables."""
+    return Vertex(np.empty(n, dtype=np.int64), np.empty(n), np.empty(n))
+
+
+@njit(cache=True)
+def measure(rows: Rows) -> None:
+    """Fill in the lengths of the rows."""
     rows.norms[:] = 0.0
-    for i in range(n):
+    for i in range(len(rows.At)):
         for k in range(len(rows.norms)):
             rows.norms[k] += rows.At[i, k] * rows.At[i, k]
     for k in range(len(rows.norms)):
         rows.norms[k] = np.sqrt(rows.norms[k])
-    status, _ = solve(c, rows, least, basis, y)
-    return np.inf if status == LOST else proved_bound(c, rows, basis, y, ACCURACY)

@@ -12,13 +12,14 @@ from grasp_core.kernels.attempts import (
     FINGERS,
     bounded,
     edges_of,
+    facet_sines,
     room_for,
     tilted_faces,
 )
 from grasp_core.kernels.limits import reaches
 from grasp_core.kernels.simplex import Rows
 from grasp_core.kernels.tables import Attempts, Corners, FaceTable
-from grasp_core.kernels.vectors import cross, dotted
+from grasp_core.kernels.vectors import across
 
 VARIABLES = 12
 
@@ -70,11 +71,11 @@ def _aim_rows(
 ) -> int:
     """What keeps the focus x0 in the cones of a disc, over (x0 (3), y (4 x 2), r)."""
     (a, finger), (turns, side) = place, facets
-    tangent = np.tan(attempts.half_angles[a]) * np.cos(np.pi / len(turns))
-    sine, cosine = side * tangent / np.hypot(1.0, tangent), side / np.hypot(1.0, tangent)
+    sine, cosine = facet_sines(attempts.half_angles[a], len(turns))
+    sine, cosine = side * sine, side * cosine
     face, y, r = attempts.faces[a, finger], 3 + 2 * finger, VARIABLES - 1
     axis, T, o = attempts.axes[a, finger], faces.frames[face], faces.origins[face]
-    first, second = _across(axis, T)
+    first, second = across(axis, T)
     for m in range(len(turns)):
         flat, flat_too, height, lean = 0.0, 0.0, 0.0, 0.0
         for j in range(3):
@@ -100,18 +101,3 @@ def _inside_rows(faces: FaceTable, face: int, finger: int, rows: Rows, row: int)
         rows.At[r, row], rows.b[row] = 1.0, faces.b[face, e]
         row += 1
     return row
-
-
-@njit(cache=True)
-def _across(axis: Array, T: Array) -> tuple[Array, Array]:
-    """Two unit vectors across an axis, the first leaning as the first of a face's frame."""
-    first, second, along = np.empty(3), np.empty(3), 0.0
-    for j in range(3):
-        along += T[j, 0] * axis[j]
-    for j in range(3):
-        first[j] = T[j, 0] - along * axis[j]
-    length = np.sqrt(dotted(first, first))
-    for j in range(3):
-        first[j] /= length
-    cross(axis, first, second)
-    return first, second

@@ -18,7 +18,7 @@ from grasp_core.kernels.attempts import (
 )
 from grasp_core.kernels.simplex import Rows
 from grasp_core.kernels.tables import Attempts, FaceTable
-from grasp_core.kernels.vectors import balancing_weights, dotted
+from grasp_core.kernels.vectors import dotted, focus_direction
 
 VARIABLES, K = 5, 3
 """How many there are, and where half the distance of the foci is among them."""
@@ -46,7 +46,7 @@ def pencil_bounds(
     """
     room = np.empty((VARIABLES + 2) * (1 + FINGERS * (2 + faces.E.shape[1])))
     for a in range(len(bounds)):
-        u, edges = _focus_direction(attempts.axes[a]), edges_of(faces, attempts, a)
+        u, edges = focus_direction(attempts.axes[a]), edges_of(faces, attempts, a)
         bounds[a] = -np.inf
         for cell in (CELL_A, CELL_B):
             near = FINGERS if cell == CELL_B else 0
@@ -148,16 +148,3 @@ def _near_row(
     rows.At[-1, row] = np.sqrt(max(1.0 - across * across, 0.0))
     rows.b[row] = toward * s0 - faces.depths[face] * across
     return row + 1
-
-
-@njit(cache=True)
-def _focus_direction(axes: Array) -> Array:
-    """As `focus_direction` of `grasp_core.placements`."""
-    weights, u = np.empty(FINGERS), np.empty(3)
-    balancing_weights(axes, weights)
-    for j in range(3):
-        u[j] = weights[0] * axes[0, j] + weights[1] * axes[1, j]
-    length = np.sqrt(dotted(u, u))
-    for j in range(3):
-        u[j] /= length
-    return u

@@ -42,9 +42,9 @@ OPTIMAL, INFEASIBLE, BELOW, LOST = 0, 1, 2, 3
 
 def try_out() -> None:
     """Solve a tiny program."""
-    basis = np.empty(1, dtype=np.int64)
     one = np.ones(1)
-    solve(one, Rows(np.ones((1, 1)), one, one, 0), -np.inf, basis, np.empty(1))
+    vertex = Vertex(np.empty(1, dtype=np.int64), np.empty(1), np.empty(1))
+    solve(one, Rows(np.ones((1, 1)), one, one, 0), -np.inf, vertex)
 
 
 class Rows(NamedTuple):
@@ -59,23 +59,34 @@ class Rows(NamedTuple):
     equalities: int
 
 
+class Vertex(NamedTuple):
+    """Where the method stands."""
+
+    basis: Indices
+    """Rows of the basis, (n,); rows + 2 i and rows + 2 i + 1 are the upper and the lower side of
+    the box."""
+    y: Array
+    """Their multipliers; where a row contradicts them, its combination alpha, (n,)."""
+    x: Array
+    """Where they meet, (n,)."""
+
+
 @njit(cache=True, error_model="numpy")
-def solve(c: Array, rows: Rows, cutoff: float, basis: Indices, y: Array) -> tuple[int, int]:
+def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex) -> tuple[int, int]:
     """Find a best vertex.
 
     Args:
         c: (n,)
         rows: Of the program.
         cutoff: Stop as soon as the optimum is known to be smaller.
-        basis: Filled with the rows of the basis, (n,); rows + 2 i and rows + 2 i + 1 are the upper
-            and the lower side of the box.
-        y: Filled with their multipliers, (n,).
+        vertex: Filled with the last one.
 
     Returns:
         How it ended, and the row that contradicts the basis, if one does.
     """
     n, count, idle = len(c), len(rows.b), 0
-    inverse, x, value = _corner(c, count, basis, y)
+    basis, y, x = vertex
+    inverse, value = _corner(c, count, vertex)
     alpha, excess, inside = np.empty(n), np.empty(count), np.zeros(count, dtype=np.bool_)
     for _ in range(MOST * n):
         if value < cutoff and not _leans_on_box(y, basis, count):
@@ -92,6 +103,7 @@ def solve(c: Array, rows: Rows, cutoff: float, basis: Indices, y: Array) -> tupl
         _combined(rows, entering, inverse, alpha)
         leaving = _leaving(y, alpha, basis, rows)
         if leaving < 0:
+            y[:] = alpha
             return INFEASIBLE, entering
         drop = max(y[leaving] / alpha[leaving], 0.0)
         idle = idle + 1 if drop * beyond < UNCHANGED else 0
@@ -108,33 +120,58 @@ def solve(c: Array, rows: Rows, cutoff: float, basis: Indices, y: Array) -> tupl
 
 
 @njit(cache=True, error_model="numpy")
-def proved_bound(c: Array, rows: Rows, basis: Indices, y: Array, accuracy: float) -> float:
+def proved_bound(c: Array, rows: Rows, vertex: Vertex, accuracy: float) -> float:
     """No feasible value is larger: y.b, if y >= 0 gives c to within an accuracy; else infinity."""
     bound, left = 0.0, c.copy()
     for j in range(len(c)):
-        k = basis[j]
-        if abs(y[j]) <= NEGLIGIBLE:
+        share = vertex.y[j]
+        if abs(share) <= NEGLIGIBLE:
             continue
-        if k >= len(rows.b) or y[j] < 0.0:
+        if not _may_weigh(share, vertex.basis[j], rows):
             return np.inf
-        bound += y[j] * rows.b[k]
-        for i in range(len(c)):
-            left[i] -= y[j] * rows.At[i, k]
+        bound += share * rows.b[vertex.basis[j]]
+        _subtract(left, share, rows, vertex.basis[j])
     proved = np.abs(left).max() <= accuracy and bound < np.inf  # which no bound is that is none
     return bound if proved else np.inf
 
 
 @njit(cache=True, error_model="numpy")
-def _corner(c: Array, count: int, basis: Indices, y: Array) -> tuple[Array, Array, float]:
-    """The corner of the box on the side of c: inverse of its basis, x and c.x."""
+def proved_empty(rows: Rows, vertex: Vertex, against: int, farthest: float) -> bool:
+    """Whether a row and the basis that it contradicts exclude all points up to |x|_1 = farthest.
+
+    Where a_r = alpha_1 a_1 + .. with alpha <= 0, its excess over b_r is at least that of
+    alpha_1 b_1 + .. .
+    """
+    gap, left = -rows.b[against], rows.At[:, against].copy()
+    for j in range(len(left)):
+        share = vertex.y[j]
+        if not _may_weigh(-share, vertex.basis[j], rows):
+            if abs(share) > POSITIVE:
+                return False
+            continue  # left out, it shows in what is left
+        gap += share * rows.b[vertex.basis[j]]
+        _subtract(left, share, rows, vertex.basis[j])
+    return gap > farthest * np.abs(left).max() + VIOLATED
+
+
+@njit(cache=True, error_model="numpy")
+def _may_weigh(share: float, k: int, rows: Rows) -> bool:
+    """Whether a proof may use a row this much: sides of the box never, equalities always."""
+    count = len(rows.b)
+    return k < count and (share > 0.0 or k >= count - rows.equalities)
+
+
+@njit(cache=True, error_model="numpy")
+def _corner(c: Array, count: int, vertex: Vertex) -> tuple[Array, float]:
+    """The corner of the box on the side of c: inverse of its basis, and c.x."""
     n = len(c)
-    inverse, x, value = np.zeros((n, n)), np.empty(n), 0.0
+    inverse, value = np.zeros((n, n)), 0.0
     for i in range(n):
         side = 1.0 if c[i] >= 0.0 else -1.0
-        basis[i] = count + 2 * i + (0 if side > 0.0 else 1)
-        inverse[i, i], x[i], y[i] = side, side * BOX, abs(c[i])
-        value += c[i] * x[i]
-    return inverse, x, value
+        vertex.basis[i] = count + 2 * i + (0 if side > 0.0 else 1)
+        inverse[i, i], vertex.x[i], vertex.y[i] = side, side * BOX, abs(c[i])
+        value += c[i] * vertex.x[i]
+    return inverse, value
 
 
 @njit(cache=True, error_model="numpy")

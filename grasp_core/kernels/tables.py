@@ -44,3 +44,17 @@ class Corners(NamedTuple):
     """(f, c, 3), as many of each face as it has."""
     counts: Indices
     """(f,)"""
+
+
+class RegulusTerms(NamedTuple):
+    """What `regulus_grasps` counts as a regulus."""
+
+    turns: Array
+    """Cosines and sines of the directions in which a pyramid's facets lean, (m, 2)."""
+    shares: Array
+    """Where in its interval each slope's angle is tried, (s,)."""
+    depth: float
+    inset: float
+    gap: float
+    tie: float
+    """Merits that differ by no more are equal: the slopes tried first win."""

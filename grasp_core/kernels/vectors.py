@@ -34,3 +34,31 @@ def balancing_weights(axes: Array, weights: Array) -> None:
     scale = np.sign(total) / max(size, np.finfo(np.float64).tiny)
     for i in range(4):
         weights[i] *= scale
+
+
+@njit(cache=True)
+def focus_direction(axes: Array) -> Array:
+    """As `focus_direction` of `grasp_core.placements`."""
+    weights, u = np.empty(4), np.empty(3)
+    balancing_weights(axes, weights)
+    for j in range(3):
+        u[j] = weights[0] * axes[0, j] + weights[1] * axes[1, j]
+    length = np.sqrt(dotted(u, u))
+    for j in range(3):
+        u[j] /= length
+    return u
+
+
+@njit(cache=True)
+def across(axis: Array, T: Array) -> tuple[Array, Array]:
+    """Two unit vectors across an axis, the first leaning as the first of a face's frame."""
+    first, second, along = np.empty(3), np.empty(3), 0.0
+    for j in range(3):
+        along += T[j, 0] * axis[j]
+    for j in range(3):
+        first[j] = T[j, 0] - along * axis[j]
+    length = np.sqrt(dotted(first, first))
+    for j in range(3):
+        first[j] /= length
+    cross(axis, first, second)
+    return first, second

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.kernels.simplex import OPTIMAL, Rows, solve
+from grasp_core.kernels.simplex import OPTIMAL, Rows, Vertex, solve
 
 WRENCH = 6
 
@@ -36,10 +36,10 @@ def vertices(wrenches: Array, twists: Array, multipliers: Array, rows: Indices) 
     """
     count = wrenches.shape[1]
     At, b, norms = np.empty((WRENCH, count)), np.ones(count), np.empty(count)
-    c, M = np.empty(WRENCH), np.empty((WRENCH, WRENCH))
+    c, x, M = np.empty(WRENCH), np.empty(WRENCH), np.empty((WRENCH, WRENCH))
     for g in range(len(wrenches)):
         _program(wrenches[g], c, At, norms)
-        status, _ = solve(c, Rows(At, b, norms, 0), -np.inf, rows[g], multipliers[g])
+        status, _ = solve(c, Rows(At, b, norms, 0), -np.inf, Vertex(rows[g], multipliers[g], x))
         if status != OPTIMAL or rows[g].max() >= count:  # else it leans on the simplex method's box
             twists[g], rows[g] = np.nan, 0
             continue

@@ -9,11 +9,11 @@ import math
 
 import numpy as np
 
+from grasp_core.attempt_bounds import KERNELS, AttemptBounds
 from grasp_core.candidates import NORMAL, spanning_blocks
 from grasp_core.concurrent_grasps import BEFORE, BEHIND
 from grasp_core.concurrent_grasps import _rows as concurrent_rows
 from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS
-from grasp_core.disc_bounds import KERNELS, DiscBounds
 from grasp_core.face_pieces import face_shapes
 from grasp_core.kernels.tables import Attempts
 from grasp_core.lp import LinearProgram, _by_highs
@@ -40,7 +40,7 @@ class Programs:
     def __init__(self, name, family):
         body = example_object(name)
         shapes = face_shapes(body)
-        self.construction, self.discs = CONSTRUCTIONS[family], DiscBounds(shapes)
+        self.construction, self.discs = CONSTRUCTIONS[family], AttemptBounds(shapes)
         parts = [make() for _, make in spanning_blocks(body, shapes, THETA, len(body.faces))]
         orders = [list(order) for order in self.construction.orders]
         self.attempts = Attempts(

@@ -21,7 +21,7 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 import grasp_core as gc
-from grasp_core import disc_bounds, lp
+from grasp_core import attempt_bounds, lp
 from scenes.objects import example_object
 
 PLANS = [
@@ -52,14 +52,14 @@ def programs(count):
     doors = [importlib.import_module(f"grasp_core.{name}") for name in ("lp", "largest_discs")]
     for door in doors:
         door.maximize_above = record
-    kernels, disc_bounds.compiled = disc_bounds.compiled, lambda _: None  # by whole programs
+    kernels, attempt_bounds.compiled = attempt_bounds.compiled, lambda _: None  # by whole programs
     try:
         for name, friction in PLANS:
             gc.plan(example_object(name), friction)
     except EnoughError:
         pass
     finally:
-        disc_bounds.compiled = kernels
+        attempt_bounds.compiled = kernels
         for door in doors:
             door.maximize_above = solve
     return found

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from grasp_core.attempt_bounds import AttemptBounds
 from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS, PAIRINGS
-from grasp_core.disc_bounds import DiscBounds
 from grasp_core.disc_limits import _reaches, _widths, corners_of, disc_limits
 from grasp_core.face_pieces import face_shapes
 from grasp_core.kernels.tables import Attempts
@@ -53,7 +53,7 @@ def test_no_program_reaches_beyond_its_limit(name):
     faces, axes, half_angles = quadruples(body, seed=1)
     limits, discs, held = (
         limits_on(body, faces, axes, half_angles),
-        DiscBounds(face_shapes(body)),
+        AttemptBounds(face_shapes(body)),
         0,
     )
     for family in ("concurrent", "pencil"):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core import disc_bounds, largest_discs
+from grasp_core import attempt_bounds, largest_discs
+from grasp_core.attempt_bounds import AttemptBounds
 from grasp_core.constructions import CONSTRUCTIONS
-from grasp_core.disc_bounds import DiscBounds
 from grasp_core.errors import SolverError
 from grasp_core.face_pieces import face_shapes
 from grasp_core.promising import Block, promising
@@ -61,7 +61,7 @@ def opened(body, family, least):
     listed = [
         Block(room, lambda place=place: rank(place)) for place, room in enumerate(blocks.rooms)
     ]
-    discs = DiscBounds(face_shapes(body))
+    discs = AttemptBounds(face_shapes(body))
     return promising(construction, listed, discs, lambda _: least[0], tally), made
 
 
@@ -92,7 +92,7 @@ def test_a_program_that_fails_leaves_its_attempt_to_the_search(monkeypatch):
         return solve(program, cutoff)
 
     expected = gc.plan(body, 0.4, families="concurrent", limit=5).grasps
-    monkeypatch.setattr(disc_bounds, "compiled", lambda _: None)
+    monkeypatch.setattr(attempt_bounds, "compiled", lambda _: None)
     monkeypatch.setattr(largest_discs, "maximize_above", sometimes)
     plan = gc.plan(body, 0.4, families="concurrent", limit=5)
     assert len(calls) >= 80

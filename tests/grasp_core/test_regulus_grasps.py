@@ -1,12 +1,22 @@
 import math
+from collections import Counter
 
 import numpy as np
 import pytest
 
 import grasp_core as gc
 from grasp_core.lines import plucker_vectors
-from grasp_core.placements import Placement
-from grasp_core.regulus_grasps import LEAST_DEPTH, nearly_symmetric, place_regulus
+from grasp_core.kernels import compiled
+from grasp_core.placements import NoPlacement, Placement
+from grasp_core.regulus_grasps import (
+    CHOICES,
+    KERNEL,
+    LEAST_DEPTH,
+    _best_choice,
+    _best_of,
+    nearly_symmetric,
+    place_regulus,
+)
 from tests.grasp_core.quadruples import paired_quadruples
 
 TOLERANCE = 1e-7
@@ -106,3 +116,35 @@ def test_pairings_that_are_dropped_unseen_have_no_regulus():
             assert not isinstance(place_regulus(quad, cones), Placement)
             dropped += 1
     assert dropped >= 100
+
+
+def test_compiled_code_chooses_the_slopes_that_all_programs_choose():
+    if compiled(KERNEL) is None:
+        pytest.skip("no compiled code here")
+    tried = Counter()
+    for name in OBJECTS:
+        for quad, cones in paired_quadruples(name, math.radians(10.0), 30):
+            merit, choices = _best_choice(quad, cones)
+            slow = _best_of(quad, cones, CHOICES)
+            if isinstance(slow, NoPlacement):
+                assert merit == -math.inf
+                assert not choices
+            else:
+                quick = _best_of(quad, cones, choices)
+                assert merit == pytest.approx(slow.merit, abs=1e-8)
+                np.testing.assert_allclose(quick.positions, slow.positions, atol=1e-9)
+            tried[type(slow)] += 1
+    assert tried[Placement] >= 60
+    assert tried[NoPlacement] >= 10
+
+
+def test_without_compiled_code_reguli_are_the_same(without_kernels):
+    pairs = list(paired_quadruples("random-30-1", math.radians(10.0), 12))
+    quick = [place_regulus(*pair) for pair in pairs]
+    without_kernels()
+    slow = [place_regulus(*pair) for pair in pairs]
+    assert len({type(one) for one in quick}) == 2
+    for one, other in zip(quick, slow, strict=True):
+        assert type(one) is type(other)
+        if isinstance(one, Placement):
+            np.testing.assert_allclose(one.positions, other.positions, atol=1e-7)

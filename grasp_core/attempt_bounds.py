@@ -1,9 +1,10 @@
-"""How large the discs of many attempts can be: one small program each, solved in compiled code.
+"""What many attempts can offer at most: small programs, solved in compiled code.
 
-An attempt is four faces in the order of the fingers with a force cone each. Its bound is the value
-of the first program of `largest_discs`, which maximises the smallest radius, on the convex hulls of
-the faces: no choice of their pieces offers more. Without kernels the constructions themselves are
-asked, at a hundred times the cost.
+An attempt is four faces in the order of the fingers with a force cone each. Where a construction
+has discs, the bound is the value of the first program of `largest_discs`, which maximises the
+smallest radius, on the convex hulls of the faces: no choice of their pieces offers more. For
+reguli it only says whether any slopes are feasible there. Without kernels the constructions
+themselves are asked for discs, at a hundred times the cost, and reguli are not bounded.
 """
 
 from dataclasses import dataclass
@@ -16,37 +17,45 @@ from grasp_core.concurrent_grasps import PYRAMID_SIDES, facet_turns
 from grasp_core.constructions import LEAST_RADIUS, Construction
 from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece, Shapes
+from grasp_core.face_tables import face_table
 from grasp_core.kernels import compiled
 from grasp_core.kernels.tables import Attempts, FaceTable
 from grasp_core.lp import RESIDUAL
 from grasp_core.placements import Placement
+from grasp_core.regulus_grasps import regulus_bounds
 from grasp_core.values import Family, ForceCone, four
 
 KERNELS: dict[Family, str] = {"concurrent": "concurrent", "pencil": "pencils"}
 
 
 @dataclass(frozen=True, eq=False)
-class DiscBounds:
-    """Bounds for attempts on the faces of one object."""
+class AttemptBounds:
+    """Those on the faces of one object."""
 
     shapes: Shapes
 
     def of(self, construction: Construction, attempts: Attempts, least: float) -> Array:
         """Upper bounds on the smallest radius, (a,), in object radii; infinite if none is proved.
 
+        Those of reguli are infinite or, where no slopes are feasible, minus infinity.
+
         Args:
-            construction: With discs.
+            construction: Of a family.
             attempts: On faces with room, in finger order, with cones that positively span (P3).
             least: Smaller discs do not matter; their bounds are the best ones or this at most.
         """
-        kernel = compiled(KERNELS[construction.family])
-        if kernel is None:
-            return self._by_constructions(construction, attempts, least)
         attempts = Attempts(
             np.ascontiguousarray(attempts.faces),
             np.ascontiguousarray(attempts.axes),
             np.ascontiguousarray(attempts.half_angles),
         )
+        if construction.limits is None:
+            known = regulus_bounds(self._table, attempts)
+            none = known is not None and known[0] == -np.inf
+            return np.where(none, -np.inf, np.full(len(attempts.faces), np.inf))
+        kernel = compiled(KERNELS[construction.family])
+        if kernel is None:
+            return self._by_constructions(construction, attempts, least)
         bounds = np.empty(len(attempts.faces))
         if construction.family == "pencil":
             kernel.pencil_bounds(self._table, attempts, LEAST_RADIUS, least, bounds)
@@ -78,23 +87,5 @@ class DiscBounds:
 
     @cached_property
     def _table(self) -> FaceTable:
-        """The hulls as the kernel wants them, in one array per property."""
-        hulls = {face: shape.hull for face, shape in enumerate(self.shapes) if shape}
-        count, most = len(self.shapes), max((len(hull.E) for hull in hulls.values()), default=0)
-        table = FaceTable(
-            normals=np.zeros((count, 3)),
-            origins=np.zeros((count, 3)),
-            frames=np.zeros((count, 3, 2)),
-            E=np.zeros((count, most, 2)),
-            b=np.zeros((count, most)),
-            edges=np.zeros(count, dtype=np.int64),
-            corners=np.zeros((count, most, 3)),
-            depths=np.zeros(count),
-        )
-        for face, hull in hulls.items():
-            table.normals[face], table.origins[face] = hull.normal, hull.origin
-            table.frames[face], table.depths[face] = hull.frame, hull.depth
-            table.edges[face] = len(hull.E)
-            table.corners[face, : len(hull.E)] = hull.origin + hull.corners @ hull.frame.T
-            table.E[face, : len(hull.E)], table.b[face, : len(hull.b)] = hull.E, hull.b
-        return table
+        """The hulls as kernels want them."""
+        return face_table([shape.hull if shape else None for shape in self.shapes])

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.attempt_bounds import KERNELS, AttemptBounds
 from grasp_core.candidates import LEAST_SPAN_ANGLE, NORMAL, TILTED, candidate_blocks
 from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS
-from grasp_core.disc_bounds import KERNELS, DiscBounds
 from grasp_core.face_pieces import face_shapes
 from grasp_core.kernels.tables import Attempts
 from scenes.objects import example_object
@@ -38,7 +38,7 @@ def attempts(body, kind, order, count=60):
 @pytest.mark.parametrize("name", BODIES)
 def test_bounds_are_the_merits_that_the_constructions_reach(name, family):
     body = BODIES[name]()
-    construction, discs = CONSTRUCTIONS[family], DiscBounds(face_shapes(body))
+    construction, discs = CONSTRUCTIONS[family], AttemptBounds(face_shapes(body))
     seen = np.zeros(2, dtype=int)
     for kind in (NORMAL, TILTED):
         for order in construction.orders:
@@ -55,7 +55,7 @@ def test_bounds_are_the_merits_that_the_constructions_reach(name, family):
 
 def test_with_a_larger_least_radius_bounds_above_it_stay_and_others_stay_below():
     body = example_object("random-14-1")
-    discs = DiscBounds(face_shapes(body))
+    discs = AttemptBounds(face_shapes(body))
     for family in KERNELS:
         some = attempts(body, TILTED, (0, 1, 2, 3), 200)
         every = discs.of(CONSTRUCTIONS[family], some, -np.inf)
