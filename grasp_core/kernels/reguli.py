@@ -96,25 +96,31 @@ def regulus_bounds(
                 _fill(faces, attempts.faces[a], frames, (i, j), terms, rows)
                 gap = terms.gap / min(abs(frames.tau[0, i]), abs(frames.tau[1, j]))
                 worth = bounds[a] + terms.tie
-                best, side = _best_side(rows, gap, worth, vertex)
+                best, side = _best_side(rows, gap, terms.tie, worth, vertex)
                 if best > worth:
                     bounds[a] = best
                     chosen[a, 0], chosen[a, 1], chosen[a, 2] = i, j, side
 
 
 @njit(cache=True)
-def _best_side(rows: Rows, gap: float, worth: float, vertex: Vertex) -> tuple[float, int]:
+def _best_side(
+    rows: Rows, gap: float, tie: float, worth: float, vertex: Vertex
+) -> tuple[float, int]:
     """The better of the programs for p > gap and p < -gap: a bound on its value, and the side."""
-    best = _bounded(rows, worth, vertex)
-    if best <= worth or abs(vertex.x[P]) >= gap:
-        return best, PLUS if vertex.x[P] > 0.0 else MINUS
-    found, side = -np.inf, PLUS
-    for which, sign in ((PLUS, 1.0), (MINUS, -1.0)):
-        rows.At[P, 0], rows.b[0] = -sign, -gap
-        value = _bounded(rows, worth, vertex)
-        if value > worth:
-            found, side, worth = value, which, value
-    return found, side
+    either = _bounded(rows, worth, vertex)
+    p = vertex.x[P]
+    if either <= worth or p >= gap:
+        return either, PLUS
+    rows.At[P, 0], rows.b[0] = -1.0, -gap
+    plus = _bounded(rows, worth, vertex)
+    if plus >= either - tie:
+        return plus, PLUS
+    if p <= -gap:
+        return either, MINUS
+    worth = max(worth, plus + tie)
+    rows.At[P, 0] = 1.0
+    minus = _bounded(rows, worth, vertex)
+    return (minus, MINUS) if minus > worth else (plus, PLUS)
 
 
 @njit(cache=True)
