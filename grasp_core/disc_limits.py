@@ -81,6 +81,19 @@ def disc_limits(
     return limits
 
 
+def angle_limits(extent: float, half_angles: Array) -> Array:
+    """What is left of the limits where nothing but the half-angle is known, (q, 4).
+
+    Args:
+        extent: Largest distance of a corner from the centre of mass, which no reach exceeds.
+        half_angles: Upper bounds, (q,) [rad].
+    """
+    reaches = np.full(len(half_angles), extent)
+    widths = np.full((len(half_angles), FINGERS, FINGERS), np.inf)
+    concurrent = concurrent_radius_bounds(reaches, widths, half_angles)
+    return np.hstack([concurrent, pencil_radius_bounds(reaches, widths, half_angles, PAIRINGS)])
+
+
 def _reaches(corners: Array, axes: Array) -> Array:
     """Upper bounds on the mean distance of a focus before or behind its contacts, (q,)."""
     heights = np.einsum("qfki,qfi->qfk", corners, axes)

@@ -1,10 +1,11 @@
 """Quadruples with tight bounds, best first over several blocks, as far as they are asked for.
 
-Three kinds of things wait in one queue: blocks that nobody made yet, bounded by the room of their
-faces; made ones, by the cheap bounds of their rankings; and single quadruples, by small programs.
-What has the largest bound comes first: a block is made, the bounds of some dozens of quadruples are
-tightened, or a quadruple is handed out. So none with larger discs can follow, and hardly a
-program is solved that was not needed to know this.
+Four kinds of things wait in one queue: blocks that nobody made yet, bounded by the room of their
+faces; made ones, by how wide their cones can be; some quadruples with their cones, by their
+corners; and single quadruples, by small programs. What has the largest bound comes first: a block
+is made, cones are chosen for some dozens of quadruples, their bounds are tightened, or a quadruple
+is handed out. So none with larger discs can follow, and hardly a cone is tilted and hardly a
+program solved that was not needed to know this.
 """
 
 from collections import Counter
@@ -20,7 +21,8 @@ from grasp_core.arrays import Array
 from grasp_core.attempt_bounds import AttemptBounds
 from grasp_core.constructions import Construction
 from grasp_core.kernels.tables import Attempts
-from grasp_core.ranking import SAME_PROMISE, Quadruple, Ranking
+from grasp_core.prospects import Prospects
+from grasp_core.ranking import SAME_PROMISE, Outlook, Quadruple, Ranking, outlook
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 32, 2048
 """Quadruples whose bounds are tightened together."""
@@ -28,27 +30,27 @@ SMALLEST_CHUNK, LARGEST_CHUNK = 32, 2048
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Quadruples that are ranked when they are needed."""
+    """Quadruples that are listed when they are needed."""
 
     room: float
     """No disc is larger."""
-    rank: Callable[[], Ranking]
+    make: Callable[[], Prospects]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rest:
-    """What is left of a ranking from a row on."""
+    """What is left of a list of quadruples from a row on."""
 
-    ranking: Ranking
+    listed: Outlook | Ranking
     best: Array
-    """The cheap bounds of its quadruples, falling."""
+    """The bounds of its quadruples, falling."""
     start: int
 
-    def until(self, bound: float) -> int:
-        """Where those end that are worth being tightened before what else has a bound."""
+    def until(self, bound: float) -> slice:
+        """Those that are worth a closer look before what else has a bound."""
         larger = int(np.searchsorted(-self.best[self.start :], -bound))
         count = min(max(larger, SMALLEST_CHUNK), LARGEST_CHUNK)
-        return min(self.start + count, len(self.best))
+        return slice(self.start, min(self.start + count, len(self.best)))
 
 
 _Waiting: TypeAlias = tuple[float, int, tuple[int, ...], Block | _Rest | Callable[[], Quadruple]]
@@ -84,19 +86,23 @@ def promising(
             return
         match item:
             case Block():
-                item = _opened(item.rank(), worth)
-                _put_back(waiting, item, place)
+                listed = outlook(item.make(), construction, worth)
+                _put_back(waiting, _Rest(listed, listed.bounds, 0), place)
             case _Rest():
-                end = item.until(-waiting[0][0] if waiting else worth)
-                for one in _tightened(item.ranking, slice(item.start, end), discs, worth, tally):
-                    heappush(waiting, one)
-                _put_back(waiting, _Rest(item.ranking, item.best, end), place)
+                rows = item.until(-waiting[0][0] if waiting else worth)
+                if isinstance(item.listed, Outlook):
+                    _put_back(waiting, _closer(item.listed, rows, worth), (*place, rows.start))
+                else:
+                    for one in _tightened(item.listed, rows, discs, worth, tally):
+                        heappush(waiting, one)
+                _put_back(waiting, _Rest(item.listed, item.best, rows.stop), place)
             case _:
                 yield item()
 
 
-def _opened(ranking: Ranking, worth: float) -> _Rest:
-    """A ranking without what is not worth having: the rest of the block can be forgotten."""
+def _closer(listed: Outlook, rows: slice, worth: float) -> _Rest:
+    """Some quadruples with their cones, without what is not worth having: that is forgotten."""
+    ranking = listed.ranking(rows)
     best = ranking.bounds.max(axis=(1, 2), initial=-np.inf)
     count = int((best > worth).sum())
     return _Rest(ranking.first(count), best[:count], 0)
@@ -109,19 +115,20 @@ def _put_back(waiting: list[_Waiting], rest: _Rest, place: tuple[int, ...]) -> N
 
 
 def in_rows(
-    ranking: Ranking, discs: AttemptBounds, worth: float, tally: Counter[str]
+    listed: Outlook, discs: AttemptBounds, worth: float, tally: Counter[str]
 ) -> Iterator[Quadruple]:
-    """The quadruples of a ranking that may be worth having, in its order.
+    """Quadruples that may be worth having, some after others as they are listed.
 
     Args:
-        ranking: Of one block.
+        listed: Of one block.
         discs: Of the object's faces.
         worth: The merit above which grasps are worth having.
         tally: Where to count attempts whose bound proves that they have none.
     """
-    for start in range(0, len(ranking), SMALLEST_CHUNK):
-        rows = slice(start, min(start + SMALLEST_CHUNK, len(ranking)))
-        for _, _, _, make in _tightened(ranking, rows, discs, worth, tally):
+    for start in range(0, len(listed), SMALLEST_CHUNK):
+        ranking = listed.ranking(slice(start, start + SMALLEST_CHUNK))
+        every = slice(0, len(ranking))
+        for _, _, _, make in _tightened(ranking, every, discs, worth, tally):
             yield make()
 
 

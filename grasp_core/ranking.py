@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 from grasp_core.candidates import LEAST_SPAN_ANGLE, NORMAL, TILTED, Candidates
 from grasp_core.constructions import LEAST_RADIUS, Construction, FingerOrder
+from grasp_core.disc_limits import angle_limits
+from grasp_core.prospects import Prospects
 from grasp_core.values import FaceQuadruple, ForceCone, four
 
 SAME_PROMISE = 7
@@ -91,6 +93,42 @@ class Ranking:
             for kind in np.argsort(-bounds, kind="stable")
             if bounds[kind] > -np.inf
         )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outlook:
+    """Quadruples whose cones are not chosen yet, most promising first."""
+
+    prospects: Prospects
+    bounds: Array
+    """No disc is larger, (q,); infinite for reguli."""
+    construction: Construction
+
+    def __len__(self) -> int:
+        return len(self.bounds)
+
+    def ranking(self, rows: slice) -> "Ranking":
+        """Some of them with their cones."""
+        return ranked(self.prospects.candidates(rows), self.construction)
+
+
+def outlook(prospects: Prospects, construction: Construction, worth: float) -> Outlook:
+    """In the order of what the widest cones allow; only what may be worth having.
+
+    Args:
+        prospects: Quadruples of faces.
+        construction: What is to be built on them.
+        worth: The merit above which placements are worth having.
+    """
+    widest, bounds = prospects.widest, np.full(len(prospects), np.inf)
+    promise = widest
+    if construction.limits is not None:
+        limits = angle_limits(prospects.cones.extent, widest)[:, construction.limits]
+        promise = bounds = np.minimum(limits.max(axis=1), prospects.rooms)
+    usable = (widest > LEAST_SPAN_ANGLE) & (prospects.rooms > 0.0) & (bounds > worth)
+    order = np.argsort(-np.round(promise, SAME_PROMISE), kind="stable")
+    order = order[usable[order]]
+    return Outlook(prospects.some(order), bounds[order], construction)
 
 
 def ranked(candidates: Candidates, construction: Construction) -> Ranking:

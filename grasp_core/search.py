@@ -19,7 +19,8 @@ from grasp_core.face_pieces import FacePiece, FaceShape, Shapes, choices_near
 from grasp_core.placements import Placement
 from grasp_core.plans import MethodCounts, Proof
 from grasp_core.promising import Block, in_rows, promising
-from grasp_core.ranking import Attempt, Quadruple
+from grasp_core.prospects import Blocks
+from grasp_core.ranking import Attempt, Quadruple, outlook
 from grasp_core.reach import Reach
 from grasp_core.spanning import cones_positively_span
 from grasp_core.true_surface import on_true_surface
@@ -125,7 +126,7 @@ def search_construction(
     construction: Construction,
     shapes: Shapes,
     friction: float,
-    blocks: Sequence[Block],
+    blocks: Blocks,
     search: Search,
 ) -> Iterator[list[Certified]]:
     """Go through blocks of quadruples, yielding what each promising one gave.
@@ -147,19 +148,23 @@ def search_construction(
 
 
 def _in_order(
-    construction: Construction, discs: AttemptBounds, blocks: Sequence[Block], search: Search
+    construction: Construction, discs: AttemptBounds, blocks: Blocks, search: Search
 ) -> Iterator[Quadruple]:
     """Quadruples to try: with a limit best first over many blocks, else block by block."""
     if construction.limits is not None:
         size = 1 if search.limit is None else TOGETHER
         for start in range(0, len(blocks), size):
-            some = blocks[start : start + size]
+            places = range(start, min(start + size, len(blocks)))
+            if not search.may_gain(construction, float(blocks.rooms[places].max())):
+                continue
+            some = [Block(float(blocks.rooms[at]), partial(blocks.make, at)) for at in places]
             yield from promising(construction, some, discs, search.least, search.tally)
         return
-    for block in blocks:
+    for place in range(len(blocks)):
         if search.full:
             return
-        some = in_rows(block.rank(), discs, construction.least, search.tally)
+        listed = outlook(blocks.make(place), construction, construction.least)
+        some = in_rows(listed, discs, construction.least, search.tally)
         yield from takewhile(lambda _: not search.full, some)
 
 

@@ -4,19 +4,17 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
 from itertools import combinations, islice
 from typing import TypeAlias
 
-from grasp_core.candidates import Candidates, candidate_blocks, spanning_blocks
+from grasp_core.candidates import PlannedCones
 from grasp_core.certified import Certified
 from grasp_core.clear_of_edges import clear_of_edges
 from grasp_core.constructions import CONSTRUCTIONS, MIXED, Construction
 from grasp_core.face_pieces import face_shapes
 from grasp_core.free_search import FreeRequest, search_free, search_undecided
 from grasp_core.plans import Outcomes
-from grasp_core.promising import Block
-from grasp_core.ranking import Ranking, ranked
+from grasp_core.prospects import Blocks, Prospects, all_blocks, spanning_blocks
 from grasp_core.reach import Reach, reach
 from grasp_core.requests import COMPLETE_CELLS, FAMILIES, METHODS, PlanRequest
 from grasp_core.search import Search, search_construction
@@ -29,15 +27,12 @@ Progress: TypeAlias = Callable[[int, int, int], None]
 """Called with a count of quadruples that rises to that of all, the latter, and grasps so far."""
 
 
-class _Blocks:
-    """Blocks of quadruples, made when they are asked for; the first ones are kept."""
+class _Kept:
+    """Blocks of quadruples, of which the first ones are kept once they are made."""
 
-    def __init__(self, blocks: Iterator[tuple[float, Callable[[], Candidates]]]) -> None:
-        listed = tuple(blocks)
-        self.rooms = tuple(room for room, _ in listed)
-        """No disc of each block is larger."""
-        self.makers = tuple(make for _, make in listed)
-        self.made: dict[int, Candidates] = {}
+    def __init__(self, blocks: Blocks) -> None:
+        self.blocks = blocks
+        self.made: dict[int, Prospects] = {}
         self.counts: dict[int, int] = {}
 
     @property
@@ -47,14 +42,15 @@ class _Blocks:
 
     def make_all(self) -> None:
         """Make the blocks that nobody asked for, to know what is in them."""
-        for place in range(len(self.rooms)):
+        for place in range(len(self.blocks)):
             if place not in self.counts:
-                self[place]
+                self.make(place)
 
-    def __getitem__(self, place: int) -> Candidates:
+    def make(self, place: int) -> Prospects:
+        """One of the blocks."""
         if place in self.made:
             return self.made[place]
-        block = self.makers[place]()
+        block = self.blocks.make(place)
         if place < KEPT_BLOCKS:
             self.made[place] = block
         self.counts[place] = block.spanning
@@ -79,12 +75,13 @@ class Searches:
             if method in request.families
         }
         self.whole = len(body.faces)
-        of_object = self.body, self.shapes, request.theta, self.whole
-        self.spanning_blocks = _Blocks(spanning_blocks(*of_object))
-        tilted = request.cones == "tilted"
-        self.tilted_blocks = (
-            _Blocks(candidate_blocks(*of_object, self.shared)) if tilted else self.spanning_blocks
-        )
+        of_object = self.body, self.shapes, request.theta
+        around = PlannedCones(*of_object, tilted=False)
+        self.spanning_blocks = _Kept(spanning_blocks(around, self.whole))
+        self.tilted_blocks = self.spanning_blocks
+        if request.cones == "tilted":
+            tilted = PlannedCones(*of_object, tilted=True)
+            self.tilted_blocks = _Kept(all_blocks(tilted, self.whole, self.shared))
 
     def count_spanning(self) -> int:
         """How many quadruples with normals that span (P3) were come across.
@@ -168,19 +165,19 @@ class Searches:
         left = [limit - sum(found[:short]) for short in range(place + 1)]
         return max(each // (place - short + 1) for short, each in enumerate(left))
 
-    def _blocks(self, construction: Construction, search: Search) -> tuple[Block, ...]:
+    def _blocks(self, construction: Construction, search: Search) -> Blocks:
         """Blocks of quadruples for one construction.
 
         Where nothing bounds discs, only cones around the normals count.
         """
-        blocks = self.spanning_blocks if construction.limits is None else self.tilted_blocks
+        kept = self.spanning_blocks if construction.limits is None else self.tilted_blocks
 
-        def rank(place: int) -> Ranking:
-            candidates = blocks[place]
-            search.tally["pruned"] += len(candidates) * len(construction.orders)
-            return ranked(candidates, construction)
+        def make(place: int) -> Prospects:
+            prospects = kept.make(place)
+            search.tally["pruned"] += len(prospects) * len(construction.orders)
+            return prospects
 
-        return tuple(Block(room, partial(rank, place)) for place, room in enumerate(blocks.rooms))
+        return Blocks(kept.blocks.rooms, make)
 
     def _free_request(self, cells: int | None = None) -> FreeRequest:
         request = self.request

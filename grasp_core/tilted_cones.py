@@ -27,7 +27,7 @@ Source: this project's; P3 with its closed form is explained in `spanning`.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import combinations, pairwise, product
 
 import numpy as np
 
@@ -85,6 +85,44 @@ def tilted_cones(normals: Array, thetas: Array) -> TiltedCones:
         return TiltedCones(np.empty((0, FINGERS, 3)), np.empty(0))
     axes, half_angles = (np.concatenate(each) for each in zip(*parts, strict=True))
     return TiltedCones(axes, half_angles)
+
+
+def widest_half_angles(normals: Array, thetas: Array, sines: Array) -> Array:
+    """Half-angles psi that no force cones exceed, however they are tilted, (q,) [rad].
+
+    For every unit vector m some axis has a_i.m < -sin(psi), and it is within theta_i - psi of its
+    normal: the largest angle(n_i, m) - 90 deg + theta_i is above 2 psi. Where the normals span, the
+    smallest over m of max angle(n_i, m) - 90 deg is theta*. Else it is negative, and taken where m
+    is in the middle of two normals, or as far from three.
+
+    Args:
+        normals: Unit vectors, (q, 4, 3).
+        thetas: Half-angles of the friction cones, (q, 4) [rad].
+        sines: Those of theta*, not positive where the normals do not span, (q,).
+    """
+    if kernel := compiled(KERNEL):
+        lowest = np.empty(len(normals))
+        kernel.lowest_heights(np.ascontiguousarray(normals), lowest)
+    else:
+        lowest = _lowest_heights(normals)
+    heights = np.where(sines > 0.0, sines, np.minimum(lowest, 0.0))
+    widest = 0.5 * (thetas.max(axis=1) + np.arcsin(np.clip(heights, -1.0, 1.0)))
+    return np.minimum(widest + SLIGHT, thetas.min(axis=1))
+
+
+def _lowest_heights(normals: Array) -> Array:
+    """The least max_i -n_i.m over the middles m of two normals or three, (q,)."""
+    lowest = np.full(len(normals), np.inf)
+    units = np.moveaxis(normals, 1, 0)
+    middles = [one + other for one, other in combinations(units, 2)]
+    for one, two, three in combinations(units, 3):
+        across = np.cross(two - one, three - one)
+        middles += [across, -across]
+    for middle in middles:
+        length = np.linalg.norm(middle, axis=1)
+        heights = -np.einsum("fqi,qi->qf", units, middle).min(axis=1) / np.maximum(length, SLIGHT)
+        lowest = np.where(length > SLIGHT, np.minimum(lowest, heights), lowest)
+    return lowest
 
 
 def widened(directions: Array, normals: Array, thetas: Array) -> TiltedCones:

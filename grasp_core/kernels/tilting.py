@@ -4,17 +4,20 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array
-from grasp_core.kernels.vectors import dotted
+from grasp_core.kernels.vectors import cross, dotted
 
 FINGERS = 4
 DEPENDENT = 1e-12
 """As in `grasp_core.spanning`."""
+SLIGHT = 1e-6
+"""As in `grasp_core.tilted_cones`."""
 
 
 def try_out() -> None:
     """Tilt one quadruple."""
     axes, thetas = np.ones((1, FINGERS, 3)), np.ones((1, FINGERS))
     half_angles(axes, axes, thetas, np.empty(1))
+    lowest_heights(axes, np.empty(1))
     balance(axes.copy(), axes, thetas, 1, 1e-6)
     frames = np.ones((2, 1, FINGERS, 3))
     moves, pace = np.ones((1, FINGERS, 2)), np.ones(4)
@@ -26,6 +29,35 @@ def half_angles(axes: Array, normals: Array, thetas: Array, reached: Array) -> N
     """Fill in the largest psi that axes allow, (q,) [rad]; negative where they do not span."""
     for q in range(len(axes)):
         reached[q] = _half_angle(axes[q], normals[q], thetas[q], -np.inf)
+
+
+@njit(cache=True)
+def lowest_heights(normals: Array, lowest: Array) -> None:
+    """Fill in the least max_i -n_i.m over the middles m of two normals or three, (q,)."""
+    middle, one, other = np.empty(3), np.empty(3), np.empty(3)
+    for q in range(len(normals)):
+        n, lowest[q] = normals[q], np.inf
+        for i in range(FINGERS):
+            for j in range(i):
+                for d in range(3):
+                    middle[d] = n[i, d] + n[j, d]
+                lowest[q] = min(lowest[q], _height(n, middle, 1.0))
+                for k in range(j):
+                    for d in range(3):
+                        one[d], other[d] = n[i, d] - n[k, d], n[j, d] - n[k, d]
+                    cross(one, other, middle)
+                    lowest[q] = min(lowest[q], _height(n, middle, 1.0), _height(n, middle, -1.0))
+
+
+@njit(cache=True)
+def _height(normals: Array, middle: Array, side: float) -> float:
+    """Largest -n_i.m, for m along a vector or against it; infinite if it has no direction."""
+    length, least = np.sqrt(dotted(middle, middle)), np.inf
+    if length <= SLIGHT:
+        return np.inf
+    for finger in range(FINGERS):
+        least = min(least, side * dotted(normals[finger], middle))
+    return -least / length
 
 
 @njit(cache=True)
