@@ -13,7 +13,13 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.constructions import LEAST_RADIUS
-from grasp_core.disc_limits import corners_of, disc_limits
+from grasp_core.disc_limits import (
+    angle_limits,
+    corners_of,
+    disc_limits,
+    distances,
+    widths_apart,
+)
 from grasp_core.face_pieces import Shapes
 from grasp_core.kernels.tables import Corners
 from grasp_core.spanning import span_sines
@@ -78,11 +84,6 @@ class PlannedCones:
             [max(p.inradius for p in shape.pieces) if shape else 0.0 for shape in self.shapes]
         )
 
-    @cached_property
-    def extent(self) -> float:
-        """Largest distance of a face's corner from the centre of mass, in object radii."""
-        return float(np.linalg.norm(self._corners.points, axis=-1).max(initial=0.0))
-
     def widest(self, quads: Indices) -> tuple[Array, Array]:
         """Half-angles around the normals, and those that no choice of cones exceeds, (q,) [rad].
 
@@ -95,6 +96,16 @@ class PlannedCones:
         if not self.tilted:
             return around, around
         return around, np.maximum(around, widest_half_angles(normals, thetas, sines))
+
+    def limits(self, quads: Indices, widest: Array) -> Array:
+        """Upper bounds on discs of cones that are no wider (see `disc_limits`), (q, 4).
+
+        The narrower the cones, the more they may lean; but smaller bounds follow.
+        """
+        extent = float(np.linalg.norm(self._corners.points, axis=-1).max(initial=0.0))
+        leaning = np.maximum(self._thetas[quads].max(axis=1, initial=0.0) - widest, 0.0)
+        widths = widths_apart(quads, self._distances, self._halves, leaning)
+        return angle_limits(extent, widths, widest)
 
     def candidates(self, quads: Indices) -> Candidates:
         """Quadruples of faces (q, 4) with their cones."""
@@ -121,6 +132,16 @@ class PlannedCones:
     @cached_property
     def _normals(self) -> Array:
         return self.body.normals
+
+    @cached_property
+    def _distances(self) -> Array:
+        return distances(self._corners)
+
+    @cached_property
+    def _halves(self) -> Array:
+        """Half the angles between normals, (f, f) [rad]."""
+        apart = np.linalg.norm(self._normals[:, None] - self._normals, axis=-1)
+        return np.arcsin(np.minimum(0.5 * apart, 1.0))
 
     @cached_property
     def _thetas(self) -> Array:

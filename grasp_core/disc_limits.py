@@ -81,17 +81,46 @@ def disc_limits(
     return limits
 
 
-def angle_limits(extent: float, half_angles: Array) -> Array:
-    """What is left of the limits where nothing but the half-angle is known, (q, 4).
+def angle_limits(extent: float, widths: Array, half_angles: Array) -> Array:
+    """What is left of the limits where the axes are not known, (q, 4).
 
     Args:
         extent: Largest distance of a corner from the centre of mass, which no reach exceeds.
+        widths: Upper bounds on s_i + s_j (see `widths_apart`), (q, 4, 4).
         half_angles: Upper bounds, (q,) [rad].
     """
     reaches = np.full(len(half_angles), extent)
-    widths = np.full((len(half_angles), FINGERS, FINGERS), np.inf)
     concurrent = concurrent_radius_bounds(reaches, widths, half_angles)
     return np.hstack([concurrent, pencil_radius_bounds(reaches, widths, half_angles, PAIRINGS)])
+
+
+def distances(corners: Corners) -> Array:
+    """Upper bounds on the distance of a point of one face from one of another, (f, f)."""
+    middles = corners.points.mean(axis=1)
+    radii = np.linalg.norm(corners.points - middles[:, None], axis=-1).max(axis=1)
+    between = np.linalg.norm(middles[:, None] - middles, axis=-1)
+    return between + radii[:, None] + radii
+
+
+def widths_apart(faces: Indices, apart: Array, halves: Array, leaning: Array) -> Array:
+    """Upper bounds on s_i + s_j for axes that lean from the normals, (q, 4, 4).
+
+    The vector d above has the length 2 / |a_i - a_j|, and the angle between the axes is that
+    between the normals but for what both lean.
+
+    Args:
+        faces: (q, 4)
+        apart: The `distances` of all faces, (f, f).
+        halves: Half the angles between their normals, (f, f) [rad].
+        leaning: How far an axis leans at most, (q,) [rad].
+    """
+    widths = np.full((len(faces), FINGERS, FINGERS), np.inf)
+    for i, j in combinations(range(FINGERS), 2):
+        pair = faces[:, i], faces[:, j]
+        sines = np.sin(np.maximum(halves[pair] - leaning, 0.0))
+        bound = np.where(sines > PARALLEL, apart[pair] / np.maximum(sines, PARALLEL), np.inf)
+        widths[:, i, j] = widths[:, j, i] = bound
+    return widths
 
 
 def _reaches(corners: Array, axes: Array) -> Array:

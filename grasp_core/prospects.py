@@ -80,7 +80,7 @@ def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
     with_room = shared[(cones.rooms[shared] > 0.0).all(axis=1)]
     parts = [with_room[i : i + LARGEST_BLOCK] for i in range(0, len(with_room), LARGEST_BLOCK)]
     rooms = [
-        cones.rooms[order][_unranked(starts)[:, -1]],
+        cones.rooms[order][_unranked(starts, len(order))[:, -1]],
         np.array([cones.rooms[part].min(axis=1).max() for part in parts]),
     ]
 
@@ -88,7 +88,7 @@ def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
         if place >= len(ends):
             return _prospects(cones, parts[place - len(ends)])
         numbers = np.arange(int(starts[place]), int(ends[place]), dtype=np.int64)
-        return _prospects(cones, order[_unranked(numbers)])
+        return _prospects(cones, order[_unranked(numbers, len(order))])
 
     return Blocks(np.concatenate(rooms), make)
 
@@ -128,24 +128,15 @@ def _range_ends(count: int) -> Indices:
     return np.unique([*ends, *rest.tolist(), count]) if count else np.empty(0, dtype=np.int64)
 
 
-def _unranked(numbers: Indices) -> Indices:
-    """The quadruples with some numbers, ascending in each, (q, 4)."""
-    largest = int(numbers.max(initial=0))
+def _unranked(numbers: Indices, count: int) -> Indices:
+    """The quadruples of so many faces with some numbers, ascending in each, (q, 4)."""
     found = np.empty((len(numbers), FINGERS), dtype=np.int64)
     left = numbers.copy()
     for size in range(FINGERS, 0, -1):
-        counts = _binomials(size, largest)
-        found[:, size - 1] = np.searchsorted(counts, left, side="right") - 1
-        left -= counts[found[:, size - 1]]
+        before = np.array([math.comb(face, size) for face in range(count)], dtype=np.int64)
+        found[:, size - 1] = np.searchsorted(before, left, side="right") - 1
+        left -= before[found[:, size - 1]]
     return found
-
-
-def _binomials(size: int, largest: int) -> Indices:
-    """C(0, size), C(1, size), .. up to the first beyond a number."""
-    found = [0]
-    while found[-1] <= largest:
-        found.append(math.comb(len(found), size))
-    return np.array(found, dtype=np.int64)
 
 
 def _face_ends(count: int, largest: int) -> Sequence[int]:

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 from grasp_core.candidates import LEAST_SPAN_ANGLE, NORMAL, TILTED, Candidates
 from grasp_core.constructions import LEAST_RADIUS, Construction, FingerOrder
-from grasp_core.disc_limits import angle_limits
 from grasp_core.prospects import Prospects
 from grasp_core.values import FaceQuadruple, ForceCone, four
 
@@ -123,7 +122,7 @@ def outlook(prospects: Prospects, construction: Construction, worth: float) -> O
     widest, bounds = prospects.widest, np.full(len(prospects), np.inf)
     promise = widest
     if construction.limits is not None:
-        limits = angle_limits(prospects.cones.extent, widest)[:, construction.limits]
+        limits = prospects.cones.limits(prospects.faces, widest)[:, construction.limits]
         promise = bounds = np.minimum(limits.max(axis=1), prospects.rooms)
     usable = (widest > LEAST_SPAN_ANGLE) & (prospects.rooms > 0.0) & (bounds > worth)
     order = np.argsort(-np.round(promise, SAME_PROMISE), kind="stable")
