@@ -75,6 +75,7 @@ def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
         shared: Quadruples with such parts, (s, 4), which come last.
     """
     order = _by_room(cones, whole)
+    order = order[cones.rooms[order] > 0.0]
     ends = _range_ends(math.comb(len(order), FINGERS))
     starts = np.append(0, ends)[:-1]
     with_room = shared[(cones.rooms[shared] > 0.0).all(axis=1)]
@@ -94,7 +95,7 @@ def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
 
 
 def spanning_blocks(cones: PlannedCones, whole: int) -> Blocks:
-    """Those whose normals span (P3)."""
+    """Those whose normals span (P3), whether there is room on their faces or not."""
     order = _by_room(cones, whole)
     table = SpanningTable(cones.body.normals[order], LEAST_SPAN_ANGLE)
     cuts = _face_ends(len(order), int(LARGEST_BLOCK / SPANNING_SHARE))
@@ -108,8 +109,7 @@ def spanning_blocks(cones: PlannedCones, whole: int) -> Blocks:
 
 
 def _by_room(cones: PlannedCones, whole: int) -> Indices:
-    order = np.argsort(-cones.rooms[:whole], kind="stable")
-    return order[cones.rooms[order] > 0.0]
+    return np.argsort(-cones.rooms[:whole], kind="stable")
 
 
 def _prospects(cones: PlannedCones, quads: Indices) -> Prospects:

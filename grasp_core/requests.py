@@ -19,6 +19,8 @@ RankBy: TypeAlias = Literal["radius", "friction-margin", "ferrari-canny", "diver
 """What makes one grasp better than another."""
 COMPLETE_CELLS = 20_000
 """Parts into which `complete` may cut the faces of one quadruple."""
+MOST_FACES = 1000
+"""Above it the table of faces whose normals span takes more than some hundred megabytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +77,21 @@ def check_request(body: Polyhedron, request: PlanRequest) -> None:
             f"share_faces must be from 0 to the object's size of {2.0 * body.radius:.4g} m, got "
             f"{request.share_faces}"
         )
-    if len(body.faces) > MAX_FACES:
+    _check_size(body, request)
+
+
+def _check_size(body: Polyhedron, request: PlanRequest) -> None:
+    faces = len(body.faces)
+    if faces > MOST_FACES:
         raise InputError(
-            f"{body.name} has {len(body.faces)} planar faces, over the limit of {MAX_FACES}; "
-            "load it with patches for faces"
+            f"{body.name} has {faces} planar faces, over the limit of {MOST_FACES}; load it with "
+            "patches for faces"
+        )
+    if faces > MAX_FACES and (request.searched is None or "free" in request.families):
+        raise InputError(
+            f"{body.name} has {faces} planar faces: above {MAX_FACES} only the largest grasps of "
+            f"{', '.join(FAMILIES)} are planned. Give these families and a limit, ranked by "
+            "radius, or load it with patches for faces"
         )
 
 

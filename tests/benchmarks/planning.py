@@ -37,7 +37,8 @@ def sphere_hull(faces, seed=0):
     """A polytope with so many triangles."""
     points = np.random.default_rng(seed).normal(size=(faces // 2 + 2, 3))
     hull = trimesh.convex.convex_hull(points / np.linalg.norm(points, axis=1, keepdims=True))
-    return gc.Polyhedron.from_mesh(hull.vertices, hull.faces, name=f"hull of {faces} faces")
+    name = f"hull of {faces} faces"
+    return gc.Polyhedron.from_mesh(hull.vertices, hull.faces, name=name, faces="planar")
 
 
 def check():

@@ -7,10 +7,11 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.attempt_bounds import KERNELS, AttemptBounds
-from grasp_core.candidates import LEAST_SPAN_ANGLE, NORMAL, TILTED, candidate_blocks
+from grasp_core.candidates import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
 from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS
 from grasp_core.face_pieces import face_shapes
 from grasp_core.kernels.tables import Attempts
+from grasp_core.prospects import all_blocks
 from scenes.objects import example_object
 from tests.grasp_core.curved import curved_body
 
@@ -24,9 +25,9 @@ NONE = np.empty((0, 4), dtype=np.int64)
 
 def attempts(body, kind, order, count=60):
     """Faces in finger order, axes and half-angles of some quadruples of a body."""
-    blocks = candidate_blocks(body, face_shapes(body), math.atan(0.5), len(body.faces), NONE)
-    _, make = next(iter(blocks))
-    found = make()
+    cones = PlannedCones(body, face_shapes(body), math.atan(0.5), tilted=True)
+    prospects = all_blocks(cones, len(body.faces), NONE).make(0)
+    found = prospects.candidates(slice(None))
     usable = np.flatnonzero(found.half_angles[:, kind] > LEAST_SPAN_ANGLE)
     some = np.random.default_rng(0).permutation(usable)[:count]
     order = list(order)

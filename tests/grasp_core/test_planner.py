@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.candidates import candidate_blocks
+from grasp_core.candidates import PlannedCones
 from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS
 from grasp_core.face_pieces import face_shapes
-from grasp_core.ranking import ranked
-from grasp_core.requests import METHODS
+from grasp_core.prospects import all_blocks
+from grasp_core.ranking import outlook
+from grasp_core.requests import FAMILIES, METHODS
 from scenes.objects import example_object
 from tests.judges import pyramid_margin, random_rotation
 
@@ -214,8 +215,18 @@ def test_an_object_with_too_many_faces_is_refused_at_once():
     import trimesh
 
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
-    with pytest.raises(gc.InputError, match="over the limit of 200"):
-        gc.plan(gc.Polyhedron.from_mesh(ball.vertices, ball.faces, faces="planar"))
+    with pytest.raises(gc.InputError, match="over the limit of 1000"):
+        gc.plan(gc.Polyhedron.from_mesh(ball.vertices, ball.faces, faces="planar"), limit=4)
+
+
+def test_of_more_than_200_faces_only_the_largest_grasps_of_the_paper_s_families_are_planned():
+    body = sphere_hull(240)
+    for options in ({}, {"limit": 4}, {"families": FAMILIES}):
+        with pytest.raises(gc.InputError, match="above 200 only the largest"):
+            gc.plan(body, 0.2, **options)
+    every = gc.plan(body, 0.2, families=FAMILIES, limit=9).grasps
+    assert {grasp.family for grasp in every} == set(FAMILIES)
+    assert all(grasp.certificate.verify() for grasp in every)
 
 
 def test_regions_are_larger_than_discs_but_smaller_than_faces():
@@ -310,12 +321,16 @@ def test_grasps_are_streamed_as_they_are_found():
 
 def test_radii_stay_below_the_bounds_that_prune():
     body, theta = example_object("random-12-1"), math.radians(8.0)
-    ((room, block),) = candidate_blocks(
-        body, face_shapes(body), theta, len(body.faces), np.empty((0, 4), dtype=int)
-    )
-    candidates, tested = block(), 0
+    cones = PlannedCones(body, face_shapes(body), theta, tilted=True)
+    blocks, tested = all_blocks(cones, len(body.faces), np.empty((0, 4), dtype=int)), 0
+    (room,) = blocks.rooms
     for family in DISCS:
-        ranking = ranked(candidates, CONSTRUCTIONS[family])
+        listed = outlook(blocks.make(0), CONSTRUCTIONS[family], LEAST_RADIUS)
+        ranking = listed.ranking(slice(None))
+        coarse = dict(zip(map(tuple, listed.prospects.faces.tolist()), listed.bounds, strict=True))
+        faces = ranking.candidates.faces[ranking.places].tolist()
+        limits = [coarse[tuple(each)] for each in faces]
+        assert (ranking.bounds.max(axis=(1, 2)) <= limits).all()
         ordered = (ranking.quadruple(row, ranking.bounds[row]) for row in range(len(ranking)))
         bounds = {each.faces: each.bound for each in ordered}
         assert max(bounds.values()) <= room

@@ -12,7 +12,6 @@ from grasp_core.constructions import CONSTRUCTIONS
 from grasp_core.errors import SolverError
 from grasp_core.face_pieces import face_shapes
 from grasp_core.promising import Block, promising
-from grasp_core.ranking import ranked
 from grasp_core.requests import PlanRequest
 from grasp_core.search import SAME_MERIT
 from grasp_core.searches import Searches
@@ -51,15 +50,15 @@ def test_a_limit_keeps_the_largest_discs_of_all(name, family):
 def opened(body, family, least):
     """Quadruples as they are handed out, with the tally, and blocks that were made."""
     request = PlanRequest(0.4, (family,), None, "tilted")
-    blocks = Searches(body, request).tilted_blocks
+    blocks = Searches(body, request).tilted_blocks.blocks
     construction, tally, made = CONSTRUCTIONS[family], Counter(), []
 
-    def rank(place):
+    def make(place):
         made.append(place)
-        return ranked(blocks[place], construction)
+        return blocks.make(place)
 
     listed = [
-        Block(room, lambda place=place: rank(place)) for place, room in enumerate(blocks.rooms)
+        Block(room, lambda place=place: make(place)) for place, room in enumerate(blocks.rooms)
     ]
     discs = AttemptBounds(face_shapes(body))
     return promising(construction, listed, discs, lambda _: least[0], tally), made

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.lines import plucker_vectors
 from grasp_core.kernels import compiled
+from grasp_core.lines import plucker_vectors
 from grasp_core.placements import NoPlacement, Placement
 from grasp_core.regulus_grasps import (
     CHOICES,

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.candidates import FIRST_FACES
 from grasp_core.on_faces import check_on_faces
+from grasp_core.prospects import FIRST_FACES
 from grasp_core.records import grasps_from_json, plan_to_json
 from grasp_core.shared_faces import shared_quadruples, with_halves
 from grasp_core.solids import hull

@@ -1,0 +1,109 @@
+"""Blocks of quadruples, and what bounds them before their cones are chosen."""
+
+import math
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from grasp_core.candidates import LEAST_SPAN_ANGLE, TILTED, PlannedCones
+from grasp_core.constructions import LEAST_RADIUS
+from grasp_core.disc_limits import _widths, corners_of, widths_apart
+from grasp_core.face_pieces import face_shapes
+from grasp_core.prospects import LARGEST_BLOCK, all_blocks, spanning_blocks
+from grasp_core.spanning import span_sines
+from grasp_core.tilted_cones import tilted_cones, widest_half_angles
+from scenes.objects import example_object
+from tests.benchmarks.planning import sphere_hull
+
+NONE = np.empty((0, 4), dtype=np.int64)
+BODIES = ("random-14-1", "chamfered-box", "l-bracket", "double-wedge-bar")
+
+
+def planned(body):
+    return PlannedCones(body, face_shapes(body), math.atan(0.5), tilted=True)
+
+
+@pytest.mark.parametrize("name", ["random-40-1", "l-bracket", "tetrahedron"])
+def test_blocks_hold_every_quadruple_with_room_once(name):
+    cones = planned(example_object(name))
+    roomy = np.flatnonzero(cones.rooms > 0.0)
+    blocks = all_blocks(cones, len(cones.rooms), NONE)
+    made = [blocks.make(place).faces for place in range(len(blocks))]
+    assert all(len(each) <= LARGEST_BLOCK for each in made)
+    listed = np.concatenate(made)
+    assert len(listed) == math.comb(len(roomy), 4)
+    assert {tuple(each) for each in listed.tolist()} == set(combinations(roomy.tolist(), 4))
+
+
+@pytest.mark.parametrize("build", [all_blocks, spanning_blocks])
+def test_no_block_has_more_room_than_it_says_nor_than_the_one_before(build):
+    cones = planned(example_object("random-40-1"))
+    blocks = build(cones, 40, NONE) if build is all_blocks else build(cones, 40)
+    assert len(blocks) >= 5
+    assert (np.diff(blocks.rooms) <= 0.0).all()
+    for place, room in enumerate(blocks.rooms):
+        assert blocks.make(place).rooms.max() <= room
+
+
+def test_the_blocks_of_800_faces_are_not_listed_before_they_are_asked_for():
+    body = sphere_hull(800)
+    assert len(body.faces) == 800
+    blocks = all_blocks(planned(body), 800, NONE)
+    assert len(blocks) > math.comb(800, 4) / LARGEST_BLOCK
+    last = blocks.make(len(blocks) - 1)
+    order = np.argsort(-last.cones.rooms, kind="stable")
+    assert np.sort(order[-4:]).tolist() in last.faces.tolist()
+
+
+def test_no_tilted_cones_are_wider_than_what_bounds_them(without_kernels):
+    rng, tested = np.random.default_rng(0), 0
+    normals = rng.normal(size=(3000, 4, 3))
+    normals[:1000, :, 2] *= 0.1  # nearly in a plane
+    normals[1000:1100, 1] = -normals[1000:1100, 0]
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    thetas = np.repeat(rng.uniform(0.05, 0.7, size=(3000, 1)), 4, axis=1)
+    thetas[:500] *= rng.uniform(0.3, 1.0, size=(500, 4))
+    sines = span_sines(normals)
+    quick = widest_half_angles(normals, thetas, sines)
+    found = tilted_cones(normals, thetas).half_angles
+    usable = found > LEAST_SPAN_ANGLE
+    assert (found[usable] <= quick[usable]).all()
+    tested = usable.sum(), (quick < LEAST_SPAN_ANGLE).sum()
+    assert min(tested) >= 500
+    close = found[usable] >= 0.7 * quick[usable]
+    assert close.mean() >= 0.5  # nor is the bound far beyond what a search reaches
+    without_kernels()
+    np.testing.assert_allclose(widest_half_angles(normals, thetas, sines), quick, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_limits_before_cones_are_chosen_bound_those_after(name):
+    body = example_object(name)
+    cones, tested = planned(body), 0
+    prospects = all_blocks(cones, len(body.faces), NONE).make(0)
+    limits = cones.limits(prospects.faces, prospects.widest)
+    candidates = prospects.candidates(slice(None))
+    usable = candidates.half_angles > LEAST_SPAN_ANGLE
+    assert (candidates.half_angles[usable] <= prospects.widest[np.nonzero(usable)[0]]).all()
+    for kind in range(2):
+        held = usable[:, kind]
+        assert (candidates.limits[held, kind] <= limits[held] * (1.0 + 1e-9)).all()
+        tested += held.sum()
+    assert tested >= 30
+
+
+def test_widths_from_distances_bound_those_from_corners_however_axes_lean():
+    body = example_object("random-14-1")
+    cones = planned(body)
+    candidates = all_blocks(cones, 14, NONE).make(0).candidates(slice(None))
+    held = candidates.half_angles[:, TILTED] > LEAST_SPAN_ANGLE
+    faces, axes = candidates.faces[held], candidates.axes[held, TILTED]
+    leaning = np.arccos(np.clip((axes * candidates.normals[held]).sum(axis=-1), -1.0, 1.0))
+    bounds = widths_apart(faces, cones._distances, cones._halves, leaning.max(axis=1))
+    widths = _widths(corners_of(body).points[faces], axes)
+    pairs = np.triu_indices(4, 1)
+    assert (widths[:, *pairs] <= bounds[:, *pairs] * (1.0 + 1e-9)).all()
+    finite = np.isfinite(bounds[:, *pairs])
+    assert finite.sum() >= 1000
+    assert LEAST_RADIUS < np.median(bounds[:, *pairs][finite]) < 5.0
