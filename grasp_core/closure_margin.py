@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
-from grasp_core.conic import ConicProgram, minimize
 from grasp_core.errors import SolverError
+from grasp_core.margin_program import ROUNDING, TINY, allowed, deepest_forces, margin_program
 from grasp_core.nearest_wrench import nearest_wrench
 from grasp_core.wrench_sets import WrenchSet
 from grasp_core.wrenches import (
@@ -25,9 +25,8 @@ from grasp_core.wrenches import (
 DECIDED = 1e-9
 """Margins closer to zero are left undecided unless a certificate settles them: a hundred
 times the tolerance asked of the solver."""
-ROUNDING = 1e-12
-"""Slack of the plain-arithmetic checks, for data scaled to unit size: some thousand
-rounding errors."""
+PRECISE = 1e-10
+"""The gap left by compiled code, relative to the margin: below what the conic solver leaves."""
 INTERIOR = 1e-6
 """Depth inside its cone, of forces whose normal parts sum to 1, from which a contact counts
 as carrying an interior force: far above what the solver leaves on a boundary."""
@@ -52,7 +51,7 @@ def _generators(arms: Array, normals: Array, friction: Array) -> Array:
     G = grasp_map(arms)
     if (friction > 0.0).all():
         return G
-    return in_frames(G, contact_frames(normals))[:, _allowed(friction)]
+    return in_frames(G, contact_frames(normals))[:, allowed(friction)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,8 +69,13 @@ class Answer:
 
 def decide(arms: Array, normals: Array, friction: Array) -> Answer:
     """Decide closure of contacts at unit size."""
+    answer = _decided_quickly(arms, normals, friction)
+    return answer or _decided_by_programs(arms, normals, friction)
+
+
+def _decided_by_programs(arms: Array, normals: Array, friction: Array) -> Answer:
     try:
-        margin, forces, twist = _margin_program(grasp_map(arms), normals, friction)
+        margin, forces, twist = margin_program(grasp_map(arms), normals, friction)
     except SolverError:
         # nearly parallel normals: the program has no solution, or none to within rounding
         return _apart(arms, normals, friction)
@@ -87,6 +91,21 @@ def decide(arms: Array, normals: Array, friction: Array) -> Answer:
     if sparing is not None and refutes_closure(sparing, arms, normals, friction):
         return Answer(0.0, forces, sparing, closed=False)
     return Answer(margin, forces, twist, closed=None)
+
+
+def _decided_quickly(arms: Array, normals: Array, friction: Array) -> Answer | None:
+    """The answer of compiled code, if it proves one; it knows one positive friction only."""
+    if not (friction[0] > 0.0 and (friction == friction[0]).all()):
+        return None
+    forces, twists, margins = deepest_forces(arms[None], normals[None], friction[:1], PRECISE)
+    lower, upper = (float(each) for each in margins[0])
+    if not upper - lower <= DECIDED * max(friction[0], abs(lower)):  # nor if one is not a number
+        return None
+    if lower > DECIDED and proves_closure(forces[0], arms, normals, friction):
+        return Answer(lower, forces[0], twists[0], closed=True)
+    if upper < -DECIDED and refutes_closure(twists[0], arms, normals, friction):
+        return Answer(lower, forces[0], twists[0], closed=False)
+    return None
 
 
 def _apart(arms: Array, normals: Array, friction: Array) -> Answer:
@@ -181,13 +200,13 @@ def _touching_twist(twist: Array, arms: Array, normals: Array, friction: Array) 
     Where the margin is exactly zero, as with symmetric normals at just their critical friction, the
     solver's twist passes the cones by its own tolerance; Newton's method takes it onto them.
     """
-    twist = twist / max(float(np.linalg.norm(twist)), _TINY)
+    twist = twist / max(float(np.linalg.norm(twist)), TINY)
     for _ in range(NEWTON_STEPS):
         velocities = twist[:3] + np.cross(twist[3:], arms)
         along, across = normal_and_tangential(velocities, normals)
         excess = along + friction * across
         touched = excess > -TOUCHING
-        sideways = (velocities - along[:, None] * normals) / np.maximum(across, _TINY)[:, None]
+        sideways = (velocities - along[:, None] * normals) / np.maximum(across, TINY)[:, None]
         forces = (normals + friction[:, None] * sideways)[touched]
         slopes = np.hstack([forces, np.cross(arms[touched], forces)])
         step, *_ = np.linalg.lstsq(slopes, excess[touched], rcond=RANK)
@@ -221,7 +240,7 @@ def _twist_sparing_interior_forces(
         if not rest.size:
             return twists[:, 0]
         balance = twists.T @ grasp_map(arms[rest])
-        margin, forces, reduced = _margin_program(balance, normals[rest], friction[rest])
+        margin, forces, reduced = margin_program(balance, normals[rest], friction[rest])
         if margin < -DECIDED:
             return twists @ reduced
         if margin > DECIDED:
@@ -240,65 +259,3 @@ def _null_space(rows: Array, basis: Array) -> Array:
     _, values, right = np.linalg.svd(rows)
     rank = int((values > RANK).sum())
     return basis @ right[rank:].T
-
-
-def _margin_program(balance: Array, normals: Array, friction: Array) -> tuple[float, Array, Array]:
-    """Margin t, balancing forces (k, 3), and the dual twist in the rows of `balance`.
-
-    The unknowns of a contact are its normal force and its tangential force over mu, so that
-    small coefficients are solved as well as large ones; without friction only the former.
-
-    Args:
-        balance: What must vanish as a matrix on the stacked forces, (m, 3k).
-        normals: (k, 3)
-        friction: (k,)
-    """
-    k, m = len(normals), len(balance)
-    frames = contact_frames(normals) * np.array([np.ones(k), friction, friction]).T[:, None]
-    allowed = _allowed(friction)
-    rows = in_frames(balance, frames)[:, allowed]
-    pushing = np.tile([True, False, False], k)[allowed]
-    if (departing := _departing_twist(rows, pushing * 1.0)) is not None:
-        return -math.inf, np.zeros((k, 3)), departing
-    n = int(allowed.sum())
-    largest = float(friction.max()) or 1.0
-    flat = friction == 0.0
-    A = np.zeros((m + 1 + n, n + 1))
-    A[:m, :n], A[m, :n] = rows, pushing
-    order = np.argsort(~np.repeat(flat, 3)[allowed], kind="stable")  # frictionless rows first
-    A[m + 1 + np.arange(n), order] = -1.0
-    depths = largest / np.where(flat, 1.0, np.maximum(friction, _TINY))
-    A[m + 1 :, n] = np.where(pushing, np.repeat(depths, 3)[allowed], 0.0)[order]
-    b, q = np.zeros(len(A)), np.zeros(n + 1)
-    b[m], q[-1] = 1.0, -1.0
-    flats = int(flat.sum())
-    solution = minimize(ConicProgram(q, A, b, m + 1, flats, (3,) * (k - flats)))
-    local = np.zeros(3 * k)
-    x = solution.x[:-1]
-    local[allowed] = x - np.asarray(
-        np.linalg.lstsq(rows, rows @ x, rcond=None)[0], dtype=np.float64
-    )
-    forces = np.einsum("kij,kj->ki", frames, local.reshape(k, 3))
-    return largest * float(solution.x[-1]), forces, -solution.z[:m]
-
-
-_TINY = float(np.finfo(np.float64).tiny)
-
-
-def _allowed(friction: Array) -> NDArray[np.bool_]:
-    """Which of the local forces (normal, tangent, tangent) of each contact may be non-zero."""
-    sliding = friction > 0.0
-    return np.column_stack([np.ones_like(sliding), sliding, sliding]).ravel()
-
-
-def _departing_twist(rows: Array, share: Array) -> Array | None:
-    """A twist with which every contact leaves along its normal: then no forces balance."""
-    sizes = np.maximum(np.linalg.norm(rows, axis=0), _TINY)
-    scaled: Array = (rows / sizes).T
-    twist = -np.asarray(np.linalg.lstsq(scaled, share / sizes, rcond=None)[0], dtype=np.float64)
-    missed = np.abs(rows.T @ twist + share) / np.maximum(sizes, 1.0)
-    if not np.isfinite(missed).all() or missed.max() > ROUNDING * (
-        1.0 + float(np.abs(twist).max())
-    ):
-        return None
-    return twist

@@ -169,12 +169,23 @@ def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES)
         toward: Across the axis, the direction in which the pyramid's first edge leans, (3,).
         sides: Number of facets.
     """
-    first = toward - (toward @ cone.axis) * cone.axis
-    first = first / np.linalg.norm(first)
-    frame = np.vstack([first, np.cross(cone.axis, first)])
-    across = facet_turns(sides) @ frame
-    psi = np.arctan(np.tan(cone.half_angle) * np.cos(np.pi / sides))
-    return np.sin(psi) * cone.axis - np.cos(psi) * across
+    return pyramid_facets(cone.axis, cone.half_angle, toward, sides)
+
+
+def pyramid_facets(axes: Array, half_angle: float, toward: Array, sides: int) -> Array:
+    """As `inscribed_facets`, of equally wide cones around many axes, (..., sides, 3).
+
+    Args:
+        axes: Unit vectors, (..., 3).
+        half_angle: [rad]
+        toward: (..., 3)
+        sides: Number of facets.
+    """
+    first = toward - np.sum(toward * axes, axis=-1, keepdims=True) * axes
+    first = first / np.linalg.norm(first, axis=-1, keepdims=True)
+    across = facet_turns(sides) @ np.stack([first, np.cross(axes, first)], axis=-2)
+    psi = float(np.arctan(np.tan(half_angle) * np.cos(np.pi / sides)))
+    return np.sin(psi) * axes[..., None, :] - np.cos(psi) * across
 
 
 @cache

@@ -38,6 +38,7 @@ from grasp_core.closure_margin import (
 from grasp_core.errors import UndecidedError
 from grasp_core.kernels import compiled
 from grasp_core.many_contacts import many_contact_arrays, unit_sizes
+from grasp_core.margin_program import deepest_forces
 from grasp_core.values import LARGEST_FRICTION, Grasp, contact_arrays
 from grasp_core.wrenches import WRENCH, normal_and_tangential
 
@@ -151,8 +152,8 @@ def _at_once(points: Array, normals: Array) -> Array:
         left = np.flatnonzero(bounded & np.isnan(found))
         if not left.size:
             break
-        enough, deep = lower[left] * (1.0 + width * FRICTION_ACCURACY), np.zeros_like(arms[left])
-        kernel.deepest(arms[left], units[left], enough, deep)
+        enough = lower[left] * (1.0 + width * FRICTION_ACCURACY)
+        deep, _, _ = deepest_forces(arms[left], units[left], enough)
         proved = many_prove_closure(deep, arms[left], units[left], enough)
         found[left[proved]] = enough[proved]
     return found

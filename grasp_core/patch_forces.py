@@ -17,10 +17,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.concurrent_grasps import inscribed_facets
+from grasp_core.concurrent_grasps import pyramid_facets
 from grasp_core.face_pieces import FacePiece
 from grasp_core.least_distance import least_distance
-from grasp_core.values import ForceCone
 from grasp_core.wrenches import grasp_map
 
 SIDES = 8
@@ -46,12 +45,8 @@ def smallest_forces(
     rank = int((sizes > DEPENDENT * sizes[0]).sum())
     Z = right[rank:].T
     f_0 = right[:rank].T @ (left[-1, :rank] / sizes[:rank])
-    facets = np.array(
-        [
-            inscribed_facets(ForceCone(n, math.atan(friction)), piece.frame[:, 0], SIDES)
-            for piece, n in zip(pieces, normals, strict=True)
-        ]
-    )
+    toward = np.array([piece.frame[:, 0] for piece in pieces])
+    facets = pyramid_facets(normals, math.atan(friction), toward, SIDES)
     rows = np.einsum("ksi,kiz->ksz", facets, Z.reshape(len(points), 3, -1)).reshape(-1, Z.shape[1])
     here = np.einsum("ksi,ki->ks", facets, f_0.reshape(-1, 3)).ravel()
     (z,) = least_distance(-rows, (here - depth)[None])

@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array
-from grasp_core.kernels.margin import WRENCH, least_cone_sum
+from grasp_core.kernels.margin import SHARE, WRENCH, least_cone_sum
 
 FIRST_TRIAL = 0.5
 MOST_TRIALS = 30
@@ -41,7 +41,7 @@ def try_out() -> None:
     corners = np.array([[[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]]) / math.sqrt(3.0)
     forces, twists, bounds = np.empty_like(corners), np.empty((1, WRENCH)), np.empty((1, 2))
     search(-corners, corners, 1e-3, forces, twists, bounds)
-    deepest(-corners, corners, np.ones(1), forces)
+    deepest((-corners, corners, np.ones(1)), SHARE, forces, twists, bounds)
 
 
 @njit(cache=True, error_model="numpy")
@@ -68,7 +68,7 @@ def search(
         lower, upper, friction = 0.0, np.inf, FIRST_TRIAL
         for _ in range(MOST_TRIALS):
             _at_friction(rows, mean, friction, columns)
-            primal, dual = least_cone_sum(columns, mean, pair, y)
+            primal, dual = least_cone_sum(columns, mean, SHARE, pair, y)
             needed = _needed(pair, primal, friction)
             if primal < 1.0 - EVEN and needed < upper:
                 upper = needed
@@ -90,22 +90,28 @@ def search(
 
 
 @njit(cache=True, error_model="numpy")
-def deepest(arms: Array, normals: Array, frictions: Array, forces: Array) -> None:
+def deepest(
+    contacts: tuple[Array, Array, Array], share: float, forces: Array, twists: Array, values: Array
+) -> None:
     """Balance each of many sets of contacts as deep inside its cones as can be.
 
     Args:
-        arms: Contacts at unit size, (g, k, 3).
-        normals: (g, k, 3)
-        frictions: Of each set, (g,).
+        contacts: Their arms at unit size, (g, k, 3), normals, (g, k, 3), and frictions, (g,).
+        share: As `least_cone_sum`.
         forces: Filled with the forces, (g, k, 3).
+        twists: Filled with those of the dual program, (g, 6).
+        values: Filled with those of the primal and the dual program, (g, 2).
     """
+    arms, normals, frictions = contacts
     k = arms.shape[1]
     axes, rows, columns = np.empty((k, 3, 3)), np.empty((k, 3, WRENCH)), np.empty((k, 3, WRENCH))
     mean, pair, y = np.empty(WRENCH), np.empty((2, k, 3)), np.empty(WRENCH)
     for g in range(len(arms)):
         _set_up(arms[g], normals[g], axes, rows, mean)
         _at_friction(rows, mean, frictions[g], columns)
-        primal, _ = least_cone_sum(columns, mean, pair, y)
+        primal, dual = least_cone_sum(columns, mean, share, pair, y)
+        values[g, 0], values[g, 1] = primal, dual
+        _copy(y, twists[g])
         _in_space(pair, primal, frictions[g], axes, forces[g])
 
 

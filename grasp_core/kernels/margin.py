@@ -36,7 +36,7 @@ WRENCH = 6
 MOST_STEPS = 40
 """Ten are usual."""
 SHARE = 0.1
-"""The gap between primal and dual that is left, relative to the distance of V from one."""
+"""Of the distance of V from one."""
 SMALLEST_GAP = 1e-11
 """Smaller ones are rounding, in programs of order one."""
 BALANCED = 1e-10
@@ -46,12 +46,16 @@ SHORTER = 0.99
 
 
 @njit(cache=True, error_model="numpy")
-def least_cone_sum(columns: Array, mean: Array, pair: Array, y: Array) -> tuple[float, float]:
-    """Solve the program, as far as it takes to tell on which side of one its value is.
+def least_cone_sum(
+    columns: Array, mean: Array, share: float, pair: Array, y: Array
+) -> tuple[float, float]:
+    """Solve the program, as far as it is wanted.
 
     Args:
         columns: Those of A_i, as rows, (k, 3, 6).
         mean: m, (6,).
+        share: The gap between primal and dual that may be left, relative to the distance of V from
+            one: with `SHARE` it is clear on which side of one V is.
         pair: Filled with s and z, (2, k, 3).
         y: Filled with the twist, (6,).
 
@@ -68,7 +72,7 @@ def least_cone_sum(columns: Array, mean: Array, pair: Array, y: Array) -> tuple[
     for _ in range(MOST_STEPS):
         primal, dual, gap = _values(mean, pair, y)
         off = _missing(columns, mean, pair, missing)
-        if off <= BALANCED and gap <= max(SHARE * abs(1.0 - primal), SMALLEST_GAP):
+        if off <= BALANCED and gap <= max(share * abs(1.0 - primal), SMALLEST_GAP):
             break
         if not (_scale(pair, W, middle) and _factor(columns, W, V, R)):
             break

@@ -176,8 +176,9 @@ def test_what_the_search_gets_wrong_is_made_program_by_program(monkeypatch, spoi
         else:
             forces[:], twists[:] = np.nan, np.nan
 
-    def deepest(arms, _, __, forces):
-        forces[:] = np.nan if spoil == "numbers" else -arms
+    def deepest(contacts, _, forces, twists, values):
+        forces[:] = np.nan if spoil == "numbers" else -contacts[0]
+        twists[:], values[:] = 1.0, np.nan if spoil == "numbers" else 0.5
 
     kernel = compiled(critical.KERNEL)
     honest = kernel.search
