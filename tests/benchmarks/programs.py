@@ -21,7 +21,7 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 import grasp_core as gc
-from grasp_core import attempt_bounds, lp
+from grasp_core import attempt_bounds, lp, regulus_grasps
 from scenes.objects import example_object
 
 PLANS = [
@@ -52,14 +52,15 @@ def programs(count):
     doors = [importlib.import_module(f"grasp_core.{name}") for name in ("lp", "largest_discs")]
     for door in doors:
         door.maximize_above = record
-    kernels, attempt_bounds.compiled = attempt_bounds.compiled, lambda _: None  # by whole programs
+    kernels = attempt_bounds.compiled
+    attempt_bounds.compiled = regulus_grasps.compiled = lambda _: None  # by whole programs
     try:
         for name, friction in PLANS:
             gc.plan(example_object(name), friction)
     except EnoughError:
         pass
     finally:
-        attempt_bounds.compiled = kernels
+        attempt_bounds.compiled = regulus_grasps.compiled = kernels
         for door in doors:
             door.maximize_above = solve
     return found
@@ -111,6 +112,8 @@ CONTENDERS = {
     "qpsolvers, clarabel": by_qpsolvers("clarabel"),
     "qpsolvers, proxqp": by_qpsolvers("proxqp"),
 }
+if "daqp" in qpsolvers.available_solvers:
+    CONTENDERS["qpsolvers, daqp"] = by_qpsolvers("daqp")
 
 
 def timed(sample):
