@@ -84,14 +84,18 @@ def disagreement(program, cutoff, tally):
 
 
 def by_qpsolvers(solver):
-    """A contender: the program as a quadratic one without a quadratic term."""
+    """A contender: the program as a quadratic one without a quadratic term.
+
+    Clarabel takes sparse matrices. ProxQP (proxsuite 0.8.0) writes beyond its memory if it is given
+    sparse ones of some of these programs, and with dense ones it is faster.
+    """
+    kind = sparse.csc_matrix if solver == "clarabel" else np.asarray
 
     def solve(program):
-        n = len(program.c)
-        rows = None if program.A_eq is None else sparse.csc_matrix(program.A_eq)
+        rows = None if program.A_eq is None else kind(program.A_eq)
         return qpsolvers.solve_qp(
-            sparse.csc_matrix((n, n)), -program.c, sparse.csc_matrix(program.A), program.b,
-            rows, program.b_eq, solver=solver,
+            kind(np.zeros((len(program.c), len(program.c)))), -program.c, kind(program.A),
+            program.b, rows, program.b_eq, solver=solver,
         )  # fmt: skip
 
     return solve
