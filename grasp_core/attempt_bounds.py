@@ -50,7 +50,7 @@ class AttemptBounds:
             np.ascontiguousarray(attempts.half_angles),
         )
         if construction.limits is None:
-            known = regulus_bounds(self._table, attempts)
+            known = regulus_bounds(self._table, attempts, -np.inf)
             none = known is not None and known[0] == -np.inf
             return np.where(none, -np.inf, np.full(len(attempts.faces), np.inf))
         kernel = compiled(KERNELS[construction.family])

@@ -110,12 +110,15 @@ def place_regulus(
     return _best_of(pieces, cones, CHOICES)
 
 
-def regulus_bounds(table: FaceTable, attempts: Attempts) -> tuple[Array, Indices] | None:
+def regulus_bounds(
+    table: FaceTable, attempts: Attempts, enough: float = -SAME_OFFSET
+) -> tuple[Array, Indices] | None:
     """How good reguli can be, in compiled code, or None where there is none.
 
     Args:
         table: Of the faces.
         attempts: Which of them, in finger order, with cones that positively span (P3).
+        enough: Merit above which to be content; no offset is below zero.
 
     Returns:
         The merits of the best choices, (a,): minus infinity where a proof excludes each, infinity
@@ -125,7 +128,7 @@ def regulus_bounds(table: FaceTable, attempts: Attempts) -> tuple[Array, Indices
     if kernel is None:
         return None
     turns, shares = np.array(facet_turns(PYRAMID_SIDES)), np.array(SLOPES)
-    terms = RegulusTerms(turns, shares, LEAST_DEPTH, LEAST_INSET, LEAST_GAP, SAME_OFFSET)
+    terms = RegulusTerms(turns, shares, LEAST_DEPTH, LEAST_INSET, LEAST_GAP, SAME_OFFSET, enough)
     bounds = np.empty(len(attempts.faces))
     chosen = np.empty((len(bounds), 3), dtype=np.int64)
     kernel.regulus_bounds(table, attempts, terms, bounds, chosen)

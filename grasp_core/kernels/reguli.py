@@ -58,7 +58,7 @@ class _Line(NamedTuple):
 
 def try_out() -> None:
     """Decide one attempt."""
-    terms = RegulusTerms(np.ones((16, 2)), np.ones(1), 0.0, 0.0, 0.0, 0.0)
+    terms = RegulusTerms(np.ones((16, 2)), np.ones(1), 0.0, 0.0, 0.0, 0.0, 0.0)
     regulus_bounds(*tilted_faces(), terms, np.empty(1), np.empty((1, 3), dtype=np.int64))
 
 
@@ -70,7 +70,7 @@ def regulus_bounds(
     bounds: Array,
     chosen: Indices,
 ) -> None:
-    """Bound the merit, minus the largest offset t, over the slopes tried.
+    """Bound the merit, minus the largest offset t, over the slopes tried until one is enough.
 
     Args:
         faces: Of the object.
@@ -89,8 +89,8 @@ def regulus_bounds(
         bounds[a], chosen[a] = -np.inf, NONE
         for i in range(slopes):
             for j in range(slopes):
-                if not (frames.usable[0, i] and frames.usable[1, j]) or bounds[a] >= -terms.tie:
-                    continue  # no offset is below zero
+                if not (frames.usable[0, i] and frames.usable[1, j]) or bounds[a] > terms.enough:
+                    continue
                 rows = room_for(room, VARIABLES, count)
                 rows = Rows(rows.At, rows.b, rows.norms, FINGERS)
                 _fill(faces, attempts.faces[a], frames, (i, j), terms, rows)

@@ -58,3 +58,5 @@ class RegulusTerms(NamedTuple):
     gap: float
     tie: float
     """Merits that differ by no more are equal: the slopes tried first win."""
+    enough: float
+    """The merit above which no better slopes are looked for."""
