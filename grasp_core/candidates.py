@@ -84,8 +84,8 @@ class PlannedCones:
             [max(p.inradius for p in shape.pieces) if shape else 0.0 for shape in self.shapes]
         )
 
-    def widest(self, quads: Indices) -> tuple[Array, Array]:
-        """Half-angles around the normals, and those that no choice of cones exceeds, (q,) [rad].
+    def widest(self, quads: Indices) -> Array:
+        """Half-angles that no choice of cones exceeds, (q,) [rad].
 
         Args:
             quads: Faces, (q, 4).
@@ -94,8 +94,8 @@ class PlannedCones:
         sines = span_sines(normals)
         around = _around(sines, thetas)
         if not self.tilted:
-            return around, around
-        return around, np.maximum(around, widest_half_angles(normals, thetas, sines))
+            return around
+        return np.maximum(around, widest_half_angles(normals, thetas, sines))
 
     def limits(self, quads: Indices, widest: Array) -> Array:
         """Upper bounds on discs of cones that are no wider (see `disc_limits`), (q, 4).

@@ -11,13 +11,16 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 
+from grasp_core.candidates import LEAST_SPAN_ANGLE
 from grasp_core.certified import to_grasp
 from grasp_core.choice import chosen
 from grasp_core.constructions import LEAST_RADIUS
+from grasp_core.planar_faces import MAX_FACES
 from grasp_core.plans import Outcomes, Plan, PlanCounts
 from grasp_core.reach import Finger
 from grasp_core.requests import METHODS, ConeKind, PlanRequest, RankBy, check_request
 from grasp_core.searches import Progress, Searches
+from grasp_core.spanning import count_spanning
 from grasp_core.values import Grasp, Method, Polyhedron
 
 
@@ -127,7 +130,7 @@ def _planned(body: Polyhedron, request: PlanRequest, searches: Searches) -> Plan
     counts = PlanCounts(
         len(body.faces),
         searches.quadruples,
-        searches.count_spanning(),
+        count_spanning(body.normals, LEAST_SPAN_ANGLE) if len(body.faces) <= MAX_FACES else None,
         {method: search.counts for method, search in searches.by_method.items()},
     )
     outcomes, whole = searches.outcomes(), searches.whole_faces
@@ -173,17 +176,19 @@ def _absence(body: Polyhedron, request: PlanRequest, counts: PlanCounts, outcome
             f"{name}: each of {counts.quadruples} face quadruples is proved to hold no "
             f"grasp{limits}"
         )
-    if request.cones == "normal" and not counts.spanning:
+    if request.cones == "normal" and counts.spanning == 0:
         return (
             f"{name} has no four faces whose normals keep positively spanning space when each "
             "may tilt within a force cone (P3; no box or prism has), so the paper's "
             "constructions offer no grasp; tilted cones or the free method may"
         )
     spanning = (
-        f"{counts.spanning} face quadruples span (P3), but " if request.cones == "normal" else ""
+        f"{counts.spanning} face quadruples span (P3), but "
+        if request.cones == "normal" and counts.spanning is not None
+        else ""
     )
     return (
-        f"{name}: {spanning}no {' or '.join(counts.families)} grasp was found (discs below "
-        f"{LEAST_RADIUS:g} object radii do not count); the free method may find others "
-        "(--family free)"
+        f"{name}: {spanning}no {' or '.join(counts.families)} grasp was found, which is no proof "
+        f"that there is none (discs below {LEAST_RADIUS:g} object radii do not count); the free "
+        "method may find others (--family free)"
     )

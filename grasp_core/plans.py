@@ -69,9 +69,9 @@ class PlanCounts:
     faces: int
     quadruples: int
     """All sets of four faces."""
-    spanning: int
-    """Those whose normals positively span at the least planned angle (P3), as far as the search
-    went: with a limit it stops early."""
+    spanning: int | None
+    """Those whose normals positively span at the least planned angle (P3); None above 200 faces,
+    where they are too many to count."""
     families: Mapping[str, MethodCounts] = field(default_factory=dict[str, MethodCounts])
     """By method, the three families and perhaps `free`."""
 

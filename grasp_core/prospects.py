@@ -34,8 +34,6 @@ class Prospects:
     """(q, 4)"""
     widest: Array
     """No choice of force cones is wider, (q,) [rad]."""
-    spanning: int
-    """How many have normals that span at the least angle (P3)."""
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -47,7 +45,7 @@ class Prospects:
 
     def some(self, places: Indices) -> "Prospects":
         """The quadruples at some places, in that order."""
-        return Prospects(self.cones, self.faces[places], self.widest[places], self.spanning)
+        return Prospects(self.cones, self.faces[places], self.widest[places])
 
     def candidates(self, rows: slice) -> Candidates:
         """Some of them with their cones."""
@@ -115,8 +113,7 @@ def _by_room(cones: PlannedCones, whole: int) -> Indices:
 def _prospects(cones: PlannedCones, quads: Indices) -> Prospects:
     quads = np.sort(quads.reshape(-1, FINGERS), axis=1)
     quads = quads[np.lexsort(quads.T[::-1])]
-    around, widest = cones.widest(quads)
-    return Prospects(cones, quads, widest, int((around > LEAST_SPAN_ANGLE).sum()))
+    return Prospects(cones, quads, cones.widest(quads))
 
 
 def _range_ends(count: int) -> Indices:

@@ -52,6 +52,11 @@ class PlanRequest:
         return self.limit if self.rank_by == "radius" and not self.complete else None
 
 
+def methods_for(body: Polyhedron) -> tuple[Method, ...]:
+    """What a command tries unless told otherwise: on many faces not the free method."""
+    return METHODS if len(body.faces) <= MAX_FACES else FAMILIES
+
+
 def check_request(body: Polyhedron, request: PlanRequest) -> None:
     """Refuse what cannot be planned.
 
@@ -85,13 +90,19 @@ def _check_size(body: Polyhedron, request: PlanRequest) -> None:
     if faces > MOST_FACES:
         raise InputError(
             f"{body.name} has {faces} planar faces, over the limit of {MOST_FACES}; load it with "
-            "patches for faces"
+            "patches for faces (--faces patches)"
         )
-    if faces > MAX_FACES and (request.searched is None or "free" in request.families):
+    needed = {
+        "a limit (--limit)": request.limit is None,
+        "families without the free method (--family)": "free" in request.families,
+        "radius to rank by (--rank-by)": request.rank_by != "radius",
+    }
+    missing = [what for what, lacks in needed.items() if lacks]
+    if faces > MAX_FACES and missing:
         raise InputError(
             f"{body.name} has {faces} planar faces: above {MAX_FACES} only the largest grasps of "
-            f"{', '.join(FAMILIES)} are planned. Give these families and a limit, ranked by "
-            "radius, or load it with patches for faces"
+            f"{', '.join(FAMILIES)} are planned. Give {' and '.join(missing)}, or load it with "
+            "patches for faces (--faces patches)"
         )
 
 

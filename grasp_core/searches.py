@@ -33,18 +33,6 @@ class _Kept:
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
         self.made: dict[int, Prospects] = {}
-        self.counts: dict[int, int] = {}
-
-    @property
-    def spanning(self) -> int:
-        """How many quadruples with normals that span (P3) the blocks made so far hold."""
-        return sum(self.counts.values())
-
-    def make_all(self) -> None:
-        """Make the blocks that nobody asked for, to know what is in them."""
-        for place in range(len(self.blocks)):
-            if place not in self.counts:
-                self.make(place)
 
     def make(self, place: int) -> Prospects:
         """One of the blocks."""
@@ -53,7 +41,6 @@ class _Kept:
         block = self.blocks.make(place)
         if place < KEPT_BLOCKS:
             self.made[place] = block
-        self.counts[place] = block.spanning
         return block
 
 
@@ -83,16 +70,6 @@ class Searches:
             tilted = PlannedCones(*of_object, tilted=True)
             self.tilted_blocks = _Kept(all_blocks(tilted, self.whole, self.shared))
 
-    def count_spanning(self) -> int:
-        """How many quadruples with normals that span (P3) were come across.
-
-        Where nothing but they could have held a grasp, and none did, these are all of them.
-        """
-        found = any(search.best for search in self.by_method.values())
-        if self.request.cones == "normal" and not found:
-            self.spanning_blocks.make_all()
-        return max(self.spanning_blocks.spanning, self.tilted_blocks.spanning)
-
     @property
     def constructions(self) -> dict[Family, Search]:
         """The searches of the paper's families."""
@@ -121,10 +98,11 @@ class Searches:
             search.limit = self._share(place)
             steps = search_construction(
                 construction, self.shapes, self.request.friction,
-                self._blocks(construction, search), search,
+                self._blocks(construction), search,
             )  # fmt: skip
             yield from enumerate(_timed(steps, search), start=dealt_with + 1)
-            search.tally["pruned"] -= search.tally["tried"]
+            every = self.quadruples * len(construction.orders)
+            search.tally["pruned"] = every - search.tally["tried"]
         if "free" in self.by_method:
             search = self.by_method["free"]
             search.limit = self._left()
@@ -165,19 +143,13 @@ class Searches:
         left = [limit - sum(found[:short]) for short in range(place + 1)]
         return max(each // (place - short + 1) for short, each in enumerate(left))
 
-    def _blocks(self, construction: Construction, search: Search) -> Blocks:
+    def _blocks(self, construction: Construction) -> Blocks:
         """Blocks of quadruples for one construction.
 
         Where nothing bounds discs, only cones around the normals count.
         """
         kept = self.spanning_blocks if construction.limits is None else self.tilted_blocks
-
-        def make(place: int) -> Prospects:
-            prospects = kept.make(place)
-            search.tally["pruned"] += len(prospects) * len(construction.orders)
-            return prospects
-
-        return Blocks(kept.blocks.rooms, make)
+        return Blocks(kept.blocks.rooms, kept.make)
 
     def _free_request(self, cells: int | None = None) -> FreeRequest:
         request = self.request

@@ -61,6 +61,16 @@ def span_angle(normals: ArrayLike) -> float:
     return math.asin(min(abs(triple_sine(*triple)) for triple in triples))
 
 
+def count_spanning(normals: ArrayLike, least: float) -> int:
+    """How many quadruples of unit vectors (n, 3) span at an angle [rad], without listing them."""
+    units = frozen_units(normals, (None, 3), "normals")
+    kernel = compiled(KERNEL) if len(units) > FEW else None
+    if kernel is None:
+        return len(spanning_quadruples(units, least).indices)
+    table = SpanningTable(units, least)
+    return sum(table.count(newest) for newest in range(len(units)))
+
+
 def span_sines(units: Array) -> Array:
     """Sine of theta* of many quadruples of unit vectors (q, 4, 3); negative where they do not span.
 
@@ -212,13 +222,21 @@ class SpanningTable:
             every = _spanning_by_pairs(self.units[:end], self.least)
             last = every.indices[:, 3] >= start
             return SpanningQuadruples(every.indices[last], every.span_angles[last])
-        if self.size < end:
-            self.kernel.extend(self.bits, self.units, self.size, end, self.least)
-            self.size = end
+        self._extend(end)
         indices = _sorted([self._ending_in(newest) for newest in range(start, end)], end)
         sines = np.empty(len(indices))
         self.kernel.least_sines(self.units, indices, sines)
         return SpanningQuadruples(indices, np.arcsin(sines))
+
+    def count(self, newest: int) -> int:
+        """How many have this direction for their last one; only with compiled code."""
+        self._extend(newest + 1)
+        return int(self.kernel.quadruples(self.bits, newest, np.empty((0, 4), dtype=np.int64)))
+
+    def _extend(self, end: int) -> None:
+        if self.size < end:
+            self.kernel.extend(self.bits, self.units, self.size, end, self.least)
+            self.size = end
 
     def _ending_in(self, newest: int) -> Indices:
         found = np.empty((GUESS * newest * newest, 4), dtype=np.int64)

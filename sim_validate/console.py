@@ -24,6 +24,8 @@ from sim_validate import interrupts
 
 PLAIN_EVERY_S = 5.0
 """Without a terminal, progress is a line this often."""
+EARLIEST = 0.02
+"""Share of the work after which it is worth saying how long the rest takes."""
 
 
 def printable(text: str) -> str:
@@ -126,6 +128,7 @@ class Steps:
         elif self.shown and time.monotonic() - self.last > PLAIN_EVERY_S:
             self.last = time.monotonic()
             rate = done / (self.last - self.begun)
-            left = (total - done) / rate if rate else float("inf")
-            line = f"{self.title} {done}/{total} {note} {rate:.1f}/s, {left:.0f} s left"
+            line = f"{self.title} {done}/{total} {note} {rate:.1f}/s"
+            if done > EARLIEST * total:
+                line += f", {(total - done) / rate:.0f} s left"
             self.console.print(Text(line), soft_wrap=True)

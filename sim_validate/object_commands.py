@@ -6,7 +6,7 @@ from typing import Any, cast
 
 from grasp_core.candidates import LEAST_SPAN_ANGLE
 from grasp_core.planar_faces import MAX_FACES
-from grasp_core.spanning import spanning_quadruples
+from grasp_core.spanning import count_spanning
 from scenes.objects import example_names
 from sim_validate import cli
 from sim_validate.console import Reporter
@@ -17,9 +17,7 @@ def inspect_object(command: cli.Inspect, reporter: Reporter) -> int:
     """Show the facts about a mesh."""
     body = load_object(command.object, command.mesh)
     spanning = (
-        len(spanning_quadruples(body.normals, LEAST_SPAN_ANGLE).indices)
-        if len(body.faces) <= MAX_FACES
-        else None
+        count_spanning(body.normals, LEAST_SPAN_ANGLE) if len(body.faces) <= MAX_FACES else None
     )
     facts = {
         "name": body.name,

@@ -12,7 +12,7 @@ from grasp_core.plans import Plan
 from grasp_core.polyhedra import load_polyhedron
 from grasp_core.reach import Finger
 from grasp_core.records import Moved, plan_to_json
-from grasp_core.requests import METHODS
+from grasp_core.requests import methods_for
 from grasp_core.values import FaceQuadruple, PatchLimits, Polyhedron
 from scenes.objects import example_object
 from sim_validate import cli, flags
@@ -66,7 +66,7 @@ def plan_object(
         found = plan(
             body,
             planning.friction,
-            families=planning.family or METHODS,
+            families=planning.family or methods_for(body),
             cones=planning.cones,
             theta_deg=planning.theta_deg,
             limit=planning.limit,
@@ -125,7 +125,7 @@ def plan_file(command: cli.Plan, reporter: Reporter) -> int:
         reporter.say(found.absence)
         return cli.Exit.NONE
     rows = [
-        (g.id, g.family, f"{1e3 * g.radius:.3g}", f"{g.critical_friction:.4f}",
+        (g.id, g.family, f"{1e3 * g.radius:.3g}" if g.radius else "-", f"{g.critical_friction:.4f}",
          f"{math.degrees(g.span_angle):.2f}", f"{g.closure_margin:.4f}",
          f"{g.ferrari_canny[0]:.4f}")
         for g in found.grasps[:TABLE_ROWS]
@@ -143,7 +143,8 @@ def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
     counts = found.counts
     reporter.say(
         f"{body.name}: {counts.faces} faces, {counts.quadruples} face quadruples, "
-        f"{counts.spanning} spanning (P3), friction {found.friction:g}, "
+        + (f"{counts.spanning} spanning (P3), " if counts.spanning is not None else "")
+        + f"friction {found.friction:g}, "
         f"theta {math.degrees(found.theta):.4g} deg"
     )
     known = found.outcomes

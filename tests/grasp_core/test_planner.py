@@ -274,7 +274,7 @@ def test_counts_add_up_and_nothing_is_rejected(name):
         assert counts.tried == ended
         assert counts.rejected == counts.undecided == 0
         orders = 1 if family == "concurrent" else 3
-        assert counts.tried + counts.pruned == orders * found.counts.spanning
+        assert counts.tried + counts.pruned == orders * found.counts.quadruples
 
 
 def test_an_elongated_object_has_pencils_where_it_has_no_concurrent_grasp():

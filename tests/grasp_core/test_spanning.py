@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.spanning import LARGEST_SPAN_ANGLE, positively_span, spanning_quadruples
+from grasp_core.spanning import (
+    LARGEST_SPAN_ANGLE,
+    count_spanning,
+    positively_span,
+    spanning_quadruples,
+)
 from scenes.objects import example_object
 from tests.judges import TETRA_NORMALS, picks_positively_span, random_rotation
 
@@ -142,3 +147,13 @@ def _tilted(rng, axis, tilt):
     across = np.cross(axis, rng.normal(size=3))
     across /= np.linalg.norm(across)
     return math.cos(tilt) * axis + math.sin(tilt) * across
+
+
+@pytest.mark.parametrize("name", ["dodecahedron", "cube", "random-40-1"])
+def test_spanning_quadruples_are_counted_without_being_listed(without_kernels, name):
+    normals, least = example_object(name).normals, math.radians(0.5)
+    listed = len(spanning_quadruples(normals, least).indices)
+    assert count_spanning(normals, least) == listed
+    without_kernels()
+    assert count_spanning(normals, least) == listed
+    assert bool(listed) == (name != "cube")
