@@ -50,9 +50,7 @@ class AttemptBounds:
             np.ascontiguousarray(attempts.half_angles),
         )
         if construction.limits is None:
-            known = regulus_bounds(self._table, attempts, -np.inf)
-            none = known is not None and known[0] == -np.inf
-            return np.where(none, -np.inf, np.full(len(attempts.faces), np.inf))
+            return self._of_reguli(attempts)
         kernel = compiled(KERNELS[construction.family])
         if kernel is None:
             return self._by_constructions(construction, attempts, least)
@@ -63,6 +61,14 @@ class AttemptBounds:
             turns = np.array(facet_turns(PYRAMID_SIDES))
             kernel.concurrent_bounds(self._table, attempts, turns, least, bounds)
         return bounds + RESIDUAL
+
+    def _of_reguli(self, attempts: Attempts) -> Array:
+        bounds = np.full(len(attempts.faces), np.inf)
+        known = regulus_bounds(self._table, attempts, -np.inf)
+        if known is not None:
+            merits, _ = known
+            bounds[merits == -np.inf] = -np.inf
+        return bounds
 
     def _by_constructions(
         self, construction: Construction, attempts: Attempts, least: float

@@ -100,7 +100,19 @@ class PlannedCones:
     def limits(self, quads: Indices, widest: Array) -> Array:
         """Upper bounds on discs of cones that are no wider (see `disc_limits`), (q, 4).
 
-        The narrower the cones, the more they may lean; but smaller bounds follow.
+        With psi the half-angle, theta the friction angle and h half the angle between two normals,
+        narrower cones may lean more, and the bound tan(psi / 2) / sin(h - theta + psi) of a pair is
+        to hold for all psi up to the widest w. Where h >= theta it grows with psi, as
+        1 / sin(psi) is above cot(h - theta + psi). Where h < theta cones that positively span (P3)
+        still never overlap: half the angle between their axes is above psi, so that the true bound
+        is below tan(psi / 2) / sin(psi) = 1 / (2 cos^2(psi / 2)), and that of w above this.
+
+        Args:
+            quads: Faces, (q, 4).
+            widest: Half-angles, (q,) [rad].
+
+        Returns:
+            In object radii, for cones that positively span.
         """
         extent = float(np.linalg.norm(self._corners.points, axis=-1).max(initial=0.0))
         leaning = np.maximum(self._thetas[quads].max(axis=1, initial=0.0) - widest, 0.0)

@@ -27,6 +27,9 @@ DECIDED = 1e-9
 times the tolerance asked of the solver."""
 PRECISE = 1e-10
 """The gap left by compiled code, relative to the margin: below what the conic solver leaves."""
+FAR = 1e3
+"""Margins farther from zero, in units of the friction, are those of nearly parallel normals, where
+compiled code is off by some per mille; the programs are asked."""
 INTERIOR = 1e-6
 """Depth inside its cone, of forces whose normal parts sum to 1, from which a contact counts
 as carrying an interior force: far above what the solver leaves on a boundary."""
@@ -98,8 +101,11 @@ def _decided_quickly(arms: Array, normals: Array, friction: Array) -> Answer | N
     if not (friction[0] > 0.0 and (friction == friction[0]).all()):
         return None
     forces, twists, margins = deepest_forces(arms[None], normals[None], friction[:1], PRECISE)
+    forces, twists = _without_giants(forces), _without_giants(twists)
     lower, upper = (float(each) for each in margins[0])
-    if not upper - lower <= DECIDED * max(friction[0], abs(lower)):  # nor if one is not a number
+    scale = float(friction[0])
+    close = abs(upper - lower) <= DECIDED * max(scale, abs(lower)) and abs(lower) <= FAR * scale
+    if not close:  # nor if one is not a number
         return None
     if lower > DECIDED and proves_closure(forces[0], arms, normals, friction):
         return Answer(lower, forces[0], twists[0], closed=True)

@@ -15,6 +15,7 @@ from grasp_core.kernels import compiled
 from grasp_core.wrenches import WRENCH, contact_frames, in_frames
 
 KERNEL = "critical"
+"""The search for critical friction solves the same programs at many frictions."""
 ROUNDING = 1e-12
 """Slack of the plain-arithmetic checks, for data scaled to unit size: some thousand
 rounding errors."""
@@ -36,8 +37,9 @@ def deepest_forces(
 
     Returns:
         Forces, (g, k, 3), twists (g, 6) on which the supports are at most the margin over the
-        friction, and lower and upper bounds of the margin, (g, 2), where the forces balance. All
-        zeros without kernels.
+        friction, and lower and upper bounds of the margin, (g, 2), where the forces balance. Bounds
+        that have crossed, or are no numbers, are those of a search that broke down, as it does on
+        degenerate contacts. All zeros without kernels.
     """
     forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))
     values = np.ones((len(arms), 2))

@@ -64,16 +64,16 @@ BLOCK, REST, QUADRUPLE = range(3)
 def promising(
     construction: Construction,
     blocks: Sequence[Block],
-    discs: AttemptBounds,
+    bounded: AttemptBounds,
     least: Callable[[Construction], float],
     tally: Counter[str],
 ) -> Iterator[Quadruple]:
     """Quadruples that may be worth having, with tight bounds, best first.
 
     Args:
-        construction: With discs.
+        construction: With discs; others are gone through by `in_rows`.
         blocks: Of all quadruples.
-        discs: Of the object's faces.
+        bounded: What attempts on the object's faces can offer.
         least: The radius above which discs are worth having at present.
         tally: Where to count attempts whose bound proves that they have none at all.
     """
@@ -96,7 +96,7 @@ def promising(
                 if isinstance(item.listed, Outlook):
                     _put_back(waiting, _closer(item.listed, rows, worth), (*place, rows.start))
                 else:
-                    for one in _tightened(item.listed, rows, discs, worth, tally):
+                    for one in _tightened(item.listed, rows, bounded, worth, tally):
                         heappush(waiting, one)
                 _put_back(waiting, _Rest(item.listed, item.best, rows.stop), place)
             case _:
@@ -118,25 +118,25 @@ def _put_back(waiting: list[_Waiting], rest: _Rest, place: tuple[int, ...]) -> N
 
 
 def in_rows(
-    listed: Outlook, discs: AttemptBounds, worth: float, tally: Counter[str]
+    listed: Outlook, bounded: AttemptBounds, worth: float, tally: Counter[str]
 ) -> Iterator[Quadruple]:
     """Quadruples that may be worth having, some after others as they are listed.
 
     Args:
         listed: Of one block.
-        discs: Of the object's faces.
+        bounded: What attempts on the object's faces can offer.
         worth: The merit above which grasps are worth having.
         tally: Where to count attempts whose bound proves that they have none.
     """
     for start in range(0, len(listed), SMALLEST_CHUNK):
         ranking = listed.ranking(slice(start, start + SMALLEST_CHUNK))
         every = slice(0, len(ranking))
-        for _, _, _, make in _tightened(ranking, every, discs, worth, tally):
+        for _, _, _, make in _tightened(ranking, every, bounded, worth, tally):
             yield make()
 
 
 def _tightened(
-    ranking: Ranking, rows: slice, discs: AttemptBounds, worth: float, tally: Counter[str]
+    ranking: Ranking, rows: slice, bounded: AttemptBounds, worth: float, tally: Counter[str]
 ) -> Iterator[tuple[float, int, tuple[int, ...], Callable[[], Quadruple]]]:
     """Some quadruples, those of them that are worth having, with tight bounds."""
     construction, candidates = ranking.construction, ranking.candidates
@@ -150,7 +150,7 @@ def _tightened(
         np.take_along_axis(candidates.axes[place, kind], order[:, :, None], axis=1),
         candidates.half_angles[place, kind],
     )
-    bounds[row, kind, column] = discs.of(construction, attempts, worth)
+    bounds[row, kind, column] = bounded.of(construction, attempts, worth)
     bounds = np.minimum(bounds, cheap)
     solved = cheap > worth
     none = solved.any(axis=1) & (bounds.max(axis=1) <= construction.least)

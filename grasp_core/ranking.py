@@ -100,7 +100,7 @@ class Outlook:
 
     prospects: Prospects
     bounds: Array
-    """No disc is larger, (q,); infinite for reguli."""
+    """No disc is larger, in object radii, (q,); infinite for reguli."""
     construction: Construction
 
     def __len__(self) -> int:

@@ -20,7 +20,8 @@ RankBy: TypeAlias = Literal["radius", "friction-margin", "ferrari-canny", "diver
 COMPLETE_CELLS = 20_000
 """Parts into which `complete` may cut the faces of one quadruple."""
 MOST_FACES = 1000
-"""Above it the table of faces whose normals span takes more than some hundred megabytes."""
+"""Tables of all pairs and, of those whose normals span, triples of faces take some hundred
+megabytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +97,7 @@ def _check_size(body: Polyhedron, request: PlanRequest) -> None:
         "a limit (--limit)": request.limit is None,
         "families without the free method (--family)": "free" in request.families,
         "radius to rank by (--rank-by)": request.rank_by != "radius",
+        "no share_faces (--share-faces-m)": request.share_faces is not None,
     }
     missing = [what for what, lacks in needed.items() if lacks]
     if faces > MAX_FACES and missing:

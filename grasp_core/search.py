@@ -148,7 +148,7 @@ def search_construction(
 
 
 def _in_order(
-    construction: Construction, discs: AttemptBounds, blocks: Blocks, search: Search
+    construction: Construction, bounded: AttemptBounds, blocks: Blocks, search: Search
 ) -> Iterator[Quadruple]:
     """Quadruples to try: with a limit best first over many blocks, else block by block."""
     if construction.limits is not None:
@@ -158,13 +158,13 @@ def _in_order(
             if not search.may_gain(construction, float(blocks.rooms[places].max())):
                 continue
             some = [Block(float(blocks.rooms[at]), partial(blocks.make, at)) for at in places]
-            yield from promising(construction, some, discs, search.least, search.tally)
+            yield from promising(construction, some, bounded, search.least, search.tally)
         return
     for place in range(len(blocks)):
         if search.full:
             return
         listed = outlook(blocks.make(place), construction, construction.least)
-        some = in_rows(listed, discs, construction.least, search.tally)
+        some = in_rows(listed, bounded, construction.least, search.tally)
         yield from takewhile(lambda _: not search.full, some)
 
 

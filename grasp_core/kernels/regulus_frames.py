@@ -15,13 +15,14 @@ from grasp_core.kernels.tables import Attempts, FaceTable, RegulusTerms
 from grasp_core.kernels.vectors import across, cross, dotted, focus_direction
 
 FLAT = 1e-12
-"""Facets that lean no more than this bound nothing."""
+"""Facets that lean no more than this do not bound z / x: they allow all of it or nothing."""
 
 
 class PairFrames(NamedTuple):
     """Of both pairs: along and across their planes, and what their slopes may be."""
 
     u: Array
+    """(3,)"""
     v: Array
     """(2, 3)"""
     N: Array
@@ -104,7 +105,7 @@ def _tightest(facets: Array, resultant: float, tau: float, tight: Array) -> bool
             alpha = facets[each, m, 0] + side * tau * facets[each, m, 1]
             beta = side * facets[each, m, 2]
             if abs(beta) <= FLAT:
-                if resultant * alpha < 0.0:
+                if resultant * alpha < -FLAT:
                     return False
                 continue
             bound = -resultant * alpha / beta

@@ -54,8 +54,11 @@ class RegulusTerms(NamedTuple):
     shares: Array
     """Where in its interval each slope's angle is tried, (s,)."""
     depth: float
+    """Least height of the passing points over their faces, in object radii."""
     inset: float
+    """Least distance of a contact from the edges of its face, likewise."""
     gap: float
+    """Least distance at which a line passes the focus line, likewise."""
     tie: float
     """Merits that differ by no more are equal: the slopes tried first win."""
     enough: float

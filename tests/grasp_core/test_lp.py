@@ -202,3 +202,49 @@ def test_numbers_that_are_none_are_an_error():
     program = LinearProgram(np.ones(2), SQUARE, np.ones(4))
     with pytest.raises(SolverError):
         lp._checked_optimum(program, np.full(2, np.nan), np.ones(4))
+
+
+def kernel_rows(A, b, equalities=0):
+    """A program as compiled code wants it."""
+    simplex = compiled(lp.KERNEL)
+    if simplex is None:
+        pytest.skip("no compiled code here")
+    A, b = np.asarray(A, dtype=float), np.asarray(b, dtype=float)
+    rows = simplex.Rows(np.array(A.T, order="C"), b, np.linalg.norm(A, axis=1), equalities)
+    return simplex, rows
+
+
+def vertex_of(simplex, basis, y):
+    return simplex.Vertex(np.array(basis), np.array(y, dtype=float), np.zeros(len(basis)))
+
+
+def test_compiled_bounds_count_only_what_multipliers_prove():
+    simplex, rows = kernel_rows(SQUARE, [3.0, 4.0, 0.0, 0.0])
+    c = np.array([1.0, 2.0])
+
+    def bound(basis, y, of=rows):
+        return simplex.proved_bound(c, of, vertex_of(simplex, basis, y), 1e-12)
+
+    assert bound([0, 1], [1.0, 2.0]) == pytest.approx(11.0)
+    assert bound([0, 1], [1.0, 1.0]) == np.inf  # something of c is left over
+    assert bound([2, 3], [-1.0, -2.0]) == np.inf  # rows that may not be turned
+    assert bound([0, 4 + 2], [1.0, 2.0]) == np.inf  # a side of the box
+    _, equal = kernel_rows(SQUARE, [3.0, 4.0, 0.0, 0.0], equalities=2)
+    assert bound([2, 3], [-1.0, -2.0], equal) == pytest.approx(0.0)
+    assert bound([0, 1], [1.0, 2.0], kernel_rows(SQUARE, [np.nan, 4.0, 0.0, 0.0])[1]) == np.inf
+
+
+def test_compiled_refutations_count_only_what_the_combination_proves():
+    contradictory = [3.0, 4.0, -5.0, 0.0]  # x <= 3 and x >= 5
+
+    def empty(alpha, basis=(0, 1), b=contradictory, equalities=0):
+        simplex, rows = kernel_rows(SQUARE, b, equalities)
+        return simplex.proved_empty(rows, vertex_of(simplex, basis, alpha), 2, 1e4)
+
+    assert empty([-1.0, 0.0])
+    assert not empty([-1.0, 0.0], b=[3.0, 4.0, -3.0, 0.0])  # they meet
+    assert not empty([-0.9, 0.0])  # something of the row is left over
+    assert not empty([1.0, 0.0])
+    assert not empty([-1.0, 0.1])
+    assert not empty([-1.0, 0.0], basis=(4, 1))  # a side of the box
+    assert not empty([-1.0, 0.0], b=[np.nan, 4.0, -5.0, 0.0])

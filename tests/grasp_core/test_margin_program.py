@@ -29,6 +29,40 @@ def contact_sets(count=400, seed=0):
         yield arms, normals, np.full(k, 10.0 ** rng.uniform(-2.0, 0.5))
 
 
+def degenerate_sets(count=400, seed=1):
+    """Two contacts, contacts in a plane, and contacts that push alike."""
+    rng = np.random.default_rng(seed)
+    for place in range(count):
+        kind = place % 4
+        k = 2 if kind < 2 else int(rng.integers(3, 7))
+        points, normals = rng.normal(size=(2, k, 3))
+        if kind == 1:
+            normals[:] = normals[0]
+        elif kind == 2:
+            points[:, 2] = normals[:, 2] = 0.0
+        elif kind == 3:
+            normals[:] = normals[0] + 1e-7 * normals
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        arms, _, _ = unit_size(points)
+        yield arms, normals, np.full(k, 10.0 ** rng.uniform(-3.0, 3.0))
+
+
+def test_degenerate_contacts_have_the_margins_of_the_programs():
+    closed = answered = 0
+    for contacts in degenerate_sets():
+        quick, slow = _decided_quickly(*contacts), _decided_by_programs(*contacts)
+        if quick is None:
+            continue
+        answered += 1
+        closed += quick.closed
+        assert quick.closed or quick.margin <= 0.0
+        if slow.closed is not None and np.isfinite(slow.margin):
+            assert quick.closed == slow.closed
+            scale = max(1.0, float(contacts[2][0]))
+            assert quick.margin == pytest.approx(slow.margin, rel=1e-5, abs=1e-7 * scale)
+    assert answered >= 50
+
+
 def test_compiled_code_answers_as_the_programs_do():
     if compiled(KERNEL) is None:
         pytest.skip("no compiled code here")

@@ -7,6 +7,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core import attempt_bounds, largest_discs
+from grasp_core import promising as promising_module
 from grasp_core.attempt_bounds import AttemptBounds
 from grasp_core.constructions import CONSTRUCTIONS
 from grasp_core.errors import SolverError
@@ -44,6 +45,17 @@ def test_a_limit_keeps_the_largest_discs_of_all(name, family):
     assert len(every) >= 2
     for limit in (1, 3, 8):
         best = radii(body, options, family, limit)
+        np.testing.assert_allclose(best, every[:limit], rtol=2.0 * SAME_MERIT)
+
+
+def test_cones_that_are_tilted_late_are_not_missed(monkeypatch):
+    """In chunks so small that many are looked at only when something is worth having."""
+    body = example_object("random-12-1")
+    every = sorted(radii(body, {"friction": 0.4}, "pencil", None), reverse=True)
+    for name, size in (("LARGEST_CHUNK", 40), ("SMALLEST_TILT", 10), ("SMALLEST_CHUNK", 5)):
+        monkeypatch.setattr(promising_module, name, size)
+    for limit in (2, 25, 200):
+        best = radii(body, {"friction": 0.4}, "pencil", limit)
         np.testing.assert_allclose(best, every[:limit], rtol=2.0 * SAME_MERIT)
 
 

@@ -93,6 +93,28 @@ def test_limits_before_cones_are_chosen_bound_those_after(name):
     assert tested >= 30
 
 
+def test_no_pair_of_tilted_cones_has_larger_discs_than_its_widest_cones_allow():
+    """Axes that lean towards each other as far as P3 and friction let them."""
+    rng, count = np.random.default_rng(0), 200_000
+    halves, theta = rng.uniform(0.05, 1.57, size=count), rng.uniform(0.05, 1.2, size=count)
+    widest = theta * rng.uniform(0.05, 1.0, size=count)
+    psi = widest * rng.uniform(0.02, 1.0, size=count)
+    leaning = (theta - psi) * rng.uniform(0.5, 1.0, size=count)
+    between = halves - leaning  # half the angle between the axes; cones that span do not overlap
+    possible = between > psi
+    real = 0.5 * np.tan(0.5 * psi) / np.sin(np.where(possible, between, 1.0))
+    apart, angles = np.ones((2, 2)), np.zeros((2, 2))
+    tested = 0
+    for at in np.flatnonzero(possible)[:4000]:
+        angles[0, 1] = angles[1, 0] = halves[at]
+        faces = np.array([[0, 1, 0, 1]])
+        widths = widths_apart(faces, apart, angles, theta[[at]] - widest[[at]])
+        limit = 0.5 * widths[0, 0, 1] * np.tan(0.5 * widest[at])
+        assert real[at] <= limit * (1.0 + 1e-9)
+        tested += np.isfinite(limit) and halves[at] < theta[at]
+    assert tested >= 100
+
+
 def test_widths_from_distances_bound_those_from_corners_however_axes_lean():
     body = example_object("random-14-1")
     cones = planned(body)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core import regulus_grasps
 from grasp_core.kernels import compiled
 from grasp_core.lines import plucker_vectors
 from grasp_core.placements import NoPlacement, Placement
@@ -136,6 +137,30 @@ def test_compiled_code_chooses_the_slopes_that_all_programs_choose():
             tried[type(slow)] += 1
     assert tried[Placement] >= 60
     assert tried[NoPlacement] >= 10
+
+
+@pytest.mark.parametrize("lie", ["better", "worse", "none", "other slopes"])
+def test_what_compiled_code_gets_wrong_is_found_by_all_programs(monkeypatch, lie):
+    def lying(table, attempts, *rest):
+        merits, chosen = honest(table, attempts, *rest)
+        if lie == "other slopes":
+            return merits, np.where(chosen[:, :1] >= 0, 2 - chosen, chosen) % (3, 3, 2)
+        if lie == "none":
+            return np.full_like(merits, np.inf), np.full_like(chosen, -1)
+        return merits + (0.1 if lie == "better" else -0.1), chosen
+
+    pairs = list(paired_quadruples("random-30-1", math.radians(10.0), 12))
+    right = [_best_of(*pair, CHOICES) for pair in pairs]
+    honest = regulus_grasps.regulus_bounds
+    monkeypatch.setattr(regulus_grasps, "regulus_bounds", lying)
+    placed = 0
+    for pair, expected in zip(pairs, right, strict=True):
+        found = place_regulus(*pair)
+        assert type(found) is type(expected)
+        if isinstance(found, Placement):
+            assert found.merit == pytest.approx(expected.merit, abs=1e-8)
+            placed += 1
+    assert placed >= 4
 
 
 def test_without_compiled_code_reguli_are_the_same(without_kernels):
