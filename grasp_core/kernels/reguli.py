@@ -1,9 +1,10 @@
 """Which slopes suit a regulus best: the programs of `regulus_grasps` for all slopes tried.
 
 A program, over (x0, k, p, x_1, x_2, z_1, z_2, t), is solved without its gap first: where p keeps
-beyond the gap anyway, that was the better side. With x_i beyond zero the rows that keep the forces
-of a pair in their pyramids are bounds on z_i / x_i, of which the tightest imply the others.
-See `kernels.attempts`.
+beyond the gap anyway, that was the better side. As the cones span (P3), x_i is on the side of its
+pair's resultant; there the rows that keep the forces of a pair in their pyramids are bounds on
+z_i / x_i, of which the tightest imply the others. `regulus_grasps` builds the same programs whole
+and solves the best one again. See `kernels.attempts`.
 """
 
 from typing import NamedTuple
@@ -108,7 +109,7 @@ def _best_side(
 ) -> tuple[float, int]:
     """The better of the programs for p > gap and p < -gap: a bound on its value, and the side."""
     either = _bounded(rows, worth, vertex)
-    p = vertex.x[P]
+    p = vertex.x[P]  # anything where `either` is infinite: the sides decide then, or nothing does
     if either <= worth or p >= gap:
         return either, PLUS
     rows.At[P, 0], rows.b[0] = -1.0, -gap
