@@ -1,0 +1,1 @@
+"""Datasets: many objects at several frictions, planned, simulated and written as tables."""

@@ -1,0 +1,161 @@
+"""What a dataset is made of: a TOML file or flags -> one checked value, and back to TOML.
+
+Everything that decides a row is here, so the hash of the resolved text, with the hashes of the
+meshes and the versions, names what a dataset can hold.
+"""
+
+import hashlib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Literal, TypeAlias, cast, get_args
+
+from grasp_core.errors import InputError
+from grasp_core.polyhedra import UNITS_M
+from grasp_core.requests import METHODS, ConeKind
+from grasp_core.values import LARGEST_FRICTION, FaceKind, Method
+from sim_validate.files import read_text
+
+LimitsKind: TypeAlias = Literal["none", "ramp", "bisection"]
+KINDS: dict[str, tuple[str, ...]] = {
+    "unit": tuple(UNITS_M),
+    "faces": get_args(FaceKind),
+    "cones": get_args(ConeKind),
+    "limits": get_args(LimitsKind),
+}
+"""Settings that are one of some words."""
+LEAST = {"limit": 1, "random_wrenches": 0, "seed": 0}
+"""Settings that are whole numbers, and from where on."""
+MOST_SEED = 2**63 - 1
+LISTS: dict[str, type[str] | type[float]] = {"objects": str, "frictions": float, "families": str}
+"""Settings that are lists, and of what."""
+WORDS: dict[type, str] = {str: "text", float: "numbers", int: "a whole number"}
+
+
+@dataclass(frozen=True, slots=True)
+class DatasetConfig:
+    """Objects x frictions x families, and how their grasps are planned and tried.
+
+    Raises:
+        InputError: A setting is out of range.
+    """
+
+    objects: tuple[str, ...]
+    """Mesh files, or names of built-in objects."""
+    frictions: tuple[float, ...] = (0.5,)
+    """Coulomb coefficients; each object is planned and tried at each."""
+    families: tuple[Method, ...] = METHODS
+    limit: int = 20
+    """Largest number of grasps of each object, friction and family."""
+    cones: ConeKind = "tilted"
+    unit: str = "m"
+    """What one unit in a mesh file is."""
+    faces: FaceKind = "auto"
+    limits: LimitsKind = "none"
+    """How the largest multiples of wrenches are found in simulation."""
+    random_wrenches: int = 0
+    """Held beside the usual ones."""
+    seed: int = 0
+    """For everything random."""
+
+    def __post_init__(self) -> None:
+        for name in ("objects", "frictions", "families"):
+            values: tuple[object, ...] = getattr(self, name)
+            if not values or len(set(values)) < len(values):
+                raise InputError(f"{name}: expected one or more, each once, got {list(values)}")
+        wrong = [friction for friction in self.frictions if not 0.0 < friction <= LARGEST_FRICTION]
+        if wrong:
+            most = f"{LARGEST_FRICTION:g}"
+            raise InputError(f"frictions: expected numbers above 0, up to {most}, got {wrong[0]}")
+        if unknown := [family for family in self.families if family not in METHODS]:
+            raise InputError(f"families: expected some of {', '.join(METHODS)}, got {unknown[0]}")
+        self._check_words_and_counts()
+
+    def _check_words_and_counts(self) -> None:
+        for name, kinds in KINDS.items():
+            if getattr(self, name) not in kinds:
+                raise InputError(
+                    f"{name}: expected one of {', '.join(kinds)}, got {getattr(self, name)!r}"
+                )
+        for name, least in LEAST.items():
+            if not least <= getattr(self, name) <= MOST_SEED:
+                raise InputError(f"{name}: expected {least} or more, got {getattr(self, name)}")
+
+    @property
+    def sha256(self) -> str:
+        """Of the resolved text."""
+        return hashlib.sha256(config_to_toml(self).encode()).hexdigest()
+
+
+def config_from_toml(path: Path) -> DatasetConfig:
+    """Read a configuration.
+
+    Raises:
+        InputError: The file cannot be read, is not TOML, or a setting is unknown or refused.
+    """
+    try:
+        given = tomllib.loads(read_text(path))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not TOML: {error}") from error
+    try:
+        return config_from_settings(given)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
+    """A configuration from settings by name, of the types that TOML has.
+
+    Raises:
+        InputError: A setting is unknown, missing, of another type, or refused.
+    """
+    known = [each.name for each in fields(DatasetConfig)]
+    if unknown := [name for name in given if name not in known]:
+        raise InputError(f"{unknown[0]}: no such setting; there are {', '.join(known)}")
+    if "objects" not in given:
+        raise InputError("objects: expected a list of mesh files or built-in objects")
+    return DatasetConfig(**{name: _typed(name, value) for name, value in given.items()})
+
+
+def _typed(name: str, value: Any) -> Any:
+    """A setting of the type it has in the configuration."""
+    wanted = LISTS.get(name, int if name in LEAST else str)
+    if name not in LISTS:
+        if not _is(value, wanted):
+            raise InputError(f"{name}: expected {WORDS[wanted]}, got {value!r}")
+        return value
+    if not isinstance(value, list):
+        raise InputError(f"{name}: expected a list of {WORDS[wanted]}, got {value!r}")
+    listed = cast("list[object]", value)
+    if not all(_is(one, wanted) for one in listed):
+        raise InputError(f"{name}: expected a list of {WORDS[wanted]}, got {value!r}")
+    return tuple(float(cast("float", one)) if wanted is float else one for one in listed)
+
+
+def _is(value: object, wanted: type) -> bool:
+    if isinstance(value, bool):
+        return False
+    return isinstance(value, (int, float) if wanted is float else wanted)
+
+
+def config_to_toml(config: DatasetConfig) -> str:
+    """The resolved text: every setting, in the order of the class; the same for equal values."""
+    return "".join(
+        f"{each.name} = {_as_toml(getattr(config, each.name))}\n" for each in fields(config)
+    )
+
+
+def _as_toml(value: object) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_as_toml, cast('tuple[object, ...]', value)))}]"
+    if isinstance(value, str):
+        return '"' + "".join(_escaped(letter) for letter in value) + '"'
+    return repr(value)
+
+
+def _escaped(letter: str) -> str:
+    """A letter of a TOML basic string."""
+    if letter in '"\\':
+        return "\\" + letter
+    return letter if letter.isprintable() else f"\\U{ord(letter):08x}"

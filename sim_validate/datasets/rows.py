@@ -1,0 +1,185 @@
+"""A work unit -> rows of the tables: its object, its grasps with their controls, their trials."""
+
+import hashlib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from grasp_core.planner import plan
+from grasp_core.values import FINGERS, Contact, Grasp, Polyhedron
+from sim_validate.control_trials import ControlVerdict
+from sim_validate.datasets.columns import Name
+from sim_validate.datasets.units import WorkUnit, body_of
+from sim_validate.setup import Agenda
+from sim_validate.validation import Verdict, WrenchVerdict, validate
+from sim_validate.verdict import HoldVerdict, Outcome
+
+Row: TypeAlias = Mapping[str, Any]
+Rows: TypeAlias = Mapping[Name, tuple[Row, ...]]
+SPLITS = (("test", 0.1), ("validation", 0.2), ("train", 1.0))
+"""Up to which share of all hashes an object is in each."""
+SHORT = 16
+"""Digits of an object's hash in the names of its grasps."""
+
+
+def rows_of(unit: WorkUnit) -> Rows:
+    """Plan the grasps of a unit, try each in simulation, and write down everything.
+
+    Raises:
+        GraspError: The mesh is refused, or the simulator fails its gate.
+    """
+    body, config = body_of(unit), unit.config
+    found = _Rows(body, unit)
+    agenda = Agenda(random_wrenches=config.random_wrenches, limits=config.limits, seed=config.seed)
+    for family in config.families:
+        planned = plan(
+            body, unit.friction, families=(family,), cones=config.cones, limit=config.limit,
+            seed=config.seed,
+        )  # fmt: skip
+        for grasp in planned.grasps:
+            found.add(grasp, validate(body, grasp, unit.friction, agenda=agenda))
+    return {
+        "objects": (_object_row(body, unit),),
+        "grasps": tuple(found.grasps),
+        "trials": tuple(found.trials),
+    }
+
+
+def split_of(object_id: str, seed: int) -> str:
+    """In which part of the dataset an object is: by its hash, so that more objects move none."""
+    digest = hashlib.sha256(f"{seed} {object_id}".encode()).digest()
+    share = int.from_bytes(digest[:8], "big") / 2.0**64
+    return next(name for name, upto in SPLITS if share < upto)
+
+
+def _object_row(body: Polyhedron, unit: WorkUnit) -> Row:
+    return {
+        "object_id": body.content_sha256,
+        "source_name": Path(unit.object).name,
+        "source_sha256": unit.source_sha256,
+        "split": split_of(body.content_sha256, unit.config.seed),
+        "vertices": len(body.vertices),
+        "triangles": len(body.triangles),
+        "faces": len(body.faces),
+        "curved": body.patches is not None,
+        "volume_m3": body.volume,
+        "radius_m": body.radius,
+        "center_of_mass_m": body.center_of_mass.tolist(),
+    }
+
+
+@dataclass(slots=True)
+class _Rows:
+    """Rows of one object at one friction as they grow."""
+
+    body: Polyhedron
+    unit: WorkUnit
+    grasps: list[Row] = field(default_factory=list[Row])
+    trials: list[Row] = field(default_factory=list[Row])
+
+    def add(self, grasp: Grasp, verdict: Verdict) -> None:
+        """Write down a grasp, its negative controls, and the trials of all."""
+        name = self._name(grasp.id)
+        friction = verdict.critical_friction
+        self.grasps.append(
+            self._common(name, grasp.contacts)
+            | {
+                "name": grasp.id,
+                "label": "grasp",
+                "control_of": None,
+                "family": grasp.family,
+                "faces": list(grasp.faces),
+                "force_closed": True,
+                "closure_margin": grasp.closure_margin,
+                "critical_friction": grasp.critical_friction,
+                "region_radius_m": grasp.radius,
+                "ferrari_canny_lower_n": grasp.ferrari_canny[0],
+                "ferrari_canny_upper_n": grasp.ferrari_canny[1],
+                "held": verdict.held,
+                "outcome": verdict.outcome.value,
+                "trials": len(verdict.wrenches),
+                "mismatches": len(verdict.mismatches),
+                "simulated_critical_friction": friction.simulated,
+            }
+        )
+        self._add_trials(name, verdict.wrenches, _wrench_row)
+        for control in verdict.controls:
+            self._add_control(name, grasp, control)
+
+    def _add_control(self, of: str, grasp: Grasp, verdict: ControlVerdict) -> None:
+        control = verdict.control
+        name = f"{of}:{control.name}"
+        first = next((t for t in verdict.tried if t.hold.outcome is not Outcome.HELD), None)
+        self.grasps.append(
+            self._common(name, control.contacts)
+            | {
+                "name": grasp.id,
+                "label": control.name,
+                "control_of": of,
+                "friction": control.friction,
+                "force_closed": False,
+                "closure_margin": control.certificate.margin,
+                "held": first is None,
+                "outcome": Outcome.HELD.value if first is None else first.hold.outcome.value,
+                "trials": len(verdict.tried),
+                "mismatches": int(not verdict.failed),
+            }
+        )
+        self._add_trials(name, verdict.tried, lambda _: {})
+
+    def _name(self, grasp: str) -> str:
+        return f"{self.body.content_sha256[:SHORT]}-{self.unit.friction}-{grasp}"
+
+    def _common(self, name: str, contacts: Iterable[Contact]) -> dict[str, Any]:
+        listed = list(contacts)
+        return {
+            "grasp_id": name,
+            "object_id": self.body.content_sha256,
+            "split": split_of(self.body.content_sha256, self.unit.config.seed),
+            "friction": self.unit.friction,
+            "contacts": len(listed),
+            "contact_points_m": _for_fingers([c.position.tolist() for c in listed], [None] * 3),
+            "contact_normals": _for_fingers([c.normal.tolist() for c in listed], [None] * 3),
+        }
+
+    def _add_trials(
+        self, name: str, tried: Iterable[Any], more: Callable[[Any], dict[str, Any]]
+    ) -> None:
+        for number, trial in enumerate(tried):
+            self.trials.append(
+                {
+                    "grasp_id": name,
+                    "trial": number,
+                    "name": trial.name,
+                    "wrench_n_nm": trial.wrench.tolist(),
+                    "required_friction": trial.required_friction,
+                    **_hold_row(trial.hold),
+                    **more(trial),
+                }
+            )
+
+
+def _wrench_row(trial: WrenchVerdict) -> dict[str, Any]:
+    found, predicted = trial.simulated_limit, trial.predicted_limit
+    return {
+        "predicted_limit": predicted,
+        "simulated_limit": None if found is None else found.share * predicted,
+    }
+
+
+def _for_fingers(values: Iterable[Any], missing: Any) -> list[Any]:
+    """A value for each of four fingers: controls may have fewer."""
+    listed = list(values)
+    return listed + [missing] * (FINGERS - len(listed))
+
+
+def _hold_row(hold: HoldVerdict) -> dict[str, Any]:
+    return {
+        "outcome": hold.outcome.value,
+        "reason": hold.reason,
+        "displacement_m": hold.displacement_m,
+        "rotation_rad": hold.rotation_rad,
+        "slip_m": _for_fingers(hold.slip_m.tolist(), None),
+        "failed_after_s": hold.failed_after_s,
+    }

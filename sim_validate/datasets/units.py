@@ -1,0 +1,99 @@
+"""A configuration -> work units, each of which can be done anywhere, in any order.
+
+A unit is one object at one friction. Its name is a hash of all that decides its rows: the bytes of
+the mesh, the configuration, and the versions of the packages. So results of an earlier run
+count exactly if they would come out the same.
+"""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from grasp_core.errors import InputError
+from grasp_core.mesh import FORMATS
+from grasp_core.polyhedra import load_polyhedron
+from grasp_core.values import Polyhedron
+from grasp_core.versions import versions
+from scenes.objects import example_object
+from sim_validate.datasets.config import DatasetConfig
+
+CHUNK = 2**20
+
+
+@dataclass(frozen=True, slots=True)
+class WorkUnit:
+    """One object at one friction."""
+
+    object: str
+    """A mesh file, or the name of a built-in object."""
+    source_sha256: str
+    """Of the mesh file's bytes, or of the built-in object's mesh."""
+    friction: float
+    config: DatasetConfig
+
+    @property
+    def id(self) -> str:
+        """Sixteen bytes in hexadecimal digits; the same wherever the mesh file lies."""
+        settings = shared_settings(self.config)
+        decisive = [self.source_sha256, self.friction, settings, sorted(versions().items())]
+        return hashlib.sha256(json.dumps(decisive).encode()).hexdigest()[:32]
+
+
+def shared_settings(config: DatasetConfig) -> dict[str, object]:
+    """What decides the rows of every unit: all but which objects and frictions there are."""
+    return {
+        "families": config.families,
+        "limit": config.limit,
+        "cones": config.cones,
+        "unit": config.unit,
+        "faces": config.faces,
+        "limits": config.limits,
+        "random_wrenches": config.random_wrenches,
+        "seed": config.seed,
+    }
+
+
+def units_of(config: DatasetConfig) -> list[WorkUnit]:
+    """All units, sorted by their names.
+
+    Raises:
+        InputError: An object is neither a file that can be read nor built in.
+    """
+    hashes = {name: _source_sha256(name) for name in config.objects}
+    units = [
+        WorkUnit(name, hashes[name], friction, config)
+        for name in config.objects
+        for friction in config.frictions
+    ]
+    return sorted(units, key=lambda unit: unit.id)
+
+
+def body_of(unit: WorkUnit) -> Polyhedron:
+    """The object of a unit.
+
+    Raises:
+        MeshError: Its mesh is no solid.
+    """
+    if not is_mesh_file(unit.object):
+        return example_object(unit.object)
+    return load_polyhedron(unit.object, unit=unit.config.unit, faces=unit.config.faces)
+
+
+def is_mesh_file(name: str) -> bool:
+    """Whether an object is a file, by its ending or because it is there; else it is built in."""
+    path = Path(name)
+    return path.suffix.lower().lstrip(".") in FORMATS or path.is_file()
+
+
+def _source_sha256(name: str) -> str:
+    if not is_mesh_file(name):
+        return example_object(name).content_sha256
+    digest = hashlib.sha256()
+    try:
+        with Path(name).open("rb") as stream:
+            while part := stream.read(CHUNK):
+                digest.update(part)
+    except OSError as error:
+        raise InputError(f"{name}: cannot be read ({error.strerror})") from error
+    return digest.hexdigest()

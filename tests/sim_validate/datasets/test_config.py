@@ -1,0 +1,63 @@
+import pytest
+
+import grasp_core as gc
+from sim_validate.datasets.config import (
+    DatasetConfig,
+    config_from_settings,
+    config_from_toml,
+    config_to_toml,
+)
+
+SETTINGS = {"objects": ["wedge", "dodecahedron"], "frictions": [0.3, 1], "limit": 4, "seed": 7}
+
+
+def test_a_configuration_is_the_same_when_it_is_written_and_read_again(tmp_path):
+    config = config_from_settings(SETTINGS)
+    path = tmp_path / "dataset.toml"
+    path.write_text(config_to_toml(config))
+    assert config_from_toml(path) == config
+    assert config_from_toml(path).sha256 == config.sha256
+    assert config.frictions == (0.3, 1.0)
+
+
+def test_names_with_quotes_and_control_characters_survive(tmp_path):
+    odd = DatasetConfig(objects=('a"b\\c', "tab\there", "line\nbreak", "ring\u00f6", "bell\x07"))
+    path = tmp_path / "dataset.toml"
+    path.write_text(config_to_toml(odd), encoding="utf-8")
+    assert config_from_toml(path) == odd
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"objects": []}, "objects: expected one or more"),
+        ({"objects": ["wedge", "wedge"]}, "each once"),
+        ({"objects": "wedge"}, "objects: expected a list of text"),
+        ({"frictions": [0.0]}, "frictions: expected numbers above 0"),
+        ({"frictions": [True]}, "frictions: expected a list of numbers"),
+        ({"families": ["spiral"]}, "families: expected some of"),
+        ({"limit": 0}, "limit: expected 1 or more"),
+        ({"limit": 1.5}, "limit: expected a whole number"),
+        ({"seed": -1}, "seed: expected 0 or more"),
+        ({"cones": "round"}, "cones: expected one of tilted, normal"),
+        ({"unit": "mile"}, "unit: expected one of"),
+        ({"limits": 3}, "limits: expected text"),
+        ({"colour": "red"}, "colour: no such setting"),
+    ],
+)
+def test_what_is_refused_names_the_setting_and_what_was_expected(changed, message):
+    with pytest.raises(gc.InputError, match=message):
+        config_from_settings(SETTINGS | changed)
+
+
+def test_a_configuration_without_objects_is_refused():
+    with pytest.raises(gc.InputError, match="objects: expected a list"):
+        config_from_settings({})
+
+
+@pytest.mark.parametrize("text", ["objects = [", 'objects = ["wedge"]\nlimit = "many"'])
+def test_a_bad_file_is_named(tmp_path, text):
+    path = tmp_path / "bad.toml"
+    path.write_text(text)
+    with pytest.raises(gc.InputError, match=r"bad\.toml"):
+        config_from_toml(path)

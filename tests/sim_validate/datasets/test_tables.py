@@ -1,0 +1,128 @@
+import math
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from sim_validate.datasets.columns import KEYS, TABLES
+from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.rows import rows_of, split_of
+from sim_validate.datasets.tables import parquet_bytes, read_rows
+from sim_validate.datasets.units import body_of, units_of
+
+pytest.importorskip("pyarrow")
+
+
+@pytest.fixture(scope="module")
+def unit():
+    (unit,) = units_of(DatasetConfig(objects=("tetrahedron",), limit=2))
+    return unit
+
+
+@pytest.fixture(scope="module")
+def rows(unit):
+    return rows_of(unit)
+
+
+@pytest.fixture
+def written(rows, tmp_path):
+    found = {}
+    for name in TABLES:
+        path = tmp_path / f"{name}.parquet"
+        path.write_bytes(parquet_bytes(name, rows[name], {"made by": "a test"}))
+        found[name] = path
+    return found
+
+
+def test_rows_have_exactly_the_columns_of_their_tables(rows):
+    for name, columns in TABLES.items():
+        known = {column.name for column in columns}
+        seen = set().union(*(set(row) for row in rows[name]))
+        assert seen <= known
+        assert known <= seen
+
+
+def test_a_unit_holds_grasps_their_controls_and_the_trials_of_both(unit, rows):
+    (object_row,) = rows["objects"]
+    body = body_of(unit)
+    assert object_row["object_id"] == body.content_sha256
+    grasps = [row for row in rows["grasps"] if row["label"] == "grasp"]
+    controls = [row for row in rows["grasps"] if row["label"] != "grasp"]
+    assert len(grasps) >= 4
+    assert len(controls) >= len(grasps)
+    assert all(row["held"] and row["force_closed"] for row in grasps)
+    assert not any(row["held"] or row["force_closed"] for row in controls)
+    assert {row["control_of"] for row in controls} <= {row["grasp_id"] for row in grasps}
+    for row in rows["grasps"]:
+        tried = [trial for trial in rows["trials"] if trial["grasp_id"] == row["grasp_id"]]
+        assert [trial["trial"] for trial in tried] == list(range(row["trials"]))
+        assert row["held"] == all(trial["outcome"] == "held" for trial in tried)
+    for row in grasps:
+        certificate = gc.force_closure(
+            row["contact_points_m"], row["contact_normals"], row["friction"]
+        )
+        assert certificate.closed
+        assert certificate.margin == pytest.approx(row["closure_margin"], rel=1e-6)
+
+
+def test_tables_are_read_as_they_were_written(rows, written):
+    for name, path in written.items():
+        back = read_rows(path)
+        given = sorted(rows[name], key=lambda row: [row[key] for key in KEYS[name]])
+        assert len(back) == len(given) >= 1
+        for row, original in zip(back, given, strict=True):
+            for column in TABLES[name]:
+                expected = original.get(column.name)
+                if isinstance(expected, float) and not math.isfinite(expected):
+                    expected = None
+                assert row[column.name] == expected
+                if column.shape and expected is not None:
+                    assert np.shape(row[column.name]) == column.shape
+
+
+def test_files_do_not_depend_on_the_order_of_rows_nor_on_when_they_are_made(unit, rows):
+    for name in TABLES:
+        once = parquet_bytes(name, rows[name], {"a": "1", "b": "2"})
+        assert parquet_bytes(name, rows[name][::-1], {"b": "2", "a": "1"}) == once
+        assert parquet_bytes(name, rows_of(unit)[name], {"a": "1", "b": "2"}) == once
+
+
+def test_columns_say_their_units(written):
+    from pyarrow import parquet
+
+    schema = parquet.read_schema(written["grasps"])
+    assert schema.metadata == {b"made by": b"a test"}
+    for column in TABLES["grasps"]:
+        said = schema.field(column.name).metadata
+        assert said[b"meaning"].decode() == column.meaning
+        assert said.get(b"unit", b"").decode() == column.unit
+
+
+def test_a_flipped_bit_or_a_cut_file_is_noticed(written):
+    path = written["trials"]
+    whole = path.read_bytes()
+    noticed = 0
+    for place in range(4, len(whole), len(whole) // 40):
+        spoiled = bytearray(whole)
+        spoiled[place] ^= 0x10
+        path.write_bytes(bytes(spoiled))
+        try:
+            noticed += read_rows(path) is None
+        except gc.InputError:
+            noticed += 1
+    assert noticed >= 30  # of some 40: the rest lies in the file's own description of itself
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(gc.InputError, match="damaged"):
+        read_rows(path)
+
+
+def test_two_rows_with_one_name_are_refused(rows):
+    with pytest.raises(gc.InputError, match="two rows"):
+        parquet_bytes("grasps", [*rows["grasps"], rows["grasps"][0]], {})
+
+
+def test_objects_are_split_by_their_hash_in_stated_shares():
+    splits = [split_of(f"object {number}", 0) for number in range(4000)]
+    assert splits.count("train") == pytest.approx(3200, abs=120)
+    assert splits.count("validation") == pytest.approx(400, abs=80)
+    assert [split_of(f"object {number}", 1) for number in range(4000)] != splits
