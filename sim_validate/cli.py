@@ -13,7 +13,14 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
-from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, UseAppendAction, arg
+from tyro.conf import (
+    FlagCreatePairsOff,
+    OmitArgPrefixes,
+    Positional,
+    UseAppendAction,
+    arg,
+    subcommand,
+)
 
 from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError, UnfaithfulError
 from sim_validate.bounds import check
@@ -21,6 +28,7 @@ from sim_validate.config_file import with_config
 from sim_validate.engines import available_cores
 from sim_validate.flags import (
     Count,
+    DatasetSettings,
     Edges,
     Fingers,
     Mesh,
@@ -139,6 +147,48 @@ class Analyze:
 
 
 @dataclass(frozen=True, slots=True)
+class DatasetBuild:
+    """Plan and try the grasps of many objects, and write them as tables; started again, go on."""
+
+    objects: Positional[tuple[str, ...]]
+    """Mesh files, folders of mesh files, or names of built-in objects."""
+    out: Path
+    """Folder of the dataset."""
+    settings: OmitArgPrefixes[DatasetSettings] = field(default_factory=DatasetSettings)
+    timeout_s: Positive = 3600.0
+    """Give an object at one friction up after so long, twice [s]."""
+    memory_mb: Count | None = None
+    """What each process may ask for."""
+    jobs: Count = field(default_factory=available_cores)
+    """Number of processes; results do not depend on it."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+
+
+@dataclass(frozen=True, slots=True)
+class DatasetVerify:
+    """Check a dataset: its files, its rows, and every closure from the contacts alone."""
+
+    dataset: Positional[Path]
+    """Its folder."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+
+
+@dataclass(frozen=True, slots=True)
+class Dataset:
+    """Make a dataset of many objects, or check one."""
+
+    action: OmitArgPrefixes[
+        Annotated[DatasetBuild, subcommand("build", prefix_name=False)]
+        | Annotated[DatasetVerify, subcommand("verify", prefix_name=False)]
+    ]
+
+    @property
+    def speech(self) -> Speech:
+        """How much to say."""
+        return self.action.speech
+
+
+@dataclass(frozen=True, slots=True)
 class Inspect:
     """Show what a mesh is as a polyhedron: faces, mass properties, spanning quadruples."""
 
@@ -162,7 +212,7 @@ class Doctor:
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
-Command = Run | Plan | Validate | Scene | Analyze | Inspect | Objects | Doctor
+Command = Run | Plan | Validate | Scene | Analyze | Dataset | Inspect | Objects | Doctor
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -12,6 +12,8 @@ ACTIONS: dict[type[Any], str] = {
     cli.Validate: "validate_command:validate_file",
     cli.Scene: "scene_command:write_scenes",
     cli.Analyze: "analyze_command:analyze_file",
+    cli.DatasetBuild: "dataset_commands:build_dataset",
+    cli.DatasetVerify: "dataset_commands:verify_dataset",
     cli.Inspect: "object_commands:inspect_object",
     cli.Objects: "object_commands:list_objects",
     cli.Doctor: "doctor_command:check_installation",
@@ -23,4 +25,5 @@ def execute(command: cli.Command) -> int:
     """Carry out a command and return its exit code."""
     speech = command.speech
     reporter = Reporter(speech.quiet, speech.verbose, speech.json)
-    return resolve_name(f"sim_validate.{ACTIONS[type(command)]}")(command, reporter)
+    asked = command.action if isinstance(command, cli.Dataset) else command
+    return resolve_name(f"sim_validate.{ACTIONS[type(asked)]}")(asked, reporter)

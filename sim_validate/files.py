@@ -36,6 +36,11 @@ def write_text(path: Path, text: str) -> Path:
     return _write(path, text.encode())
 
 
+def write_bytes(path: Path, data: bytes) -> Path:
+    """As `write_text`."""
+    return _write(path, data)
+
+
 def write_arrays(path: Path, arrays: Mapping[str, Array]) -> Path:
     """Write arrays by name, compressed, as `numpy.load` reads them."""
     held = io.BytesIO()

@@ -107,6 +107,30 @@ class Planning:
 
 
 @dataclass(frozen=True, slots=True)
+class DatasetSettings:
+    """What a dataset is made of."""
+
+    friction: UseAppendAction[tuple[Positive, ...]] = ()
+    """Coulomb coefficient to plan and try at, may be repeated; 0.5 if not given."""
+    family: UseAppendAction[tuple[Literal["concurrent", "pencil", "regulus", "free"], ...]] = ()
+    """Construction to try, may be repeated; all if not given."""
+    limit: Count = 20
+    """Largest number of grasps of each object, friction and family."""
+    cones: Literal["normal", "tilted"] = "tilted"
+    """Force cones to construct with."""
+    unit: Literal["m", "cm", "mm", "in"] = "m"
+    """What one unit in a mesh file is."""
+    faces: Literal["auto", "planar", "patches"] = "auto"
+    """Exact planar faces, or nearly flat patches of a curved or scanned surface."""
+    limits: Literal["none", "ramp", "bisection"] = "none"
+    """Also find the largest multiple of each wrench in simulation."""
+    random_wrenches: Annotated[int, at_least(0, up_to=10_000)] = 0
+    """Also hold so many random wrenches."""
+    seed: Annotated[int, at_least(0, up_to=2**63 - 1)] = 0
+    """For everything random."""
+
+
+@dataclass(frozen=True, slots=True)
 class Fingers:
     """How fingertips are built; what is not given suits the grasp."""
 

@@ -1,0 +1,82 @@
+"""The commands about datasets: to make one, to go on making it, and to check it."""
+
+from pathlib import Path
+
+from grasp_core.errors import InputError
+from grasp_core.mesh import FORMATS
+from grasp_core.requests import METHODS
+from sim_validate import cli
+from sim_validate.console import TABLE_ROWS, Reporter
+from sim_validate.datasets.build import build, read_manifest
+from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.driver import local_engine
+from sim_validate.datasets.verify import verify
+from sim_validate.plan_command import say_cut
+
+FRICTION = 0.5
+"""Planned and tried at unless told otherwise."""
+MEGABYTE = 2**20
+
+
+def build_dataset(command: cli.DatasetBuild, reporter: Reporter) -> int:
+    """Make a dataset."""
+    settings = command.settings
+    config = DatasetConfig(
+        objects=_listed(command.objects),
+        frictions=settings.friction or (FRICTION,),
+        families=settings.family or METHODS,
+        limit=settings.limit,
+        cones=settings.cones,
+        unit=settings.unit,
+        faces=settings.faces,
+        limits=settings.limits,
+        random_wrenches=settings.random_wrenches,
+        seed=settings.seed,
+    )
+    memory = None if command.memory_mb is None else command.memory_mb * MEGABYTE
+    with (
+        reporter.progress("building") as steps,
+        local_engine(command.jobs, command.timeout_s, memory) as engine,
+    ):
+        built = build(config, command.out, engine, steps.update)
+    counts = ", ".join(f"{count} {name}" for name, count in built.rows.items())
+    reporter.say(
+        f"{command.out}: {built.units} units, {built.made} made now, {built.quarantined} "
+        f"quarantined; {counts}"
+    )
+    if built.quarantined:
+        reporter.warn(f"{command.out / 'quarantine.jsonl'} says why objects were left out")
+    reporter.document({"out": str(command.out), "manifest": read_manifest(command.out)})
+    return cli.Exit.PARTIAL if built.quarantined else cli.Exit.GOOD
+
+
+def verify_dataset(command: cli.DatasetVerify, reporter: Reporter) -> int:
+    """Check a dataset."""
+    faults = verify(command.dataset)
+    for fault in faults[:TABLE_ROWS]:
+        reporter.warn(fault)
+    say_cut(len(faults), reporter)
+    reporter.say(
+        f"{command.dataset}: {'nothing is wrong' if not faults else f'{len(faults)} faults'}"
+    )
+    reporter.document({"dataset": str(command.dataset), "faults": faults})
+    return cli.Exit.NEGATIVE if faults else cli.Exit.GOOD
+
+
+def _listed(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Objects by name; folders stand for the mesh files in them.
+
+    Raises:
+        InputError: A folder holds none.
+    """
+    found: list[str] = []
+    for name in names:
+        folder = Path(name)
+        if not folder.is_dir():
+            found.append(name)
+            continue
+        meshes = sorted(path for path in folder.iterdir() if path.suffix.lower()[1:] in FORMATS)
+        if not meshes:
+            raise InputError(f"{name}: holds no mesh file ({', '.join(FORMATS)})")
+        found += map(str, meshes)
+    return tuple(found)

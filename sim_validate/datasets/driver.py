@@ -1,0 +1,145 @@
+"""One loop that has work units done by an engine, some at a time, and notes what became of each.
+
+An engine submits a unit and returns a future. A unit that crashes its worker, or takes too long, is
+tried once more when nothing else is under way; then it is quarantined with its reason, as is
+at once what fails with an error of ours: that would come out the same again.
+"""
+
+import importlib
+from collections import deque
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager
+from typing import Any, Protocol
+
+from grasp_core.errors import GraspError
+from sim_validate import interrupts
+from sim_validate.datasets.rows import rows_of
+from sim_validate.datasets.staging import Staging
+from sim_validate.datasets.units import WorkUnit
+
+AHEAD = 3
+"""Units under way for each worker, so that none waits for the driver."""
+LOOK_S = 1.0
+"""How often the driver looks whether it was interrupted [s]."""
+Work = Callable[[WorkUnit, Staging], None]
+
+
+class Engine(Protocol):
+    """Where units are done."""
+
+    workers: int
+
+    def submit(self, work: Work, unit: WorkUnit, staging: Staging) -> "Future[None]":
+        """Have a unit done; its future fails with `TimeoutError` where it takes too long."""
+        ...
+
+
+def do_unit(unit: WorkUnit, staging: Staging) -> None:
+    """Make the rows of a unit and keep them."""
+    staging.write(unit, rows_of(unit))
+
+
+class LocalEngine:
+    """Processes of this machine; the door to pebble's single tasks."""
+
+    def __init__(self, workers: int, timeout_s: float, memory_bytes: int | None) -> None:
+        pebble: Any = importlib.import_module("pebble")
+        context = importlib.import_module("multiprocessing").get_context("spawn")
+        self.workers = workers
+        self._timeout_s = timeout_s
+        self._pool = pebble.ProcessPool(
+            max_workers=workers, context=context, initializer=limit_memory, initargs=[memory_bytes]
+        )
+
+    def submit(self, work: Work, unit: WorkUnit, staging: Staging) -> "Future[None]":
+        """As `Engine` says."""
+        return self._pool.schedule(work, args=[unit, staging], timeout=self._timeout_s)
+
+    def close(self) -> None:
+        """Stop all workers, whatever they do."""
+        self._pool.stop()
+        self._pool.join()
+
+
+@contextmanager
+def local_engine(
+    workers: int, timeout_s: float, memory_bytes: int | None = None
+) -> Generator[LocalEngine]:
+    """Processes of this machine, gone afterwards."""
+    engine = LocalEngine(workers, timeout_s, memory_bytes)
+    try:
+        yield engine
+    finally:
+        engine.close()
+
+
+def limit_memory(most: int | None) -> None:
+    """Have what this process asks for beyond so many bytes refused."""
+    if most is not None:
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+
+
+def drive(
+    units: Sequence[WorkUnit],
+    staging: Staging,
+    engine: Engine,
+    report: Callable[[int, int], None],
+    work: Work = do_unit,
+) -> None:
+    """Have units done, each kept or quarantined in the end.
+
+    Args:
+        units: Those that are not done.
+        staging: Where they are kept.
+        engine: Where they are done.
+        report: Told how many are finished, and of how many.
+        work: What is done.
+    """
+    waiting, again = deque(units), list[WorkUnit]()
+    under_way: dict[Future[None], WorkUnit] = {}
+    finished = 0
+    while waiting or under_way:
+        while waiting and len(under_way) < AHEAD * engine.workers:
+            unit = waiting.popleft()
+            under_way[engine.submit(work, unit, staging)] = unit
+        done, _ = wait(under_way, timeout=LOOK_S, return_when=FIRST_COMPLETED)
+        for future in done:
+            unit = under_way.pop(future)
+            if _ended(future, unit, staging):
+                finished += 1
+            else:
+                again.append(unit)
+        interrupts.check()
+        report(finished, len(units))
+    for unit in again:
+        future = engine.submit(work, unit, staging)
+        while not wait([future], timeout=LOOK_S).done:
+            interrupts.check()
+        if not _ended(future, unit, staging):
+            staging.quarantine(unit, _why(future.exception()))
+        finished += 1
+        report(finished, len(units))
+
+
+def _ended(future: "Future[None]", unit: WorkUnit, staging: Staging) -> bool:
+    """Whether a unit is done or will never be; False where it is worth another try."""
+    error = future.exception()
+    if error is None:
+        return True
+    if isinstance(error, GraspError | MemoryError):
+        staging.quarantine(unit, _why(error))
+        return True
+    return False
+
+
+def _why(error: BaseException | None) -> str:
+    if isinstance(error, GraspError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "out of memory"
+    if isinstance(error, TimeoutError):
+        return "took too long, twice"
+    return f"its worker ended, twice: {type(error).__name__}: {error}"

@@ -1,0 +1,105 @@
+"""What is done so far, in a folder: a subfolder for each finished unit, put there in one step.
+
+A unit that was killed leaves nothing but a temporary folder, which the next run removes. So what is
+there is whole, and a run that is started again redoes no more than what was under way.
+"""
+
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from sim_validate.datasets.columns import TABLES, Name
+from sim_validate.datasets.rows import Row, Rows
+from sim_validate.datasets.tables import parquet_bytes, read_rows
+from sim_validate.datasets.units import WorkUnit
+
+RECORD = "unit.json"
+UNFINISHED = "."
+"""First letter of the names of temporary folders."""
+
+
+@dataclass(frozen=True, slots=True)
+class Staging:
+    """The folder of finished units."""
+
+    folder: Path
+
+    def clear_unfinished(self) -> None:
+        """Remove what killed units left; only when none is under way."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        for path in self.folder.iterdir():
+            if path.name.startswith(UNFINISHED):
+                shutil.rmtree(path)
+
+    def write(self, unit: WorkUnit, rows: Rows) -> None:
+        """Keep the rows of a finished unit."""
+        files = {f"{name}.parquet": parquet_bytes(name, rows[name], {}) for name in TABLES}
+        self._put(unit, files, {})
+
+    def quarantine(self, unit: WorkUnit, reason: str) -> None:
+        """Note that a unit cannot be done."""
+        self._put(unit, {}, {"reason": reason})
+
+    def reason(self, unit: WorkUnit) -> str | None:
+        """Why a unit cannot be done; None if it is done."""
+        return self._record(unit).get("reason")
+
+    def done(self, unit: WorkUnit) -> bool:
+        """Whether a unit is finished or quarantined, and all its files are as they were written."""
+        try:
+            record = self._record(unit)
+            return all(
+                _sha256(self._of(unit).joinpath(name).read_bytes()) == sha256
+                for name, sha256 in record["files"].items()
+            )
+        except (OSError, ValueError, KeyError):
+            return False
+
+    def rows(self, unit: WorkUnit, name: Name) -> list[Row]:
+        """The rows of a finished unit in one of the tables."""
+        path = self._of(unit) / f"{name}.parquet"
+        return list[Row](read_rows(path)) if path.is_file() else []
+
+    def forget(self, unit: WorkUnit) -> None:
+        """Remove what there is of a unit that is not done: damaged files."""
+        shutil.rmtree(self._of(unit), ignore_errors=True)
+
+    def _of(self, unit: WorkUnit) -> Path:
+        return self.folder / unit.id
+
+    def _record(self, unit: WorkUnit) -> dict[str, Any]:
+        found: object = json.loads((self._of(unit) / RECORD).read_text(encoding="utf-8"))
+        if not isinstance(found, dict):
+            raise ValueError(f"{unit.id}: its record is no object")
+        return cast("dict[str, Any]", found)
+
+    def _put(self, unit: WorkUnit, files: Mapping[str, bytes], more: Mapping[str, str]) -> None:
+        record = {
+            "object": unit.object,
+            "friction": unit.friction,
+            "files": {name: _sha256(data) for name, data in files.items()},
+            **more,
+        }
+        self.folder.mkdir(parents=True, exist_ok=True)
+        made = Path(tempfile.mkdtemp(dir=self.folder, prefix=f"{UNFINISHED}{unit.id}."))
+        for name, data in {**files, RECORD: json.dumps(record).encode()}.items():
+            with (made / name).open("wb") as stream:
+                stream.write(data)
+                stream.flush()
+                os.fsync(stream.fileno())
+        try:
+            made.rename(self._of(unit))
+        except OSError:  # another attempt was faster, with the same rows
+            shutil.rmtree(made)
+            if not self.done(unit):
+                raise
+
+
+def _sha256(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()

@@ -1,0 +1,119 @@
+"""Is a dataset what its manifest says, and do its rows keep the laws of what they describe?"""
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence, Set
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from grasp_core.closure import force_closure
+from grasp_core.errors import GraspError, InputError
+from sim_validate.datasets.build import MANIFEST, read_manifest
+from sim_validate.datasets.columns import KEYS, TABLES, Name
+from sim_validate.datasets.tables import read_rows
+
+SAME_MARGIN = 1e-6
+"""How far a closure margin may be from that of the contacts, relative to the friction."""
+UNIT = 1e-9
+"""How far normals may be from unit length."""
+
+
+def verify(folder: Path) -> list[str]:
+    """What is wrong with a dataset, a line each; nothing where all is well.
+
+    Hashes, sizes and page checksums of all files; counts, keys and references of rows; and of each
+    contact set its normals, its closure proved again, and that its trials say what it says.
+
+    Raises:
+        InputError: The folder holds no finished dataset.
+    """
+    manifest = read_manifest(folder)
+    faults = list(_file_faults(folder, manifest["files"]))
+    if faults:
+        return faults
+    rows: dict[Name, list[dict[str, Any]]] = {name: [] for name in TABLES}
+    for each in manifest["files"]:
+        if "table" not in each:
+            continue
+        try:
+            found = read_rows(folder / each["path"])
+        except InputError as error:
+            return [str(error)]
+        if len(found) != each["rows"]:
+            faults.append(f"{each['path']}: {len(found)} rows, listed are {each['rows']}")
+        rows[each["table"]] += found
+    return [*faults, *_row_faults(rows)]
+
+
+def _file_faults(folder: Path, files: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    listed = {str(each["path"]) for each in files}
+    there = {
+        path.relative_to(folder).as_posix()
+        for path in folder.rglob("*")
+        if path.is_file() and path.name not in (MANIFEST, ".lock")
+    }
+    yield from (f"{path}: not in the manifest" for path in sorted(there - listed))
+    for each in files:
+        path = folder / each["path"]
+        if str(each["path"]) not in there:
+            yield f"{each['path']}: missing"
+            continue
+        data = path.read_bytes()
+        if len(data) != each["bytes"]:
+            yield f"{each['path']}: {len(data)} bytes, listed are {each['bytes']}"
+        elif hashlib.sha256(data).hexdigest() != each["sha256"]:
+            yield f"{each['path']}: its contents are not what was written (sha256 differs)"
+
+
+def _row_faults(rows: Mapping[Name, Sequence[Mapping[str, Any]]]) -> Iterator[str]:
+    for name in TABLES:
+        keys = [tuple(row[key] for key in KEYS[name]) for row in rows[name]]
+        if len(set(keys)) < len(keys):
+            yield f"{name}: rows with the same {' and '.join(KEYS[name])}"
+    splits = {row["object_id"]: row["split"] for row in rows["objects"]}
+    names = {row["grasp_id"] for row in rows["grasps"]}
+    ended: dict[str, list[str]] = {}
+    for trial in rows["trials"]:
+        ended.setdefault(trial["grasp_id"], []).append(trial["outcome"])
+    yield from (f"trials: {name} is no grasp" for name in sorted(ended.keys() - names))
+    for row in rows["grasps"]:
+        name = row["grasp_id"]
+        faults = [*_reference_faults(row, splits, names), *_contact_faults(row)]
+        trials = ended.get(name, [])
+        if len(trials) != row["trials"] or row["held"] != all(one == "held" for one in trials):
+            faults.append("its trials say something else")
+        yield from (f"grasps: {name}: {fault}" for fault in faults)
+
+
+def _reference_faults(
+    row: Mapping[str, Any], splits: Mapping[str, str], names: Set[str]
+) -> Iterator[str]:
+    """What a row names that is not there."""
+    if splits.get(row["object_id"]) != row["split"]:
+        yield "its object is not there, or in another split"
+    if row["control_of"] is not None and row["control_of"] not in names:
+        yield f"{row['control_of']} is no grasp"
+
+
+def _contact_faults(row: Mapping[str, Any]) -> Iterator[str]:
+    """Normals, and closure from the contacts alone."""
+    count = row["contacts"]
+    points = np.array(row["contact_points_m"][:count], dtype=np.float64)
+    normals = np.array(row["contact_normals"][:count], dtype=np.float64)
+    if not (np.abs(np.linalg.norm(normals, axis=1) - 1.0) <= UNIT).all():
+        yield "a normal is no unit vector"
+        return
+    try:
+        certificate = force_closure(points, normals, row["friction"])
+    except GraspError as error:
+        if row["label"] == "grasp":
+            yield f"closure cannot be decided ({error})"
+        return
+    if certificate.closed != row["force_closed"]:
+        yield f"force-closed is {row['force_closed']}, the contacts say {certificate.closed}"
+    elif certificate.closed and not np.isclose(
+        certificate.margin, row["closure_margin"], rtol=0.0, atol=SAME_MARGIN * row["friction"]
+    ):
+        stated = row["closure_margin"]
+        yield f"closure margin {stated:.9g}, the contacts say {certificate.margin:.9g}"

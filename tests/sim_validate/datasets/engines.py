@@ -1,0 +1,34 @@
+"""Engines for tests: units are done at once, here, or as a test says."""
+
+from concurrent.futures import Future
+
+from sim_validate.datasets.driver import do_unit
+
+
+class Here:
+    """Does each unit at once in this process."""
+
+    workers = 1
+
+    def __init__(self, before=lambda _: None):
+        self.before = before
+        self.submitted = []
+
+    def submit(self, work, unit, staging):
+        self.submitted.append(unit)
+        future = Future()
+        try:
+            self.before(unit)
+            work(unit, staging)
+        except Exception as error:
+            future.set_exception(error)
+        else:
+            future.set_result(None)
+        return future
+
+
+def silent(_, __):
+    """Reports to nobody."""
+
+
+__all__ = ["Here", "do_unit", "silent"]

@@ -1,0 +1,248 @@
+import dataclasses
+import hashlib
+import json
+import shutil
+
+import pytest
+import trimesh
+
+import grasp_core as gc
+from sim_validate.datasets.build import build, read_manifest
+from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.driver import local_engine
+from sim_validate.datasets.tables import parquet_bytes, read_rows
+from sim_validate.datasets.units import units_of
+from sim_validate.datasets.verify import verify
+from tests.sim_validate.datasets.engines import Here, silent
+
+pytest.importorskip("pyarrow")
+CONFIG = DatasetConfig(
+    objects=("tetrahedron", "wedge"), frictions=(0.4, 0.5), families=("concurrent",), limit=2
+)
+
+
+class KilledError(BaseException):
+    """Stands for the end of the process."""
+
+
+def contents(folder):
+    """Hashes of all files of a dataset."""
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name != ".lock"
+    }
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("dataset") / "ds"
+    built = build(CONFIG, folder, Here(), silent)
+    assert (built.units, built.made, built.quarantined) == (4, 4, 0)
+    return folder
+
+
+@pytest.fixture
+def copy(dataset, tmp_path):
+    return shutil.copytree(dataset, tmp_path / "copy")
+
+
+def all_rows(folder, name):
+    return [
+        row for path in sorted(folder.glob(f"data/{name}/*.parquet")) for row in read_rows(path)
+    ]
+
+
+def test_a_dataset_holds_every_object_at_every_friction(dataset):
+    assert verify(dataset) == []
+    grasps = [row for row in all_rows(dataset, "grasps") if row["label"] == "grasp"]
+    names = {row["object_id"]: row["source_name"] for row in all_rows(dataset, "objects")}
+    assert sorted(names.values()) == ["tetrahedron", "wedge"]
+    assert {(names[row["object_id"]], row["friction"]) for row in grasps} == {
+        (name, friction) for name in CONFIG.objects for friction in CONFIG.frictions
+    }
+    assert all(row["held"] for row in grasps)
+    assert not (dataset / "staging").exists()
+
+
+def test_it_is_the_same_bytes_on_processes_and_in_another_order(dataset, tmp_path):
+    turned = dataclasses.replace(CONFIG, objects=CONFIG.objects[::-1])
+    with local_engine(2, timeout_s=120.0) as engine:
+        built = build(turned, tmp_path / "other", engine, silent)
+    assert built.made == 4
+    before, after = contents(dataset), contents(tmp_path / "other")
+    tables = {path for path in before if path.startswith("data/")}
+    assert len(tables) >= 3
+    assert tables == {path for path in after if path.startswith("data/")}
+
+
+@pytest.mark.parametrize("killed_at", range(4))
+def test_a_killed_build_goes_on_where_it_was(dataset, tmp_path, killed_at):
+    folder = tmp_path / "ds"
+
+    def die(_):
+        if len(engine.submitted) == killed_at + 1:
+            raise KilledError
+
+    engine = Here(die)
+    with pytest.raises(KilledError):
+        build(CONFIG, folder, engine, silent)
+    with pytest.raises(gc.InputError, match="not finished"):
+        verify(folder)
+    again = Here()
+    built = build(CONFIG, folder, again, silent)
+    assert len(again.submitted) == built.made == 4 - killed_at
+    assert contents(folder) == contents(dataset)
+
+
+def test_what_a_killed_worker_left_is_removed_and_damaged_units_are_done_again(dataset, tmp_path):
+    folder = tmp_path / "ds"
+
+    def die(_):
+        if len(engine.submitted) == 4:
+            raise KilledError
+
+    engine = Here(die)
+    with pytest.raises(KilledError):
+        build(CONFIG, folder, engine, silent)
+    (folder / "staging" / ".halfway").mkdir()
+    shard = next((folder / "staging").glob("*/trials.parquet"))
+    shard.write_bytes(shard.read_bytes()[:-8])
+    again = Here()
+    build(CONFIG, folder, again, silent)
+    assert len(again.submitted) == 2
+    assert contents(folder) == contents(dataset)
+
+
+def test_a_finished_dataset_is_left_alone(copy):
+    before, engine = contents(copy), Here()
+    built = build(CONFIG, copy, engine, silent)
+    assert not engine.submitted
+    assert built.rows["objects"] == 2
+    assert contents(copy) == before
+
+
+def test_a_bad_object_is_quarantined_with_its_reason_and_the_others_are_there(tmp_path):
+    bad, twin = tmp_path / "open.stl", tmp_path / "twin.stl"
+    box = trimesh.creation.box(extents=(0.04, 0.05, 0.06))
+    trimesh.Trimesh(box.vertices, box.faces[:-2]).export(bad)
+    body = gc.Polyhedron.from_mesh(box.vertices, box.faces)
+    trimesh.Trimesh(body.vertices, body.triangles).export(twin)
+    shutil.copy(twin, tmp_path / "again.stl")
+    config = dataclasses.replace(
+        CONFIG, objects=(str(bad), str(twin), str(tmp_path / "again.stl")), frictions=(0.5,)
+    )
+    built = build(config, tmp_path / "ds", Here(), silent)
+    assert (built.units, built.quarantined, built.rows["objects"]) == (3, 2, 1)
+    lines = (tmp_path / "ds" / "quarantine.jsonl").read_text().splitlines()
+    reasons = {json.loads(line)["object"]: json.loads(line)["reason"] for line in lines}
+    assert "the same object as" in reasons[str(twin)]
+    assert reasons[str(bad)].startswith("GP-MESH-OPEN")
+    assert verify(tmp_path / "ds") == []
+
+
+def test_a_unit_that_ends_its_worker_is_tried_again_alone_then_quarantined(tmp_path):
+    ends = {0.4: 1, 0.5: 9}
+
+    def crash(unit):
+        if unit.object == "wedge" and ends[unit.friction]:
+            ends[unit.friction] -= 1
+            raise RuntimeError("the worker ended")
+
+    engine = Here(crash)
+    built = build(CONFIG, tmp_path / "ds", engine, silent)
+    assert built.quarantined == 1
+    assert len(engine.submitted) == 6
+    (line,) = (tmp_path / "ds" / "quarantine.jsonl").read_text().splitlines()
+    assert json.loads(line)["friction"] == 0.5
+    assert "the worker ended" in json.loads(line)["reason"]
+
+
+def test_a_unit_that_never_ends_is_given_up(tmp_path):
+    config = dataclasses.replace(CONFIG, objects=("tetrahedron",), frictions=(0.5,))
+    with local_engine(1, timeout_s=0.2) as engine:  # less than a process takes to start working
+        built = build(config, tmp_path / "ds", engine, silent)
+    assert built.quarantined == 1
+    assert "took too long, twice" in (tmp_path / "ds" / "quarantine.jsonl").read_text()
+
+
+def test_two_builds_do_not_work_in_one_folder(tmp_path):
+    def another(_):
+        with pytest.raises(gc.InputError, match="another build"):
+            build(CONFIG, tmp_path / "ds", Here(), silent)
+        tried.append(1)
+
+    tried = []
+    build(CONFIG, tmp_path / "ds", Here(another), silent)
+    assert len(tried) == 4
+
+
+def test_folders_of_something_else_are_refused(copy, tmp_path):
+    with pytest.raises(gc.InputError, match="another configuration"):
+        build(dataclasses.replace(CONFIG, limit=3), copy, Here(), silent)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.tex").write_text("all my work")
+    with pytest.raises(gc.InputError, match=r"holds thesis\.tex"):
+        build(CONFIG, tmp_path / "mine", Here(), silent)
+    with pytest.raises(gc.InputError, match="no dataset"):
+        verify(tmp_path / "mine")
+
+
+def test_one_byte_changed_in_any_file_is_named(dataset, tmp_path):
+    files = [path for path in contents(dataset) if path != "manifest.json"]
+    assert len(files) >= 5
+    for path in files:
+        spoiled = shutil.copytree(dataset, tmp_path / "spoiled")
+        data = bytearray((spoiled / path).read_bytes())
+        if data:
+            data[len(data) // 2] ^= 1
+        else:
+            data += b"x"
+        (spoiled / path).write_bytes(bytes(data))
+        assert any(path in fault for fault in verify(spoiled))
+        (spoiled / path).unlink()
+        assert f"{path}: missing" in verify(spoiled)
+        shutil.rmtree(spoiled)
+
+
+def forged(folder, name, change):
+    """The same dataset with changed rows of one table, and hashes to match."""
+    path = next(folder.glob(f"data/{name}/*.parquet"))
+    rows = read_rows(path)
+    change(rows)
+    data = parquet_bytes(name, rows, {})
+    path.write_bytes(data)
+    manifest = read_manifest(folder)
+    (entry,) = [
+        each for each in manifest["files"] if each["path"] == path.relative_to(folder).as_posix()
+    ]
+    entry |= {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest(), "rows": len(rows)}
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "message"),
+    [
+        ("grasps", lambda rows: rows[0].update(closure_margin=0.9), "closure margin"),
+        (
+            "grasps",
+            lambda rows: rows[0]["contact_normals"][0].__setitem__(0, 2.0),
+            "no unit vector",
+        ),
+        ("grasps", lambda rows: rows[0].update(held=not rows[0]["held"]), "its trials say"),
+        ("grasps", lambda rows: rows[0].update(object_id="0" * 64), "its object is not there"),
+        ("grasps", lambda rows: rows[0].update(force_closed=False), "force-closed is"),
+        ("trials", lambda rows: rows.pop(), "its trials say something else"),
+        ("trials", lambda rows: rows[0].update(grasp_id="nobody"), "nobody is no grasp"),
+        ("trials", lambda rows: rows[0].update(outcome="slipped"), "its trials say something else"),
+    ],
+)
+def test_rows_that_contradict_each_other_are_named(copy, name, change, message):
+    forged(copy, name, len)
+    assert verify(copy) == []
+    forged(copy, name, change)
+    assert any(message in fault for fault in verify(copy))
+
+
+def test_units_are_the_same_wherever_they_are_made():
+    assert [unit.id for unit in units_of(CONFIG)] == [unit.id for unit in units_of(CONFIG)]
