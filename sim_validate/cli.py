@@ -151,7 +151,8 @@ class DatasetBuild:
     """Plan and try the grasps of many objects, and write them as tables; started again, go on."""
 
     objects: Positional[tuple[str, ...]]
-    """Mesh files, folders of mesh files, or names of built-in objects."""
+    """Mesh files, folders of mesh files, or names of built-in objects; or one TOML file that says
+    all but where to (see README)."""
     out: Path
     """Folder of the dataset."""
     settings: OmitArgPrefixes[DatasetSettings] = field(default_factory=DatasetSettings)

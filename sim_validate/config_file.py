@@ -6,6 +6,9 @@ from typing import Any, cast
 
 from grasp_core.errors import InputError
 
+COMMAND_WORDS = {"dataset": 2}
+"""Of how many words a command consists, where it is not one."""
+
 
 def with_config(arguments: list[str]) -> list[str]:
     """Put the settings of `--config FILE.toml` before the flags, which then override them.
@@ -26,7 +29,8 @@ def with_config(arguments: list[str]) -> list[str]:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"--config {path}: {error}") from error
     flags = [word for name, value in settings.items() for word in _as_flags(name, value)]
-    return [*rest[:1], *flags, *rest[1:]]
+    command = COMMAND_WORDS.get(rest[0], 1) if rest else 0
+    return [*rest[:command], *flags, *rest[command:]]
 
 
 def _split_config(word: str) -> list[str]:

@@ -5,10 +5,10 @@ from pathlib import Path
 from grasp_core.errors import InputError
 from grasp_core.mesh import FORMATS
 from grasp_core.requests import METHODS
-from sim_validate import cli
+from sim_validate import cli, flags
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.datasets.build import build, read_manifest
-from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.config import DatasetConfig, config_from_toml
 from sim_validate.datasets.driver import local_engine
 from sim_validate.datasets.verify import verify
 from sim_validate.plan_command import say_cut
@@ -20,19 +20,7 @@ MEGABYTE = 2**20
 
 def build_dataset(command: cli.DatasetBuild, reporter: Reporter) -> int:
     """Make a dataset."""
-    settings = command.settings
-    config = DatasetConfig(
-        objects=_listed(command.objects),
-        frictions=settings.friction or (FRICTION,),
-        families=settings.family or METHODS,
-        limit=settings.limit,
-        cones=settings.cones,
-        unit=settings.unit,
-        faces=settings.faces,
-        limits=settings.limits,
-        random_wrenches=settings.random_wrenches,
-        seed=settings.seed,
-    )
+    config = _asked(command)
     memory = None if command.memory_mb is None else command.memory_mb * MEGABYTE
     with (
         reporter.progress("building") as steps,
@@ -61,6 +49,31 @@ def verify_dataset(command: cli.DatasetVerify, reporter: Reporter) -> int:
     )
     reporter.document({"dataset": str(command.dataset), "faults": faults})
     return cli.Exit.NEGATIVE if faults else cli.Exit.GOOD
+
+
+def _asked(command: cli.DatasetBuild) -> DatasetConfig:
+    """What a TOML file or the flags say a dataset is made of.
+
+    Raises:
+        InputError: A setting or the file is refused, or there are flags beside a file.
+    """
+    first, settings = Path(command.objects[0]), command.settings
+    if first.suffix == ".toml":
+        if len(command.objects) > 1 or settings != flags.DatasetSettings():
+            raise InputError(f"{first} says what the dataset is made of: give nothing beside it")
+        return config_from_toml(first)
+    return DatasetConfig(
+        objects=_listed(command.objects),
+        frictions=settings.friction or (FRICTION,),
+        families=settings.family or METHODS,
+        limit=settings.limit,
+        cones=settings.cones,
+        unit=settings.unit,
+        faces=settings.faces,
+        limits=settings.limits,
+        random_wrenches=settings.random_wrenches,
+        seed=settings.seed,
+    )
 
 
 def _listed(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -1,8 +1,8 @@
 """One loop that has work units done by an engine, some at a time, and notes what became of each.
 
-An engine submits a unit and returns a future. A unit that crashes its worker, or takes too long, is
-tried once more when nothing else is under way; then it is quarantined with its reason, as is
-at once what fails with an error of ours: that would come out the same again.
+An engine submits a unit and returns a future. A unit that ends its worker, or takes too long, is
+tried once more when nothing else is under way; then it is quarantined with its reason. What fails
+with an error of ours is quarantined at once, by the worker: it would come out the same again.
 """
 
 import importlib
@@ -36,8 +36,15 @@ class Engine(Protocol):
 
 
 def do_unit(unit: WorkUnit, staging: Staging) -> None:
-    """Make the rows of a unit and keep them."""
-    staging.write(unit, rows_of(unit))
+    """Make the rows of a unit and keep them, or the reason why there are none."""
+    try:
+        rows = rows_of(unit)
+    except GraspError as error:
+        staging.quarantine(unit, str(error))
+    except MemoryError:
+        staging.quarantine(unit, "out of memory")
+    else:
+        staging.write(unit, rows)
 
 
 class LocalEngine:
@@ -108,7 +115,7 @@ def drive(
         done, _ = wait(under_way, timeout=LOOK_S, return_when=FIRST_COMPLETED)
         for future in done:
             unit = under_way.pop(future)
-            if _ended(future, unit, staging):
+            if future.exception() is None:
                 finished += 1
             else:
                 again.append(unit)
@@ -118,28 +125,13 @@ def drive(
         future = engine.submit(work, unit, staging)
         while not wait([future], timeout=LOOK_S).done:
             interrupts.check()
-        if not _ended(future, unit, staging):
-            staging.quarantine(unit, _why(future.exception()))
+        if (error := future.exception()) is not None:
+            staging.quarantine(unit, _why(error))
         finished += 1
         report(finished, len(units))
 
 
-def _ended(future: "Future[None]", unit: WorkUnit, staging: Staging) -> bool:
-    """Whether a unit is done or will never be; False where it is worth another try."""
-    error = future.exception()
-    if error is None:
-        return True
-    if isinstance(error, GraspError | MemoryError):
-        staging.quarantine(unit, _why(error))
-        return True
-    return False
-
-
-def _why(error: BaseException | None) -> str:
-    if isinstance(error, GraspError):
-        return str(error)
-    if isinstance(error, MemoryError):
-        return "out of memory"
+def _why(error: BaseException) -> str:
     if isinstance(error, TimeoutError):
         return "took too long, twice"
     return f"its worker ended, twice: {type(error).__name__}: {error}"
