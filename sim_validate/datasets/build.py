@@ -22,7 +22,7 @@ from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.driver import Engine, drive
 from sim_validate.datasets.rows import SPLITS, Row
 from sim_validate.datasets.staging import Staging
-from sim_validate.datasets.tables import parquet_bytes
+from sim_validate.datasets.tables import parquet_bytes, require_pyarrow
 from sim_validate.datasets.units import WorkUnit, units_of
 from sim_validate.files import read_text, write_bytes, write_text
 
@@ -58,6 +58,7 @@ def build(
         InputError: An object is nowhere, the folder holds something else, or another build is at
             work in it.
     """
+    require_pyarrow()
     units = units_of(config)
     with _alone(folder):
         _refuse_others(folder, config)

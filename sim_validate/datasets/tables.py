@@ -24,6 +24,15 @@ PAGES: Mapping[str, Any] = {
 }
 
 
+def require_pyarrow() -> None:
+    """Check that tables can be written and read here.
+
+    Raises:
+        InputError: pyarrow is not installed.
+    """
+    _pyarrow()
+
+
 def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[str, str]) -> bytes:
     """The file of one table.
 

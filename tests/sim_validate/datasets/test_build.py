@@ -2,6 +2,7 @@ import dataclasses
 import hashlib
 import json
 import shutil
+import sys
 
 import pytest
 import trimesh
@@ -164,6 +165,13 @@ def test_a_unit_that_never_ends_is_given_up(tmp_path):
         built = build(config, tmp_path / "ds", engine, silent)
     assert built.quarantined == 1
     assert "took too long, twice" in (tmp_path / "ds" / "quarantine.jsonl").read_text()
+
+
+def test_without_pyarrow_nothing_is_begun_and_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(gc.InputError, match=r"graspproof\[dataset\]"):
+        build(CONFIG, tmp_path / "ds", Here(), silent)
+    assert not (tmp_path / "ds").exists()
 
 
 def test_two_builds_do_not_work_in_one_folder(tmp_path):
