@@ -106,3 +106,13 @@ def test_a_worker_that_is_killed_costs_nothing_but_time(dataset, tmp_path):
     assert killed
     assert process.wait(timeout=120) == Exit.GOOD
     assert files(folder) == files(dataset)
+
+
+@pytest.mark.slow
+def test_a_worker_without_enough_memory_leaves_its_object_out(tmp_path):
+    flags = ["--family", "concurrent", "--limit", "1", "--jobs", "1", "--memory-mb", "300"]
+    folder = tmp_path / "ds"
+    assert main(["dataset", "build", "wedge", *flags, "--out", str(folder)]) == Exit.PARTIAL
+    (line,) = (folder / "quarantine.jsonl").read_text().splitlines()
+    assert json.loads(line)["object"] == "wedge"
+    assert verify(folder) == []
