@@ -9,8 +9,8 @@ from sim_validate import cli, flags
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.datasets.build import build, read_manifest
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
-from sim_validate.datasets.driver import local_engine
 from sim_validate.datasets.verify import verify
+from sim_validate.engines import started
 from sim_validate.plan_command import say_cut
 
 FRICTION = 0.5
@@ -24,7 +24,7 @@ def build_dataset(command: cli.DatasetBuild, reporter: Reporter) -> int:
     memory = None if command.memory_mb is None else command.memory_mb * MEGABYTE
     with (
         reporter.progress("building") as steps,
-        local_engine(command.jobs, command.timeout_s, memory) as engine,
+        started(command.jobs, command.timeout_s, memory) as engine,
     ):
         built = build(config, command.out, engine, steps.update)
     counts = ", ".join(f"{count} {name}" for name, count in built.rows.items())

@@ -25,6 +25,8 @@ from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.tables import parquet_bytes, require_pyarrow
 from sim_validate.datasets.units import WorkUnit, units_of
 from sim_validate.files import read_text, write_bytes, write_text
+from sim_validate.gate import require_faithful
+from sim_validate.setup import Setup
 
 SCHEMA = 1
 MANIFEST = "manifest.json"
@@ -57,6 +59,7 @@ def build(
     Raises:
         InputError: An object is nowhere, the folder holds something else, or another build is at
             work in it.
+        UnfaithfulError: The simulator fails the gate.
     """
     require_pyarrow()
     units = units_of(config)
@@ -70,6 +73,8 @@ def build(
         left = [unit for unit in units if not staging.done(unit)]
         for unit in left:
             staging.forget(unit)
+        for friction in config.frictions if left else ():
+            require_faithful(Setup(), friction)  # what fails at one object's size leaves it out
         drive(left, staging, engine, report)
         _finish(config, units, staging, folder)
         return _as_built(folder, len(units), len(left))

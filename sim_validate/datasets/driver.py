@@ -5,12 +5,10 @@ tried once more when nothing else is under way; then it is quarantined with its 
 with an error of ours is quarantined at once, by the worker: it would come out the same again.
 """
 
-import importlib
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Protocol
 
 from grasp_core.errors import GraspError
 from sim_validate import interrupts
@@ -30,7 +28,7 @@ class Engine(Protocol):
 
     workers: int
 
-    def submit(self, work: Work, unit: WorkUnit, staging: Staging) -> "Future[None]":
+    def submit(self, function: Work, unit: WorkUnit, staging: Staging, /) -> "Future[None]":
         """Have a unit done; its future fails with `TimeoutError` where it takes too long."""
         ...
 
@@ -45,48 +43,6 @@ def do_unit(unit: WorkUnit, staging: Staging) -> None:
         staging.quarantine(unit, "out of memory")
     else:
         staging.write(unit, rows)
-
-
-class LocalEngine:
-    """Processes of this machine; the door to pebble's single tasks."""
-
-    def __init__(self, workers: int, timeout_s: float, memory_bytes: int | None) -> None:
-        pebble: Any = importlib.import_module("pebble")
-        context = importlib.import_module("multiprocessing").get_context("spawn")
-        self.workers = workers
-        self._timeout_s = timeout_s
-        self._pool = pebble.ProcessPool(
-            max_workers=workers, context=context, initializer=limit_memory, initargs=[memory_bytes]
-        )
-
-    def submit(self, work: Work, unit: WorkUnit, staging: Staging) -> "Future[None]":
-        """As `Engine` says."""
-        return self._pool.schedule(work, args=[unit, staging], timeout=self._timeout_s)
-
-    def close(self) -> None:
-        """Stop all workers, whatever they do."""
-        self._pool.stop()
-        self._pool.join()
-
-
-@contextmanager
-def local_engine(
-    workers: int, timeout_s: float, memory_bytes: int | None = None
-) -> Generator[LocalEngine]:
-    """Processes of this machine, gone afterwards."""
-    engine = LocalEngine(workers, timeout_s, memory_bytes)
-    try:
-        yield engine
-    finally:
-        engine.close()
-
-
-def limit_memory(most: int | None) -> None:
-    """Have what this process asks for beyond so many bytes refused."""
-    if most is not None:
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_AS, (most, most))
 
 
 def drive(

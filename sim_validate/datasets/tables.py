@@ -11,12 +11,18 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
 from sim_validate.datasets.columns import KEYS, TABLES, Column, Name
 
+Columns: TypeAlias = dict[str, NDArray[Any]]
 TYPES = {"text": "string", "bool": "bool_", "int": "int64", "float": "float64"}
+MISSING: Mapping[str, float] = {"float": math.nan, "int": 0}
+"""What stands for null in arrays."""
 PAGES: Mapping[str, Any] = {
     "compression": "zstd",
     "write_page_checksum": True,
@@ -74,6 +80,31 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     except (OSError, arrow.ArrowException) as error:
         raise InputError(f"{path}: cannot be read, or is damaged ({error})") from error
     return table.to_pylist()
+
+
+def read_columns(paths: Sequence[Path], name: Name) -> Columns:
+    """The columns of a table's files, one after another, as arrays (rows, ..).
+
+    Numbers that are null are NaN in columns of floats, and 0 in columns of whole numbers; text and
+    truth values are objects, None where they are null.
+
+    Raises:
+        InputError: A file is damaged.
+    """
+    rows = [row for path in paths for row in read_rows(path)]
+    return {column.name: _as_array(column, rows) for column in TABLES[name]}
+
+
+def _as_array(column: Column, rows: Sequence[Mapping[str, Any]]) -> NDArray[Any]:
+    values = [row[column.name] for row in rows]
+    if column.kind not in MISSING:
+        return np.array(values, dtype=object)
+    missing = MISSING[column.kind]
+    empty = np.full(column.shape, missing).tolist()
+    filled = [empty if value is None else value for value in values]
+    found = np.array(filled, dtype=object).reshape(len(rows), *column.shape)
+    found[found == None] = missing  # noqa: E711 - elementwise
+    return found.astype(np.int64 if column.kind == "int" else np.float64)
 
 
 def _key(name: Name, row: Mapping[str, Any]) -> tuple[Any, ...]:

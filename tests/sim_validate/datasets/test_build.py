@@ -4,16 +4,19 @@ import json
 import shutil
 import sys
 
+import numpy as np
 import pytest
 import trimesh
 
 import grasp_core as gc
+import sim_validate
+from sim_validate.datasets import build as build_module
 from sim_validate.datasets.build import build, read_manifest
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.driver import local_engine
 from sim_validate.datasets.tables import parquet_bytes, read_rows
 from sim_validate.datasets.units import units_of
 from sim_validate.datasets.verify import verify
+from sim_validate.engines import started
 from tests.sim_validate.datasets.engines import Here, silent
 
 pytest.importorskip("pyarrow")
@@ -68,7 +71,7 @@ def test_a_dataset_holds_every_object_at_every_friction(dataset):
 
 def test_it_is_the_same_bytes_on_processes_and_in_another_order(dataset, tmp_path):
     turned = dataclasses.replace(CONFIG, objects=CONFIG.objects[::-1])
-    with local_engine(2, timeout_s=120.0) as engine:
+    with started(2, timeout_s=120.0) as engine:
         built = build(turned, tmp_path / "other", engine, silent)
     assert built.made == 4
     before, after = contents(dataset), contents(tmp_path / "other")
@@ -161,7 +164,7 @@ def test_a_unit_that_ends_its_worker_is_tried_again_alone_then_quarantined(tmp_p
 
 def test_a_unit_that_never_ends_is_given_up(tmp_path):
     config = dataclasses.replace(CONFIG, objects=("tetrahedron",), frictions=(0.5,))
-    with local_engine(1, timeout_s=0.2) as engine:  # less than a process takes to start working
+    with started(1, timeout_s=0.2) as engine:  # less than a process takes to start working
         built = build(config, tmp_path / "ds", engine, silent)
     assert built.quarantined == 1
     assert "took too long, twice" in (tmp_path / "ds" / "quarantine.jsonl").read_text()
@@ -172,6 +175,17 @@ def test_without_pyarrow_nothing_is_begun_and_the_extra_is_named(tmp_path, monke
     with pytest.raises(gc.InputError, match=r"graspproof\[dataset\]"):
         build(CONFIG, tmp_path / "ds", Here(), silent)
     assert not (tmp_path / "ds").exists()
+
+
+def test_an_unfaithful_simulator_ends_a_build_before_it_begins(tmp_path, monkeypatch):
+    def fail(*_):
+        raise gc.UnfaithfulError("the simulator is off")
+
+    monkeypatch.setattr(build_module, "require_faithful", fail)
+    engine = Here()
+    with pytest.raises(gc.UnfaithfulError):
+        build(CONFIG, tmp_path / "ds", engine, silent)
+    assert not engine.submitted
 
 
 def test_two_builds_do_not_work_in_one_folder(tmp_path):
@@ -250,6 +264,25 @@ def test_rows_that_contradict_each_other_are_named(copy, name, change, message):
     assert verify(copy) == []
     forged(copy, name, change)
     assert any(message in fault for fault in verify(copy))
+
+
+def test_a_dataset_is_loaded_as_arrays(dataset):
+    tables = sim_validate.load_dataset(dataset)
+    grasps = tables["grasps"]
+    rows = all_rows(dataset, "grasps")
+    count = len(rows)
+    assert {len(column) for column in grasps.values()} == {count}
+    assert grasps["contact_points_m"].shape == (count, 4, 3)
+    assert grasps["contact_points_m"].dtype == np.float64
+    for row, points, family in zip(rows, grasps["contact_points_m"], grasps["family"], strict=True):
+        there = row["contacts"]
+        np.testing.assert_array_equal(points[:there], row["contact_points_m"][:there])
+        assert np.isnan(points[row["contacts"] :]).all()
+        assert family == row["family"]
+    parts = [sim_validate.load_dataset(dataset, part) for part in ("train", "validation", "test")]
+    assert sum(len(part["trials"]["trial"]) for part in parts) == len(tables["trials"]["trial"])
+    with pytest.raises(gc.InputError, match="expected one of"):
+        sim_validate.load_dataset(dataset, "training")
 
 
 def test_units_are_the_same_wherever_they_are_made():

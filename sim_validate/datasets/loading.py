@@ -1,0 +1,35 @@
+"""A dataset's tables as arrays."""
+
+from pathlib import Path
+
+from grasp_core.errors import InputError
+from sim_validate.datasets.build import read_manifest
+from sim_validate.datasets.columns import TABLES, Name
+from sim_validate.datasets.rows import SPLITS
+from sim_validate.datasets.tables import Columns, read_columns
+
+
+def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Columns]:
+    """The tables of a dataset, each a dictionary of its columns.
+
+    Args:
+        folder: Of the dataset.
+        split: `train`, `validation` or `test`; everything if not given.
+
+    Returns:
+        By table and column, arrays with a row per row: contact points, say, are (n, 4, 3) [m].
+        Missing numbers are NaN, or 0 in columns of whole numbers; missing text is None.
+
+    Raises:
+        InputError: There is no such split, no finished dataset, or a file is damaged.
+    """
+    splits = [name for name, _ in SPLITS]
+    if split is not None and split not in splits:
+        raise InputError(f"split: expected one of {', '.join(splits)}, got {split!r}")
+    root = Path(folder)
+    listed = [each for each in read_manifest(root)["files"] if "table" in each]
+    wanted = [each for each in listed if split is None or Path(each["path"]).name.startswith(split)]
+    return {
+        name: read_columns([root / each["path"] for each in wanted if each["table"] == name], name)
+        for name in TABLES
+    }
