@@ -1,5 +1,6 @@
 """The commands about datasets: to make one, to go on making it, and to check it."""
 
+from dataclasses import fields
 from pathlib import Path
 
 from grasp_core.errors import InputError
@@ -62,17 +63,13 @@ def _asked(command: cli.DatasetBuild) -> DatasetConfig:
         if len(command.objects) > 1 or settings != flags.DatasetSettings():
             raise InputError(f"{first} says what the dataset is made of: give nothing beside it")
         return config_from_toml(first)
+    given = {each.name: getattr(settings, each.name) for each in fields(settings)}
+    frictions, families = given.pop("friction"), given.pop("family")
     return DatasetConfig(
         objects=_listed(command.objects),
-        frictions=settings.friction or (FRICTION,),
-        families=settings.family or METHODS,
-        limit=settings.limit,
-        cones=settings.cones,
-        unit=settings.unit,
-        faces=settings.faces,
-        limits=settings.limits,
-        random_wrenches=settings.random_wrenches,
-        seed=settings.seed,
+        frictions=frictions or (FRICTION,),
+        families=families or METHODS,
+        **given,
     )
 
 

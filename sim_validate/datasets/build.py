@@ -114,7 +114,6 @@ def _finish(
     """Put the rows of all units into tables, a file per table and split, and list the files."""
     good, quarantined = _sorted_out(units, staging)
     about = {"schema": str(SCHEMA), "config_sha256": config.sha256}
-    files = [write_text(folder / "config.toml", config_to_toml(config))]
     listed: list[dict[str, Any]] = []
     shutil.rmtree(folder / "data", ignore_errors=True)
     rows: dict[Name, list[Row]] = {name: _all_rows(good, staging, name) for name in TABLES}
@@ -129,7 +128,7 @@ def _finish(
                 write_bytes(path, parquet_bytes(name, some, about))
                 listed.append(_listed(folder, path) | {"table": name, "rows": len(some)})
     lines = "".join(json.dumps(each, sort_keys=True) + "\n" for each in quarantined)
-    files.append(write_text(folder / "quarantine.jsonl", lines))
+    files = [folder / "config.toml", write_text(folder / "quarantine.jsonl", lines)]
     manifest = {
         "schema": SCHEMA,
         "config_sha256": config.sha256,

@@ -7,7 +7,7 @@ count exactly if they would come out the same.
 
 import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 from grasp_core.errors import InputError
@@ -19,6 +19,8 @@ from scenes.objects import example_object
 from sim_validate.datasets.config import DatasetConfig
 
 CHUNK = 2**20
+OWN_TO_UNITS = ("objects", "frictions")
+"""Settings that each unit has for itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,14 +45,9 @@ class WorkUnit:
 def shared_settings(config: DatasetConfig) -> dict[str, object]:
     """What decides the rows of every unit: all but which objects and frictions there are."""
     return {
-        "families": config.families,
-        "limit": config.limit,
-        "cones": config.cones,
-        "unit": config.unit,
-        "faces": config.faces,
-        "limits": config.limits,
-        "random_wrenches": config.random_wrenches,
-        "seed": config.seed,
+        each.name: getattr(config, each.name)
+        for each in fields(config)
+        if each.name not in OWN_TO_UNITS
     }
 
 

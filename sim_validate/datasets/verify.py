@@ -11,7 +11,7 @@ from grasp_core.closure import force_closure
 from grasp_core.errors import GraspError, InputError
 from sim_validate.datasets.build import MANIFEST, read_manifest
 from sim_validate.datasets.columns import KEYS, TABLES, Name
-from sim_validate.datasets.tables import read_rows
+from sim_validate.datasets.tables import read_rows, require_pyarrow
 
 SAME_MARGIN = 1e-6
 """How far a closure margin may be from that of the contacts, relative to the friction."""
@@ -26,8 +26,9 @@ def verify(folder: Path) -> list[str]:
     contact set its normals, its closure proved again, and that its trials say what it says.
 
     Raises:
-        InputError: The folder holds no finished dataset.
+        InputError: The folder holds no finished dataset, or pyarrow is not installed.
     """
+    require_pyarrow()
     manifest = read_manifest(folder)
     faults = list(_file_faults(folder, manifest["files"]))
     if faults:

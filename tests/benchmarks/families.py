@@ -8,6 +8,7 @@ HiGHS at its door, with all its checks, and every value the same.
 import math
 import time
 from collections import Counter
+from itertools import combinations
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS
 from grasp_core.face_pieces import face_shapes
 from grasp_core.kernels.tables import Attempts
 from grasp_core.lp import LinearProgram, Optimum, _by_highs
+from grasp_core.patch import place_free
 from grasp_core.pencil_grasps import CELL_A, CELL_B, _discs, _near_rows
 from grasp_core.pencil_grasps import _rows as pencil_rows
 from grasp_core.placements import focus_direction
@@ -38,12 +40,15 @@ from grasp_core.values import ForceCone
 from scenes.objects import example_object
 from tests.benchmarks.planning import sphere_hull
 from tests.benchmarks.programs import COMPILED, CONTENDERS
-from tests.benchmarks.timing import Row, compared
+from tests.benchmarks.timing import Row, compared, once
 
 OBJECTS = ("random-12-1", "icosahedron", "random-30-1")
 GROWING = ("tetrahedron", "octahedron", "dodecahedron", "icosahedron", "random-20-1",
            "random-30-1", "random-50-1", 100)  # fmt: skip
 """Built-in objects, and a hull with so many faces."""
+TYPE_FREE = (("random-12-1", 0.2), ("icosahedron", 0.1), ("random-20-1", 0.3))
+MANY = 600
+"""Quadruples that are decided without a type."""
 THETA = math.radians(10.0)
 BLOCKS, SAMPLE = 9, 12
 """Blocks in turns, and programs that contenders get of each."""
@@ -131,7 +136,7 @@ def rows():
             found += group(name, family)
     for name in GROWING:
         found += whole(name)
-    return found
+    return found + [type_free(*case) for case in TYPE_FREE]
 
 
 def group(name, family):
@@ -188,6 +193,20 @@ def whole(name):
         if median > TOO_LONG:
             break
     return found
+
+
+def type_free(name, friction):
+    """A grasp of any type on four faces or a proof that there is none, on many quadruples."""
+    shapes = face_shapes(example_object(name))
+    quads = np.random.default_rng(0).permutation(list(combinations(range(len(shapes)), 4)))[:MANY]
+    faces = [[shapes[face].pieces[0] for face in quad] for quad in quads]
+
+    def decide():
+        return [place_free(each, friction, rng=np.random.default_rng(0)) for each in faces]
+
+    ended = Counter(type(one).__name__ for one in decide())
+    row, _ = once("families", f"type-free, {name}, friction {friction}", decide, len(faces))
+    return row.with_remark(", ".join(f"{count} {kind}" for kind, count in sorted(ended.items())))
 
 
 TOO_LONG = 1.5e6

@@ -2,8 +2,6 @@
 
 from concurrent.futures import Future
 
-from sim_validate.datasets.driver import do_unit
-
 
 class Here:
     """Does each unit at once in this process."""
@@ -29,6 +27,3 @@ class Here:
 
 def silent(_, __):
     """Reports to nobody."""
-
-
-__all__ = ["Here", "do_unit", "silent"]

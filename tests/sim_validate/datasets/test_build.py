@@ -175,6 +175,8 @@ def test_without_pyarrow_nothing_is_begun_and_the_extra_is_named(tmp_path, monke
     with pytest.raises(gc.InputError, match=r"graspproof\[dataset\]"):
         build(CONFIG, tmp_path / "ds", Here(), silent)
     assert not (tmp_path / "ds").exists()
+    with pytest.raises(gc.InputError, match=r"graspproof\[dataset\]"):
+        verify(tmp_path / "ds")
 
 
 def test_an_unfaithful_simulator_ends_a_build_before_it_begins(tmp_path, monkeypatch):

@@ -98,19 +98,25 @@ def test_columns_say_their_units(written):
         assert said.get(b"unit", b"").decode() == column.unit
 
 
-def test_a_flipped_bit_or_a_cut_file_is_noticed(written):
+def test_no_flipped_bit_in_a_page_changes_rows_in_silence(written):
     path = written["trials"]
-    whole = path.read_bytes()
+    whole, rows = path.read_bytes(), read_rows(path)
+    footer = len(whole) - 8 - int.from_bytes(whole[-8:-4], "little")
     noticed = 0
-    for place in range(4, len(whole), len(whole) // 40):
+    for place in range(4, footer, footer // 80):
         spoiled = bytearray(whole)
         spoiled[place] ^= 0x10
         path.write_bytes(bytes(spoiled))
         try:
-            noticed += read_rows(path) is None
+            assert read_rows(path) == rows
         except gc.InputError:
             noticed += 1
-    assert noticed >= 30  # of some 40: the rest lies in the file's own description of itself
+    assert noticed >= 1
+
+
+def test_a_cut_file_is_noticed(written):
+    path = written["trials"]
+    whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(gc.InputError, match="damaged"):
         read_rows(path)
