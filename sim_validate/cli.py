@@ -159,7 +159,7 @@ class DatasetBuild:
     timeout_s: Positive = 3600.0
     """Give an object at one friction up after so long, twice [s]."""
     memory_mb: Count | None = None
-    """What each process may ask for."""
+    """What a process may ask for beyond what it needs to start."""
     jobs: Count = field(default_factory=available_cores)
     """Number of processes; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)

@@ -10,8 +10,9 @@ from sim_validate import cli, flags
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.datasets.build import build, read_manifest
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
+from sim_validate.datasets.tasks import Limits
 from sim_validate.datasets.verify import verify
-from sim_validate.engines import started
+from sim_validate.engines import local_processes
 from sim_validate.plan_command import say_cut
 
 FRICTION = 0.5
@@ -23,11 +24,9 @@ def build_dataset(command: cli.DatasetBuild, reporter: Reporter) -> int:
     """Make a dataset."""
     config = _asked(command)
     memory = None if command.memory_mb is None else command.memory_mb * MEGABYTE
-    with (
-        reporter.progress("building") as steps,
-        started(command.jobs, command.timeout_s, memory) as engine,
-    ):
-        built = build(config, command.out, engine, steps.update)
+    limits = Limits(command.timeout_s, memory)
+    with reporter.progress("building") as steps, local_processes(command.jobs) as engine:
+        built = build(config, command.out, engine, steps.update, limits)
     counts = ", ".join(f"{count} {name}" for name, count in built.rows.items())
     reporter.say(
         f"{command.out}: {built.units} units, {built.made} made now, {built.quarantined} "

@@ -42,58 +42,40 @@ def each(
     if workers <= 1:
         yield from map(function, units)
         return
-    pebble: Any = importlib.import_module("pebble")
-    context = importlib.import_module("multiprocessing").get_context("spawn")
-    with pebble.ProcessPool(max_workers=workers, context=context) as pool:
+    with _pool(workers) as pool:
         future = pool.map(function, units)
         try:
             yield from future.result()
         finally:
             future.cancel()
-            pool.stop()
 
 
 class Processes:
-    """Processes that do single tasks, with limits of time and memory."""
+    """Processes of this machine that do single tasks."""
 
-    def __init__(self, workers: int, timeout_s: float, memory_bytes: int | None) -> None:
-        pebble: Any = importlib.import_module("pebble")
-        context = importlib.import_module("multiprocessing").get_context("spawn")
+    def __init__(self, pool: Any, workers: int) -> None:
         self.workers = workers
-        self._timeout_s = timeout_s
-        self._pool = pebble.ProcessPool(
-            max_workers=workers, context=context, initializer=_limit_memory, initargs=[memory_bytes]
-        )
+        self._pool = pool
 
-    def submit(self, function: Callable[..., Result], /, *args: object) -> "Future[Result]":
-        """Have a function called; its future fails with `TimeoutError` where it takes too long."""
-        return self._pool.schedule(function, args=list(args), timeout=self._timeout_s)
-
-    def close(self) -> None:
-        """Stop all processes, whatever they do."""
-        self._pool.stop()
-        self._pool.join()
+    def submit(self, function: Callable[[Unit], Result], unit: Unit, /) -> "Future[Result]":
+        """Have a function called; its future fails where the process ends."""
+        return self._pool.schedule(function, args=[unit])
 
 
 @contextmanager
-def started(
-    workers: int, timeout_s: float, memory_bytes: int | None = None
-) -> Generator[Processes]:
-    """Processes for single tasks, gone afterwards.
+def local_processes(workers: int) -> Generator[Processes]:
+    """Processes of this machine, stopped afterwards, whatever they do."""
+    with _pool(workers) as pool:
+        yield Processes(pool, workers)
 
-    Args:
-        workers: How many.
-        timeout_s: How long each task may take.
-        memory_bytes: What each process may ask for; no limit if not given.
-    """
-    engine = Processes(workers, timeout_s, memory_bytes)
+
+@contextmanager
+def _pool(workers: int) -> Generator[Any]:
+    pebble: Any = importlib.import_module("pebble")
+    context = importlib.import_module("multiprocessing").get_context("spawn")
+    pool = pebble.ProcessPool(max_workers=workers, context=context)
     try:
-        yield engine
+        yield pool
     finally:
-        engine.close()
-
-
-def _limit_memory(most: int | None) -> None:
-    if most is not None:
-        resource: Any = importlib.import_module("resource")
-        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+        pool.stop()
+        pool.join()

@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import Any, cast
 
 from grasp_core.errors import InputError
-from grasp_core.versions import versions
 from sim_validate.datasets.columns import TABLES, Name
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.driver import Engine, drive
 from sim_validate.datasets.rows import SPLITS, Row
 from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.tables import parquet_bytes, require_pyarrow
-from sim_validate.datasets.units import WorkUnit, units_of
+from sim_validate.datasets.tasks import Limits
+from sim_validate.datasets.units import WorkUnit, provenance, units_of
 from sim_validate.files import read_text, write_bytes, write_text
 from sim_validate.gate import require_faithful
 from sim_validate.setup import Setup
@@ -46,7 +46,11 @@ class Built:
 
 
 def build(
-    config: DatasetConfig, folder: Path, engine: Engine, report: Callable[[int, int], None]
+    config: DatasetConfig,
+    folder: Path,
+    engine: Engine,
+    report: Callable[[int, int], None],
+    limits: Limits | None = None,
 ) -> Built:
     """Make a dataset, or go on making it.
 
@@ -55,11 +59,13 @@ def build(
         folder: Where; it may hold an unfinished or finished dataset of the same configuration.
         engine: Where units are done.
         report: Told how many units are finished, and of how many.
+        limits: What each unit may take; only for engines with processes of their own.
 
     Raises:
         InputError: An object is nowhere, the folder holds something else, or another build is at
             work in it.
         UnfaithfulError: The simulator fails the gate.
+        WorkerError: A worker cannot do units for this driver.
     """
     require_pyarrow()
     units = units_of(config)
@@ -68,14 +74,14 @@ def build(
         if (folder / MANIFEST).is_file():
             return _as_built(folder, len(units))
         write_text(folder / "config.toml", config_to_toml(config))
-        staging = Staging(folder / "staging")
+        staging = Staging(folder.resolve() / "staging")
         staging.clear_unfinished()
         left = [unit for unit in units if not staging.done(unit)]
         for unit in left:
             staging.forget(unit)
         for friction in config.frictions if left else ():
             require_faithful(Setup(), friction)  # what fails at one object's size leaves it out
-        drive(left, staging, engine, report)
+        drive(left, staging, engine, report, limits)
         _finish(config, units, staging, folder)
         return _as_built(folder, len(units), len(left))
 
@@ -132,7 +138,7 @@ def _finish(
     manifest = {
         "schema": SCHEMA,
         "config_sha256": config.sha256,
-        "versions": versions(),
+        "versions": dict(provenance()),
         "units": len(units),
         "quarantined": len(quarantined),
         "files": sorted(

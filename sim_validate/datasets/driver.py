@@ -1,26 +1,29 @@
 """One loop that has work units done by an engine, some at a time, and notes what became of each.
 
-An engine submits a unit and returns a future. A unit that ends its worker, or takes too long, is
+An engine submits a task and returns a future. A unit that ends its worker, or takes too long, is
 tried once more when nothing else is under way; then it is quarantined with its reason. What fails
-with an error of ours is quarantined at once, by the worker: it would come out the same again.
+with an error of ours is quarantined at once, by the worker: it would come out the same again. What
+would befall every unit - a full disk, a worker with other packages - ends the run.
 """
 
+import errno
+import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import Protocol
 
-from grasp_core.errors import GraspError
 from sim_validate import interrupts
-from sim_validate.datasets.rows import rows_of
 from sim_validate.datasets.staging import Staging
-from sim_validate.datasets.units import WorkUnit
+from sim_validate.datasets.tasks import Limits, Task, WorkerError, do_task
+from sim_validate.datasets.units import WorkUnit, provenance
 
 AHEAD = 3
 """Units under way for each worker, so that none waits for the driver."""
 LOOK_S = 1.0
 """How often the driver looks whether it was interrupted [s]."""
-Work = Callable[[WorkUnit, Staging], None]
+NO_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES)
+"""What says that no rows can be written where they should be."""
 
 
 class Engine(Protocol):
@@ -28,21 +31,9 @@ class Engine(Protocol):
 
     workers: int
 
-    def submit(self, function: Work, unit: WorkUnit, staging: Staging, /) -> "Future[None]":
-        """Have a unit done; its future fails with `TimeoutError` where it takes too long."""
+    def submit(self, function: Callable[[Task], None], task: Task, /) -> "Future[None]":
+        """Have a task done."""
         ...
-
-
-def do_unit(unit: WorkUnit, staging: Staging) -> None:
-    """Make the rows of a unit and keep them, or the reason why there are none."""
-    try:
-        rows = rows_of(unit)
-    except GraspError as error:
-        staging.quarantine(unit, str(error))
-    except MemoryError:
-        staging.quarantine(unit, "out of memory")
-    else:
-        staging.write(unit, rows)
 
 
 def drive(
@@ -50,7 +41,7 @@ def drive(
     staging: Staging,
     engine: Engine,
     report: Callable[[int, int], None],
-    work: Work = do_unit,
+    limits: Limits | None = None,
 ) -> None:
     """Have units done, each kept or quarantined in the end.
 
@@ -59,35 +50,62 @@ def drive(
         staging: Where they are kept.
         engine: Where they are done.
         report: Told how many are finished, and of how many.
-        work: What is done.
+        limits: What each unit may take.
+
+    Raises:
+        WorkerError: A worker cannot do units for this driver.
+        OSError: Rows cannot be written.
     """
-    waiting, again = deque(units), list[WorkUnit]()
-    under_way: dict[Future[None], WorkUnit] = {}
-    finished = 0
+    own = dict(provenance())
+    waiting = deque(Task(unit, staging, own, limits) for unit in units)
+    again, finished = list[Task](), 0
+    under_way: dict[Future[None], Task] = {}
     while waiting or under_way:
         while waiting and len(under_way) < AHEAD * engine.workers:
-            unit = waiting.popleft()
-            under_way[engine.submit(work, unit, staging)] = unit
+            task = waiting.popleft()
+            under_way[engine.submit(do_task, task)] = task
         done, _ = wait(under_way, timeout=LOOK_S, return_when=FIRST_COMPLETED)
         for future in done:
-            unit = under_way.pop(future)
-            if future.exception() is None:
+            task = under_way.pop(future)
+            if _succeeded(future, task):
                 finished += 1
             else:
-                again.append(unit)
+                again.append(task)
         interrupts.check()
         report(finished, len(units))
-    for unit in again:
-        future = engine.submit(work, unit, staging)
-        while not wait([future], timeout=LOOK_S).done:
-            interrupts.check()
-        if (error := future.exception()) is not None:
-            staging.quarantine(unit, _why(error))
+    for task in again:
+        _try_alone(task, engine)
         finished += 1
         report(finished, len(units))
 
 
-def _why(error: BaseException) -> str:
-    if isinstance(error, TimeoutError):
-        return "took too long, twice"
-    return f"its worker ended, twice: {type(error).__name__}: {error}"
+def _try_alone(task: Task, engine: Engine) -> None:
+    """Try a unit once more; what fails now is at fault itself."""
+    began = time.monotonic()
+    future = engine.submit(do_task, task)
+    while not wait([future], timeout=LOOK_S).done:
+        interrupts.check()
+    if _succeeded(future, task):
+        return
+    took_s = time.monotonic() - began
+    late = task.limits is not None and took_s >= task.limits.timeout_s
+    reason = "took too long, twice" if late else "its worker ended, twice"
+    task.staging.quarantine(task.unit, reason)
+
+
+def _succeeded(future: "Future[None]", task: Task) -> bool:
+    """Whether a unit was done; false if its worker ended, or was stopped.
+
+    Raises:
+        WorkerError: The worker cannot do units for this driver.
+        OSError: Its rows could not be written.
+    """
+    error = future.exception()
+    if isinstance(error, WorkerError) or (isinstance(error, OSError) and error.errno in NO_WRITING):
+        raise error
+    if error is None and not task.staging.finished(task.unit):
+        raise WorkerError(
+            f"{task.staging.folder}: a unit was done, but its rows are not here; --out must be on "
+            "a file system that driver and workers share"
+        )
+    return error is None

@@ -61,6 +61,10 @@ class Staging:
         except (OSError, ValueError, KeyError):
             return False
 
+    def finished(self, unit: WorkUnit) -> bool:
+        """Whether there is anything of a unit: its rows, or why there are none."""
+        return self._of(unit).is_dir()
+
     def rows(self, unit: WorkUnit, name: Name) -> list[Row]:
         """The rows of a finished unit in one of the tables."""
         path = self._of(unit) / f"{name}.parquet"
@@ -88,16 +92,16 @@ class Staging:
         }
         self.folder.mkdir(parents=True, exist_ok=True)
         made = Path(tempfile.mkdtemp(dir=self.folder, prefix=f"{UNFINISHED}{unit.id}."))
-        for name, data in {**files, RECORD: json.dumps(record).encode()}.items():
-            with (made / name).open("wb") as stream:
-                stream.write(data)
-                stream.flush()
-                os.fsync(stream.fileno())
         try:
+            for name, data in {**files, RECORD: json.dumps(record).encode()}.items():
+                with (made / name).open("wb") as stream:
+                    stream.write(data)
+                    stream.flush()
+                    os.fsync(stream.fileno())
             made.rename(self._of(unit))
-        except OSError:  # another attempt was faster, with the same rows
-            shutil.rmtree(made)
-            if not self.done(unit):
+        except OSError:
+            shutil.rmtree(made, ignore_errors=True)
+            if not self.done(unit):  # else another attempt was faster, with the same rows
                 raise
 
 

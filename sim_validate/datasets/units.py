@@ -1,14 +1,18 @@
 """A configuration -> work units, each of which can be done anywhere, in any order.
 
 A unit is one object at one friction. Its name is a hash of all that decides its rows: the bytes of
-the mesh, the configuration, and the versions of the packages. So results of an earlier run
-count exactly if they would come out the same.
+the mesh, the configuration, the versions of the packages, and our own code. So results of an
+earlier run count exactly if they would come out the same.
 """
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import cache
+from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
 
 from grasp_core.errors import InputError
 from grasp_core.mesh import FORMATS
@@ -19,6 +23,7 @@ from scenes.objects import example_object
 from sim_validate.datasets.config import DatasetConfig
 
 CHUNK = 2**20
+PACKAGES = ("grasp_core", "scenes", "sim_validate")
 OWN_TO_UNITS = ("objects", "frictions")
 """Settings that each unit has for itself."""
 
@@ -28,7 +33,9 @@ class WorkUnit:
     """One object at one friction."""
 
     object: str
-    """A mesh file, or the name of a built-in object."""
+    """A mesh file as it was given, or the name of a built-in object."""
+    path: Path | None
+    """Where the mesh file is, from the root; None for built-in objects."""
     source_sha256: str
     """Of the mesh file's bytes, or of the built-in object's mesh."""
     friction: float
@@ -38,8 +45,20 @@ class WorkUnit:
     def id(self) -> str:
         """Sixteen bytes in hexadecimal digits; the same wherever the mesh file lies."""
         settings = shared_settings(self.config)
-        decisive = [self.source_sha256, self.friction, settings, sorted(versions().items())]
+        decisive = [self.source_sha256, self.friction, settings, sorted(provenance().items())]
         return hashlib.sha256(json.dumps(decisive).encode()).hexdigest()[:32]
+
+
+@cache
+def provenance() -> Mapping[str, str]:
+    """Versions of all packages, and the hash of our own code: all that results can depend on."""
+    digest = hashlib.sha256()
+    for package in PACKAGES:
+        root = Path(str(files(package)))
+        for path in sorted(root.rglob("*.py")):
+            digest.update(f"{package}/{path.relative_to(root).as_posix()}\n".encode())
+            digest.update(path.read_bytes())
+    return MappingProxyType(versions() | {"code_sha256": digest.hexdigest()})
 
 
 def shared_settings(config: DatasetConfig) -> dict[str, object]:
@@ -58,8 +77,9 @@ def units_of(config: DatasetConfig) -> list[WorkUnit]:
         InputError: An object is neither a file that can be read nor built in.
     """
     hashes = {name: _source_sha256(name) for name in config.objects}
+    paths = {name: Path(name).resolve() if is_mesh_file(name) else None for name in hashes}
     units = [
-        WorkUnit(name, hashes[name], friction, config)
+        WorkUnit(name, paths[name], hashes[name], friction, config)
         for name in config.objects
         for friction in config.frictions
     ]
@@ -71,10 +91,14 @@ def body_of(unit: WorkUnit) -> Polyhedron:
 
     Raises:
         MeshError: Its mesh is no solid.
+        InputError: Its mesh is not the one that the unit is about.
     """
-    if not is_mesh_file(unit.object):
+    if unit.path is None:
         return example_object(unit.object)
-    return load_polyhedron(unit.object, unit=unit.config.unit, faces=unit.config.faces)
+    body = load_polyhedron(unit.path, unit=unit.config.unit, faces=unit.config.faces)
+    if body.source_sha256 != unit.source_sha256:
+        raise InputError(f"{unit.object}: was changed after the build began; build again")
+    return body
 
 
 def is_mesh_file(name: str) -> bool:

@@ -110,9 +110,10 @@ def test_a_worker_that_is_killed_costs_nothing_but_time(dataset, tmp_path):
 
 @pytest.mark.slow
 def test_a_worker_without_enough_memory_leaves_its_object_out(tmp_path):
-    flags = ["--family", "concurrent", "--limit", "1", "--jobs", "1", "--memory-mb", "300"]
+    flags = ["--family", "concurrent", "--limit", "1", "--jobs", "1", "--memory-mb", "16"]
     folder = tmp_path / "ds"
-    assert main(["dataset", "build", "wedge", *flags, "--out", str(folder)]) == Exit.PARTIAL
+    names = ["wedge", *flags, "--timeout-s", "60", "--out", str(folder)]
+    assert main(["dataset", "build", *names]) == Exit.PARTIAL
     (line,) = (folder / "quarantine.jsonl").read_text().splitlines()
     assert json.loads(line)["object"] == "wedge"
     assert verify(folder) == []

@@ -12,12 +12,12 @@ class Here:
         self.before = before
         self.submitted = []
 
-    def submit(self, work, unit, staging):
-        self.submitted.append(unit)
+    def submit(self, function, task):
+        self.submitted.append(task.unit)
         future = Future()
         try:
-            self.before(unit)
-            work(unit, staging)
+            self.before(task.unit)
+            function(task)
         except Exception as error:
             future.set_exception(error)
         else:

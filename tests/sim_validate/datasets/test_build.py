@@ -14,9 +14,10 @@ from sim_validate.datasets import build as build_module
 from sim_validate.datasets.build import build, read_manifest
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.tables import parquet_bytes, read_rows
+from sim_validate.datasets.tasks import Limits
 from sim_validate.datasets.units import units_of
 from sim_validate.datasets.verify import verify
-from sim_validate.engines import started
+from sim_validate.engines import local_processes
 from tests.sim_validate.datasets.engines import Here, silent
 
 pytest.importorskip("pyarrow")
@@ -71,8 +72,8 @@ def test_a_dataset_holds_every_object_at_every_friction(dataset):
 
 def test_it_is_the_same_bytes_on_processes_and_in_another_order(dataset, tmp_path):
     turned = dataclasses.replace(CONFIG, objects=CONFIG.objects[::-1])
-    with started(2, timeout_s=120.0) as engine:
-        built = build(turned, tmp_path / "other", engine, silent)
+    with local_processes(2) as engine:
+        built = build(turned, tmp_path / "other", engine, silent, Limits(120.0))
     assert built.made == 4
     before, after = contents(dataset), contents(tmp_path / "other")
     tables = {path for path in before if path.startswith("data/")}
@@ -159,13 +160,13 @@ def test_a_unit_that_ends_its_worker_is_tried_again_alone_then_quarantined(tmp_p
     assert len(engine.submitted) == 6
     (line,) = (tmp_path / "ds" / "quarantine.jsonl").read_text().splitlines()
     assert json.loads(line)["friction"] == 0.5
-    assert "the worker ended" in json.loads(line)["reason"]
+    assert json.loads(line)["reason"] == "its worker ended, twice"
 
 
 def test_a_unit_that_never_ends_is_given_up(tmp_path):
     config = dataclasses.replace(CONFIG, objects=("tetrahedron",), frictions=(0.5,))
-    with started(1, timeout_s=0.2) as engine:  # less than a process takes to start working
-        built = build(config, tmp_path / "ds", engine, silent)
+    with local_processes(1) as engine:
+        built = build(config, tmp_path / "ds", engine, silent, Limits(0.1))
     assert built.quarantined == 1
     assert "took too long, twice" in (tmp_path / "ds" / "quarantine.jsonl").read_text()
 
