@@ -125,7 +125,7 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
         found = planar_faces(points, corners, groups or [], flatness, triangulate)
     solid = hull(points) if fault and fault.reason is MeshRefusal.OPEN else Solid(points, corners)
     mass = mass_properties(solid, _given_center(points, center_of_mass))
-    content = _content_hash(points, corners)
+    content = content_hash(points, corners)
     return kind(
         name=name,
         vertices=points,
@@ -236,7 +236,7 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike) -> tuple[Array, I
     return points, corners.astype(np.int64)
 
 
-def _content_hash(points: Array, corners: Indices) -> str:
+def content_hash(points: Array, corners: Indices) -> str:
     """Hash of the mesh with vertices and triangles in sorted order."""
     order = np.lexsort(points.T[::-1])
     place = np.empty_like(order)

@@ -23,7 +23,7 @@ from tyro.conf import (
 )
 
 from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError, UnfaithfulError
-from sim_validate.bounds import check
+from sim_validate.bounds import FINITE, at_least, check
 from sim_validate.config_file import with_config
 from sim_validate.engines import available_cores
 from sim_validate.flags import (
@@ -167,10 +167,14 @@ class DatasetBuild:
 
 @dataclass(frozen=True, slots=True)
 class DatasetVerify:
-    """Check a dataset: its files, its rows, and every closure from the contacts alone."""
+    """Check a dataset: files, rows, each closure from the contacts, and a sample done again."""
 
     dataset: Positional[Path]
     """Its folder."""
+    share: Annotated[float, FINITE, at_least(0.0, up_to=1.0)] = 0.01
+    """Part of all objects and frictions that is done again, at least one; 0 for none."""
+    seed: Seed = 0
+    """For which ones."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 

@@ -1,6 +1,6 @@
 """The commands about datasets: to make one, to go on making it, and to check it."""
 
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 
 from grasp_core.errors import InputError
@@ -8,8 +8,10 @@ from grasp_core.mesh import FORMATS
 from grasp_core.requests import METHODS
 from sim_validate import cli, flags
 from sim_validate.console import TABLE_ROWS, Reporter
-from sim_validate.datasets.build import build, read_manifest
+from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
+from sim_validate.datasets.manifest import read_manifest
+from sim_validate.datasets.redo import Sample
 from sim_validate.datasets.tasks import Limits
 from sim_validate.datasets.verify import verify
 from sim_validate.engines import local_processes
@@ -34,13 +36,14 @@ def build_dataset(command: cli.DatasetBuild, reporter: Reporter) -> int:
     )
     if built.quarantined:
         reporter.warn(f"{command.out / 'quarantine.jsonl'} says why objects were left out")
-    reporter.document({"out": str(command.out), "manifest": read_manifest(command.out)})
+    reporter.document({"out": str(command.out), "manifest": asdict(read_manifest(command.out))})
     return cli.Exit.PARTIAL if built.quarantined else cli.Exit.GOOD
 
 
 def verify_dataset(command: cli.DatasetVerify, reporter: Reporter) -> int:
     """Check a dataset."""
-    faults = verify(command.dataset)
+    sample = Sample(command.share, command.seed) if command.share > 0.0 else None
+    faults = verify(command.dataset, sample)
     for fault in faults[:TABLE_ROWS]:
         reporter.warn(fault)
     say_cut(len(faults), reporter)

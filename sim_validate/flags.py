@@ -128,6 +128,18 @@ class DatasetSettings:
     """Also hold so many random wrenches."""
     seed: Annotated[int, at_least(0, up_to=2**63 - 1)] = 0
     """For everything random."""
+    scenes: bool = False
+    """Also write each grasp as a MuJoCo scene."""
+    title: str = "four-finger grasps"
+    """What to call the dataset; for its card, as the following."""
+    license: str = ""
+    """Of the dataset, such as CC-BY-4.0."""
+    creator: str = ""
+    """Who makes it."""
+    url: str = ""
+    """Where it is to be found."""
+    published: str = ""
+    """When, such as 2026-11-22."""
 
 
 @dataclass(frozen=True, slots=True)

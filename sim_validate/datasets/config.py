@@ -28,9 +28,15 @@ KINDS: dict[str, tuple[str, ...]] = {
 LEAST = {"limit": 1, "random_wrenches": 0, "seed": 0}
 """Settings that are whole numbers, and from where on."""
 MOST_SEED = 2**63 - 1
+SWITCHES = ("scenes",)
+"""Settings that are true or false."""
+CREDITS = ("title", "license", "creator", "url", "published")
+"""Settings for people."""
 LISTS: dict[str, type[str] | type[float]] = {"objects": str, "frictions": float, "families": str}
 """Settings that are lists, and of what."""
-WORDS: dict[type, str] = {str: "text", float: "numbers", int: "a whole number"}
+WORDS: dict[type, str] = {
+    str: "text", float: "numbers", int: "a whole number", bool: "true or false",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +64,18 @@ class DatasetConfig:
     """Held beside the usual ones."""
     seed: int = 0
     """For everything random."""
+    scenes: bool = False
+    """Whether each grasp is also written as a MuJoCo scene."""
+    title: str = "four-finger grasps"
+    """What the dataset is called; this and what follows is for its card, and decides no row."""
+    license: str = ""
+    """Of the dataset, such as `CC-BY-4.0`."""
+    creator: str = ""
+    """Who made it."""
+    url: str = ""
+    """Where it is to be found."""
+    published: str = ""
+    """When, such as `2026-11-22`; no clock is asked, so that the same is made again."""
 
     def __post_init__(self) -> None:
         for name in ("objects", "frictions", "families"):
@@ -120,7 +138,8 @@ def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
 
 def _typed(name: str, value: Any) -> Any:
     """A setting of the type it has in the configuration."""
-    wanted = LISTS.get(name, int if name in LEAST else str)
+    kinds = {**LISTS, **dict.fromkeys(LEAST, int), **dict.fromkeys(SWITCHES, bool)}
+    wanted = kinds.get(name, str)
     if name not in LISTS:
         if not _is(value, wanted):
             raise InputError(f"{name}: expected {WORDS[wanted]}, got {value!r}")
@@ -135,7 +154,7 @@ def _typed(name: str, value: Any) -> Any:
 
 def _is(value: object, wanted: type) -> bool:
     if isinstance(value, bool):
-        return False
+        return wanted is bool
     return isinstance(value, (int, float) if wanted is float else wanted)
 
 
@@ -149,6 +168,8 @@ def config_to_toml(config: DatasetConfig) -> str:
 def _as_toml(value: object) -> str:
     if isinstance(value, tuple):
         return f"[{', '.join(map(_as_toml, cast('tuple[object, ...]', value)))}]"
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, str):
         return '"' + "".join(_escaped(letter) for letter in value) + '"'
     return repr(value)

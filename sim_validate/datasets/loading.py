@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from grasp_core.errors import InputError
-from sim_validate.datasets.build import read_manifest
 from sim_validate.datasets.columns import TABLES, Name
+from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.rows import SPLITS
 from sim_validate.datasets.tables import Columns, read_columns
 
@@ -27,9 +27,11 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
     if split is not None and split not in splits:
         raise InputError(f"split: expected one of {', '.join(splits)}, got {split!r}")
     root = Path(folder)
-    listed = [each for each in read_manifest(root)["files"] if "table" in each]
-    wanted = [each for each in listed if split is None or Path(each["path"]).name.startswith(split)]
+    manifest = read_manifest(root)
     return {
-        name: read_columns([root / each["path"] for each in wanted if each["table"] == name], name)
+        name: read_columns(
+            [root / each.path for each in manifest.of_table(name) if split in (None, each.split)],
+            name,
+        )
         for name in TABLES
     }

@@ -1,4 +1,4 @@
-"""A work unit -> rows of the tables: its object, its grasps with their controls, their trials."""
+"""A work unit -> rows of the tables and files: its object, its grasps with their controls."""
 
 import hashlib
 from collections.abc import Callable, Iterable, Mapping
@@ -10,7 +10,8 @@ from grasp_core.planner import plan
 from grasp_core.values import FINGERS, Contact, Grasp, Polyhedron
 from sim_validate.control_trials import ControlVerdict
 from sim_validate.datasets.columns import Name
-from sim_validate.datasets.units import WorkUnit, body_of
+from sim_validate.datasets.meshes import mesh_path, mesh_text
+from sim_validate.datasets.units import WorkUnit
 from sim_validate.setup import Agenda
 from sim_validate.validation import Verdict, WrenchVerdict, validate
 from sim_validate.verdict import HoldVerdict, Outcome
@@ -23,14 +24,31 @@ SHORT = 16
 """Digits of an object's hash in the names of its grasps."""
 
 
-def rows_of(unit: WorkUnit) -> Rows:
+@dataclass(frozen=True, slots=True)
+class Made:
+    """What comes of a unit."""
+
+    object_id: str
+    split: str
+    rows: Rows
+    files: Mapping[str, str]
+    """Texts by their paths in the dataset's folder."""
+
+
+def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
     """Plan the grasps of a unit, try each in simulation, and write down everything.
 
+    Args:
+        unit: What to do.
+        body: Its object.
+
     Raises:
-        GraspError: The mesh is refused, or the simulator fails its gate.
+        GraspError: The simulator fails its gate.
     """
-    body, config = body_of(unit), unit.config
+    config = unit.config
     found = _Rows(body, unit)
+    mesh = mesh_path(Path(), body.content_sha256).as_posix()
+    files = {mesh: mesh_text(body)}
     agenda = Agenda(random_wrenches=config.random_wrenches, limits=config.limits, seed=config.seed)
     for family in config.families:
         planned = plan(
@@ -38,12 +56,20 @@ def rows_of(unit: WorkUnit) -> Rows:
             seed=config.seed,
         )  # fmt: skip
         for grasp in planned.grasps:
-            found.add(grasp, validate(body, grasp, unit.friction, agenda=agenda))
-    return {
-        "objects": (_object_row(body, unit),),
-        "grasps": tuple(found.grasps),
-        "trials": tuple(found.trials),
-    }
+            verdict = validate(body, grasp, unit.friction, agenda=agenda)
+            found.add(grasp, verdict)
+            if config.scenes:
+                files[f"scenes/{found.name(grasp.id)}.xml"] = verdict.scene.xml
+    row = _object_row(body, unit)
+    rows: Rows = {
+        "objects": (row,), "grasps": tuple(found.grasps), "trials": tuple(found.trials),
+    }  # fmt: skip
+    return Made(body.content_sha256, row["split"], rows, files)
+
+
+def id_beginning(object_id: str, friction: float) -> str:
+    """What the names of all grasps of a unit begin with."""
+    return f"{object_id[:SHORT]}-{friction}-"
 
 
 def split_of(object_id: str, seed: int) -> str:
@@ -80,7 +106,7 @@ class _Rows:
 
     def add(self, grasp: Grasp, verdict: Verdict) -> None:
         """Write down a grasp, its negative controls, and the trials of all."""
-        name = self._name(grasp.id)
+        name = self.name(grasp.id)
         friction = verdict.critical_friction
         self.grasps.append(
             self._common(name, grasp.contacts)
@@ -128,8 +154,9 @@ class _Rows:
         )
         self._add_trials(name, verdict.tried, lambda _: {})
 
-    def _name(self, grasp: str) -> str:
-        return f"{self.body.content_sha256[:SHORT]}-{self.unit.friction}-{grasp}"
+    def name(self, grasp: str) -> str:
+        """What a grasp is called in the whole dataset."""
+        return id_beginning(self.body.content_sha256, self.unit.friction) + grasp
 
     def _common(self, name: str, contacts: Iterable[Contact]) -> dict[str, Any]:
         listed = list(contacts)

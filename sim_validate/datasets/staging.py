@@ -15,13 +15,24 @@ from pathlib import Path
 from typing import Any, cast
 
 from sim_validate.datasets.columns import TABLES, Name
-from sim_validate.datasets.rows import Row, Rows
-from sim_validate.datasets.tables import parquet_bytes, read_rows
+from sim_validate.datasets.rows import Made
+from sim_validate.datasets.tables import parquet_bytes
 from sim_validate.datasets.units import WorkUnit
 
 RECORD = "unit.json"
+OTHERS = "others"
+"""Folder of what is no table."""
 UNFINISHED = "."
 """First letter of the names of temporary folders."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """A unit that has rows."""
+
+    unit: WorkUnit
+    object_id: str
+    split: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,18 +48,23 @@ class Staging:
             if path.name.startswith(UNFINISHED):
                 shutil.rmtree(path)
 
-    def write(self, unit: WorkUnit, rows: Rows) -> None:
-        """Keep the rows of a finished unit."""
-        files = {f"{name}.parquet": parquet_bytes(name, rows[name], {}) for name in TABLES}
-        self._put(unit, files, {})
+    def write(self, unit: WorkUnit, made: Made) -> None:
+        """Keep what came of a finished unit."""
+        tables = {_file(name): parquet_bytes(name, made.rows[name], {}) for name in TABLES}
+        others = {f"{OTHERS}/{path}": text.encode() for path, text in made.files.items()}
+        about = {"object_id": made.object_id, "split": made.split}
+        self._put(unit, {**tables, **others}, about)
 
     def quarantine(self, unit: WorkUnit, reason: str) -> None:
         """Note that a unit cannot be done."""
         self._put(unit, {}, {"reason": reason})
 
-    def reason(self, unit: WorkUnit) -> str | None:
-        """Why a unit cannot be done; None if it is done."""
-        return self._record(unit).get("reason")
+    def result(self, unit: WorkUnit) -> Finished | str:
+        """What a unit came to, or why it cannot be done."""
+        record = self._record(unit)
+        if "reason" in record:
+            return str(record["reason"])
+        return Finished(unit, str(record["object_id"]), str(record["split"]))
 
     def done(self, unit: WorkUnit) -> bool:
         """Whether a unit is finished or quarantined, and all its files are as they were written."""
@@ -65,10 +81,13 @@ class Staging:
         """Whether there is anything of a unit: its rows, or why there are none."""
         return self._of(unit).is_dir()
 
-    def rows(self, unit: WorkUnit, name: Name) -> list[Row]:
-        """The rows of a finished unit in one of the tables."""
-        path = self._of(unit) / f"{name}.parquet"
-        return list[Row](read_rows(path)) if path.is_file() else []
+    def table(self, unit: WorkUnit, name: Name) -> Path:
+        """The file of a finished unit's rows in one of the tables."""
+        return self._of(unit) / _file(name)
+
+    def copy_files(self, unit: WorkUnit, folder: Path) -> None:
+        """Put what a finished unit made beside its rows into the dataset."""
+        shutil.copytree(self._of(unit) / OTHERS, folder, dirs_exist_ok=True)
 
     def forget(self, unit: WorkUnit) -> None:
         """Remove what there is of a unit that is not done: damaged files."""
@@ -94,7 +113,9 @@ class Staging:
         made = Path(tempfile.mkdtemp(dir=self.folder, prefix=f"{UNFINISHED}{unit.id}."))
         try:
             for name, data in {**files, RECORD: json.dumps(record).encode()}.items():
-                with (made / name).open("wb") as stream:
+                path = made / name
+                path.parent.mkdir(parents=True, exist_ok=True)
+                with path.open("wb") as stream:
                     stream.write(data)
                     stream.flush()
                     os.fsync(stream.fileno())
@@ -103,6 +124,10 @@ class Staging:
             shutil.rmtree(made, ignore_errors=True)
             if not self.done(unit):  # else another attempt was faster, with the same rows
                 raise
+
+
+def _file(name: Name) -> str:
+    return f"{name}.parquet"
 
 
 def _sha256(data: bytes) -> str:

@@ -9,6 +9,7 @@ import io
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -23,6 +24,10 @@ Columns: TypeAlias = dict[str, NDArray[Any]]
 TYPES = {"text": "string", "bool": "bool_", "int": "int64", "float": "float64"}
 MISSING: Mapping[str, float] = {"float": math.nan, "int": 0}
 """What stands for null in arrays."""
+GROUP_ROWS = 20_000
+"""Rows that are written at a time, some tens of megabytes in memory."""
+FILE_ROWS = 500_000
+"""A file has at least so many rows before the next one is begun, about 100 MB of grasps."""
 PAGES: Mapping[str, Any] = {
     "compression": "zstd",
     "write_page_checksum": True,
@@ -68,18 +73,115 @@ def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[
     return held.getvalue()
 
 
-def read_rows(path: Path) -> list[dict[str, Any]]:
-    """The rows of a file, all checksums checked.
+def as_read(name: Name, rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Rows as they come back from a file: sorted, with null for what is no number."""
+    return _parquet().read_table(io.BytesIO(parquet_bytes(name, rows, {}))).to_pylist()
+
+
+def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[dict[str, Any]]:
+    """The rows of a file, all checksums checked; some columns only if given.
 
     Raises:
         InputError: It is no such file, or damaged.
     """
+    return _read(path, columns).to_pylist()
+
+
+def _read(path: Path, columns: Sequence[str] | None = None) -> Any:
     arrow, parquet = _pyarrow(), _parquet()
+    chosen = None if columns is None else list(columns)
     try:
-        table = parquet.ParquetFile(path, page_checksum_verification=True).read()
+        return parquet.ParquetFile(path, page_checksum_verification=True).read(chosen)
     except (OSError, arrow.ArrowException) as error:
         raise InputError(f"{path}: cannot be read, or is damaged ({error})") from error
-    return table.to_pylist()
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenTable:
+    """A file of a table."""
+
+    name: Name
+    split: str
+    path: Path
+    rows: int
+
+
+class TableFiles:
+    """Files of tables as they grow, for each table and split one after another.
+
+    Rows are kept back until there are enough for a group of rows, so memory does not grow.
+    """
+
+    def __init__(self, folder: Path, about: Mapping[str, str]) -> None:
+        self._folder = folder
+        self._about = dict(sorted(about.items()))
+        self._parts: dict[tuple[Name, str], _Part] = {}
+
+    def add(self, name: Name, split: str, paths: Iterable[Path]) -> None:
+        """Add the rows of some files, whose keys come after all that were added before.
+
+        Raises:
+            InputError: A file is damaged, or two rows have the same key.
+        """
+        arrow, keys = _pyarrow(), list(KEYS[name])
+        table = arrow.concat_tables([_read(path) for path in paths])
+        table = table.sort_by([(key, "ascending") for key in keys])
+        if table.group_by(keys).aggregate([]).num_rows < table.num_rows:
+            raise InputError(f"{name}: two rows have the same {' and '.join(keys)}")
+        part = self._parts.setdefault((name, split), _Part(self._folder / name, split))
+        part.add(table.replace_schema_metadata(self._about))
+
+    def close(self) -> list[WrittenTable]:
+        """Write what waits, and name the files."""
+        return [
+            WrittenTable(name, split, path, rows)
+            for (name, split), part in sorted(self._parts.items())
+            for path, rows in part.close()
+        ]
+
+
+class _Part:
+    """The files of one table and split."""
+
+    def __init__(self, folder: Path, split: str) -> None:
+        self._folder, self._split = folder, split
+        self._waiting: list[Any] = []
+        self._writer: Any = None
+        self._rows: list[int] = []
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def add(self, table: Any) -> None:
+        self._waiting.append(table)
+        if sum(each.num_rows for each in self._waiting) >= GROUP_ROWS:
+            self._flush()
+
+    def close(self) -> list[tuple[Path, int]]:
+        if self._waiting:
+            self._flush()
+        if self._writer is not None:
+            self._writer.close()
+        files = len(self._rows)
+        named = [self._folder / f"{self._split}-{i:05}-of-{files:05}.parquet" for i in range(files)]
+        return [
+            (self._path(i).rename(path), rows)
+            for i, (path, rows) in enumerate(zip(named, self._rows, strict=True))
+        ]
+
+    def _path(self, number: int) -> Path:
+        return self._folder / f".{self._split}-{number:05}"
+
+    def _flush(self) -> None:
+        table = _pyarrow().concat_tables(self._waiting)
+        self._waiting.clear()
+        if self._writer is None:
+            path = self._path(len(self._rows))
+            self._writer = _parquet().ParquetWriter(path, table.schema, **PAGES)
+            self._rows.append(0)
+        self._writer.write_table(table, row_group_size=table.num_rows)
+        self._rows[-1] += table.num_rows
+        if self._rows[-1] >= FILE_ROWS:
+            self._writer.close()
+            self._writer = None
 
 
 def read_columns(paths: Sequence[Path], name: Name) -> Columns:

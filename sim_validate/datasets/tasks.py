@@ -17,9 +17,9 @@ from typing import Any, TypeAlias
 
 from grasp_core.errors import GraspError
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.rows import rows_of
+from sim_validate.datasets.rows import made_of
 from sim_validate.datasets.staging import Staging
-from sim_validate.datasets.units import WorkUnit, provenance, units_of
+from sim_validate.datasets.units import WorkUnit, body_of, provenance, units_of
 
 
 class WorkerError(GraspError):
@@ -41,13 +41,13 @@ Work: TypeAlias = Callable[[WorkUnit, Staging], None]
 def do_unit(unit: WorkUnit, staging: Staging) -> None:
     """Make the rows of a unit and keep them, or the reason why there are none."""
     try:
-        rows = rows_of(unit)
+        made = made_of(unit, body_of(unit))
     except GraspError as error:
         staging.quarantine(unit, str(error))
     except MemoryError:
         staging.quarantine(unit, "out of memory")
     else:
-        staging.write(unit, rows)
+        staging.write(unit, made)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +121,8 @@ def _memory_kept(more: int | None) -> Generator[None]:
 def _load() -> None:
     """Do a small unit, so that all is loaded that units need."""
     config = DatasetConfig(objects=("tetrahedron",), families=("concurrent",), limit=1)
-    rows_of(units_of(config)[0])
+    (unit,) = units_of(config)
+    made_of(unit, body_of(unit))
 
 
 def _address_space() -> int:

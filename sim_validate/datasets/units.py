@@ -20,12 +20,12 @@ from grasp_core.polyhedra import load_polyhedron
 from grasp_core.values import Polyhedron
 from grasp_core.versions import versions
 from scenes.objects import example_object
-from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.config import CREDITS, DatasetConfig
 
 CHUNK = 2**20
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
-OWN_TO_UNITS = ("objects", "frictions")
-"""Settings that each unit has for itself."""
+APART = ("objects", "frictions", *CREDITS)
+"""Settings that each unit has for itself, or that decide no row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +64,7 @@ def provenance() -> Mapping[str, str]:
 def shared_settings(config: DatasetConfig) -> dict[str, object]:
     """What decides the rows of every unit: all but which objects and frictions there are."""
     return {
-        each.name: getattr(config, each.name)
-        for each in fields(config)
-        if each.name not in OWN_TO_UNITS
+        each.name: getattr(config, each.name) for each in fields(config) if each.name not in APART
     }
 
 

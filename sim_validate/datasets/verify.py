@@ -1,6 +1,5 @@
 """Is a dataset what its manifest says, and do its rows keep the laws of what they describe?"""
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence, Set
 from pathlib import Path
 from typing import Any
@@ -9,62 +8,73 @@ import numpy as np
 
 from grasp_core.closure import force_closure
 from grasp_core.errors import GraspError, InputError
-from sim_validate.datasets.build import MANIFEST, read_manifest
+from grasp_core.mesh import nearest_on_surface
 from sim_validate.datasets.columns import KEYS, TABLES, Name
+from sim_validate.datasets.manifest import MANIFEST, Listed, listed, read_manifest
+from sim_validate.datasets.meshes import stored_surface
+from sim_validate.datasets.redo import Sample, sample_faults
 from sim_validate.datasets.tables import read_rows, require_pyarrow
 
 SAME_MARGIN = 1e-6
 """How far a closure margin may be from that of the contacts, relative to the friction."""
+ON_SURFACE = 1e-6
+"""How far contacts may be from the object's surface, relative to its size."""
 UNIT = 1e-9
 """How far normals may be from unit length."""
 
 
-def verify(folder: Path) -> list[str]:
+def verify(folder: Path, sample: Sample | None = None) -> list[str]:
     """What is wrong with a dataset, a line each; nothing where all is well.
 
-    Hashes, sizes and page checksums of all files; counts, keys and references of rows; and of each
-    contact set its normals, its closure proved again, and that its trials say what it says.
+    Hashes, sizes and page checksums of all files; counts, keys and references of rows; of each
+    contact set its normals, its closure proved again, and that its trials say what it says; and
+    of a sample, whether planning and simulating again gives the same rows.
+
+    Args:
+        folder: Of the dataset.
+        sample: What to plan and simulate again; nothing if not given.
 
     Raises:
         InputError: The folder holds no finished dataset, or pyarrow is not installed.
     """
     require_pyarrow()
     manifest = read_manifest(folder)
-    faults = list(_file_faults(folder, manifest["files"]))
-    if faults:
+    if faults := list(_file_faults(folder, manifest.files)):
         return faults
     rows: dict[Name, list[dict[str, Any]]] = {name: [] for name in TABLES}
-    for each in manifest["files"]:
-        if "table" not in each:
+    for each in manifest.files:
+        if each.table is None:
             continue
         try:
-            found = read_rows(folder / each["path"])
+            found = read_rows(folder / each.path)
         except InputError as error:
             return [str(error)]
-        if len(found) != each["rows"]:
-            faults.append(f"{each['path']}: {len(found)} rows, listed are {each['rows']}")
-        rows[each["table"]] += found
-    return [*faults, *_row_faults(rows)]
+        if len(found) != each.rows:
+            faults.append(f"{each.path}: {len(found)} rows, listed are {each.rows}")
+        rows[each.table] += found
+    faults += [*_row_faults(rows), *_mesh_faults(folder, rows)]
+    if sample is not None and not faults:
+        faults += sample_faults(folder, manifest, rows, sample)
+    return faults
 
 
-def _file_faults(folder: Path, files: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    listed = {str(each["path"]) for each in files}
+def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
+    names = {each.path for each in files}
     there = {
         path.relative_to(folder).as_posix()
         for path in folder.rglob("*")
         if path.is_file() and path.name not in (MANIFEST, ".lock")
     }
-    yield from (f"{path}: not in the manifest" for path in sorted(there - listed))
+    yield from (f"{path}: not in the manifest" for path in sorted(there - names))
     for each in files:
-        path = folder / each["path"]
-        if str(each["path"]) not in there:
-            yield f"{each['path']}: missing"
+        if each.path not in there:
+            yield f"{each.path}: missing"
             continue
-        data = path.read_bytes()
-        if len(data) != each["bytes"]:
-            yield f"{each['path']}: {len(data)} bytes, listed are {each['bytes']}"
-        elif hashlib.sha256(data).hexdigest() != each["sha256"]:
-            yield f"{each['path']}: its contents are not what was written (sha256 differs)"
+        found = listed(folder, folder / each.path)
+        if found.bytes != each.bytes:
+            yield f"{each.path}: {found.bytes} bytes, listed are {each.bytes}"
+        elif found.sha256 != each.sha256:
+            yield f"{each.path}: its contents are not what was written (sha256 differs)"
 
 
 def _row_faults(rows: Mapping[Name, Sequence[Mapping[str, Any]]]) -> Iterator[str]:
@@ -85,6 +95,24 @@ def _row_faults(rows: Mapping[Name, Sequence[Mapping[str, Any]]]) -> Iterator[st
         if len(trials) != row["trials"] or row["held"] != all(one == "held" for one in trials):
             faults.append("its trials say something else")
         yield from (f"grasps: {name}: {fault}" for fault in faults)
+
+
+def _mesh_faults(folder: Path, rows: Mapping[Name, Sequence[Mapping[str, Any]]]) -> Iterator[str]:
+    """Whether meshes are those of their objects, and contacts are on them."""
+    points: dict[str, list[list[float]]] = {row["object_id"]: [] for row in rows["objects"]}
+    for row in rows["grasps"]:
+        points.get(row["object_id"], []).extend(row["contact_points_m"][: row["contacts"]])
+    for row in rows["objects"]:
+        try:
+            vertices, triangles = stored_surface(folder, row["object_id"])
+        except InputError as error:
+            yield str(error)
+            continue
+        contacts = np.array(points[row["object_id"]]).reshape(-1, 3)
+        nearest = nearest_on_surface(vertices, triangles, contacts)
+        away = np.linalg.norm(nearest - contacts, axis=1)
+        if (off := int((away > ON_SURFACE * row["radius_m"]).sum())) > 0:
+            yield f"grasps: {off} contacts of {row['source_name']} are not on the object"
 
 
 def _reference_faults(

@@ -11,8 +11,9 @@ import trimesh
 import grasp_core as gc
 import sim_validate
 from sim_validate.datasets import build as build_module
-from sim_validate.datasets.build import build, read_manifest
+from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.manifest import read_manifest, write_manifest
 from sim_validate.datasets.tables import parquet_bytes, read_rows
 from sim_validate.datasets.tasks import Limits
 from sim_validate.datasets.units import units_of
@@ -237,12 +238,13 @@ def forged(folder, name, change):
     change(rows)
     data = parquet_bytes(name, rows, {})
     path.write_bytes(data)
-    manifest = read_manifest(folder)
-    (entry,) = [
-        each for each in manifest["files"] if each["path"] == path.relative_to(folder).as_posix()
-    ]
-    entry |= {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest(), "rows": len(rows)}
-    (folder / "manifest.json").write_text(json.dumps(manifest))
+    manifest, name = read_manifest(folder), path.relative_to(folder).as_posix()
+    others = [each for each in manifest.files if each.path != name]
+    (entry,) = [each for each in manifest.files if each.path == name]
+    changed = dataclasses.replace(
+        entry, bytes=len(data), sha256=hashlib.sha256(data).hexdigest(), rows=len(rows)
+    )
+    write_manifest(folder, dataclasses.replace(manifest, files=(*others, changed)))
 
 
 @pytest.mark.parametrize(
@@ -257,6 +259,11 @@ def forged(folder, name, change):
         ("grasps", lambda rows: rows[0].update(held=not rows[0]["held"]), "its trials say"),
         ("grasps", lambda rows: rows[0].update(object_id="0" * 64), "its object is not there"),
         ("grasps", lambda rows: rows[0].update(force_closed=False), "force-closed is"),
+        (
+            "grasps",
+            lambda rows: rows[0]["contact_points_m"].__setitem__(0, [1.0, 0.0, 0.0]),
+            "not on the object",
+        ),
         ("trials", lambda rows: rows.pop(), "its trials say something else"),
         ("trials", lambda rows: rows[0].update(grasp_id="nobody"), "nobody is no grasp"),
         ("trials", lambda rows: rows[0].update(outcome="slipped"), "its trials say something else"),

@@ -6,7 +6,7 @@ import pytest
 import grasp_core as gc
 from sim_validate.datasets.columns import KEYS, TABLES
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.rows import rows_of, split_of
+from sim_validate.datasets.rows import made_of, split_of
 from sim_validate.datasets.tables import parquet_bytes, read_rows
 from sim_validate.datasets.units import body_of, units_of
 
@@ -21,7 +21,7 @@ def unit():
 
 @pytest.fixture(scope="module")
 def rows(unit):
-    return rows_of(unit)
+    return made_of(unit, body_of(unit)).rows
 
 
 @pytest.fixture
@@ -84,7 +84,10 @@ def test_files_do_not_depend_on_the_order_of_rows_nor_on_when_they_are_made(unit
     for name in TABLES:
         once = parquet_bytes(name, rows[name], {"a": "1", "b": "2"})
         assert parquet_bytes(name, rows[name][::-1], {"b": "2", "a": "1"}) == once
-        assert parquet_bytes(name, rows_of(unit)[name], {"a": "1", "b": "2"}) == once
+        assert (
+            parquet_bytes(name, made_of(unit, body_of(unit)).rows[name], {"a": "1", "b": "2"})
+            == once
+        )
 
 
 def test_columns_say_their_units(written):

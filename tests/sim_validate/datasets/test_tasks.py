@@ -96,7 +96,7 @@ def test_memory_is_limited_while_a_unit_is_done_and_no_longer(staging):
     given = task(staging, note_memory, Limits(600.0, 2**30))
     with local_processes(1) as engine:
         engine.submit(do_task, given).result()
-    assert staging.reason(given.unit) == "limited"
+    assert staging.result(given.unit) == "limited"
     assert resource.getrlimit(resource.RLIMIT_AS) == before
 
 
@@ -108,7 +108,7 @@ def test_a_process_in_which_a_unit_never_ends_is_ended(staging, never):
         assert failed is not None
         assert time.monotonic() - began < 30.0  # both go on for a minute or more
         engine.submit(do_task, task(staging, note_memory)).result()
-    assert staging.reason(units_of(CONFIG)[0]) == "unlimited"
+    assert staging.result(units_of(CONFIG)[0]) == "unlimited"
 
 
 @pytest.mark.slow

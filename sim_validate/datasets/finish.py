@@ -1,0 +1,87 @@
+"""From the rows of all units to the files of a dataset, an object at a time.
+
+Rows are sorted by object, then by their table's key, so the files do not depend on which unit was
+done when, where, or in which run; nothing but the rows of one object, and those that wait to be
+written, is in memory.
+"""
+
+import json
+import shutil
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import groupby
+from pathlib import Path
+
+from sim_validate.datasets.columns import TABLES
+from sim_validate.datasets.config import DatasetConfig, config_to_toml
+from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest, listed, write_manifest
+from sim_validate.datasets.staging import Finished, Staging
+from sim_validate.datasets.tables import TableFiles
+from sim_validate.datasets.units import WorkUnit, provenance
+from sim_validate.files import write_text
+
+DATA = "data"
+EXTRAS = ("meshes", "scenes")
+"""Folders of files that units make beside their rows."""
+
+
+def finish(
+    config: DatasetConfig, units: Sequence[WorkUnit], staging: Staging, folder: Path
+) -> None:
+    """Put the rows of all units into tables, list all files, and remove what was staged."""
+    for name in (DATA, *EXTRAS):
+        shutil.rmtree(folder / name, ignore_errors=True)
+    good, quarantined = _sorted_out(units, staging)
+    tables = _write_tables(config, good, staging, folder)
+    for each in good:
+        staging.copy_files(each.unit, folder)
+    lines = "".join(json.dumps(each, sort_keys=True) + "\n" for each in quarantined)
+    others = [
+        write_text(folder / "config.toml", config_to_toml(config)),
+        write_text(folder / "quarantine.jsonl", lines),
+        *(path for name in EXTRAS for path in sorted((folder / name).glob("*"))),
+    ]
+    manifest = Manifest(
+        config_sha256=config.sha256,
+        versions=dict(provenance()),
+        units=len(units),
+        quarantined=len(quarantined),
+        files=(*tables, *(listed(folder, path) for path in others)),
+    )
+    write_manifest(folder, manifest)
+    shutil.rmtree(staging.folder)
+
+
+def _sorted_out(
+    units: Sequence[WorkUnit], staging: Staging
+) -> tuple[list[Finished], list[dict[str, object]]]:
+    """Units with rows of their own, by object, and why others have none."""
+    good, quarantined = list[Finished](), list[dict[str, object]]()
+    first: dict[tuple[str, float], str] = {}
+    for unit in sorted(units, key=lambda each: (each.object, each.friction)):
+        found = staging.result(unit)
+        if isinstance(found, Finished):
+            other = first.setdefault((found.object_id, unit.friction), unit.object)
+            if other == unit.object:
+                good.append(found)
+                continue
+            found = f"the same object as {other}"
+        quarantined.append({"object": unit.object, "friction": unit.friction, "reason": found})
+    return sorted(good, key=lambda each: (each.object_id, each.unit.friction)), quarantined
+
+
+def _write_tables(
+    config: DatasetConfig, good: Sequence[Finished], staging: Staging, folder: Path
+) -> list[Listed]:
+    about = {"schema": str(SCHEMA), "config_sha256": config.sha256}
+    files = TableFiles(folder / DATA, about)
+    for _, same in groupby(good, key=lambda each: each.object_id):
+        of_object = list(same)
+        for name in TABLES:
+            chosen = of_object[:1] if name == "objects" else of_object
+            paths = [staging.table(each.unit, name) for each in chosen]
+            files.add(name, of_object[0].split, paths)
+    return [
+        replace(listed(folder, each.path), table=each.name, split=each.split, rows=each.rows)
+        for each in files.close()
+    ]

@@ -1,0 +1,58 @@
+"""Canonical meshes of a dataset: a file in metres that gives back exactly the same solid."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.errors import InputError
+from grasp_core.mesh import read_triangles
+from grasp_core.polyhedra import content_hash, load_polyhedron
+from grasp_core.values import FaceKind, Polyhedron
+
+FOLDER = "meshes"
+
+
+def mesh_text(body: Polyhedron) -> str:
+    """An OBJ file of a solid; every number reads back as it is [m]."""
+    points = [f"v {x!r} {y!r} {z!r}\n" for x, y, z in body.vertices.tolist()]
+    triangles = [f"f {i} {j} {k}\n" for i, j, k in (body.triangles + 1).tolist()]
+    return "".join(points + triangles)
+
+
+def mesh_path(folder: Path, object_id: str) -> Path:
+    """Where a dataset keeps the mesh of an object."""
+    return folder / FOLDER / f"{object_id}.obj"
+
+
+def stored_surface(folder: Path, object_id: str) -> tuple[Array, Indices]:
+    """Vertices (n, 3) [m] and triangles (t, 3) of an object of a dataset.
+
+    Raises:
+        MeshError: The mesh is missing, or cannot be read.
+        InputError: It is another object's.
+    """
+    path = mesh_path(folder, object_id)
+    vertices, triangles, _ = read_triangles(path)
+    if (found := content_hash(vertices, triangles)) != object_id:
+        raise InputError(f"{path}: is the mesh of another object, {found}")
+    return vertices, triangles
+
+
+def stored_body(folder: Path, object_id: str, name: str, faces: FaceKind) -> Polyhedron:
+    """An object of a dataset, from its canonical mesh.
+
+    Args:
+        folder: Of the dataset.
+        object_id: Its hash.
+        name: What to call it.
+        faces: How its faces were found.
+
+    Raises:
+        MeshError: The mesh is missing, or no solid.
+        InputError: It is another object's.
+    """
+    path = mesh_path(folder, object_id)
+    body = load_polyhedron(path, faces=faces)
+    if body.content_sha256 != object_id:
+        raise InputError(f"{path}: is the mesh of another object, {body.content_sha256}")
+    return replace(body, name=name)
