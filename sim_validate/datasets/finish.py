@@ -21,6 +21,8 @@ from sim_validate.datasets.units import WorkUnit, provenance
 from sim_validate.files import write_text
 
 DATA = "data"
+TWIN = "the same object as"
+"""How the reason begins why an object's rows are not there a second time."""
 EXTRAS = ("meshes", "scenes")
 """Folders of files that units make beside their rows."""
 
@@ -65,7 +67,7 @@ def _sorted_out(
             if other == unit.object:
                 good.append(found)
                 continue
-            found = f"the same object as {other}"
+            found = f"{TWIN} {other}"
         quarantined.append({"object": unit.object, "friction": unit.friction, "reason": found})
     return sorted(good, key=lambda each: (each.object_id, each.unit.friction)), quarantined
 

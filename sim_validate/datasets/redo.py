@@ -6,6 +6,7 @@ those of the analysis by rounding.
 """
 
 import hashlib
+import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,11 +16,13 @@ from typing import Any, cast
 from grasp_core.errors import GraspError
 from sim_validate.datasets.columns import KEYS, TABLES, Name
 from sim_validate.datasets.config import config_from_toml
+from sim_validate.datasets.finish import TWIN
 from sim_validate.datasets.manifest import Manifest
 from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.rows import id_beginning, made_of
 from sim_validate.datasets.tables import as_read
 from sim_validate.datasets.units import WorkUnit, provenance
+from sim_validate.files import read_text
 
 ROUNDING = 1e-6
 """How far numbers of the analysis may be apart with other packages, relative to the larger."""
@@ -59,10 +62,8 @@ def sample_faults(folder: Path, manifest: Manifest, rows: Rows, sample: Sample) 
     config = config_from_toml(folder / "config.toml")
     exact = manifest.versions == dict(provenance())
     bodies = {row["object_id"]: row for row in rows["objects"]}
-    units = sorted(
-        {(row["object_id"], row["friction"]) for row in rows["grasps"] if row["label"] == "grasp"}
-    )
-    for object_id, friction in _drawn(units, sample):
+    units = _units(folder, bodies, config.frictions)
+    for object_id, friction in drawn(units, sample):
         about = bodies[object_id]
         where = f"{about['source_name']} at friction {friction}"
         try:
@@ -81,7 +82,22 @@ def sample_faults(folder: Path, manifest: Manifest, rows: Rows, sample: Sample) 
         yield from (f"{where}: {fault}" for fault in faults[:MOST_NAMED])
 
 
-def _drawn(units: Sequence[tuple[str, float]], sample: Sample) -> list[tuple[str, float]]:
+def _units(
+    folder: Path, bodies: Mapping[str, Mapping[str, Any]], frictions: Sequence[float]
+) -> list[tuple[str, float]]:
+    """Objects and frictions that have rows, though perhaps no grasp."""
+    lines = read_text(folder / "quarantine.jsonl").splitlines()
+    left_out = {(Path(each["object"]).name, each["friction"]) for each in map(json.loads, lines)
+                if not each["reason"].startswith(TWIN)}  # fmt: skip
+    return [
+        (object_id, friction)
+        for object_id in sorted(bodies)
+        for friction in sorted(frictions)
+        if (bodies[object_id]["source_name"], friction) not in left_out
+    ]
+
+
+def drawn(units: Sequence[tuple[str, float]], sample: Sample) -> list[tuple[str, float]]:
     """Units in an order that only the seed decides, so that a larger share holds a smaller one."""
 
     def place(unit: tuple[str, float]) -> bytes:

@@ -4,6 +4,7 @@ import json
 import shutil
 import sys
 
+import mujoco
 import numpy as np
 import pytest
 import trimesh
@@ -11,9 +12,11 @@ import trimesh
 import grasp_core as gc
 import sim_validate
 from sim_validate.datasets import build as build_module
+from sim_validate.datasets import tables
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.manifest import read_manifest, write_manifest
+from sim_validate.datasets.redo import Sample, drawn
 from sim_validate.datasets.tables import parquet_bytes, read_rows
 from sim_validate.datasets.tasks import Limits
 from sim_validate.datasets.units import units_of
@@ -274,6 +277,85 @@ def test_rows_that_contradict_each_other_are_named(copy, name, change, message):
     assert verify(copy) == []
     forged(copy, name, change)
     assert any(message in fault for fault in verify(copy))
+
+
+def test_all_of_it_comes_out_again(dataset):
+    assert verify(dataset, Sample(1.0)) == []
+
+
+def shifted(rows, column):
+    row = next(row for row in rows if row[column] is not None)
+    row[column] *= 1.0 + 1e-4
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "message"),
+    [
+        ("objects", lambda rows: shifted(rows, "volume_m3"), "volume_m3 is"),
+        ("grasps", lambda rows: shifted(rows, "ferrari_canny_lower_n"), "ferrari_canny_lower_n is"),
+        ("grasps", lambda rows: rows[0].update(family="pencil"), "family is pencil"),
+        ("trials", lambda rows: rows[0].update(name="gravity"), "name is gravity"),
+        ("trials", lambda rows: shifted(rows, "displacement_m"), "displacement_m is"),
+    ],
+)
+def test_what_comes_out_otherwise_is_named(copy, name, change, message):
+    forged(copy, name, change)
+    assert verify(copy) == []
+    faults = verify(copy, Sample(1.0))
+    assert any(message in fault for fault in faults)
+    manifest = read_manifest(copy)
+    older = manifest.versions | {"mujoco": "3.0.0"}
+    write_manifest(copy, dataclasses.replace(manifest, versions=older))
+    measured = name == "trials" and "displacement" in message
+    assert bool(verify(copy, Sample(1.0))) != measured  # another simulator may measure otherwise
+
+
+def test_a_grasp_that_was_left_out_is_named(copy):
+    (first, *_) = all_rows(copy, "grasps")
+    gone = first["grasp_id"]
+
+    def kept(row):
+        return gone not in (row["grasp_id"], row.get("control_of")) and not row[
+            "grasp_id"
+        ].startswith(f"{gone}:")
+
+    for name in ("grasps", "trials"):
+        forged(copy, name, lambda rows: rows.__setitem__(slice(None), list(filter(kept, rows))))
+    assert verify(copy) == []
+    assert any(gone in fault and "not there" in fault for fault in verify(copy, Sample(1.0)))
+
+
+def test_a_larger_sample_holds_a_smaller_one():
+    units = [(f"{i:064x}", 0.5) for i in range(100)]
+    some, more = drawn(units, Sample(0.1, seed=3)), drawn(units, Sample(0.25, seed=3))
+    assert (len(some), len(more)) == (10, 25)
+    assert more[:10] == some
+    assert drawn(units, Sample(0.1, seed=4)) != some
+    assert len(drawn(units, Sample(0.001))) == 1
+
+
+def test_scenes_are_written_on_request(dataset, tmp_path):
+    config = dataclasses.replace(CONFIG, scenes=True, objects=("tetrahedron",), frictions=(0.5,))
+    build(config, tmp_path / "ds", Here(), silent)
+    assert verify(tmp_path / "ds", Sample(1.0)) == []
+    rows = [row for row in all_rows(tmp_path / "ds", "grasps") if row["label"] == "grasp"]
+    scenes = {path.stem: path for path in (tmp_path / "ds" / "scenes").iterdir()}
+    assert rows
+    assert sorted(scenes) == sorted(row["grasp_id"] for row in rows)
+    for path in scenes.values():
+        assert mujoco.MjModel.from_xml_string(path.read_text()).ngeom > 4
+    assert not (dataset / "scenes").exists()
+
+
+def test_many_rows_take_several_files(dataset, tmp_path, monkeypatch):
+    monkeypatch.setattr(tables, "GROUP_ROWS", 5)
+    monkeypatch.setattr(tables, "FILE_ROWS", 12)
+    build(CONFIG, tmp_path / "ds", Here(), silent)
+    assert verify(tmp_path / "ds") == []
+    files = sorted((tmp_path / "ds" / "data" / "trials").glob("*.parquet"))
+    assert len(files) > len(list((dataset / "data" / "trials").glob("*.parquet")))
+    for name in ("objects", "grasps", "trials"):
+        assert all_rows(tmp_path / "ds", name) == all_rows(dataset, name)
 
 
 def test_a_dataset_is_loaded_as_arrays(dataset):

@@ -1,0 +1,62 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from scenes.objects import example_names, example_object
+from sim_validate.datasets.meshes import mesh_path, mesh_text, stored_body, stored_surface
+
+SCANS = Path(__file__).parents[4] / "shared" / "objects" / "ycb"
+NAMES = [*(name for name in example_names() if "FACES" not in name), "random-30-1"]
+
+
+def stored(body, folder):
+    path = mesh_path(folder, body.content_sha256)
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(mesh_text(body))
+    return stored_body(folder, body.content_sha256, body.name, "auto")
+
+
+def same(one, other):
+    fields = ("vertices", "triangles", "center_of_mass", "inertia", "normals")
+    return (
+        all(np.array_equal(getattr(one, name), getattr(other, name)) for name in fields)
+        and one.volume == other.volume
+        and one.content_sha256 == other.content_sha256
+        and len(one.faces) == len(other.faces)
+        and all(
+            np.array_equal(face.polygon, found.polygon)
+            for face, found in zip(one.faces, other.faces, strict=True)
+        )
+    )
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_stored_object_comes_back_to_the_last_bit(name, tmp_path):
+    body = example_object(name)
+    assert same(body, stored(body, tmp_path))
+    vertices, triangles = stored_surface(tmp_path, body.content_sha256)
+    np.testing.assert_array_equal(vertices, body.vertices)
+    np.testing.assert_array_equal(triangles, body.triangles)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not SCANS.is_dir(), reason="no scanned objects here")
+def test_stored_scans_come_back_to_the_last_bit(tmp_path):
+    paths = sorted(path for path in SCANS.rglob("*") if path.suffix in {".ply", ".obj", ".stl"})
+    assert len(paths) >= 6
+    for path in paths:
+        body = gc.load_polyhedron(path)
+        assert same(body, stored(body, tmp_path))
+
+
+def test_the_mesh_of_another_object_is_refused(tmp_path):
+    wedge, prism = example_object("wedge"), example_object("prism")
+    path = mesh_path(tmp_path, wedge.content_sha256)
+    path.parent.mkdir()
+    path.write_text(mesh_text(prism))
+    with pytest.raises(gc.InputError, match="another object"):
+        stored_body(tmp_path, wedge.content_sha256, "wedge", "auto")
+    with pytest.raises(gc.InputError, match="another object"):
+        stored_surface(tmp_path, wedge.content_sha256)
