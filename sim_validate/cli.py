@@ -158,6 +158,10 @@ class DatasetBuild:
     settings: OmitArgPrefixes[DatasetSettings] = field(default_factory=DatasetSettings)
     timeout_s: Positive = 3600.0
     """Give an object at one friction up after so long, twice [s]."""
+    engine: Literal["local", "ray", "dask"] = "local"
+    """Where objects are done: processes of this machine, or a Ray or Dask cluster."""
+    address: str | None = None
+    """Of the cluster; one is started on this machine if not given."""
     memory_mb: Count | None = None
     """What a process may ask for beyond what it needs to start."""
     jobs: Count = field(default_factory=available_cores)

@@ -1,5 +1,6 @@
 """The commands about datasets: to make one, to go on making it, and to check it."""
 
+from contextlib import AbstractContextManager
 from dataclasses import asdict, fields
 from pathlib import Path
 
@@ -7,9 +8,11 @@ from grasp_core.errors import InputError
 from grasp_core.mesh import FORMATS
 from grasp_core.requests import METHODS
 from sim_validate import cli, flags
+from sim_validate.clusters import dask_workers, ray_workers
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
+from sim_validate.datasets.driver import Engine
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.redo import Sample
 from sim_validate.datasets.tasks import Limits
@@ -27,7 +30,7 @@ def build_dataset(command: cli.DatasetBuild, reporter: Reporter) -> int:
     config = _asked(command)
     memory = None if command.memory_mb is None else command.memory_mb * MEGABYTE
     limits = Limits(command.timeout_s, memory)
-    with reporter.progress("building") as steps, local_processes(command.jobs) as engine:
+    with reporter.progress("building") as steps, _engine(command) as engine:
         built = build(config, command.out, engine, steps.update, limits)
     counts = ", ".join(f"{count} {name}" for name, count in built.rows.items())
     reporter.say(
@@ -38,6 +41,20 @@ def build_dataset(command: cli.DatasetBuild, reporter: Reporter) -> int:
         reporter.warn(f"{command.out / 'quarantine.jsonl'} says why objects were left out")
     reporter.document({"out": str(command.out), "manifest": asdict(read_manifest(command.out))})
     return cli.Exit.PARTIAL if built.quarantined else cli.Exit.GOOD
+
+
+def _engine(command: cli.DatasetBuild) -> AbstractContextManager[Engine]:
+    """Where units are done.
+
+    Raises:
+        InputError: The engine is not installed, or there is no cluster.
+    """
+    if command.engine != "local":
+        start = ray_workers if command.engine == "ray" else dask_workers
+        return start(command.jobs, command.address)
+    if command.address is not None:
+        raise InputError("--address is for --engine ray and dask")
+    return local_processes(command.jobs)
 
 
 def verify_dataset(command: cli.DatasetVerify, reporter: Reporter) -> int:

@@ -15,7 +15,7 @@ from typing import Protocol
 
 from sim_validate import interrupts
 from sim_validate.datasets.staging import Staging
-from sim_validate.datasets.tasks import Limits, Task, WorkerError, do_task
+from sim_validate.datasets.tasks import Limits, Task, Work, WorkerError, do_task, do_unit
 from sim_validate.datasets.units import WorkUnit, provenance
 
 AHEAD = 3
@@ -42,6 +42,7 @@ def drive(
     engine: Engine,
     report: Callable[[int, int], None],
     limits: Limits | None = None,
+    work: Work = do_unit,
 ) -> None:
     """Have units done, each kept or quarantined in the end.
 
@@ -51,13 +52,14 @@ def drive(
         engine: Where they are done.
         report: Told how many are finished, and of how many.
         limits: What each unit may take.
+        work: What is done with it.
 
     Raises:
         WorkerError: A worker cannot do units for this driver.
         OSError: Rows cannot be written.
     """
     own = dict(provenance())
-    waiting = deque(Task(unit, staging, own, limits) for unit in units)
+    waiting = deque(Task(unit, staging, own, limits, work) for unit in units)
     again, finished = list[Task](), 0
     under_way: dict[Future[None], Task] = {}
     while waiting or under_way:

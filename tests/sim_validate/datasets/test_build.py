@@ -22,7 +22,7 @@ from sim_validate.datasets.tasks import Limits
 from sim_validate.datasets.units import units_of
 from sim_validate.datasets.verify import verify
 from sim_validate.engines import local_processes
-from tests.sim_validate.datasets.engines import Here, silent
+from tests.sim_validate.datasets.engines import Here, contents, silent
 
 pytest.importorskip("pyarrow")
 CONFIG = DatasetConfig(
@@ -32,15 +32,6 @@ CONFIG = DatasetConfig(
 
 class KilledError(BaseException):
     """Stands for the end of the process."""
-
-
-def contents(folder):
-    """Hashes of all files of a dataset."""
-    return {
-        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.name != ".lock"
-    }
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,138 @@
+"""Work units on a Ray or Dask cluster, or on one started here; the door to both.
+
+Neither repeats a unit by itself: who gives up on a unit, and when, is decided in one place for all
+engines. Ray without `address`, and Dask likewise, start workers on this machine and stop them.
+"""
+
+import importlib
+import os
+from collections.abc import Callable, Generator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+from grasp_core.errors import InputError
+
+Unit = TypeVar("Unit")
+Result = TypeVar("Result")
+
+OBJECT_STORE_BYTES = 200 * 2**20
+"""Of a Ray started here; units and their rows go through files."""
+
+RAY_SETTINGS = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
+"""Nothing is told to anybody, and no GPU is hidden from what else runs here."""
+
+ANSWER_S = 10.0
+"""How long a Dask scheduler may take to answer [s]."""
+
+
+class RayCluster:
+    """Workers of a Ray cluster."""
+
+    def __init__(self, ray: Any, workers: int) -> None:
+        self.workers = workers
+        self._ray = ray
+        self._remote: dict[Callable[..., Any], Any] = {}
+
+    def submit(self, function: Callable[[Unit], Result], unit: Unit, /) -> "Future[Result]":
+        """Have a function called; its future fails where the worker ends."""
+        if function not in self._remote:
+            self._remote[function] = self._ray.remote(max_retries=0, num_cpus=1)(function)
+        return self._remote[function].remote(unit).future()
+
+
+class DaskCluster:
+    """Workers of a Dask cluster."""
+
+    def __init__(self, client: Any, workers: int) -> None:
+        self.workers = workers
+        self._executor = client.get_executor(pure=False, retries=0)
+
+    def submit(self, function: Callable[[Unit], Result], unit: Unit, /) -> "Future[Result]":
+        """Have a function called; its future fails where the worker ends."""
+        return self._executor.submit(function, unit)
+
+
+@contextmanager
+def ray_workers(workers: int, address: str | None) -> Generator[RayCluster]:
+    """Workers of a Ray cluster.
+
+    Args:
+        workers: How many to start here, if no address is given.
+        address: Of a cluster that runs, such as `auto` or `ray://head:10001`.
+
+    Raises:
+        InputError: Ray is not installed, or there is no cluster.
+    """
+    os.environ.update(dict(RAY_SETTINGS) | dict(os.environ))  # before Ray is imported
+    ray = _imported("ray", "ray")
+    quiet = {"log_to_driver": False, "configure_logging": False}
+    here = {
+        "num_cpus": workers,
+        "num_gpus": 0,
+        "include_dashboard": False,
+        "object_store_memory": OBJECT_STORE_BYTES,
+    }
+    try:
+        ray.init(**quiet, **({"address": address} if address else here))
+    except (ConnectionError, ValueError, RuntimeError, TimeoutError) as error:
+        raise InputError(f"--address {address}: no Ray cluster answers there ({error})") from error
+    try:
+        yield RayCluster(ray, int(ray.cluster_resources().get("CPU", workers)))
+    finally:
+        ray.shutdown()
+
+
+@contextmanager
+def dask_workers(workers: int, address: str | None) -> Generator[DaskCluster]:
+    """Workers of a Dask cluster.
+
+    Args:
+        workers: How many to start here, if no address is given.
+        address: Of a scheduler that runs, such as `tcp://head:8786`, or a scheduler file. Its
+            workers must have one thread each: limits of time end a whole process.
+
+    Raises:
+        InputError: Dask is not installed, there is no scheduler, or a worker has several threads.
+    """
+    distributed = _imported("distributed", "dask")
+    with _dask_client(distributed, workers, address) as client:
+        threads: dict[str, int] = client.nthreads()
+        if any(count > 1 for count in threads.values()):
+            raise InputError(
+                "a Dask worker has several threads, but a unit that takes too long ends its "
+                "process: start workers with --nthreads 1"
+            )
+        yield DaskCluster(client, max(1, len(threads)))
+
+
+@contextmanager
+def _dask_client(distributed: Any, workers: int, address: str | None) -> Generator[Any]:
+    if address is None:
+        settings = {"distributed.scheduler.allowed-failures": 0}
+        with importlib.import_module("dask").config.set(settings):
+            cluster = distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50,
+                memory_limit=0,
+            )  # fmt: skip
+        with cluster, distributed.Client(cluster) as client:
+            yield client
+        return
+    where = {"scheduler_file" if Path(address).is_file() else "address": address}
+    try:
+        client = distributed.Client(timeout=ANSWER_S, **where)
+    except (OSError, ValueError) as error:
+        raise InputError(f"--address {address}: no Dask scheduler answers ({error})") from error
+    with client:
+        client.wait_for_workers(1)
+        yield client
+
+
+def _imported(module: str, extra: str) -> Any:
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise InputError(
+            f"--engine {extra} takes {module}: pip install 'graspproof[{extra}]'"
+        ) from error

@@ -1,0 +1,116 @@
+"""Ray and Dask, started on this machine: the same bytes, the same faults, the same endings."""
+
+import os
+import signal
+import time
+
+import pytest
+
+import grasp_core as gc
+from sim_validate.clusters import dask_workers, ray_workers
+from sim_validate.datasets import driver
+from sim_validate.datasets.build import build
+from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.driver import drive
+from sim_validate.datasets.staging import Staging
+from sim_validate.datasets.tasks import Limits, WorkerError, do_unit
+from sim_validate.datasets.units import units_of
+from sim_validate.engines import local_processes
+from tests.sim_validate.datasets.engines import Here, contents, silent
+
+pytest.importorskip("pyarrow")
+pytestmark = pytest.mark.slow
+CONFIG = DatasetConfig(
+    objects=("tetrahedron", "wedge"), frictions=(0.4, 0.5), families=("concurrent",), limit=2
+)
+LIMITS = Limits(timeout_s=100.0)
+PACKAGES = {"ray": "ray", "dask": "distributed"}
+
+
+@pytest.fixture(scope="module", params=["local", "dask", "ray"])
+def engine(request):
+    if request.param == "local":
+        with local_processes(2) as started:
+            yield started
+        return
+    pytest.importorskip(PACKAGES[request.param])
+    start = dask_workers if request.param == "dask" else ray_workers
+    with start(2, None) as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("alone") / "ds"
+    build(CONFIG, folder, Here(), silent)
+    return contents(folder)
+
+
+def faulty(unit, staging):
+    """Ends, hangs or does its work, as the object's name says."""
+    if unit.object == "wedge":
+        os.kill(os.getpid(), signal.SIGKILL)
+    if unit.object == "prism":
+        time.sleep(100.0)
+    do_unit(unit, staging)
+
+
+def test_every_engine_makes_the_same_bytes(engine, alone, tmp_path):
+    assert engine.workers == 2
+    built = build(CONFIG, tmp_path / "ds", engine, silent, LIMITS)
+    assert built.made == 4
+    assert contents(tmp_path / "ds") == alone
+
+
+def test_what_ends_or_hangs_is_given_up_and_the_others_are_done(engine, tmp_path):
+    config = DatasetConfig(
+        objects=("tetrahedron", "octahedron", "wedge", "prism"),
+        families=("concurrent",),
+        limit=1,
+    )
+    staging = Staging(tmp_path / "staging")
+    staging.clear_unfinished()
+    units = units_of(config)
+    drive(units, staging, engine, silent, Limits(timeout_s=12.0), faulty)
+    came = {unit.object: staging.result(unit) for unit in units}
+    assert came["wedge"] == "its worker ended, twice"
+    assert came["prism"] == "took too long, twice"
+    assert all(not isinstance(came[name], str) for name in ("tetrahedron", "octahedron"))
+
+
+def test_a_worker_with_other_packages_ends_the_run(engine, tmp_path, monkeypatch):
+    other = dict(driver.provenance()) | {"mujoco": "3.0.0"}
+    monkeypatch.setattr(driver, "provenance", lambda: other)
+    with pytest.raises(WorkerError, match=r"another mujoco .* instead of 3\.0\.0"):
+        build(CONFIG, tmp_path / "ds", engine, silent, LIMITS)
+
+
+def test_a_running_dask_cluster_is_used_and_several_threads_are_refused(alone, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    settings = {"dashboard_address": None, "silence_logs": 50, "n_workers": 1}
+    with distributed.LocalCluster(threads_per_worker=1, **settings) as cluster:
+        with dask_workers(9, cluster.scheduler_address) as started:
+            assert started.workers == 1
+            build(CONFIG, tmp_path / "ds", started, silent, LIMITS)
+        assert contents(tmp_path / "ds") == alone
+    with (
+        distributed.LocalCluster(threads_per_worker=2, **settings) as cluster,
+        pytest.raises(gc.InputError, match="--nthreads 1"),
+        dask_workers(1, cluster.scheduler_address),
+    ):
+        pass
+
+
+@pytest.mark.parametrize("start", [dask_workers, ray_workers])
+def test_an_address_where_nothing_answers_is_said(start):
+    pytest.importorskip("ray" if start is ray_workers else "distributed")
+    with pytest.raises(gc.InputError, match=r"no .* answers"), start(1, "127.0.0.1:1"):
+        pass
+
+
+@pytest.mark.parametrize(("start", "name"), [(dask_workers, "distributed"), (ray_workers, "ray")])
+def test_an_engine_that_is_not_installed_is_said(start, name, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, name, None)
+    named = rf"pip install 'graspproof\[{start.__name__[:3]}"
+    with pytest.raises(gc.InputError, match=named), start(1, None):
+        pass
