@@ -28,7 +28,9 @@ from sim_validate.config_file import with_config
 from sim_validate.engines import available_cores
 from sim_validate.flags import (
     Count,
+    DatasetPlanning,
     DatasetSettings,
+    DatasetWork,
     Edges,
     Fingers,
     Mesh,
@@ -155,17 +157,26 @@ class DatasetBuild:
     all but where to (see README)."""
     out: Path
     """Folder of the dataset."""
+    planning: OmitArgPrefixes[DatasetPlanning] = field(default_factory=DatasetPlanning)
     settings: OmitArgPrefixes[DatasetSettings] = field(default_factory=DatasetSettings)
-    timeout_s: Positive = 3600.0
-    """Give an object at one friction up after so long, twice [s]."""
-    engine: Literal["local", "ray", "dask"] = "local"
-    """Where objects are done: processes of this machine, or a Ray or Dask cluster."""
-    address: str | None = None
-    """Of the cluster; one is started on this machine if not given."""
-    memory_mb: Count | None = None
-    """What a process may ask for beyond what it needs to start."""
-    jobs: Count = field(default_factory=available_cores)
-    """Number of processes; results do not depend on it."""
+    work: OmitArgPrefixes[DatasetWork] = field(default_factory=DatasetWork)
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+
+
+@dataclass(frozen=True, slots=True)
+class DatasetImport:
+    """Judge grasps of other tools, and write them as a dataset."""
+
+    contacts: Positional[Path]
+    """A contacts file (JSON) or npz file of four contacts for each grasp (see README)."""
+    object: Positional[str]
+    """The mesh file they are on, or the name of a built-in object."""
+    out: Path
+    """Folder of the dataset."""
+    outward: bool = False
+    """The file's normals point out of the object."""
+    settings: OmitArgPrefixes[DatasetSettings] = field(default_factory=DatasetSettings)
+    work: OmitArgPrefixes[DatasetWork] = field(default_factory=DatasetWork)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
@@ -188,6 +199,7 @@ class Dataset:
 
     action: OmitArgPrefixes[
         Annotated[DatasetBuild, subcommand("build", prefix_name=False)]
+        | Annotated[DatasetImport, subcommand("import", prefix_name=False)]
         | Annotated[DatasetVerify, subcommand("verify", prefix_name=False)]
     ]
 

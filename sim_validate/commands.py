@@ -13,6 +13,7 @@ ACTIONS: dict[type[Any], str] = {
     cli.Scene: "scene_command:write_scenes",
     cli.Analyze: "analyze_command:analyze_file",
     cli.DatasetBuild: "dataset_commands:build_dataset",
+    cli.DatasetImport: "dataset_commands:import_dataset",
     cli.DatasetVerify: "dataset_commands:verify_dataset",
     cli.Inspect: "object_commands:inspect_object",
     cli.Objects: "object_commands:list_objects",

@@ -3,6 +3,7 @@
 from contextlib import AbstractContextManager
 from dataclasses import asdict, fields
 from pathlib import Path
+from typing import Any
 
 from grasp_core.errors import InputError
 from grasp_core.mesh import FORMATS
@@ -27,34 +28,47 @@ MEGABYTE = 2**20
 
 def build_dataset(command: cli.DatasetBuild, reporter: Reporter) -> int:
     """Make a dataset."""
-    config = _asked(command)
-    memory = None if command.memory_mb is None else command.memory_mb * MEGABYTE
-    limits = Limits(command.timeout_s, memory)
-    with reporter.progress("building") as steps, _engine(command) as engine:
-        built = build(config, command.out, engine, steps.update, limits)
+    return _build(_asked(command), command.out, command.work, reporter)
+
+
+def import_dataset(command: cli.DatasetImport, reporter: Reporter) -> int:
+    """Judge grasps of other tools."""
+    config = DatasetConfig(
+        objects=(command.object,),
+        contacts=str(command.contacts),
+        outward=command.outward,
+        **_settings(command.settings),
+    )
+    return _build(config, command.out, command.work, reporter)
+
+
+def _build(config: DatasetConfig, out: Path, work: flags.DatasetWork, reporter: Reporter) -> int:
+    memory = None if work.memory_mb is None else work.memory_mb * MEGABYTE
+    with reporter.progress("building") as steps, _engine(work) as engine:
+        built = build(config, out, engine, steps.update, Limits(work.timeout_s, memory))
     counts = ", ".join(f"{count} {name}" for name, count in built.rows.items())
     reporter.say(
-        f"{command.out}: {built.units} units, {built.made} made now, {built.quarantined} "
-        f"quarantined; {counts}"
+        f"{out}: {built.units} units, {built.made} made now, {built.quarantined} quarantined; "
+        f"{counts}"
     )
     if built.quarantined:
-        reporter.warn(f"{command.out / 'quarantine.jsonl'} says why objects were left out")
-    reporter.document({"out": str(command.out), "manifest": asdict(read_manifest(command.out))})
+        reporter.warn(f"{out / 'quarantine.jsonl'} says why objects were left out")
+    reporter.document({"out": str(out), "manifest": asdict(read_manifest(out))})
     return cli.Exit.PARTIAL if built.quarantined else cli.Exit.GOOD
 
 
-def _engine(command: cli.DatasetBuild) -> AbstractContextManager[Engine]:
+def _engine(work: flags.DatasetWork) -> AbstractContextManager[Engine]:
     """Where units are done.
 
     Raises:
         InputError: The engine is not installed, or there is no cluster.
     """
-    if command.engine != "local":
-        start = ray_workers if command.engine == "ray" else dask_workers
-        return start(command.jobs, command.address)
-    if command.address is not None:
+    if work.engine != "local":
+        start = ray_workers if work.engine == "ray" else dask_workers
+        return start(work.jobs, work.address)
+    if work.address is not None:
         raise InputError("--address is for --engine ray and dask")
-    return local_processes(command.jobs)
+    return local_processes(work.jobs)
 
 
 def verify_dataset(command: cli.DatasetVerify, reporter: Reporter) -> int:
@@ -77,19 +91,25 @@ def _asked(command: cli.DatasetBuild) -> DatasetConfig:
     Raises:
         InputError: A setting or the file is refused, or there are flags beside a file.
     """
-    first, settings = Path(command.objects[0]), command.settings
+    first = Path(command.objects[0])
     if first.suffix == ".toml":
-        if len(command.objects) > 1 or settings != flags.DatasetSettings():
+        unsaid = (flags.DatasetPlanning(), flags.DatasetSettings())
+        if len(command.objects) > 1 or (command.planning, command.settings) != unsaid:
             raise InputError(f"{first} says what the dataset is made of: give nothing beside it")
         return config_from_toml(first)
-    given = {each.name: getattr(settings, each.name) for each in fields(settings)}
-    frictions, families = given.pop("friction"), given.pop("family")
     return DatasetConfig(
         objects=_listed(command.objects),
-        frictions=frictions or (FRICTION,),
-        families=families or METHODS,
-        **given,
+        families=command.planning.family or METHODS,
+        limit=command.planning.limit,
+        cones=command.planning.cones,
+        **_settings(command.settings),
     )
+
+
+def _settings(settings: flags.DatasetSettings) -> dict[str, Any]:
+    """Settings by the names of the configuration."""
+    given = {each.name: getattr(settings, each.name) for each in fields(settings)}
+    return {"frictions": given.pop("friction") or (FRICTION,), **given}
 
 
 def _listed(names: tuple[str, ...]) -> tuple[str, ...]:

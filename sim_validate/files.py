@@ -4,10 +4,12 @@ import io
 import os
 import tempfile
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
@@ -52,6 +54,23 @@ def write_arrays(path: Path, arrays: Mapping[str, Array]) -> Path:
             with archive.open(member, "w") as stream:
                 np.lib.format.write_array(stream, array, allow_pickle=False)
     return _write(path, held.getvalue())
+
+
+def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
+    """Arrays of an npz file, those that are there; nothing in it is run.
+
+    Raises:
+        InputError: It cannot be read, is too large, or holds Python objects.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+        if size > MAX_TEXT_BYTES:
+            raise InputError(f"{path}: larger than {MAX_TEXT_BYTES} bytes")
+        with np.load(path, allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in names if name in arrays}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: cannot be read as npz ({error})") from error
 
 
 def _write(path: Path, data: bytes) -> Path:

@@ -107,17 +107,39 @@ class Planning:
 
 
 @dataclass(frozen=True, slots=True)
-class DatasetSettings:
-    """What a dataset is made of."""
+class DatasetPlanning:
+    """Which grasps a dataset holds."""
 
-    friction: UseAppendAction[tuple[Positive, ...]] = ()
-    """Coulomb coefficient to plan and try at, may be repeated; 0.5 if not given."""
     family: UseAppendAction[tuple[Literal["concurrent", "pencil", "regulus", "free"], ...]] = ()
     """Construction to try, may be repeated; all if not given."""
     limit: Count = 20
     """Largest number of grasps of each object, friction and family."""
     cones: Literal["normal", "tilted"] = "tilted"
     """Force cones to construct with."""
+
+
+@dataclass(frozen=True, slots=True)
+class DatasetWork:
+    """Where a dataset is made, and what an object at a friction may take; decides no row."""
+
+    engine: Literal["local", "ray", "dask"] = "local"
+    """Processes of this machine, or a Ray or Dask cluster."""
+    address: str | None = None
+    """Of the cluster; one is started on this machine if not given."""
+    timeout_s: Positive = 3600.0
+    """Give an object at one friction up after so long, twice [s]."""
+    memory_mb: Count | None = None
+    """What a process may ask for beyond what it needs to start."""
+    jobs: Count = field(default_factory=available_cores)
+    """Number of processes; results do not depend on it."""
+
+
+@dataclass(frozen=True, slots=True)
+class DatasetSettings:
+    """What a dataset is made of, however its grasps are found."""
+
+    friction: UseAppendAction[tuple[Positive, ...]] = ()
+    """Coulomb coefficient to prove and try at, may be repeated; 0.5 if not given."""
     unit: Literal["m", "cm", "mm", "in"] = "m"
     """What one unit in a mesh file is."""
     faces: Literal["auto", "planar", "patches"] = "auto"

@@ -13,7 +13,7 @@ from grasp_core.errors import InputError
 from sim_validate.datasets.columns import Name
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.driver import Engine, drive
-from sim_validate.datasets.finish import DATA, EXTRAS, finish
+from sim_validate.datasets.finish import CONTACTS, DATA, EXTRAS, finish
 from sim_validate.datasets.manifest import MANIFEST, read_manifest
 from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.tables import require_pyarrow
@@ -23,7 +23,7 @@ from sim_validate.files import read_text, write_text
 from sim_validate.gate import require_faithful
 from sim_validate.setup import Setup
 
-OWN = ("staging", DATA, *EXTRAS, "config.toml", "quarantine.jsonl", MANIFEST, ".lock")
+OWN = ("staging", DATA, *EXTRAS, CONTACTS, "config.toml", "quarantine.jsonl", MANIFEST, ".lock")
 """What a dataset's folder holds, and nothing else."""
 
 

@@ -28,7 +28,7 @@ KINDS: dict[str, tuple[str, ...]] = {
 LEAST = {"limit": 1, "random_wrenches": 0, "seed": 0}
 """Settings that are whole numbers, and from where on."""
 MOST_SEED = 2**63 - 1
-SWITCHES = ("scenes",)
+SWITCHES = ("scenes", "outward")
 """Settings that are true or false."""
 CREDITS = ("title", "license", "creator", "url", "published")
 """Settings for people."""
@@ -64,6 +64,10 @@ class DatasetConfig:
     """Held beside the usual ones."""
     seed: int = 0
     """For everything random."""
+    contacts: str = ""
+    """A file of contacts on the one object, judged in place of planning."""
+    outward: bool = False
+    """Whether normals in that file point out of the object."""
     scenes: bool = False
     """Whether each grasp is also written as a MuJoCo scene."""
     title: str = "four-finger grasps"
@@ -88,6 +92,8 @@ class DatasetConfig:
             raise InputError(f"frictions: expected numbers above 0, up to {most}, got {wrong[0]}")
         if unknown := [family for family in self.families if family not in METHODS]:
             raise InputError(f"families: expected some of {', '.join(METHODS)}, got {unknown[0]}")
+        if self.contacts and len(self.objects) > 1:
+            raise InputError("objects: expected the one that the contacts are on")
         self._check_words_and_counts()
 
     def _check_words_and_counts(self) -> None:

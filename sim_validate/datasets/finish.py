@@ -14,6 +14,7 @@ from pathlib import Path
 
 from sim_validate.datasets.columns import TABLES
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
+from sim_validate.datasets.given import given_text
 from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest, listed, write_manifest
 from sim_validate.datasets.staging import Finished, Staging
 from sim_validate.datasets.tables import TableFiles
@@ -23,6 +24,8 @@ from sim_validate.files import write_text
 DATA = "data"
 TWIN = "the same object as"
 """How the reason begins why an object's rows are not there a second time."""
+CONTACTS = "contacts.json"
+"""Contacts that were judged, if any, as a contacts file with normals into the object."""
 EXTRAS = ("meshes", "scenes")
 """Folders of files that units make beside their rows."""
 
@@ -38,9 +41,14 @@ def finish(
     for each in good:
         staging.copy_files(each.unit, folder)
     lines = "".join(json.dumps(each, sort_keys=True) + "\n" for each in quarantined)
+    given = {each.id: each for unit in units for each in unit.given}
+    if given:
+        in_order = [given[name] for name in sorted(given)]
+        write_text(folder / CONTACTS, given_text(in_order))
     others = [
         write_text(folder / "config.toml", config_to_toml(config)),
         write_text(folder / "quarantine.jsonl", lines),
+        *([folder / CONTACTS] if given else []),
         *(path for name in EXTRAS for path in sorted((folder / name).glob("*"))),
     ]
     manifest = Manifest(

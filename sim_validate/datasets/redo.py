@@ -16,10 +16,12 @@ from typing import Any, cast
 from grasp_core.errors import GraspError
 from sim_validate.datasets.columns import KEYS, TABLES, Name
 from sim_validate.datasets.config import config_from_toml
-from sim_validate.datasets.finish import TWIN
+from sim_validate.datasets.finish import CONTACTS, TWIN
+from sim_validate.datasets.given import read_given
+from sim_validate.datasets.making import made_of
 from sim_validate.datasets.manifest import Manifest
 from sim_validate.datasets.meshes import stored_body
-from sim_validate.datasets.rows import id_beginning, made_of
+from sim_validate.datasets.rows import id_beginning
 from sim_validate.datasets.tables import as_read
 from sim_validate.datasets.units import WorkUnit, provenance
 from sim_validate.files import read_text
@@ -62,13 +64,16 @@ def sample_faults(folder: Path, manifest: Manifest, rows: Rows, sample: Sample) 
     config = config_from_toml(folder / "config.toml")
     exact = manifest.versions == dict(provenance())
     bodies = {row["object_id"]: row for row in rows["objects"]}
+    given = read_given(folder / CONTACTS) if config.contacts else ()
     units = _units(folder, bodies, config.frictions)
     for object_id, friction in drawn(units, sample):
         about = bodies[object_id]
         where = f"{about['source_name']} at friction {friction}"
         try:
             body = stored_body(folder, object_id, about["source_name"], config.faces)
-            unit = WorkUnit(about["source_name"], None, about["source_sha256"], friction, config)
+            unit = WorkUnit(
+                about["source_name"], None, about["source_sha256"], friction, config, given
+            )
             made = made_of(unit, body).rows
         except GraspError as error:
             yield f"{where}: cannot be done again ({error})"

@@ -1,4 +1,4 @@
-"""A work unit -> rows of the tables and files: its object, its grasps with their controls."""
+"""Verdicts as rows of the tables: an object, its grasps with their controls, their trials."""
 
 import hashlib
 from collections.abc import Callable, Iterable, Mapping
@@ -6,65 +6,26 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from grasp_core.planner import plan
+import numpy as np
+
 from grasp_core.values import FINGERS, Contact, Grasp, Polyhedron
 from sim_validate.control_trials import ControlVerdict
 from sim_validate.datasets.columns import Name
-from sim_validate.datasets.meshes import mesh_path, mesh_text
+from sim_validate.datasets.given import GivenGrasp
 from sim_validate.datasets.units import WorkUnit
-from sim_validate.setup import Agenda
-from sim_validate.validation import Verdict, WrenchVerdict, validate
+from sim_validate.validation import Verdict, WrenchVerdict
 from sim_validate.verdict import HoldVerdict, Outcome
 
 Row: TypeAlias = Mapping[str, Any]
 Rows: TypeAlias = Mapping[Name, tuple[Row, ...]]
 SPLITS = (("test", 0.1), ("validation", 0.2), ("train", 1.0))
 """Up to which share of all hashes an object is in each."""
+GIVEN = "given"
+"""Label of grasps that come from elsewhere."""
+NOT_TRIED = "not_tried"
+"""Outcome of those that cannot be tried: their `note` says why, and nothing is claimed of them."""
 SHORT = 16
 """Digits of an object's hash in the names of its grasps."""
-
-
-@dataclass(frozen=True, slots=True)
-class Made:
-    """What comes of a unit."""
-
-    object_id: str
-    split: str
-    rows: Rows
-    files: Mapping[str, str]
-    """Texts by their paths in the dataset's folder."""
-
-
-def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
-    """Plan the grasps of a unit, try each in simulation, and write down everything.
-
-    Args:
-        unit: What to do.
-        body: Its object.
-
-    Raises:
-        GraspError: The simulator fails its gate.
-    """
-    config = unit.config
-    found = _Rows(body, unit)
-    mesh = mesh_path(Path(), body.content_sha256).as_posix()
-    files = {mesh: mesh_text(body)}
-    agenda = Agenda(random_wrenches=config.random_wrenches, limits=config.limits, seed=config.seed)
-    for family in config.families:
-        planned = plan(
-            body, unit.friction, families=(family,), cones=config.cones, limit=config.limit,
-            seed=config.seed,
-        )  # fmt: skip
-        for grasp in planned.grasps:
-            verdict = validate(body, grasp, unit.friction, agenda=agenda)
-            found.add(grasp, verdict)
-            if config.scenes:
-                files[f"scenes/{found.name(grasp.id)}.xml"] = verdict.scene.xml
-    row = _object_row(body, unit)
-    rows: Rows = {
-        "objects": (row,), "grasps": tuple(found.grasps), "trials": tuple(found.trials),
-    }  # fmt: skip
-    return Made(body.content_sha256, row["split"], rows, files)
 
 
 def id_beginning(object_id: str, friction: float) -> str:
@@ -79,7 +40,8 @@ def split_of(object_id: str, seed: int) -> str:
     return next(name for name, upto in SPLITS if share < upto)
 
 
-def _object_row(body: Polyhedron, unit: WorkUnit) -> Row:
+def object_row(body: Polyhedron, unit: WorkUnit) -> Row:
+    """The row of a unit's object."""
     return {
         "object_id": body.content_sha256,
         "source_name": Path(unit.object).name,
@@ -96,7 +58,7 @@ def _object_row(body: Polyhedron, unit: WorkUnit) -> Row:
 
 
 @dataclass(slots=True)
-class _Rows:
+class GraspRows:
     """Rows of one object at one friction as they grow."""
 
     body: Polyhedron
@@ -105,21 +67,55 @@ class _Rows:
     trials: list[Row] = field(default_factory=list[Row])
 
     def add(self, grasp: Grasp, verdict: Verdict) -> None:
-        """Write down a grasp, its negative controls, and the trials of all."""
+        """Write down a planned grasp, its negative controls, and the trials of all."""
+        about = {
+            "label": "grasp",
+            "family": grasp.family,
+            "region_radius_m": grasp.radius,
+        }
+        self._add_closed(grasp, verdict, about)
+
+    def add_given(self, given: GivenGrasp, grasp: Grasp, verdict: Verdict, moved_m: float) -> None:
+        """Write down a given grasp that is force-closed, with the same."""
+        about = {"name": given.name, "label": GIVEN, "moved_m": moved_m}
+        self._add_closed(grasp, verdict, about)
+
+    def add_open(self, given: GivenGrasp, verdict: ControlVerdict, moved_m: float) -> None:
+        """Write down a given grasp that is not force-closed, tried as controls are."""
+        about = {"name": given.name, "label": GIVEN, "control_of": None, "moved_m": moved_m}
+        self._add_refuted(self.name(given.id), verdict, about)
+
+    def add_untried(self, given: GivenGrasp, why: str) -> None:
+        """Write down a given grasp that cannot be tried."""
+        contacts = [
+            Contact(np.array(point), np.array(normal))
+            for point, normal in zip(given.points, given.normals, strict=True)
+        ]
+        self.grasps.append(
+            self._common(self.name(given.id), contacts)
+            | {
+                "name": given.name,
+                "label": GIVEN,
+                "control_of": None,
+                "outcome": NOT_TRIED,
+                "note": why,
+                "trials": 0,
+                "mismatches": 0,
+            }
+        )
+
+    def _add_closed(self, grasp: Grasp, verdict: Verdict, about: Mapping[str, Any]) -> None:
         name = self.name(grasp.id)
         friction = verdict.critical_friction
         self.grasps.append(
             self._common(name, grasp.contacts)
             | {
                 "name": grasp.id,
-                "label": "grasp",
                 "control_of": None,
-                "family": grasp.family,
                 "faces": list(grasp.faces),
                 "force_closed": True,
                 "closure_margin": grasp.closure_margin,
                 "critical_friction": grasp.critical_friction,
-                "region_radius_m": grasp.radius,
                 "ferrari_canny_lower_n": grasp.ferrari_canny[0],
                 "ferrari_canny_upper_n": grasp.ferrari_canny[1],
                 "held": verdict.held,
@@ -127,22 +123,21 @@ class _Rows:
                 "trials": len(verdict.wrenches),
                 "mismatches": len(verdict.mismatches),
                 "simulated_critical_friction": friction.simulated,
+                **about,
             }
         )
         self._add_trials(name, verdict.wrenches, _wrench_row)
         for control in verdict.controls:
-            self._add_control(name, grasp, control)
+            kind = control.control.name
+            said = {"name": about.get("name", grasp.id), "label": kind, "control_of": name}
+            self._add_refuted(f"{name}:{kind}", control, said)
 
-    def _add_control(self, of: str, grasp: Grasp, verdict: ControlVerdict) -> None:
+    def _add_refuted(self, name: str, verdict: ControlVerdict, about: Mapping[str, Any]) -> None:
         control = verdict.control
-        name = f"{of}:{control.name}"
         first = next((t for t in verdict.tried if t.hold.outcome is not Outcome.HELD), None)
         self.grasps.append(
             self._common(name, control.contacts)
             | {
-                "name": grasp.id,
-                "label": control.name,
-                "control_of": of,
                 "friction": control.friction,
                 "force_closed": False,
                 "closure_margin": control.certificate.margin,
@@ -150,6 +145,7 @@ class _Rows:
                 "outcome": Outcome.HELD.value if first is None else first.hold.outcome.value,
                 "trials": len(verdict.tried),
                 "mismatches": int(not verdict.failed),
+                **about,
             }
         )
         self._add_trials(name, verdict.tried, lambda _: {})
@@ -165,6 +161,7 @@ class _Rows:
             "object_id": self.body.content_sha256,
             "split": split_of(self.body.content_sha256, self.unit.config.seed),
             "friction": self.unit.friction,
+            "note": "",
             "contacts": len(listed),
             "contact_points_m": _for_fingers([c.position.tolist() for c in listed], [None] * 3),
             "contact_normals": _for_fingers([c.normal.tolist() for c in listed], [None] * 3),

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from sim_validate.datasets.columns import TABLES, Name
-from sim_validate.datasets.rows import Made
+from sim_validate.datasets.making import Made
 from sim_validate.datasets.tables import parquet_bytes
 from sim_validate.datasets.units import WorkUnit
 

@@ -17,7 +17,7 @@ from typing import Any, TypeAlias
 
 from grasp_core.errors import GraspError
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.rows import made_of
+from sim_validate.datasets.making import made_of
 from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.units import WorkUnit, body_of, provenance, units_of
 

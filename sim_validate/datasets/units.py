@@ -21,16 +21,19 @@ from grasp_core.values import Polyhedron
 from grasp_core.versions import versions
 from scenes.objects import example_object
 from sim_validate.datasets.config import CREDITS, DatasetConfig
+from sim_validate.datasets.given import GivenGrasp, given_sha256, read_given
 
 CHUNK = 2**20
+PART = 25
+"""Given grasps of one unit, half a minute's work."""
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
-APART = ("objects", "frictions", *CREDITS)
+APART = ("objects", "frictions", "contacts", "outward", *CREDITS)
 """Settings that each unit has for itself, or that decide no row."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorkUnit:
-    """One object at one friction."""
+    """One object at one friction, with some of the given grasps if there are any."""
 
     object: str
     """A mesh file as it was given, or the name of a built-in object."""
@@ -40,12 +43,16 @@ class WorkUnit:
     """Of the mesh file's bytes, or of the built-in object's mesh."""
     friction: float
     config: DatasetConfig
+    given: tuple[GivenGrasp, ...] = ()
+    """Grasps to judge; where there are none, grasps are planned."""
 
     @property
     def id(self) -> str:
         """Sixteen bytes in hexadecimal digits; the same wherever the mesh file lies."""
         settings = shared_settings(self.config)
-        decisive = [self.source_sha256, self.friction, settings, sorted(provenance().items())]
+        given = given_sha256(self.given)
+        own = sorted(provenance().items())
+        decisive = [self.source_sha256, self.friction, given, settings, own]
         return hashlib.sha256(json.dumps(decisive).encode()).hexdigest()[:32]
 
 
@@ -72,16 +79,26 @@ def units_of(config: DatasetConfig) -> list[WorkUnit]:
     """All units, sorted by their names.
 
     Raises:
-        InputError: An object is neither a file that can be read nor built in.
+        InputError: An object is neither a file that can be read nor built in, or the contacts are
+            refused.
     """
     hashes = {name: _source_sha256(name) for name in config.objects}
     paths = {name: Path(name).resolve() if is_mesh_file(name) else None for name in hashes}
     units = [
-        WorkUnit(name, paths[name], hashes[name], friction, config)
+        WorkUnit(name, paths[name], hashes[name], friction, config, part)
         for name in config.objects
         for friction in config.frictions
+        for part in _parts(config)
     ]
     return sorted(units, key=lambda unit: unit.id)
+
+
+def _parts(config: DatasetConfig) -> list[tuple[GivenGrasp, ...]]:
+    """Given grasps, some for each unit; none where grasps are planned."""
+    if not config.contacts:
+        return [()]
+    given = read_given(Path(config.contacts), outward=config.outward)
+    return [given[i : i + PART] for i in range(0, len(given), PART)]
 
 
 def body_of(unit: WorkUnit) -> Polyhedron:

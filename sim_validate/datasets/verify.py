@@ -13,6 +13,7 @@ from sim_validate.datasets.columns import KEYS, TABLES, Name
 from sim_validate.datasets.manifest import MANIFEST, Listed, listed, read_manifest
 from sim_validate.datasets.meshes import stored_surface
 from sim_validate.datasets.redo import Sample, sample_faults
+from sim_validate.datasets.rows import NOT_TRIED
 from sim_validate.datasets.tables import read_rows, require_pyarrow
 
 SAME_MARGIN = 1e-6
@@ -92,7 +93,8 @@ def _row_faults(rows: Mapping[Name, Sequence[Mapping[str, Any]]]) -> Iterator[st
         name = row["grasp_id"]
         faults = [*_reference_faults(row, splits, names), *_contact_faults(row)]
         trials = ended.get(name, [])
-        if len(trials) != row["trials"] or row["held"] != all(one == "held" for one in trials):
+        held = None if row["outcome"] == NOT_TRIED else all(one == "held" for one in trials)
+        if len(trials) != row["trials"] or row["held"] != held:
             faults.append("its trials say something else")
         yield from (f"grasps: {name}: {fault}" for fault in faults)
 
@@ -101,6 +103,8 @@ def _mesh_faults(folder: Path, rows: Mapping[Name, Sequence[Mapping[str, Any]]])
     """Whether meshes are those of their objects, and contacts are on them."""
     points: dict[str, list[list[float]]] = {row["object_id"]: [] for row in rows["objects"]}
     for row in rows["grasps"]:
+        if row["outcome"] == NOT_TRIED:
+            continue
         points.get(row["object_id"], []).extend(row["contact_points_m"][: row["contacts"]])
     for row in rows["objects"]:
         try:
@@ -132,6 +136,8 @@ def _contact_faults(row: Mapping[str, Any]) -> Iterator[str]:
     normals = np.array(row["contact_normals"][:count], dtype=np.float64)
     if not (np.abs(np.linalg.norm(normals, axis=1) - 1.0) <= UNIT).all():
         yield "a normal is no unit vector"
+        return
+    if row["outcome"] == NOT_TRIED:
         return
     try:
         certificate = force_closure(points, normals, row["friction"])
