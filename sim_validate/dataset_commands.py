@@ -10,6 +10,7 @@ from sim_validate import cli, flags
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
+from sim_validate.datasets.croissant import CROISSANT, missing_fields
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.redo import Sample
 from sim_validate.datasets.tasks import Limits
@@ -25,6 +26,7 @@ MEGABYTE = 2**20
 def build_dataset(command: cli.DatasetBuild, reporter: Reporter) -> int:
     """Make a dataset."""
     config = _asked(command)
+    _warn_of_missing(config, reporter)
     memory = None if command.memory_mb is None else command.memory_mb * MEGABYTE
     limits = Limits(command.timeout_s, memory)
     with reporter.progress("building") as steps, local_processes(command.jobs) as engine:
@@ -52,6 +54,17 @@ def verify_dataset(command: cli.DatasetVerify, reporter: Reporter) -> int:
     )
     reporter.document({"dataset": str(command.dataset), "faults": faults})
     return cli.Exit.NEGATIVE if faults else cli.Exit.GOOD
+
+
+def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
+    """Say what the description will lack, before the work begins: it cannot be given later."""
+    missing = missing_fields(config)
+    if missing and not reporter.quiet:
+        given = ", ".join(f"--{setting}" for setting in missing.values())
+        reporter.warn(
+            f"{CROISSANT} will lack {', '.join(missing)}, which Croissant requires: give {given}, "
+            "or the same settings in a TOML file"
+        )
 
 
 def _asked(command: cli.DatasetBuild) -> DatasetConfig:
