@@ -1,6 +1,7 @@
 """A dataset, loaded by the lines that its card gives, is what `load_dataset` gives."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from tests.sim_validate.datasets.small import build_small
 
 pytest.importorskip("pyarrow")
 SPLITS = ("train", "validation", "test")
+README = Path(__file__).parents[3] / "README.md"
 
 
 @pytest.fixture(scope="module")
@@ -144,3 +146,15 @@ def test_graspproof_loads_it_as_the_card_says(beside):
     expected = sim_validate.load_dataset(beside, "train")["grasps"]
     assert len(found["held"]) == len(expected["held"]) >= 3
     np.testing.assert_array_equal(found["contact_points_m"], expected["contact_points_m"])
+
+
+def test_the_readme_says_the_same_lines(folder):
+    said = README.read_text()
+    lines = [
+        line.partition("= ")[2] if line.startswith("grasps =") else line
+        for package in ("polars", "pandas", "datasets", "sim_validate")
+        for line in snippet(folder, package).splitlines()
+        if not line.startswith(("import ", "points ="))
+    ]
+    assert len(lines) == 6
+    assert all(line.removesuffix('["grasps"]') in said for line in lines)
