@@ -13,6 +13,7 @@ from sim_validate.clusters import dask_workers, ray_workers
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
+from sim_validate.datasets.croissant import CROISSANT, missing_fields
 from sim_validate.datasets.driver import Engine
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.redo import Sample
@@ -43,6 +44,7 @@ def import_dataset(command: cli.DatasetImport, reporter: Reporter) -> int:
 
 
 def _build(config: DatasetConfig, out: Path, work: flags.DatasetWork, reporter: Reporter) -> int:
+    _warn_of_missing(config, reporter)
     memory = None if work.memory_mb is None else work.memory_mb * MEGABYTE
     with reporter.progress("building") as steps, _engine(work) as engine:
         built = build(config, out, engine, steps.update, Limits(work.timeout_s, memory))
@@ -83,6 +85,17 @@ def verify_dataset(command: cli.DatasetVerify, reporter: Reporter) -> int:
     )
     reporter.document({"dataset": str(command.dataset), "faults": faults})
     return cli.Exit.NEGATIVE if faults else cli.Exit.GOOD
+
+
+def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
+    """Say what the description will lack, before the work begins: it cannot be given later."""
+    missing = missing_fields(config)
+    if missing and not reporter.quiet:
+        given = ", ".join(f"--{setting}" for setting in missing.values())
+        reporter.warn(
+            f"{CROISSANT} will lack {', '.join(missing)}, which Croissant requires: give {given}, "
+            "or the same settings in a TOML file"
+        )
 
 
 def _asked(command: cli.DatasetBuild) -> DatasetConfig:

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grasp_core.errors import InputError
+from sim_validate.datasets.card import CARD
 from sim_validate.datasets.columns import Name
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
+from sim_validate.datasets.croissant import CROISSANT
 from sim_validate.datasets.driver import Engine, drive
 from sim_validate.datasets.finish import CONTACTS, DATA, EXTRAS, finish
 from sim_validate.datasets.manifest import MANIFEST, read_manifest
@@ -23,7 +25,10 @@ from sim_validate.files import read_text, write_text
 from sim_validate.gate import require_faithful
 from sim_validate.setup import Setup
 
-OWN = ("staging", DATA, *EXTRAS, CONTACTS, "config.toml", "quarantine.jsonl", MANIFEST, ".lock")
+OWN = (
+    "staging", DATA, *EXTRAS, CONTACTS, "config.toml", "quarantine.jsonl", CARD, CROISSANT,
+    MANIFEST, ".lock",
+)  # fmt: skip
 """What a dataset's folder holds, and nothing else."""
 
 

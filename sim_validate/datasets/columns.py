@@ -83,3 +83,8 @@ KEYS: dict[Name, tuple[str, ...]] = {
     "objects": ("object_id",), "grasps": ("object_id", "grasp_id"), "trials": ("grasp_id", "trial"),
 }  # fmt: skip
 """What rows are sorted by, and unique in."""
+REFERENCES: dict[tuple[Name, str], tuple[Name, str]] = {
+    ("grasps", "object_id"): ("objects", "object_id"),
+    ("trials", "grasp_id"): ("grasps", "grasp_id"),
+}
+"""Columns whose cells name a row of another table, and the column that has the name there."""

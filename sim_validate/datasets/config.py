@@ -8,6 +8,7 @@ import hashlib
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from datetime import date
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, cast, get_args
 
@@ -105,6 +106,10 @@ class DatasetConfig:
         for name, least in LEAST.items():
             if not least <= getattr(self, name) <= MOST_SEED:
                 raise InputError(f"{name}: expected {least} or more, got {getattr(self, name)}")
+        if self.published and not _is_date(self.published):
+            raise InputError(
+                f"published: expected a day such as 2026-11-22, got {self.published!r}"
+            )
 
     @property
     def sha256(self) -> str:
@@ -164,6 +169,14 @@ def _is(value: object, wanted: type) -> bool:
     return isinstance(value, (int, float) if wanted is float else wanted)
 
 
+def _is_date(text: str) -> bool:
+    """Whether a text is a day in the one form that all readers know."""
+    try:
+        return date.fromisoformat(text).isoformat() == text
+    except ValueError:
+        return False
+
+
 def config_to_toml(config: DatasetConfig) -> str:
     """The resolved text: every setting, in the order of the class; the same for equal values."""
     return "".join(
@@ -177,12 +190,16 @@ def _as_toml(value: object) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
-        return '"' + "".join(_escaped(letter) for letter in value) + '"'
+        return quoted(value)
     return repr(value)
 
 
+def quoted(text: str) -> str:
+    """A text in double quotes, as TOML and YAML both read it, on one line."""
+    return '"' + "".join(_escaped(letter) for letter in text) + '"'
+
+
 def _escaped(letter: str) -> str:
-    """A letter of a TOML basic string."""
     if letter in '"\\':
         return "\\" + letter
     return letter if letter.isprintable() else f"\\U{ord(letter):08x}"

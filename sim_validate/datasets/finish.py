@@ -12,8 +12,10 @@ from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
+from sim_validate.datasets.card import CARD, card_text
 from sim_validate.datasets.columns import TABLES
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
+from sim_validate.datasets.croissant import CROISSANT, croissant_text
 from sim_validate.datasets.given import given_text
 from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest, listed, write_manifest
 from sim_validate.datasets.staging import Finished, Staging
@@ -58,6 +60,9 @@ def finish(
         quarantined=len(quarantined),
         files=(*tables, *(listed(folder, path) for path in others)),
     )
+    for name, text_of in ((CARD, card_text), (CROISSANT, croissant_text)):
+        written = write_text(folder / name, text_of(config, manifest))
+        manifest = replace(manifest, files=(*manifest.files, listed(folder, written)))
     write_manifest(folder, manifest)
     shutil.rmtree(staging.folder)
 

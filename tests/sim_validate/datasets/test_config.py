@@ -42,6 +42,8 @@ def test_names_with_quotes_and_control_characters_survive(tmp_path):
         ({"cones": "round"}, "cones: expected one of tilted, normal"),
         ({"unit": "mile"}, "unit: expected one of"),
         ({"limits": 3}, "limits: expected text"),
+        ({"published": "20261122"}, "published: expected a day such as 2026-11-22"),
+        ({"published": "2026-02-30"}, "published: expected a day"),
         ({"colour": "red"}, "colour: no such setting"),
     ],
 )

@@ -1,0 +1,229 @@
+"""The card of a dataset, `README.md`: what the Hugging Face Hub and people read first.
+
+Words of the user's are escaped: in the header as quoted strings, in the text as Markdown.
+"""
+
+import re
+from collections.abc import Iterable
+
+from sim_validate.datasets.columns import KEYS, REFERENCES, TABLES, Column, Name
+from sim_validate.datasets.config import DatasetConfig, config_to_toml, quoted
+from sim_validate.datasets.licenses import known_license
+from sim_validate.datasets.manifest import Manifest
+from sim_validate.datasets.rows import SPLITS
+from sim_validate.datasets.statements import (
+    CONVENTIONS,
+    KEYWORDS,
+    LABELS,
+    LIMITS,
+    MADE,
+    ROWS,
+    SOURCES,
+    choice,
+    makers,
+    splitting,
+    summary,
+)
+
+CARD = "README.md"
+FIRST: Name = "grasps"
+"""The table that is loaded if none is named."""
+SIZES = (
+    (10**3, "n<1K"), (10**4, "1K<n<10K"), (10**5, "10K<n<100K"), (10**6, "100K<n<1M"),
+    (10**7, "1M<n<10M"), (10**8, "10M<n<100M"), (10**9, "100M<n<1B"), (10**10, "1B<n<10B"),
+)  # fmt: skip
+"""Up to how many rows, and what the Hub calls that."""
+LARGEST = "10B<n<100B"
+MARKS = frozenset("\\`*_[]<>|~&#!$@")
+"""What can begin something in Markdown within a line."""
+ADDRESS = re.compile(r"https?://[^\s<>\"'`\\|{}^]+")
+"""What can be a link as it is."""
+
+
+def card_text(config: DatasetConfig, manifest: Manifest) -> str:
+    """The card of a dataset.
+
+    Args:
+        config: What it is made of.
+        manifest: The files of its tables, and what made them.
+    """
+    sections = (
+        _header(config, manifest),
+        f"# {_as_markdown(config.title) or 'Grasps'}\n\n{summary(config, manifest)}\n"
+        + _credits(config),
+        f"## How it was made\n\n{MADE}\n\n{choice(config, manifest)}\n\n"
+        f"Made with {', '.join(makers(manifest))}; `manifest.json` has all versions and the hash "
+        f"of the code. The settings, as in `config.toml`:\n\n"
+        f"```toml\n{config_to_toml(config)}```\n",
+        f"## Tables\n\n{_counts(manifest)}",
+        *(_table(name) for name in TABLES),
+        f"## Splits\n\n{splitting()}\n",
+        f"## Negative controls and labels\n\n{_labels()}",
+        f"## Units and frames\n\n{CONVENTIONS}\n",
+        f"## Limits\n\n{_list(LIMITS)}",
+        f"## Licences of the meshes\n\n{SOURCES}\n",
+        _loading(manifest),
+    )
+    return "\n".join(sections)
+
+
+def _header(config: DatasetConfig, manifest: Manifest) -> str:
+    """The header for the Hub, in YAML."""
+    lines = [f"pretty_name: {quoted(config.title)}", *_license_lines(config.license)]
+    lines += ["task_categories:", f"- {quoted('robotics')}", "tags:"]
+    lines += [f"- {quoted(word)}" for word in KEYWORDS]
+    lines += ["size_categories:", f"- {quoted(_size(sum(manifest.rows().values())))}"]
+    configs = [line for name in TABLES for line in _config_lines(name, manifest)]
+    lines += ["configs:", *configs] if configs else []
+    return "\n".join(["---", *lines, "---", ""])
+
+
+def _license_lines(name: str) -> list[str]:
+    if not name:
+        return []
+    if (known := known_license(name)) is not None:
+        return [f"license: {quoted(known.hub)}"]
+    return [f"license: {quoted('other')}", f"license_name: {quoted(name)}"]
+
+
+def _config_lines(name: Name, manifest: Manifest) -> list[str]:
+    """Where the files of a table are, by split; nothing if there are none."""
+    splits = _splits(name, manifest)
+    if not splits:
+        return []
+    lines = [f"- config_name: {quoted(name)}"]
+    lines += ["  default: true"] if name == FIRST else []
+    lines.append("  data_files:")
+    for split in splits:
+        pattern = quoted(f"data/{name}/{split}-*.parquet")
+        lines += [f"  - split: {quoted(split)}", f"    path: {pattern}"]
+    return lines
+
+
+def _splits(name: Name, manifest: Manifest) -> list[str]:
+    """The splits that have rows of a table, the one to train with first."""
+    there = {each.split for each in manifest.of_table(name)}
+    return [split for split, _ in reversed(SPLITS) if split in there]
+
+
+def _size(rows: int) -> str:
+    return next((size for upto, size in SIZES if rows < upto), LARGEST)
+
+
+def _credits(config: DatasetConfig) -> str:
+    """What the user says of the dataset."""
+    known = known_license(config.license)
+    name = config.license if known is None else known.spdx
+    said = {
+        "By": _as_markdown(config.creator),
+        "At": f"<{config.url}>" if _is_address(config.url) else _as_markdown(config.url),
+        "Published": _as_markdown(config.published),
+        "Licence": f"<{name}>" if _is_address(name) else _as_markdown(name),
+    }
+    lines = [f"{label}: {text}" for label, text in said.items() if text]
+    return f"\n{_list(lines)}" if lines else ""
+
+
+def _counts(manifest: Manifest) -> str:
+    lines = ["| table | a row is | split | rows |", "|---|---|---|---|"]
+    for name in TABLES:
+        for split in _splits(name, manifest):
+            files = [each for each in manifest.of_table(name) if each.split == split]
+            rows = sum(each.rows or 0 for each in files)
+            lines.append(f"| `{name}` | {ROWS[name]} | {split} | {rows} |")
+    return _lines(lines)
+
+
+def _table(name: Name) -> str:
+    """All columns of a table."""
+    lines = [
+        f"### {name}", "",
+        f"Sorted by, and unique in, {' and '.join(f'`{key}`' for key in KEYS[name])}.", "",
+        "| column | type | unit | meaning |", "|---|---|---|---|",
+    ]  # fmt: skip
+    lines += [
+        f"| `{each.name}` | {_type(each)} | {each.unit} | {_meaning(name, each)} |"
+        for each in TABLES[name]
+    ]
+    return _lines(lines)
+
+
+def _type(column: Column) -> str:
+    return f"{column.kind} {list(column.shape)}" if column.shape else column.kind
+
+
+def _meaning(name: Name, column: Column) -> str:
+    if (target := REFERENCES.get((name, column.name))) is None:
+        return column.meaning
+    return f"{column.meaning}; names a row of `{target[0]}` by its `{target[1]}`"
+
+
+def _labels() -> str:
+    rest = (
+        "Controls stay in the tables, with `control_of`, the `friction` they were tried at and "
+        "`force_closed` false. `held` is what came of the trials, `force_closed` what is proved; "
+        "`mismatches` counts where they contradict each other."
+    )
+    lines = ["| `label` | what it is |", "|---|---|"]
+    lines += [f"| `{label}` | {meaning} |" for label, meaning in LABELS.items()]
+    return _lines([*lines, "", rest])
+
+
+def _loading(manifest: Manifest) -> str:
+    """Code that loads the dataset, for a folder called `ds`; what follows tries it."""
+    split = next(iter(_splits(FIRST, manifest)), "train")
+    return f"""\
+## Loading
+
+From the folder that holds this one as `ds`, with polars,
+
+```python
+import polars
+grasps = polars.read_parquet("ds/data/grasps/*.parquet")
+```
+
+pandas, where two lines make an array of a column of lists,
+
+```python
+import numpy, pandas
+grasps = pandas.read_parquet("ds/data/grasps")
+def stacked(cells, missing):
+    return numpy.array([missing if cell is None else numpy.stack(cell) for cell in cells])
+points = stacked(grasps["contact_points_m"], numpy.full((4, 3), numpy.nan))
+```
+
+Hugging Face datasets, also offline,
+
+```python
+import datasets
+grasps = datasets.load_dataset("ds", "grasps", split="{split}")
+```
+
+or graspproof, as NumPy arrays:
+
+```python
+import sim_validate
+grasps = sim_validate.load_dataset("ds", "{split}")["grasps"]
+```
+
+`graspproof dataset verify ds` compares every file with `manifest.json`, proves every closure again
+from the contacts in the table, and plans and simulates a sample again.
+"""
+
+
+def _list(lines: Iterable[str]) -> str:
+    return _lines(f"- {line}" for line in lines)
+
+
+def _lines(lines: Iterable[str]) -> str:
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _is_address(text: str) -> bool:
+    return text.isprintable() and ADDRESS.fullmatch(text) is not None
+
+
+def _as_markdown(text: str) -> str:
+    """A user's text on one line, with nothing in it that is Markdown or HTML."""
+    line = "".join(letter if letter.isprintable() else " " for letter in text).strip()
+    return "".join(f"\\{letter}" if letter in MARKS else letter for letter in line)

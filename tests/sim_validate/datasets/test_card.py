@@ -1,0 +1,150 @@
+import dataclasses
+import re
+
+import pytest
+
+from sim_validate.datasets.card import CARD, card_text
+from sim_validate.datasets.columns import TABLES
+from sim_validate.datasets.manifest import Manifest, read_manifest
+from sim_validate.datasets.statements import LABELS
+from sim_validate.datasets.tables import read_rows
+from sim_validate.datasets.verify import verify
+from tests.sim_validate.datasets.small import SMALL, build_small
+
+pytest.importorskip("pyarrow")
+yaml = pytest.importorskip("yaml")
+HOSTILE = (
+    '"]: x',
+    "one\ntwo\r\n---\nlicense: mit",
+    "<script>alert(1)</script>",
+    "a | b || `c` **d** [e](f) # g ![h](i) <!-- j",
+    "\u2028\x85\x1b[31m\x00\ufeff",
+    "\udc80 no text at all",
+    "gr\u00fc\u00dfe \U0001f916 \\U0001F916 {{x}} %s ${y}",
+    "- a: &b *c !!python/object:os.system",
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return build_small(tmp_path_factory.mktemp("card") / "ds")
+
+
+@pytest.fixture(scope="module")
+def manifest(folder):
+    return read_manifest(folder)
+
+
+def split_card(text):
+    """The parsed header and the text after it."""
+    opening, header, body = text.split("---\n", 2)
+    assert opening == ""
+    return yaml.safe_load(header), body
+
+
+def test_the_card_is_listed_in_the_manifest_and_the_dataset_is_whole(folder, manifest):
+    assert CARD in {each.path for each in manifest.files}
+    assert verify(folder) == []
+    assert (folder / CARD).read_text(encoding="utf-8") == card_text(SMALL, manifest)
+
+
+def test_the_header_says_where_each_table_and_split_is(folder):
+    header, _ = split_card((folder / CARD).read_text())
+    assert header["license"] == "cc-by-4.0"
+    assert header["pretty_name"] == SMALL.title
+    assert header["task_categories"] == ["robotics"]
+    assert header["size_categories"] == ["n<1K"]
+    assert [each["config_name"] for each in header["configs"]] == list(TABLES)
+    assert [each["config_name"] for each in header["configs"] if "default" in each] == ["grasps"]
+    seen = set()
+    for config in header["configs"]:
+        assert [each["split"] for each in config["data_files"]] == ["train", "validation", "test"]
+        for each in config["data_files"]:
+            found = set(folder.glob(each["path"]))
+            assert found
+            seen |= found
+    assert seen == set(folder.glob("data/*/*.parquet"))
+
+
+def test_every_column_is_documented_with_its_unit(folder):
+    _, body = split_card((folder / CARD).read_text())
+    count = 0
+    for name, columns in TABLES.items():
+        section = body.split(f"\n### {name}\n")[1].split("\n## ")[0].split("\n### ")[0]
+        rows = [
+            [cell.strip() for cell in line.strip("|").split("|")]
+            for line in section.splitlines()
+            if line.startswith("| `")
+        ]
+        assert [row[0] for row in rows] == [f"`{each.name}`" for each in columns]
+        for row, column in zip(rows, columns, strict=True):
+            assert row[2] == column.unit
+            assert row[3].startswith(column.meaning)
+            count += 1
+    assert count == sum(map(len, TABLES.values()))
+
+
+def test_every_label_is_explained(folder):
+    _, body = split_card((folder / CARD).read_text())
+    rows = [row for path in folder.glob("data/grasps/*.parquet") for row in read_rows(path)]
+    labels = {row["label"] for row in rows}
+    assert {"grasp"} < labels <= set(LABELS)
+    assert all(f"| `{label}` | {meaning} |" in body for label, meaning in LABELS.items())
+
+
+def test_counts_are_those_of_the_tables(folder, manifest):
+    _, body = split_card((folder / CARD).read_text())
+    rows = re.findall(r"^\| `(\w+)` \| .* \| (\w+) \| (\d+) \|$", body, re.MULTILINE)
+    assert len(rows) == 9
+    for name in TABLES:
+        assert sum(int(n) for table, _, n in rows if table == name) == manifest.rows()[name]
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_words_of_the_user_stay_words(manifest, text):
+    config = dataclasses.replace(SMALL, title=text, creator=text, url=text, license=text)
+    card = card_text(config, manifest)
+    header, body = split_card(card)
+    plain, _ = split_card(card_text(SMALL, manifest))
+    assert header.pop("pretty_name") == text
+    assert header.pop("license_name") == text
+    assert header.pop("license") == "other"
+    assert header == {key: plain[key] for key in plain if key not in ("pretty_name", "license")}
+    settings = re.compile(r"```toml\n.*?```\n", re.DOTALL)
+    said, usual = (settings.sub("", each) for each in (body, card_text(SMALL, manifest)))
+    assert not re.search(r"(?<!\\)(<script|<!--|\*\*d|\[e\]|!\[)", said)
+    assert len(said.splitlines()) == len(split_card(usual)[1].splitlines())
+    assert all(line.isprintable() for line in body.splitlines())
+    card.encode()
+
+
+def test_only_addresses_become_links(manifest):
+    def said(url):
+        return card_text(dataclasses.replace(SMALL, url=url), manifest)
+
+    assert "- At: <https://example.org/a_b?c=d>\n" in said("https://example.org/a_b?c=d")
+    assert "javascript:alert(1)" in said("javascript:alert(1)")
+    for url in ("javascript:alert(1)", "https://a.b/<script>", "https://a.b/c d"):
+        assert f"<{url}>" not in said(url).split("## How")[0]
+
+
+def test_what_is_not_given_is_not_said(manifest):
+    bare = dataclasses.replace(SMALL, license="", creator="", url="", published="")
+    header, body = split_card(card_text(bare, manifest))
+    assert "license" not in header
+    assert not re.search(r"^- (By|At|Published|Licence):", body, re.MULTILINE)
+
+
+def test_a_dataset_without_rows_has_a_card(manifest):
+    empty = Manifest(manifest.config_sha256, manifest.versions, 3, 3, ())
+    header, body = split_card(card_text(SMALL, empty))
+    assert "configs" not in header
+    assert "of 3 pairs of object and friction 3 were left out" in body
+
+
+@pytest.mark.parametrize(("rows", "size"), [(999, "n<1K"), (1000, "1K<n<10K"), (10**6, "1M<n<10M")])
+def test_sizes_are_those_of_the_hub(manifest, rows, size):
+    (one, *_) = manifest.of_table("grasps")
+    large = dataclasses.replace(manifest, files=(dataclasses.replace(one, rows=rows),))
+    header, _ = split_card(card_text(SMALL, large))
+    assert header["size_categories"] == [size]
