@@ -10,7 +10,7 @@ from typing import get_args
 
 import pytest
 
-from sim_validate.cli import Command, Dataset, DatasetBuild, DatasetVerify
+from sim_validate.cli import Command, Dataset, DatasetBuild, DatasetExport, DatasetVerify
 from sim_validate.commands import ACTIONS
 
 ROOT = Path(__file__).parent.parent
@@ -25,6 +25,7 @@ DOORS = {
     "mujoco": "sim_validate/simulate.py",
     "pebble": "sim_validate/engines.py",
     "pyarrow": "sim_validate/datasets/tables.py",
+    "h5py": "sim_validate/datasets/hdf5.py",
 }
 
 
@@ -107,6 +108,6 @@ def test_planning_without_kernels_needs_no_scipy():
 
 
 def test_every_command_has_its_function():
-    named = set(get_args(Command)) - {Dataset} | {DatasetBuild, DatasetVerify}
+    named = set(get_args(Command)) - {Dataset} | {DatasetBuild, DatasetVerify, DatasetExport}
     assert set(ACTIONS) == named
     assert all(callable(resolve_name(f"sim_validate.{place}")) for place in ACTIONS.values())

@@ -171,12 +171,17 @@ def _as_toml(value: object) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
-        return '"' + "".join(_escaped(letter) for letter in value) + '"'
+        return quoted(value)
     return repr(value)
 
 
+def quoted(text: str) -> str:
+    """A text as a basic string of TOML, which YAML reads alike: printable, on one line."""
+    return '"' + "".join(map(_escaped, text)) + '"'
+
+
 def _escaped(letter: str) -> str:
-    """A letter of a TOML basic string."""
+    """A letter of such a string."""
     if letter in '"\\':
         return "\\" + letter
     return letter if letter.isprintable() else f"\\U{ord(letter):08x}"
