@@ -87,7 +87,7 @@ def _grasp_lines(body: Polyhedron, grasp: StoredGrasp, radius: float) -> Iterato
     origin = points.mean(axis=0)
     touching = points - radius * normals - origin
     yield f"  {quoted(grasp.name)}:\n"
-    yield f"    confidence: {_number(float(grasp.held))}\n"
+    yield f"    confidence: {yaml_number(float(grasp.held))}\n"
     yield f"    position: {_list(origin)}\n"
     yield f"    orientation: {{w: 1.0, xyz: {_list(np.zeros(3))}}}\n"
     yield "    cspace_position:\n"
@@ -105,14 +105,14 @@ def _contacts(grasp: StoredGrasp) -> tuple[Array, Array]:
 def _joint_lines(places: Array) -> Iterator[str]:
     for finger, place in enumerate(places.tolist()):
         for axis, value in zip(AXES, place, strict=True):
-            yield f"      finger{finger}_{axis}: {_number(value)}\n"
+            yield f"      finger{finger}_{axis}: {yaml_number(value)}\n"
 
 
 def _list(values: Array) -> str:
-    return f"[{', '.join(map(_number, values.tolist()))}]"
+    return f"[{', '.join(map(yaml_number, values.tolist()))}]"
 
 
-def _number(value: float) -> str:
+def yaml_number(value: float) -> str:
     """A number in full; without a point YAML 1.1 would take one with an exponent for text."""
     text = repr(value)
     return text if "." in text else text.replace("e", ".0e")
