@@ -24,7 +24,7 @@ from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.values import Contact, Grasp, Polyhedron
 from scenes.fingertips import FingerSettings
-from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, Layout, arrange
+from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
 from scenes.physics import PhysicsSettings
 
 Surface = Literal["pads", "mesh"]
@@ -207,15 +207,26 @@ def _servos(actuators: ElementTree.Element, layout: Layout, finger: int) -> None
 
 
 def _keyframes(root: ElementTree.Element, layout: Layout) -> None:
-    """`approach`: fingers away from the object; `grasp`: touching. Both squeeze gently."""
+    """Where fingers are, and what their servos are told.
+
+    `pregrasp`: away from the object, and kept there. `approach`: at the same place, but told to
+    squeeze gently, so that they come in. `grasp`: touching, told to squeeze gently. `squeeze`:
+    touching, told to squeeze in the same way as hard as the largest push allows.
+    """
     fingers = len(layout.contacts)
     home = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], np.zeros(3 * fingers)])
     away = home.copy()
     away[7:] = np.einsum("kij,ki->kj", layout.frames, layout.approach).ravel()
     push = layout.squeeze / layout.drive.stiffness_n_per_m
+    told = {
+        "pregrasp": (away, away[7:]),
+        "approach": (away, push),
+        "grasp": (home, push),
+        "squeeze": (home, push / SQUEEZE),
+    }
     keys = _add(root, "keyframe", {})
-    _add(keys, "key", {"name": "approach", "qpos": away, "ctrl": push.ravel()})
-    _add(keys, "key", {"name": "grasp", "qpos": home, "ctrl": push.ravel()})
+    for name, (place, ctrl) in told.items():
+        _add(keys, "key", {"name": name, "qpos": place, "ctrl": ctrl})
 
 
 def quaternion(rotation: Array) -> Array:

@@ -32,12 +32,14 @@ from sim_validate.flags import (
     DatasetSettings,
     DatasetWork,
     Edges,
+    ExportFormat,
     Fingers,
     Mesh,
     Planning,
     Positive,
     Seed,
     Speech,
+    SplitName,
     Testing,
     Wrench,
 )
@@ -194,13 +196,30 @@ class DatasetVerify:
 
 
 @dataclass(frozen=True, slots=True)
+class DatasetExport:
+    """Write a dataset in a format that others read."""
+
+    dataset: Positional[Path]
+    """Its folder."""
+    to: ExportFormat
+    """csv, jsonl: a text file per table. npz: arrays without pickle. hdf5: one file. isaac: an
+    Isaac grasp file per object and friction. mjcf: a MuJoCo scene per grasp."""
+    out: Path
+    """Folder to make; it must not be there, or be empty."""
+    split: SplitName | None = None
+    """Only the objects of this split; all if not given."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+
+
+@dataclass(frozen=True, slots=True)
 class Dataset:
-    """Make a dataset of many objects, or check one."""
+    """Make a dataset of many objects, check one, or write one in another format."""
 
     action: OmitArgPrefixes[
         Annotated[DatasetBuild, subcommand("build", prefix_name=False)]
         | Annotated[DatasetImport, subcommand("import", prefix_name=False)]
         | Annotated[DatasetVerify, subcommand("verify", prefix_name=False)]
+        | Annotated[DatasetExport, subcommand("export", prefix_name=False)]
     ]
 
     @property

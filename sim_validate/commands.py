@@ -15,6 +15,7 @@ ACTIONS: dict[type[Any], str] = {
     cli.DatasetBuild: "dataset_commands:build_dataset",
     cli.DatasetImport: "dataset_commands:import_dataset",
     cli.DatasetVerify: "dataset_commands:verify_dataset",
+    cli.DatasetExport: "dataset_commands:export_dataset",
     cli.Inspect: "object_commands:inspect_object",
     cli.Objects: "object_commands:list_objects",
     cli.Doctor: "doctor_command:check_installation",

@@ -1,4 +1,4 @@
-"""The commands about datasets: to make one, to go on making it, and to check it."""
+"""The commands about datasets: to make one, to go on making it, to check and to export it."""
 
 from contextlib import AbstractContextManager
 from dataclasses import asdict, fields
@@ -15,6 +15,7 @@ from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
 from sim_validate.datasets.croissant import CROISSANT, missing_fields
 from sim_validate.datasets.driver import Engine
+from sim_validate.datasets.exports import export
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.redo import Sample
 from sim_validate.datasets.tasks import Limits
@@ -85,6 +86,19 @@ def verify_dataset(command: cli.DatasetVerify, reporter: Reporter) -> int:
     )
     reporter.document({"dataset": str(command.dataset), "faults": faults})
     return cli.Exit.NEGATIVE if faults else cli.Exit.GOOD
+
+
+def export_dataset(command: cli.DatasetExport, reporter: Reporter) -> int:
+    """Write a dataset in another format."""
+    with reporter.progress("exporting") as steps:
+        done = export(command.dataset, command.to, command.out, command.split, steps.update)
+    counts = ", ".join(f"{count} {name}" for name, count in done.rows.items())
+    reporter.say(f"{command.out}: {done.files} files, {counts}")
+    if not done.rows["grasps"]:
+        reporter.warn(f"{command.dataset}: no grasps in {command.split or 'it'}")
+    asked = {"dataset": str(command.dataset), "to": command.to, "split": command.split}
+    reporter.document({**asked, "out": str(command.out), **asdict(done)})
+    return cli.Exit.GOOD
 
 
 def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:

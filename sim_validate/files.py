@@ -2,16 +2,17 @@
 
 import io
 import os
+import shutil
 import tempfile
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Generator, Iterable, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 
 MAX_TEXT_BYTES = 256 * 2**20
@@ -35,15 +36,20 @@ def read_text(path: Path) -> str:
 
 def write_text(path: Path, text: str) -> Path:
     """Write a file by renaming a complete one into place; folders are made as needed."""
-    return _write(path, text.encode())
+    return _write(path, [text.encode()])
 
 
 def write_bytes(path: Path, data: bytes) -> Path:
     """As `write_text`."""
-    return _write(path, data)
+    return _write(path, [data])
 
 
-def write_arrays(path: Path, arrays: Mapping[str, Array]) -> Path:
+def write_lines(path: Path, lines: Iterable[str]) -> Path:
+    """As `write_text`, of lines that are not all in memory; each ends with its line break."""
+    return _write(path, (line.encode() for line in lines))
+
+
+def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
     """Write arrays by name, compressed, as `numpy.load` reads them."""
     held = io.BytesIO()
     with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -53,7 +59,7 @@ def write_arrays(path: Path, arrays: Mapping[str, Array]) -> Path:
             )  # of no date, so that equal arrays give equal files
             with archive.open(member, "w") as stream:
                 np.lib.format.write_array(stream, array, allow_pickle=False)
-    return _write(path, held.getvalue())
+    return _write(path, [held.getvalue()])
 
 
 def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
@@ -73,13 +79,34 @@ def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
         raise InputError(f"{path}: cannot be read as npz ({error})") from error
 
 
-def _write(path: Path, data: bytes) -> Path:
+@contextmanager
+def whole_folder(folder: Path) -> Generator[Path]:
+    """A place to write to, which becomes the folder when everything is written, and else goes.
+
+    Raises:
+        InputError: The folder is there and not empty.
+    """
+    if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
+        raise InputError(f"{folder}: is there, and no empty folder; give another --out")
+    named = folder.resolve()
+    named.parent.mkdir(parents=True, exist_ok=True)
+    temporary = Path(tempfile.mkdtemp(dir=named.parent, prefix=".unfinished-"))
+    try:
+        yield temporary
+        temporary.chmod(0o755)
+        temporary.replace(named)
+    except BaseException:
+        shutil.rmtree(temporary, ignore_errors=True)
+        raise
+
+
+def _write(path: Path, parts: Iterable[bytes]) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     temporary = Path(name)
     try:
         with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
+            stream.writelines(parts)
             stream.flush()
             os.fsync(stream.fileno())
         temporary.chmod(0o644)

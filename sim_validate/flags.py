@@ -27,6 +27,8 @@ Wrench = Annotated[
     tuple[Finite, Finite, Finite, Finite, Finite, Finite], not_zero(SMALLEST, LARGEST)
 ]
 RuleName = Literal["5cm-15deg", "contact-remains", "2cm", "3cm", "six-forces"]
+ExportFormat = Literal["csv", "jsonl", "npz", "hdf5", "isaac", "mjcf"]
+SplitName = Literal["train", "validation", "test"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,14 @@ from typing import get_args
 
 import pytest
 
-from sim_validate.cli import Command, Dataset, DatasetBuild, DatasetVerify
+from sim_validate.cli import (
+    Command,
+    Dataset,
+    DatasetBuild,
+    DatasetExport,
+    DatasetImport,
+    DatasetVerify,
+)
 from sim_validate.commands import ACTIONS
 
 ROOT = Path(__file__).parent.parent
@@ -25,6 +32,7 @@ DOORS = {
     "mujoco": "sim_validate/simulate.py",
     "pebble": "sim_validate/engines.py",
     "pyarrow": "sim_validate/datasets/tables.py",
+    "h5py": "sim_validate/datasets/hdf5.py",
 }
 
 
@@ -107,6 +115,7 @@ def test_planning_without_kernels_needs_no_scipy():
 
 
 def test_every_command_has_its_function():
-    named = set(get_args(Command)) - {Dataset} | {DatasetBuild, DatasetVerify}
+    actions = {DatasetBuild, DatasetImport, DatasetVerify, DatasetExport}
+    named = set(get_args(Command)) - {Dataset} | actions
     assert set(ACTIONS) == named
     assert all(callable(resolve_name(f"sim_validate.{place}")) for place in ACTIONS.values())

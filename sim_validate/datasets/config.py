@@ -195,11 +195,12 @@ def _as_toml(value: object) -> str:
 
 
 def quoted(text: str) -> str:
-    """A text in double quotes, as TOML and YAML both read it, on one line."""
-    return '"' + "".join(_escaped(letter) for letter in text) + '"'
+    """A text as a basic string of TOML, which YAML reads alike: printable, on one line."""
+    return '"' + "".join(map(_escaped, text)) + '"'
 
 
 def _escaped(letter: str) -> str:
+    """A letter of such a string."""
     if letter in '"\\':
         return "\\" + letter
     return letter if letter.isprintable() else f"\\U{ord(letter):08x}"

@@ -67,6 +67,7 @@ TYPES = {"text": "sc:Text", "bool": "sc:Boolean", "int": "sc:Integer", "float": 
 FORMATS = {
     "parquet": "application/x-parquet",
     "toml": "application/toml",
+    "json": "application/json",
     "jsonl": "application/jsonl",
     "md": "text/markdown",
     "obj": "model/obj",

@@ -2,10 +2,8 @@
 
 from pathlib import Path
 
-from grasp_core.errors import InputError
 from sim_validate.datasets.columns import TABLES, Name
-from sim_validate.datasets.manifest import read_manifest
-from sim_validate.datasets.rows import SPLITS
+from sim_validate.datasets.selection import select
 from sim_validate.datasets.tables import Columns, read_columns
 
 
@@ -23,15 +21,5 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
     Raises:
         InputError: There is no such split, no finished dataset, or a file is damaged.
     """
-    splits = [name for name, _ in SPLITS]
-    if split is not None and split not in splits:
-        raise InputError(f"split: expected one of {', '.join(splits)}, got {split!r}")
-    root = Path(folder)
-    manifest = read_manifest(root)
-    return {
-        name: read_columns(
-            [root / each.path for each in manifest.of_table(name) if split in (None, each.split)],
-            name,
-        )
-        for name in TABLES
-    }
+    chosen = select(Path(folder), split)
+    return {name: read_columns(chosen.paths(name), name) for name in TABLES}

@@ -41,7 +41,7 @@ class Manifest:
     versions: dict[str, str]
     """Of packages, of the interpreter, and the hash of our own code."""
     units: int
-    """Objects times frictions that were asked for."""
+    """Objects at frictions that were asked for; given grasps in parts."""
     quarantined: int
     """Of them, those that were left out."""
     files: tuple[Listed, ...]

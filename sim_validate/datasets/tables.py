@@ -8,7 +8,7 @@ import importlib
 import io
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -85,6 +85,21 @@ def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[dict[str
         InputError: It is no such file, or damaged.
     """
     return _read(path, columns).to_pylist()
+
+
+def each_row(path: Path) -> Iterator[dict[str, Any]]:
+    """The rows of a file one by one, not all in memory; otherwise as `read_rows`.
+
+    Raises:
+        InputError: It is no such file, or damaged.
+    """
+    arrow, parquet = _pyarrow(), _parquet()
+    try:
+        file = parquet.ParquetFile(path, page_checksum_verification=True)
+        for part in file.iter_batches(GROUP_ROWS):
+            yield from part.to_pylist()
+    except (OSError, arrow.ArrowException) as error:
+        raise InputError(f"{path}: cannot be read, or is damaged ({error})") from error
 
 
 def _read(path: Path, columns: Sequence[str] | None = None) -> Any:

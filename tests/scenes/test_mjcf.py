@@ -6,7 +6,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from scenes.layout import arrange, grasp_size
+from scenes.layout import SQUEEZE, arrange, grasp_size
 from scenes.mjcf import quaternion
 from scenes.physics import CHOSEN_FLAGS, ENABLED_FLAGS, UNUSED_FLAGS
 from tests.judges import random_rotation
@@ -105,6 +105,44 @@ def test_approach_starts_clear_and_ends_in_a_grasp(held):
     assert data.ncon == 4
     assert np.linalg.norm(data.qpos[:3]) < 0.02 * scene.layout.radius_m
     assert np.abs(data.qvel).max() < 1e-3
+
+
+def after(model, key, steps):
+    """The state some steps after a keyframe, and the largest push of a fingertip [N]."""
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key(key).id)
+    mujoco.mj_step(model, data, nstep=steps)
+    forces = np.zeros((data.ncon, 6))
+    for number, force in enumerate(forces):
+        mujoco.mj_contactForce(model, data, number, force)
+    return data, forces[:, 0].max(initial=0.0)
+
+
+def test_before_the_grasp_fingers_stay_where_they_come_from(held):
+    _, _, scene, model = held
+    (start, _), (later, _) = after(model, "pregrasp", 0), after(model, "pregrasp", 1500)
+    np.testing.assert_array_equal(start.qpos, model.key("approach").qpos)
+    assert start.ncon == later.ncon == 0
+    np.testing.assert_allclose(later.qpos, start.qpos, atol=1e-9 * scene.layout.radius_m)
+
+
+def test_fingers_push_as_hard_as_their_keyframe_says(held):
+    """A servo loses its stiffness times what its finger moves until the contact carries it; and as
+    the object turns, a share of the tangential force, at most `friction` of the push, is normal."""
+    _, _, scene, model = held
+    most = scene.layout.drive.max_normal_force_n
+    assert {model.key(i).name for i in range(model.nkey)} == {
+        "pregrasp", "approach", "grasp", "squeeze",
+    }  # fmt: skip
+    for key, share in (("grasp", SQUEEZE), ("squeeze", 1.0)):
+        data, push = after(model, key, 1500)
+        assert data.ncon == 4
+        moved = np.linalg.norm(data.qpos[7:].reshape(4, 3), axis=1).max()
+        turned = 2.0 * np.linalg.norm(data.qpos[4:7])
+        lost = scene.layout.drive.stiffness_n_per_m * moved + 0.5 * most * turned
+        assert lost < 0.05 * most
+        assert push == pytest.approx(share * most, abs=lost)
+        assert np.linalg.norm(data.qpos[:3]) < 1e-3 * scene.layout.radius_m
 
 
 def test_numbers_are_written_in_full(held):

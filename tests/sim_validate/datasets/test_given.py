@@ -123,8 +123,9 @@ def test_rows_do_not_depend_on_how_the_work_is_divided(planned, tmp_path, monkey
     parts = build(config, tmp_path / "parts", Here(), silent)
     assert (whole.units, parts.units) == (2, 4)
     one, other = contents(tmp_path / "whole"), contents(tmp_path / "parts")
-    assert {p for p in one if one[p] != other[p]} == {"manifest.json"}
-    assert one.keys() == other.keys()
+    counted = {"manifest.json", "README.md", "croissant.json"}  # they say how many units
+    assert one.keys() == other.keys() > counted
+    assert {path for path in one if one[path] != other[path]} <= counted
 
 
 def test_the_command_judges_a_file(planned, tmp_path):

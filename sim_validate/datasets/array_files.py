@@ -1,0 +1,57 @@
+"""Tables of a dataset -> NumPy archives that hold no pickled objects, a file per table.
+
+As in `load_dataset`, numbers that are null are NaN in columns of floats and 0 in columns of whole
+numbers; text that is null is empty. Text is of fixed width.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.errors import InputError
+from sim_validate.datasets.columns import TABLES, Column, Name
+from sim_validate.datasets.flat_files import write_about
+from sim_validate.datasets.selection import Selection
+from sim_validate.datasets.tables import Columns, read_columns
+from sim_validate.files import write_arrays
+
+NULLS = {"float": "NaN", "int": "0", "text": "empty", "bool": "none"}
+"""What stands for null in arrays, by kind of column."""
+
+
+def write_npz(
+    chosen: Selection, folder: Path, report: Callable[[int, int], None]
+) -> dict[Name, int]:
+    """Write an archive per table, with an array per column.
+
+    Raises:
+        InputError: The dataset is damaged.
+    """
+    for done, name in enumerate(TABLES, start=1):
+        write_arrays(folder / f"{name}.npz", plain_columns(chosen, name))
+        report(done, len(TABLES))
+    write_about(chosen, folder)
+    return chosen.counts()
+
+
+def plain_columns(chosen: Selection, name: Name) -> Columns:
+    """The columns of a table as arrays (rows, ..) of numbers, truth values and fixed-width text.
+
+    Raises:
+        InputError: The dataset is damaged.
+    """
+    found = read_columns(chosen.paths(name), name)
+    return {column.name: _plain(column, found[column.name]) for column in TABLES[name]}
+
+
+def _plain(column: Column, values: NDArray[Any]) -> NDArray[Any]:
+    if column.kind == "bool":
+        if any(value is None for value in values):
+            raise InputError(f"{column.name}: expected true or false in every row, got null")
+        return values.astype(np.bool_)
+    if column.kind == "text":
+        return np.array(["" if value is None else value for value in values], dtype=np.str_)
+    return values

@@ -1,0 +1,95 @@
+"""Tables of a dataset -> CSV and JSON Lines, a text file per table, and `about.json` beside them.
+
+CSV has a column per number: `contact_points_m_0_x` is of the first contact, `wrench_n_nm_fx` a
+force. Null is an empty cell. Text is in quotes; where it could be taken for a formula, it begins
+with an apostrophe, which is to be removed, as is one that was there before. JSON Lines have a row
+per line, nested, with null.
+"""
+
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict
+from itertools import product
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from sim_validate.datasets.columns import TABLES, Column, Name
+from sim_validate.datasets.selection import Selection
+from sim_validate.files import write_lines, write_text
+
+Row: TypeAlias = Mapping[str, Any]
+PARTS = {3: tuple("xyz"), 4: tuple("0123"), 6: ("fx", "fy", "fz", "tx", "ty", "tz")}
+"""What the places of a cell are called, by how many there are: a point, fingers, a wrench."""
+FORMULA = "=+-@\uff1d\uff0b\uff0d\uff20'"
+"""What a cell that spreadsheets calculate begins with, also in full width, and our own mark."""
+
+
+def write_csv(
+    chosen: Selection, folder: Path, report: Callable[[int, int], None]
+) -> dict[Name, int]:
+    """Write a CSV file per table.
+
+    Raises:
+        InputError: The dataset is damaged.
+    """
+    for done, name in enumerate(TABLES, start=1):
+        write_lines(folder / f"{name}.csv", _csv_lines(chosen, name))
+        report(done, len(TABLES))
+    write_about(chosen, folder)
+    return chosen.counts()
+
+
+def write_jsonl(
+    chosen: Selection, folder: Path, report: Callable[[int, int], None]
+) -> dict[Name, int]:
+    """Write a file of JSON Lines per table.
+
+    Raises:
+        InputError: The dataset is damaged.
+    """
+    for done, name in enumerate(TABLES, start=1):
+        lines = (json.dumps(row, allow_nan=False) + "\n" for row in chosen.rows(name))
+        write_lines(folder / f"{name}.jsonl", lines)
+        report(done, len(TABLES))
+    write_about(chosen, folder)
+    return chosen.counts()
+
+
+def write_about(chosen: Selection, folder: Path) -> None:
+    """Write what made a dataset, and what its columns mean, where a format has no place for it."""
+    columns = {name: [asdict(column) for column in table] for name, table in TABLES.items()}
+    about = {"dataset": chosen.facts(), "columns": columns}
+    write_text(folder / "about.json", json.dumps(about, indent=1) + "\n")
+
+
+def _csv_lines(chosen: Selection, name: Name) -> Iterator[str]:
+    columns = TABLES[name]
+    yield ",".join(part for column in columns for part in _names(column)) + "\n"
+    for row in chosen.rows(name):
+        yield ",".join(cell for column in columns for cell in _cells(column, row)) + "\n"
+
+
+def _names(column: Column) -> list[str]:
+    places = product(*(PARTS[size] for size in column.shape))
+    return ["_".join((column.name, *place)) for place in places]
+
+
+def _cells(column: Column, row: Row) -> list[str]:
+    value = row[column.name]
+    if value is None:
+        return [""] * math.prod(column.shape)
+    flat: list[Any] = np.array(value, dtype=object).ravel().tolist()
+    return [_cell(part) for part in flat]
+
+
+def _cell(value: object) -> str:
+    """Of a plain value, so that no spreadsheet takes it for a formula."""
+    if value is None:
+        return ""
+    if not isinstance(value, str):
+        return str(value).lower() if isinstance(value, bool) else repr(value)
+    mark = "'" if value and (value[0] in FORMULA or not value[0].isprintable()) else ""
+    return '"' + mark + value.replace('"', '""') + '"'

@@ -1,0 +1,118 @@
+"""Grasps of a dataset -> Isaac grasp files, format version 1.0: one per object and friction.
+
+The format describes a gripper by a pose and the positions of joints, so the four fingertips are
+taken as one gripper: `fingerI_x`, `fingerI_y` and `fingerI_z` slide fingertip I along the axes of
+the gripper's frame, whose origin its centre is at when they are zero. The gripper's frame is turned
+like the object's, which is that of the mesh in metres, and lies midway between the contacts. All
+fingertips of a file have the radius that fits all of its grasps, so a tip's centre is a radius
+before its contact. Negative controls, which may have fewer fingers, are left out.
+
+Source:
+    NVIDIA, "Isaac Grasp File", nvidia-isaac-ros.github.io/concepts/manipulation/isaac_grasp.html.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.values import Polyhedron
+from scenes.fingertips import FingerSettings, fitting_radius
+from scenes.layout import arrange
+from sim_validate.datasets.columns import Name
+from sim_validate.datasets.config import quoted
+from sim_validate.datasets.meshes import mesh_path
+from sim_validate.datasets.rows import SHORT
+from sim_validate.datasets.selection import Selection
+from sim_validate.datasets.stored_grasps import (
+    GraspedObject,
+    StoredGrasp,
+    grasped_objects,
+    new_path,
+)
+from sim_validate.files import write_lines
+
+AXES = "xyz"
+HEAD = """\
+# {source} at friction {friction:.12g}: grasps by four spherical fingertips of radius {radius!r} m.
+# Object frame: that of {mesh}
+# of the dataset, in metres. Gripper frame: turned like it, its origin midway between the contacts.
+# Joints fingerI_x, fingerI_y, fingerI_z [m] slide the centre of fingertip I along the gripper's
+# axes, from its origin where they are zero.
+# cspace_position: touching; pregrasp_cspace_position: moved back along the contacts' normals.
+# confidence: 1.0 if the object was held in every simulated trial, else 0.0.
+"""
+
+
+def write_isaac(
+    chosen: Selection, folder: Path, report: Callable[[int, int], None]
+) -> dict[Name, int]:
+    """Write the grasps of each object at each friction.
+
+    Raises:
+        InputError: The dataset is damaged.
+    """
+    facts, total = chosen.facts(), chosen.counts()["objects"]
+    objects = grasps = 0
+    for each in grasped_objects(chosen):
+        by_friction = sorted(each.grasps, key=lambda grasp: grasp.friction)
+        for friction, same in groupby(by_friction, key=lambda grasp: grasp.friction):
+            name = f"{each.object_id[:SHORT]}-{friction}-{each.body.name}"
+            write_lines(new_path(folder, name, "yaml"), _lines(each, list(same), facts))
+        objects += 1
+        grasps += len(each.grasps)
+        report(objects, total)
+    return {"objects": objects, "grasps": grasps}
+
+
+def _lines(
+    of: GraspedObject, grasps: Sequence[StoredGrasp], facts: Mapping[str, str]
+) -> Iterator[str]:
+    radius = min(fitting_radius(of.body, *_contacts(grasp)) for grasp in grasps)
+    source, mesh = quoted(of.body.name), mesh_path(Path(), of.object_id).as_posix()
+    friction = grasps[0].friction
+    yield HEAD.format(source=source, friction=friction, radius=radius, mesh=quoted(mesh))
+    yield from (f"# {name}: {quoted(text)}\n" for name, text in facts.items())
+    yield "format: isaac_grasp\nformat_version: 1.0\n\n"
+    yield f'object_frame: {source}\ngripper_frame: "four_fingertips"\n\ngrasps:\n'
+    for grasp in grasps:
+        yield from _grasp_lines(of.body, grasp, radius)
+
+
+def _grasp_lines(body: Polyhedron, grasp: StoredGrasp, radius: float) -> Iterator[str]:
+    layout = arrange(body, grasp.contacts, grasp.friction, FingerSettings(radius_m=radius))
+    points, normals = _contacts(grasp)
+    origin = points.mean(axis=0)
+    touching = points - radius * normals - origin
+    yield f"  {quoted(grasp.name)}:\n"
+    yield f"    confidence: {yaml_number(float(grasp.held))}\n"
+    yield f"    position: {_list(origin)}\n"
+    yield f"    orientation: {{w: 1.0, xyz: {_list(np.zeros(3))}}}\n"
+    yield "    cspace_position:\n"
+    yield from _joint_lines(touching)
+    yield "    pregrasp_cspace_position:\n"
+    yield from _joint_lines(touching + layout.approach)
+
+
+def _contacts(grasp: StoredGrasp) -> tuple[Array, Array]:
+    """Positions (4, 3) [m] and normals (4, 3)."""
+    points = np.array([contact.position for contact in grasp.contacts])
+    return points, np.array([contact.normal for contact in grasp.contacts])
+
+
+def _joint_lines(places: Array) -> Iterator[str]:
+    for finger, place in enumerate(places.tolist()):
+        for axis, value in zip(AXES, place, strict=True):
+            yield f"      finger{finger}_{axis}: {yaml_number(value)}\n"
+
+
+def _list(values: Array) -> str:
+    return f"[{', '.join(map(yaml_number, values.tolist()))}]"
+
+
+def yaml_number(value: float) -> str:
+    """A number in full; without a point YAML 1.1 would take one with an exponent for text."""
+    text = repr(value)
+    return text if "." in text else text.replace("e", ".0e")

@@ -1,0 +1,78 @@
+"""The planned grasps of a dataset with their solids, an object at a time; no negative controls."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from grasp_core.errors import InputError
+from grasp_core.values import Contact, Polyhedron
+from sim_validate.datasets.meshes import stored_body
+from sim_validate.datasets.selection import Selection
+
+UNSAFE = re.compile(r"[^A-Za-z0-9._-]")
+LONGEST = 150
+"""Letters of a file's name, fewer than any file system allows."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StoredGrasp:
+    """A grasp as the tables have it."""
+
+    id: str
+    """Of the whole dataset."""
+    name: str
+    """Family and faces."""
+    friction: float
+    held: bool
+    contacts: tuple[Contact, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GraspedObject:
+    """An object with all of its grasps."""
+
+    object_id: str
+    body: Polyhedron
+    grasps: tuple[StoredGrasp, ...]
+
+
+def grasped_objects(chosen: Selection) -> Iterator[GraspedObject]:
+    """All objects that have grasps, in the order of the tables.
+
+    Raises:
+        InputError: A table or a mesh is damaged, or a grasp's object is not there.
+    """
+    names = {row["object_id"]: row["source_name"] for row in chosen.rows("objects")}
+    faces = chosen.config().faces
+    planned = (row for row in chosen.rows("grasps") if row["label"] == "grasp")
+    for object_id, rows in groupby(planned, key=lambda row: row["object_id"]):
+        if object_id not in names:
+            raise InputError(f"{chosen.folder}: {object_id} has grasps, but is no object")
+        body = stored_body(chosen.folder, object_id, names[object_id], faces)
+        yield GraspedObject(object_id, body, tuple(map(_grasp, rows)))
+
+
+def _grasp(row: Mapping[str, Any]) -> StoredGrasp:
+    points, normals = row["contact_points_m"], row["contact_normals"]
+    return StoredGrasp(
+        id=row["grasp_id"],
+        name=row["name"],
+        friction=row["friction"],
+        held=row["held"],
+        contacts=tuple(map(Contact, points, normals)),
+    )
+
+
+def new_path(folder: Path, name: str, ending: str) -> Path:
+    """Where a file of some name goes, whatever letters the name has.
+
+    Raises:
+        InputError: There is a file of that name.
+    """
+    path = folder / f"{UNSAFE.sub('_', name).lstrip('.')[:LONGEST]}.{ending}"
+    if path.exists():
+        raise InputError(f"{name}: two files would be called {path.name}")
+    return path
