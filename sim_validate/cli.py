@@ -19,27 +19,22 @@ from tyro.conf import (
     Positional,
     UseAppendAction,
     arg,
-    subcommand,
 )
 
 from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError, UnfaithfulError
-from sim_validate.bounds import FINITE, at_least, check
+from sim_validate.bounds import check
 from sim_validate.config_file import with_config
+from sim_validate.dataset_flags import Dataset
 from sim_validate.engines import available_cores
 from sim_validate.flags import (
     Count,
-    DatasetPlanning,
-    DatasetSettings,
-    DatasetWork,
     Edges,
-    ExportFormat,
     Fingers,
     Mesh,
     Planning,
     Positive,
     Seed,
     Speech,
-    SplitName,
     Testing,
     Wrench,
 )
@@ -148,84 +143,6 @@ class Analyze:
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
-
-
-@dataclass(frozen=True, slots=True)
-class DatasetBuild:
-    """Plan and try the grasps of many objects, and write them as tables; started again, go on."""
-
-    objects: Positional[tuple[str, ...]]
-    """Mesh files, folders of mesh files, or names of built-in objects; or one TOML file that says
-    all but where to (see README)."""
-    out: Path
-    """Folder of the dataset."""
-    planning: OmitArgPrefixes[DatasetPlanning] = field(default_factory=DatasetPlanning)
-    settings: OmitArgPrefixes[DatasetSettings] = field(default_factory=DatasetSettings)
-    work: OmitArgPrefixes[DatasetWork] = field(default_factory=DatasetWork)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
-
-
-@dataclass(frozen=True, slots=True)
-class DatasetImport:
-    """Judge grasps of other tools, and write them as a dataset."""
-
-    contacts: Positional[Path]
-    """A contacts file (JSON) or npz file of four contacts for each grasp (see README)."""
-    object: Positional[str]
-    """The mesh file they are on, or the name of a built-in object."""
-    out: Path
-    """Folder of the dataset."""
-    outward: bool = False
-    """The file's normals point out of the object."""
-    settings: OmitArgPrefixes[DatasetSettings] = field(default_factory=DatasetSettings)
-    work: OmitArgPrefixes[DatasetWork] = field(default_factory=DatasetWork)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
-
-
-@dataclass(frozen=True, slots=True)
-class DatasetVerify:
-    """Check a dataset: files, rows, each closure from the contacts, and a sample done again."""
-
-    dataset: Positional[Path]
-    """Its folder."""
-    share: Annotated[float, FINITE, at_least(0.0, up_to=1.0)] = 0.01
-    """Part of all objects and frictions that is done again, at least one; 0 for none."""
-    seed: Seed = 0
-    """For which ones."""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
-
-
-@dataclass(frozen=True, slots=True)
-class DatasetExport:
-    """Write a dataset in a format that others read."""
-
-    dataset: Positional[Path]
-    """Its folder."""
-    to: ExportFormat
-    """csv, jsonl: a text file per table. npz: arrays without pickle. hdf5: one file. isaac: an
-    Isaac grasp file per object and friction. mjcf: a MuJoCo scene per grasp."""
-    out: Path
-    """Folder to make; it must not be there, or be empty."""
-    split: SplitName | None = None
-    """Only the objects of this split; all if not given."""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
-
-
-@dataclass(frozen=True, slots=True)
-class Dataset:
-    """Make a dataset of many objects, check one, or write one in another format."""
-
-    action: OmitArgPrefixes[
-        Annotated[DatasetBuild, subcommand("build", prefix_name=False)]
-        | Annotated[DatasetImport, subcommand("import", prefix_name=False)]
-        | Annotated[DatasetVerify, subcommand("verify", prefix_name=False)]
-        | Annotated[DatasetExport, subcommand("export", prefix_name=False)]
-    ]
-
-    @property
-    def speech(self) -> Speech:
-        """How much to say."""
-        return self.action.speech
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from pkgutil import resolve_name
 from typing import Any
 
-from sim_validate import cli
+from sim_validate import cli, dataset_flags
 from sim_validate.console import Reporter
 
 ACTIONS: dict[type[Any], str] = {
@@ -12,10 +12,10 @@ ACTIONS: dict[type[Any], str] = {
     cli.Validate: "validate_command:validate_file",
     cli.Scene: "scene_command:write_scenes",
     cli.Analyze: "analyze_command:analyze_file",
-    cli.DatasetBuild: "dataset_commands:build_dataset",
-    cli.DatasetImport: "dataset_commands:import_dataset",
-    cli.DatasetVerify: "dataset_commands:verify_dataset",
-    cli.DatasetExport: "dataset_commands:export_dataset",
+    dataset_flags.Build: "dataset_commands:build_dataset",
+    dataset_flags.Import: "dataset_commands:import_dataset",
+    dataset_flags.Verify: "dataset_commands:verify_dataset",
+    dataset_flags.Export: "dataset_commands:export_dataset",
     cli.Inspect: "object_commands:inspect_object",
     cli.Objects: "object_commands:list_objects",
     cli.Doctor: "doctor_command:check_installation",

@@ -8,14 +8,14 @@ from typing import Any
 from grasp_core.errors import InputError
 from grasp_core.mesh import FORMATS
 from grasp_core.requests import METHODS
-from sim_validate import cli, flags
+from sim_validate import cli, dataset_flags
 from sim_validate.clusters import dask_workers, ray_workers
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
 from sim_validate.datasets.croissant import CROISSANT, missing_fields
 from sim_validate.datasets.driver import Engine
-from sim_validate.datasets.exports import export
+from sim_validate.datasets.exports.formats import export
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.redo import Sample
 from sim_validate.datasets.tasks import Limits
@@ -28,12 +28,12 @@ FRICTION = 0.5
 MEGABYTE = 2**20
 
 
-def build_dataset(command: cli.DatasetBuild, reporter: Reporter) -> int:
+def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:
     """Make a dataset."""
     return _build(_asked(command), command.out, command.work, reporter)
 
 
-def import_dataset(command: cli.DatasetImport, reporter: Reporter) -> int:
+def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:
     """Judge grasps of other tools."""
     config = DatasetConfig(
         objects=(command.object,),
@@ -44,7 +44,7 @@ def import_dataset(command: cli.DatasetImport, reporter: Reporter) -> int:
     return _build(config, command.out, command.work, reporter)
 
 
-def _build(config: DatasetConfig, out: Path, work: flags.DatasetWork, reporter: Reporter) -> int:
+def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter: Reporter) -> int:
     _warn_of_missing(config, reporter)
     memory = None if work.memory_mb is None else work.memory_mb * MEGABYTE
     with reporter.progress("building") as steps, _engine(work) as engine:
@@ -60,7 +60,7 @@ def _build(config: DatasetConfig, out: Path, work: flags.DatasetWork, reporter: 
     return cli.Exit.PARTIAL if built.quarantined else cli.Exit.GOOD
 
 
-def _engine(work: flags.DatasetWork) -> AbstractContextManager[Engine]:
+def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:
     """Where units are done.
 
     Raises:
@@ -74,7 +74,7 @@ def _engine(work: flags.DatasetWork) -> AbstractContextManager[Engine]:
     return local_processes(work.jobs)
 
 
-def verify_dataset(command: cli.DatasetVerify, reporter: Reporter) -> int:
+def verify_dataset(command: dataset_flags.Verify, reporter: Reporter) -> int:
     """Check a dataset."""
     sample = Sample(command.share, command.seed) if command.share > 0.0 else None
     faults = verify(command.dataset, sample)
@@ -88,7 +88,7 @@ def verify_dataset(command: cli.DatasetVerify, reporter: Reporter) -> int:
     return cli.Exit.NEGATIVE if faults else cli.Exit.GOOD
 
 
-def export_dataset(command: cli.DatasetExport, reporter: Reporter) -> int:
+def export_dataset(command: dataset_flags.Export, reporter: Reporter) -> int:
     """Write a dataset in another format."""
     with reporter.progress("exporting") as steps:
         done = export(command.dataset, command.to, command.out, command.split, steps.update)
@@ -112,7 +112,7 @@ def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
         )
 
 
-def _asked(command: cli.DatasetBuild) -> DatasetConfig:
+def _asked(command: dataset_flags.Build) -> DatasetConfig:
     """What a TOML file or the flags say a dataset is made of.
 
     Raises:
@@ -120,7 +120,7 @@ def _asked(command: cli.DatasetBuild) -> DatasetConfig:
     """
     first = Path(command.objects[0])
     if first.suffix == ".toml":
-        unsaid = (flags.DatasetPlanning(), flags.DatasetSettings())
+        unsaid = (dataset_flags.Planning(), dataset_flags.Settings())
         if len(command.objects) > 1 or (command.planning, command.settings) != unsaid:
             raise InputError(f"{first} says what the dataset is made of: give nothing beside it")
         return config_from_toml(first)
@@ -133,7 +133,7 @@ def _asked(command: cli.DatasetBuild) -> DatasetConfig:
     )
 
 
-def _settings(settings: flags.DatasetSettings) -> dict[str, Any]:
+def _settings(settings: dataset_flags.Settings) -> dict[str, Any]:
     """Settings by the names of the configuration."""
     given = {each.name: getattr(settings, each.name) for each in fields(settings)}
     return {"frictions": given.pop("friction") or (FRICTION,), **given}

@@ -27,8 +27,6 @@ Wrench = Annotated[
     tuple[Finite, Finite, Finite, Finite, Finite, Finite], not_zero(SMALLEST, LARGEST)
 ]
 RuleName = Literal["5cm-15deg", "contact-remains", "2cm", "3cm", "six-forces"]
-ExportFormat = Literal["csv", "jsonl", "npz", "hdf5", "isaac", "mjcf"]
-SplitName = Literal["train", "validation", "test"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,64 +104,6 @@ class Planning:
     that are as clear of edges, cut into so many parts at most."""
     seed: Seed = 0
     """For everything random."""
-
-
-@dataclass(frozen=True, slots=True)
-class DatasetPlanning:
-    """Which grasps a dataset holds."""
-
-    family: UseAppendAction[tuple[Literal["concurrent", "pencil", "regulus", "free"], ...]] = ()
-    """Construction to try, may be repeated; all if not given."""
-    limit: Count = 20
-    """Largest number of grasps of each object, friction and family."""
-    cones: Literal["normal", "tilted"] = "tilted"
-    """Force cones to construct with."""
-
-
-@dataclass(frozen=True, slots=True)
-class DatasetWork:
-    """Where a dataset is made, and what an object at a friction may take; decides no row."""
-
-    engine: Literal["local", "ray", "dask"] = "local"
-    """Processes of this machine, or a Ray or Dask cluster."""
-    address: str | None = None
-    """Of the cluster; one is started on this machine if not given."""
-    timeout_s: Positive = 3600.0
-    """Give an object at one friction up after so long, twice [s]."""
-    memory_mb: Count | None = None
-    """What a process may ask for beyond what it needs to start."""
-    jobs: Count = field(default_factory=available_cores)
-    """Number of processes; results do not depend on it."""
-
-
-@dataclass(frozen=True, slots=True)
-class DatasetSettings:
-    """What a dataset is made of, however its grasps are found."""
-
-    friction: UseAppendAction[tuple[Positive, ...]] = ()
-    """Coulomb coefficient to prove and try at, may be repeated; 0.5 if not given."""
-    unit: Literal["m", "cm", "mm", "in"] = "m"
-    """What one unit in a mesh file is."""
-    faces: Literal["auto", "planar", "patches"] = "auto"
-    """Exact planar faces, or nearly flat patches of a curved or scanned surface."""
-    limits: Literal["none", "ramp", "bisection"] = "none"
-    """Also find the largest multiple of each wrench in simulation."""
-    random_wrenches: Annotated[int, at_least(0, up_to=10_000)] = 0
-    """Also hold so many random wrenches."""
-    seed: Annotated[int, at_least(0, up_to=2**63 - 1)] = 0
-    """For everything random."""
-    scenes: bool = False
-    """Also write each grasp as a MuJoCo scene."""
-    title: str = "four-finger grasps"
-    """What to call the dataset; for its card, as the following."""
-    license: str = ""
-    """Of the dataset, such as CC-BY-4.0."""
-    creator: str = ""
-    """Who makes it."""
-    url: str = ""
-    """Where it is to be found."""
-    published: str = ""
-    """When, such as 2026-11-22."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,10 +16,10 @@ from sim_validate.datasets.statements import (
     KEYWORDS,
     LABELS,
     LIMITS,
-    MADE,
     ROWS,
     SOURCES,
     choice,
+    made,
     makers,
     splitting,
     summary,
@@ -51,7 +51,7 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
         _header(config, manifest),
         f"# {_as_markdown(config.title) or 'Grasps'}\n\n{summary(config, manifest)}\n"
         + _credits(config),
-        f"## How it was made\n\n{MADE}\n\n{choice(config, manifest)}\n\n"
+        f"## How it was made\n\n{made(config)}\n\n{choice(config, manifest)}\n\n"
         f"Made with {', '.join(makers(manifest))}; `manifest.json` has all versions and the hash "
         f"of the code. The settings, as in `config.toml`:\n\n"
         f"```toml\n{config_to_toml(config)}```\n",

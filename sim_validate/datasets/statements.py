@@ -19,6 +19,7 @@ ROWS: Mapping[Name, str] = {
 """What a row is."""
 LABELS: Mapping[str, str] = {
     "grasp": "a planned grasp, proved to be in force closure",
+    "given": "contacts from elsewhere, put on the object and judged",
     "low_friction": "the same contacts, friction below the critical one",
     "fingers_removed": "three or two of the contacts",
     "normal_flipped": "a finger that pulls where it should push",
@@ -26,11 +27,19 @@ LABELS: Mapping[str, str] = {
     "uncorrected": "what the paper's construction as printed takes for a grasp on these faces",
 }
 """What `label` is, and what it means."""
-MADE = (
+PLANNED = (
     "Each object is planned at each friction, each family of grasps by itself. Every grasp has "
-    "a certificate of force closure. Then it is simulated in MuJoCo: four spherical fingertips "
-    "squeeze the object, which is loaded with the wrenches in `trials`. Its negative controls, "
-    "contact sets proved not to be in force closure, are loaded with what they cannot oppose."
+    "a certificate of force closure."
+)
+JUDGED = (
+    "Contacts from elsewhere, in `contacts.json`, are put on the nearest faces of their object, "
+    "`moved_m` says how far. Each set is proved to be in force closure or proved not to be; those "
+    "on no face are `not_tried`, their `note` says why."
+)
+TRIED = (
+    "Then it is simulated in MuJoCo: four spherical fingertips squeeze the object, which is "
+    "loaded with the wrenches in `trials`. Negative controls and all contact sets proved not to "
+    "be in force closure are loaded with what they cannot oppose."
 )
 CONVENTIONS = (
     "SI units, which end the names of columns. Positions, normals and wrenches are in the "
@@ -64,13 +73,23 @@ def summary(config: DatasetConfig, manifest: Manifest) -> str:
     )
 
 
+def made(config: DatasetConfig) -> str:
+    """How grasps come about."""
+    return f"{JUDGED if config.contacts else PLANNED} {TRIED}"
+
+
 def choice(config: DatasetConfig, manifest: Manifest) -> str:
     """Which objects and grasps are in, so what the dataset is no fair sample of."""
+    left_out = (
+        f"Of {manifest.units} units of work {manifest.quarantined} were left out, for the reasons "
+        "in `quarantine.jsonl`."
+    )
+    if config.contacts:
+        return f"The grasps are all that were given. {left_out}"
     return (
-        f"Of each object, friction and family the grasps with the largest regions are kept, "
-        f"{config.limit} at most: no fair sample of all grasps. Objects are those that were given; "
-        f"of {manifest.units} pairs of object and friction {manifest.quarantined} were left out, "
-        "for the reasons in `quarantine.jsonl`."
+        "Of each object, friction and family the grasps with the largest regions are kept, "
+        f"{config.limit} at most: no fair sample of all grasps. Objects are those that were given. "
+        f"{left_out}"
     )
 
 

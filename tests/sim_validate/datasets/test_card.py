@@ -139,7 +139,7 @@ def test_a_dataset_without_rows_has_a_card(manifest):
     empty = Manifest(manifest.config_sha256, manifest.versions, 3, 3, ())
     header, body = split_card(card_text(SMALL, empty))
     assert "configs" not in header
-    assert "of 3 pairs of object and friction 3 were left out" in body
+    assert "Of 3 units of work 3 were left out" in body
 
 
 @pytest.mark.parametrize(("rows", "size"), [(999, "n<1K"), (1000, "1K<n<10K"), (10**6, "1M<n<10M")])

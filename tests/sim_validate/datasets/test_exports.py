@@ -18,14 +18,14 @@ import grasp_core as gc
 import sim_validate
 from grasp_core.mesh import nearest_on_surface
 from sim_validate.cli import Exit, main
+from sim_validate.dataset_flags import ExportFormat, SplitName
 from sim_validate.datasets.build import build
 from sim_validate.datasets.columns import TABLES
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.exports import EXPORTERS, export
-from sim_validate.datasets.isaac import yaml_number
+from sim_validate.datasets.exports.formats import EXPORTERS, export
+from sim_validate.datasets.exports.isaac import yaml_number
 from sim_validate.datasets.rows import SPLITS
 from sim_validate.files import whole_folder
-from sim_validate.flags import ExportFormat, SplitName
 from tests.sim_validate.datasets.engines import Here, silent
 from tests.sim_validate.datasets.test_build import forged
 

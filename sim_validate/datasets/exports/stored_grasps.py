@@ -1,4 +1,4 @@
-"""The planned grasps of a dataset with their solids, an object at a time; no negative controls."""
+"""The grasps of a dataset with their solids, an object at a time; nothing that is not closed."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -10,9 +10,12 @@ from typing import Any
 from grasp_core.errors import InputError
 from grasp_core.values import Contact, Polyhedron
 from sim_validate.datasets.meshes import stored_body
+from sim_validate.datasets.rows import GIVEN
 from sim_validate.datasets.selection import Selection
 
 UNSAFE = re.compile(r"[^A-Za-z0-9._-]")
+GRASPS = ("grasp", GIVEN)
+"""Labels of what is no negative control."""
 LONGEST = 150
 """Letters of a file's name, fewer than any file system allows."""
 
@@ -47,12 +50,17 @@ def grasped_objects(chosen: Selection) -> Iterator[GraspedObject]:
     """
     names = {row["object_id"]: row["source_name"] for row in chosen.rows("objects")}
     faces = chosen.config().faces
-    planned = (row for row in chosen.rows("grasps") if row["label"] == "grasp")
+    planned = (row for row in chosen.rows("grasps") if is_grasp(row))
     for object_id, rows in groupby(planned, key=lambda row: row["object_id"]):
         if object_id not in names:
             raise InputError(f"{chosen.folder}: {object_id} has grasps, but is no object")
         body = stored_body(chosen.folder, object_id, names[object_id], faces)
         yield GraspedObject(object_id, body, tuple(map(_grasp, rows)))
+
+
+def is_grasp(row: Mapping[str, Any]) -> bool:
+    """Whether a row is of a grasp, planned or given, that is proved to be closed."""
+    return row["label"] in GRASPS and bool(row["force_closed"])
 
 
 def _grasp(row: Mapping[str, Any]) -> StoredGrasp:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from scenes.mjcf import build_scene
 from sim_validate.datasets.columns import Name
+from sim_validate.datasets.exports.stored_grasps import grasped_objects, is_grasp, new_path
 from sim_validate.datasets.selection import Selection
-from sim_validate.datasets.stored_grasps import grasped_objects, new_path
 from sim_validate.files import write_text
 
 
@@ -18,7 +18,7 @@ def write_mjcf(
     Raises:
         InputError: The dataset is damaged.
     """
-    total = sum(1 for row in chosen.rows("grasps") if row["label"] == "grasp")
+    total = sum(map(is_grasp, chosen.rows("grasps")))
     objects = grasps = 0
     for each in grasped_objects(chosen):
         objects += 1

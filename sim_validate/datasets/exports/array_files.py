@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
 from sim_validate.datasets.columns import TABLES, Column, Name
-from sim_validate.datasets.flat_files import write_about
+from sim_validate.datasets.exports.flat_files import write_about
 from sim_validate.datasets.selection import Selection
 from sim_validate.datasets.tables import Columns, read_columns
 from sim_validate.files import write_arrays

@@ -6,16 +6,16 @@ from pathlib import Path
 from typing import TypeAlias
 
 from grasp_core.errors import InputError
-from sim_validate.datasets.array_files import write_npz
+from sim_validate.dataset_flags import ExportFormat, SplitName
 from sim_validate.datasets.columns import Name
-from sim_validate.datasets.flat_files import write_csv, write_jsonl
-from sim_validate.datasets.hdf5 import write_hdf5
-from sim_validate.datasets.isaac import write_isaac
-from sim_validate.datasets.scene_files import write_mjcf
+from sim_validate.datasets.exports.array_files import write_npz
+from sim_validate.datasets.exports.flat_files import write_csv, write_jsonl
+from sim_validate.datasets.exports.hdf5 import write_hdf5
+from sim_validate.datasets.exports.isaac import write_isaac
+from sim_validate.datasets.exports.scene_files import write_mjcf
 from sim_validate.datasets.selection import Selection, select
 from sim_validate.datasets.tables import require_pyarrow
 from sim_validate.files import whole_folder
-from sim_validate.flags import ExportFormat, SplitName
 
 Exporter: TypeAlias = Callable[[Selection, Path, Callable[[int, int], None]], dict[Name, int]]
 EXPORTERS: Mapping[ExportFormat, Exporter] = {
@@ -27,7 +27,7 @@ EXPORTERS: Mapping[ExportFormat, Exporter] = {
     "mjcf": write_mjcf,
 }
 """What writes each format into a folder and says how many rows it took. The first four hold all
-rows, negative controls too; the last two hold planned grasps only."""
+rows, negative controls too; the last two hold closed grasps only."""
 
 
 @dataclass(frozen=True, slots=True)

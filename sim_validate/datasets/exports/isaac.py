@@ -5,7 +5,7 @@ taken as one gripper: `fingerI_x`, `fingerI_y` and `fingerI_z` slide fingertip I
 the gripper's frame, whose origin its centre is at when they are zero. The gripper's frame is turned
 like the object's, which is that of the mesh in metres, and lies midway between the contacts. All
 fingertips of a file have the radius that fits all of its grasps, so a tip's centre is a radius
-before its contact. Negative controls, which may have fewer fingers, are left out.
+before its contact. What is not in force closure is left out.
 
 Source:
     NVIDIA, "Isaac Grasp File", nvidia-isaac-ros.github.io/concepts/manipulation/isaac_grasp.html.
@@ -23,15 +23,15 @@ from scenes.fingertips import FingerSettings, fitting_radius
 from scenes.layout import arrange
 from sim_validate.datasets.columns import Name
 from sim_validate.datasets.config import quoted
-from sim_validate.datasets.meshes import mesh_path
-from sim_validate.datasets.rows import SHORT
-from sim_validate.datasets.selection import Selection
-from sim_validate.datasets.stored_grasps import (
+from sim_validate.datasets.exports.stored_grasps import (
     GraspedObject,
     StoredGrasp,
     grasped_objects,
     new_path,
 )
+from sim_validate.datasets.meshes import mesh_path
+from sim_validate.datasets.rows import SHORT
+from sim_validate.datasets.selection import Selection
 from sim_validate.files import write_lines
 
 AXES = "xyz"

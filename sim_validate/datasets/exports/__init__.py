@@ -1,0 +1,1 @@
+"""The formats of other programs that a dataset is written in."""
