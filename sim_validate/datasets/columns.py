@@ -54,6 +54,8 @@ GRASPS = (
     Column("closure_margin", "float", "margin of the exact closure test", "1"),
     Column("critical_friction", "float", "smallest coefficient that suffices", "1"),
     Column("region_radius_m", "float", "radius of the smallest independent disc, 0 without", "m"),
+    Column("region_kind", "text", "what certifies the regions: cone, disc; point claims none"),
+    Column("region_radii_m", "float", "radius of the largest disc in each region", "m", (4,)),
     Column("ferrari_canny_lower_n", "float", "proved lower bound of the quality", "N"),
     Column("ferrari_canny_upper_n", "float", "proved upper bound of the quality", "N"),
     Column("held", "bool", "whether every trial held"),

@@ -116,6 +116,8 @@ class GraspRows:
                 "force_closed": True,
                 "closure_margin": grasp.closure_margin,
                 "critical_friction": grasp.critical_friction,
+                "region_kind": grasp.regions[0].kind,
+                "region_radii_m": [region.inscribed_radius for region in grasp.regions],
                 "ferrari_canny_lower_n": grasp.ferrari_canny[0],
                 "ferrari_canny_upper_n": grasp.ferrari_canny[1],
                 "held": verdict.held,

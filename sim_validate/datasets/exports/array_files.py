@@ -1,7 +1,8 @@
 """Tables of a dataset -> NumPy archives that hold no pickled objects, a file per table.
 
 As in `load_dataset`, numbers that are null are NaN in columns of floats and 0 in columns of whole
-numbers; text that is null is empty. Text is of fixed width.
+numbers; text that is null is empty. Text is of fixed width. Truth values are 1 and 0, and -1 where
+they are null.
 """
 
 from collections.abc import Callable
@@ -11,14 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.errors import InputError
 from sim_validate.datasets.columns import TABLES, Column, Name
 from sim_validate.datasets.exports.flat_files import write_about
 from sim_validate.datasets.selection import Selection
 from sim_validate.datasets.tables import Columns, read_columns
 from sim_validate.files import write_arrays
 
-NULLS = {"float": "NaN", "int": "0", "text": "empty", "bool": "none"}
+NULLS = {"float": "NaN", "int": "0", "text": "empty", "bool": "-1"}
 """What stands for null in arrays, by kind of column."""
 
 
@@ -38,7 +38,7 @@ def write_npz(
 
 
 def plain_columns(chosen: Selection, name: Name) -> Columns:
-    """The columns of a table as arrays (rows, ..) of numbers, truth values and fixed-width text.
+    """The columns of a table as arrays (rows, ..) of numbers and fixed-width text.
 
     Raises:
         InputError: The dataset is damaged.
@@ -49,9 +49,7 @@ def plain_columns(chosen: Selection, name: Name) -> Columns:
 
 def _plain(column: Column, values: NDArray[Any]) -> NDArray[Any]:
     if column.kind == "bool":
-        if any(value is None for value in values):
-            raise InputError(f"{column.name}: expected true or false in every row, got null")
-        return values.astype(np.bool_)
+        return np.array([-1 if value is None else int(value) for value in values], dtype=np.int8)
     if column.kind == "text":
         return np.array(["" if value is None else value for value in values], dtype=np.str_)
     return values

@@ -38,6 +38,7 @@ SHAPED = {
     "contact_normals": [f"{i}_{a}" for i in range(4) for a in "xyz"],
     "wrench_n_nm": ["fx", "fy", "fz", "tx", "ty", "tz"],
     "slip_m": ["0", "1", "2", "3"],
+    "region_radii_m": ["0", "1", "2", "3"],
 }
 """What CSV calls the numbers of a cell."""
 ODD_NAME = "=cmd|' \"\u00e9\n.stl"
@@ -167,7 +168,7 @@ def compare_arrays(read, dataset):
 
 def test_archives_have_every_cell_and_no_pickle(dataset, tmp_path):
     export(dataset, "npz", tmp_path / "out", None, silent)
-    kinds = {"text": "U", "bool": "b", "int": "i", "float": "f"}
+    kinds = {"text": "U", "bool": "i", "int": "i", "float": "f"}
 
     def read(name, column):
         with np.load(tmp_path / "out" / f"{name}.npz", allow_pickle=False) as archive:

@@ -13,9 +13,11 @@ from sim_validate.cli import Exit, main
 from sim_validate.datasets import units as units_module
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.exports.formats import export
 from sim_validate.datasets.given import read_given
 from sim_validate.datasets.redo import Sample
 from sim_validate.datasets.verify import verify
+from sim_validate.files import write_arrays
 from tests.sim_validate.datasets.engines import Here, contents, silent
 
 pytest.importorskip("pyarrow")
@@ -172,3 +174,26 @@ def test_three_contacts_and_files_of_something_else_are_refused(tmp_path):
     config = DatasetConfig(objects=("wedge",), contacts=str(three))
     with pytest.raises(gc.InputError, match="the one that the contacts are on"):
         dataclasses.replace(config, objects=("wedge", "prism"))
+
+
+def test_judged_grasps_are_exported_with_what_could_not_be_tried(planned, tmp_path):
+    good = planned[0]
+    off = good.positions + 1.0
+    path = contacts_file(
+        tmp_path / "g.json", [("a", good.positions, good.normals), ("b", off, good.normals)]
+    )
+    judged(tmp_path / "ds", path)
+    for to, files in (("npz", 4), ("csv", 4), ("mjcf", 1), ("isaac", 1)):
+        done = export(tmp_path / "ds", to, tmp_path / to, None, silent)
+        assert done.files == files
+    with np.load(tmp_path / "npz" / "grasps.npz", allow_pickle=False) as arrays:
+        given = arrays["label"] == "given"
+        assert list(arrays["held"][given]) == list(arrays["force_closed"][given]) == [1, -1]
+        again = judged(
+            tmp_path / "again",
+            write_arrays(
+                tmp_path / "again.npz",
+                {name: arrays[name][given] for name in ("contact_points_m", "contact_normals")},
+            ),
+        )
+    assert list(again["held"]) == [True, None]
