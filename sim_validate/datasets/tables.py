@@ -8,7 +8,8 @@ import importlib
 import io
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -78,35 +79,45 @@ def as_read(name: Name, rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any
     return _parquet().read_table(io.BytesIO(parquet_bytes(name, rows, {}))).to_pylist()
 
 
-def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[dict[str, Any]]:
-    """The rows of a file, all checksums checked; some columns only if given.
+def read_rows(path: Path) -> list[dict[str, Any]]:
+    """The rows of a file, all checksums checked.
 
     Raises:
-        InputError: It is no such file, or damaged.
+        InputError: It is no file of a table, or damaged.
     """
-    return _read(path, columns).to_pylist()
+    return _read(path).to_pylist()
 
 
 def each_row(path: Path) -> Iterator[dict[str, Any]]:
     """The rows of a file one by one, not all in memory; otherwise as `read_rows`.
 
     Raises:
-        InputError: It is no such file, or damaged.
+        InputError: It is no file of a table, or damaged.
+    """
+    with _opened(path) as file:
+        for part in file.iter_batches(GROUP_ROWS):
+            yield from part.to_pylist()
+
+
+def _read(path: Path) -> Any:
+    with _opened(path) as file:
+        return file.read()
+
+
+@contextmanager
+def _opened(path: Path) -> Generator[Any]:
+    """A file of one of the tables, whose damage is an error of ours.
+
+    Raises:
+        InputError: It is no such file, has other columns, or is damaged.
     """
     arrow, parquet = _pyarrow(), _parquet()
     try:
-        file = parquet.ParquetFile(path, page_checksum_verification=True)
-        for part in file.iter_batches(GROUP_ROWS):
-            yield from part.to_pylist()
-    except (OSError, arrow.ArrowException) as error:
-        raise InputError(f"{path}: cannot be read, or is damaged ({error})") from error
-
-
-def _read(path: Path, columns: Sequence[str] | None = None) -> Any:
-    arrow, parquet = _pyarrow(), _parquet()
-    chosen = None if columns is None else list(columns)
-    try:
-        return parquet.ParquetFile(path, page_checksum_verification=True).read(chosen)
+        with parquet.ParquetFile(path, page_checksum_verification=True) as file:
+            names = file.schema_arrow.names
+            if all(names != [column.name for column in table] for table in TABLES.values()):
+                raise InputError(f"{path}: has other columns than the tables of this version")
+            yield file
     except (OSError, arrow.ArrowException) as error:
         raise InputError(f"{path}: cannot be read, or is damaged ({error})") from error
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from sim_validate.datasets.columns import KEYS, TABLES
+from sim_validate.datasets import tables
+from sim_validate.datasets.columns import KEYS, TABLES, Column
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.making import made_of
 from sim_validate.datasets.rows import split_of
@@ -33,6 +34,14 @@ def written(rows, tmp_path):
         path.write_bytes(parquet_bytes(name, rows[name], {"made by": "a test"}))
         found[name] = path
     return found
+
+
+def test_a_file_of_another_version_is_refused(written, monkeypatch):
+    table = TABLES["objects"]
+    monkeypatch.setitem(tables.TABLES, "objects", (*table, Column("taste", "text", "new")))
+    for read in (read_rows, lambda path: list(tables.each_row(path))):
+        with pytest.raises(gc.InputError, match="other columns"):
+            read(written["objects"])
 
 
 def test_rows_have_exactly_the_columns_of_their_tables(rows):
