@@ -94,12 +94,22 @@ def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Ar
         points: (n, 3) [m]
     """
     corners = vertices[triangles]
-    closest_point: Any = _trimesh("triangles").closest_point
     nearest = np.empty((len(points), 3))
     for place, point in enumerate(points):
-        candidates = closest_point(corners, np.broadcast_to(point, (len(corners), 3)))
+        candidates = nearest_on_triangles(corners, point)
         nearest[place] = candidates[int(np.argmin(np.linalg.norm(candidates - point, axis=1)))]
     return nearest
+
+
+def nearest_on_triangles(corners: Array, point: Array) -> Array:
+    """The point of each of several triangles nearest to a point, (t, 3).
+
+    Args:
+        corners: (t, 3, 3) [m]
+        point: (3,) [m]
+    """
+    closest_point: Any = _trimesh("triangles").closest_point
+    return closest_point(corners, np.broadcast_to(point, (len(corners), 3)))
 
 
 def _trimesh(submodule: str) -> Any:

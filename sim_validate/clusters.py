@@ -30,6 +30,8 @@ ANSWER_S = 10.0
 class RayCluster:
     """Workers of a Ray cluster."""
 
+    ended = ("WorkerCrashedError", "OutOfMemoryError", "LocalRayletDiedError", "NodeDiedError")
+
     def __init__(self, ray: Any, workers: int) -> None:
         self.workers = workers
         self._ray = ray
@@ -44,6 +46,8 @@ class RayCluster:
 
 class DaskCluster:
     """Workers of a Dask cluster."""
+
+    ended = ("KilledWorker",)
 
     def __init__(self, client: Any, workers: int) -> None:
         self.workers = workers

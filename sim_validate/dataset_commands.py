@@ -1,7 +1,7 @@
 """The commands about datasets: to make one, to go on making it, to check and to export it."""
 
 from contextlib import AbstractContextManager
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -49,10 +49,10 @@ def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter:
     memory = None if work.memory_mb is None else work.memory_mb * MEGABYTE
     with reporter.progress("building") as steps, _engine(work) as engine:
         built = build(config, out, engine, steps.update, Limits(work.timeout_s, memory))
-    counts = ", ".join(f"{count} {name}" for name, count in built.rows.items())
+    rows = built.rows
     reporter.say(
         f"{out}: {built.units} units, {built.made} made now, {built.quarantined} quarantined; "
-        f"{counts}"
+        f"{rows['objects']} objects, {rows['grasps']} grasps and controls, {rows['trials']} trials"
     )
     if built.quarantined:
         reporter.warn(f"{out / 'quarantine.jsonl'} says why objects were left out")
@@ -118,12 +118,13 @@ def _asked(command: dataset_flags.Build) -> DatasetConfig:
     Raises:
         InputError: A setting or the file is refused, or there are flags beside a file.
     """
-    first = Path(command.objects[0])
+    first = Path(command.objects[0]) if command.objects else Path()
     if first.suffix == ".toml":
         unsaid = (dataset_flags.Planning(), dataset_flags.Settings())
         if len(command.objects) > 1 or (command.planning, command.settings) != unsaid:
             raise InputError(f"{first} says what the dataset is made of: give nothing beside it")
-        return config_from_toml(first)
+        config = config_from_toml(first)
+        return replace(config, objects=_listed(config.objects))
     return DatasetConfig(
         objects=_listed(command.objects),
         families=command.planning.family or METHODS,
@@ -139,6 +140,11 @@ def _settings(settings: dataset_flags.Settings) -> dict[str, Any]:
     return {"frictions": given.pop("friction") or (FRICTION,), **given}
 
 
+def is_mesh(path: Path) -> bool:
+    """Whether a file of a folder is taken for a mesh: by its ending, hidden ones not."""
+    return path.suffix.lower()[1:] in FORMATS and not path.name.startswith(".")
+
+
 def _listed(names: tuple[str, ...]) -> tuple[str, ...]:
     """Objects by name; folders stand for the mesh files in them.
 
@@ -146,12 +152,14 @@ def _listed(names: tuple[str, ...]) -> tuple[str, ...]:
         InputError: A folder holds none.
     """
     found: list[str] = []
+    if not names:
+        raise InputError("objects: expected mesh files, folders of them, or built-in objects")
     for name in names:
         folder = Path(name)
         if not folder.is_dir():
             found.append(name)
             continue
-        meshes = sorted(path for path in folder.iterdir() if path.suffix.lower()[1:] in FORMATS)
+        meshes = sorted(path for path in folder.iterdir() if is_mesh(path))
         if not meshes:
             raise InputError(f"{name}: holds no mesh file ({', '.join(FORMATS)})")
         found += map(str, meshes)

@@ -53,6 +53,8 @@ def each(
 class Processes:
     """Processes of this machine that do single tasks."""
 
+    ended = ("ProcessExpired",)
+
     def __init__(self, pool: Any, workers: int) -> None:
         self.workers = workers
         self._pool = pool

@@ -4,7 +4,7 @@ The manifest is written last; once it is there, the staging folder goes.
 """
 
 import fcntl
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,19 +15,19 @@ from sim_validate.datasets.columns import Name
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.croissant import CROISSANT
 from sim_validate.datasets.driver import Engine, drive
-from sim_validate.datasets.finish import CONTACTS, DATA, EXTRAS, finish
+from sim_validate.datasets.finish import CONFIG, CONTACTS, DATA, EXTRAS, QUARANTINE, finish
 from sim_validate.datasets.manifest import MANIFEST, read_manifest
 from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.tables import require_pyarrow
 from sim_validate.datasets.tasks import Limits
-from sim_validate.datasets.units import units_of
+from sim_validate.datasets.units import WorkUnit, units_of, units_sha256
 from sim_validate.files import read_text, write_text
 from sim_validate.gate import require_faithful
 from sim_validate.setup import Setup
 
+LOCK = ".lock"
 OWN = (
-    "staging", DATA, *EXTRAS, CONTACTS, "config.toml", "quarantine.jsonl", CARD, CROISSANT,
-    MANIFEST, ".lock",
+    "staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, CROISSANT, MANIFEST, LOCK,
 )  # fmt: skip
 """What a dataset's folder holds, and nothing else."""
 
@@ -67,12 +67,14 @@ def build(
     """
     require_pyarrow()
     units = units_of(config)
+    _refuse_sources_inside(units, config, folder)
     with _alone(folder):
         _refuse_others(folder, config)
-        if (folder / MANIFEST).is_file():
-            return _as_built(folder, len(units))
-        write_text(folder / "config.toml", config_to_toml(config))
         staging = Staging(folder.resolve() / "staging")
+        if (folder / MANIFEST).is_file():
+            staging.remove()
+            return _as_built(folder, units)
+        write_text(folder / CONFIG, config_to_toml(config))
         staging.clear_unfinished()
         left = [unit for unit in units if not staging.done(unit)]
         for unit in left:
@@ -81,14 +83,14 @@ def build(
             require_faithful(Setup(), friction)  # what fails at one object's size leaves it out
         drive(left, staging, engine, report, limits)
         finish(config, units, staging, folder)
-        return _as_built(folder, len(units), len(left))
+        return _as_built(folder, units, len(left))
 
 
 @contextmanager
 def _alone(folder: Path) -> Generator[None]:
     """Keep other builds out of a folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    with (folder / ".lock").open("w") as lock:
+    with (folder / LOCK).open("a") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
@@ -96,22 +98,46 @@ def _alone(folder: Path) -> Generator[None]:
         yield
 
 
+def _refuse_sources_inside(units: Sequence[WorkUnit], config: DatasetConfig, folder: Path) -> None:
+    """Refuse to write over what the dataset is made of."""
+    sources = [unit.path for unit in units if unit.path is not None]
+    sources += [Path(config.contacts).resolve()] if config.contacts else []
+    for path in sources:
+        if path.is_relative_to(folder.resolve()):
+            raise InputError(f"{path}: lies in {folder}; give an --out that holds nothing else")
+
+
 def _refuse_others(folder: Path, config: DatasetConfig) -> None:
-    """Refuse a folder of something else.
+    """Refuse a folder of something else, and remove what a killed build had not finished writing.
 
     Raises:
         InputError: It holds other files, or a dataset of another configuration.
     """
-    if others := sorted({path.name for path in folder.iterdir()} - set(OWN)):
-        raise InputError(f"{folder}: holds {others[0]}, which no dataset does; give another --out")
-    stated = folder / "config.toml"
+    stated = folder / CONFIG
+    own = OWN if stated.is_file() else (LOCK,)
+    half_written = tuple(f".{name}." for name in OWN)
+    for path in sorted(folder.iterdir()):
+        if path.name.startswith(half_written):
+            path.unlink()
+        elif path.name not in own:
+            raise InputError(f"{path}: is there, and not of this dataset; give another --out")
     if stated.is_file() and read_text(stated) != config_to_toml(config):
         raise InputError(
-            f"{folder}: holds a dataset of another configuration (see its config.toml); give "
+            f"{folder}: holds a dataset of another configuration (see its {CONFIG}); give "
             "another --out, or the same settings to go on"
         )
 
 
-def _as_built(folder: Path, units: int, made: int = 0) -> Built:
+def _as_built(folder: Path, units: Sequence[WorkUnit], made: int = 0) -> Built:
+    """What a finished dataset holds.
+
+    Raises:
+        InputError: It was made from other meshes or contacts, or by other versions.
+    """
     manifest = read_manifest(folder)
-    return Built(units, made, manifest.quarantined, manifest.rows())
+    if manifest.units_sha256 != units_sha256(units):
+        raise InputError(
+            f"{folder}: is finished, but its meshes or contacts have changed since, or the "
+            "versions of packages; give another --out to make it again"
+        )
+    return Built(len(units), made, manifest.quarantined, manifest.rows())

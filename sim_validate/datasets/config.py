@@ -83,6 +83,7 @@ class DatasetConfig:
     """When, such as `2026-11-22`; no clock is asked, so that the same is made again."""
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "frictions", tuple(map(float, self.frictions)))
         for name in ("objects", "frictions", "families"):
             values: tuple[object, ...] = getattr(self, name)
             if not values or len(set(values)) < len(values):

@@ -6,7 +6,6 @@ with an error of ours is quarantined at once, by the worker: it would come out t
 would befall every unit - a full disk, a worker with other packages - ends the run.
 """
 
-import errno
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -22,14 +21,17 @@ AHEAD = 3
 """Units under way for each worker, so that none waits for the driver."""
 LOOK_S = 1.0
 """How often the driver looks whether it was interrupted [s]."""
-NO_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES)
-"""What says that no rows can be written where they should be."""
 
 
 class Engine(Protocol):
     """Where units are done."""
 
     workers: int
+
+    @property
+    def ended(self) -> tuple[str, ...]:
+        """Names of the errors that say that a worker ended, not that it could not begin."""
+        ...
 
     def submit(self, function: Callable[[Task], None], task: Task, /) -> "Future[None]":
         """Have a task done."""
@@ -69,7 +71,7 @@ def drive(
         done, _ = wait(under_way, timeout=LOOK_S, return_when=FIRST_COMPLETED)
         for future in done:
             task = under_way.pop(future)
-            if _succeeded(future, task):
+            if _succeeded(future, task, engine):
                 finished += 1
             else:
                 again.append(task)
@@ -87,7 +89,7 @@ def _try_alone(task: Task, engine: Engine) -> None:
     future = engine.submit(do_task, task)
     while not wait([future], timeout=LOOK_S).done:
         interrupts.check()
-    if _succeeded(future, task):
+    if _succeeded(future, task, engine):
         return
     took_s = time.monotonic() - began
     late = task.limits is not None and took_s >= task.limits.timeout_s
@@ -95,19 +97,24 @@ def _try_alone(task: Task, engine: Engine) -> None:
     task.staging.quarantine(task.unit, reason)
 
 
-def _succeeded(future: "Future[None]", task: Task) -> bool:
-    """Whether a unit was done; false if its worker ended, or was stopped.
+def _succeeded(future: "Future[None]", task: Task, engine: Engine) -> bool:
+    """Whether a unit was done; false if its worker ended, or was ended.
 
     Raises:
         WorkerError: The worker cannot do units for this driver.
         OSError: Its rows could not be written.
     """
     error = future.exception()
-    if isinstance(error, WorkerError) or (isinstance(error, OSError) and error.errno in NO_WRITING):
-        raise error
-    if error is None and not task.staging.finished(task.unit):
+    if error is None:
+        if task.staging.finished(task.unit):
+            return True
         raise WorkerError(
             f"{task.staging.folder}: a unit was done, but its rows are not here; --out must be on "
             "a file system that driver and workers share"
         )
-    return error is None
+    if type(error).__name__ in engine.ended:
+        return False
+    if isinstance(error, WorkerError | OSError | KeyboardInterrupt):
+        raise error
+    name = type(error).__name__
+    raise WorkerError(f"a worker cannot do units: {name}: {error}") from error

@@ -20,7 +20,7 @@ from sim_validate.datasets.given import given_text
 from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest, listed, write_manifest
 from sim_validate.datasets.staging import Finished, Staging
 from sim_validate.datasets.tables import TableFiles
-from sim_validate.datasets.units import WorkUnit, provenance
+from sim_validate.datasets.units import WorkUnit, provenance, units_sha256
 from sim_validate.files import write_text
 
 DATA = "data"
@@ -28,6 +28,7 @@ TWIN = "the same object as"
 """How the reason begins why an object's rows are not there a second time."""
 CONTACTS = "contacts.json"
 """Contacts that were judged, if any, as a contacts file with normals into the object."""
+CONFIG, QUARANTINE = "config.toml", "quarantine.jsonl"
 EXTRAS = ("meshes", "scenes")
 """Folders of files that units make beside their rows."""
 
@@ -48,8 +49,8 @@ def finish(
         in_order = [given[name] for name in sorted(given)]
         write_text(folder / CONTACTS, given_text(in_order))
     others = [
-        write_text(folder / "config.toml", config_to_toml(config)),
-        write_text(folder / "quarantine.jsonl", lines),
+        write_text(folder / CONFIG, config_to_toml(config)),
+        write_text(folder / QUARANTINE, lines),
         *([folder / CONTACTS] if given else []),
         *(path for name in EXTRAS for path in sorted((folder / name).glob("*"))),
     ]
@@ -57,6 +58,7 @@ def finish(
         config_sha256=config.sha256,
         versions=dict(provenance()),
         units=len(units),
+        units_sha256=units_sha256(units),
         quarantined=len(quarantined),
         files=(*tables, *(listed(folder, path) for path in others)),
     )
@@ -64,7 +66,7 @@ def finish(
         written = write_text(folder / name, text_of(config, manifest))
         manifest = replace(manifest, files=(*manifest.files, listed(folder, written)))
     write_manifest(folder, manifest)
-    shutil.rmtree(staging.folder)
+    staging.remove()
 
 
 def _sorted_out(
@@ -81,7 +83,15 @@ def _sorted_out(
                 good.append(found)
                 continue
             found = f"{TWIN} {other}"
-        quarantined.append({"object": unit.object, "friction": unit.friction, "reason": found})
+        quarantined.append(
+            {
+                "object": unit.object,
+                "source_sha256": unit.source_sha256,
+                "friction": unit.friction,
+                "given": [each.id for each in unit.given],
+                "reason": found,
+            }
+        )
     return sorted(good, key=lambda each: (each.object_id, each.unit.friction)), quarantined
 
 

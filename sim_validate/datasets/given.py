@@ -76,6 +76,11 @@ def given_sha256(given: Sequence[GivenGrasp]) -> str:
 
 def _from_json(text: str, outward: bool) -> tuple[GivenGrasp, ...]:
     sets = contact_sets_from_json(text, Overrides(NO_FRICTION, outward=outward))
+    stated = json.loads(text)
+    planned = "schema_version" in stated  # by us, and judged at any friction
+    own = any((each.friction != NO_FRICTION).any() for each in sets)
+    if not planned and ("friction" in stated or own):
+        raise InputError("friction: expected none in the file; a dataset has its own frictions")
     for each in sets:
         if len(each.positions) != FINGERS:
             raise InputError(f"grasp {each.id}: expected 4 contacts, got {len(each.positions)}")
@@ -92,8 +97,10 @@ def _text_of_npz(path: Path) -> str:
         if name not in arrays:
             raise InputError(f"no array {name}; expected {POINTS} and {NORMALS}, (n, 4, 3) each")
         array = arrays[name]
-        if array.dtype.kind != "f" or array.shape[1:] != (FINGERS, 3):
-            raise InputError(f"{name}: expected floats, (n, 4, 3), got {array.dtype} {array.shape}")
+        if array.dtype.kind not in "fiu" or array.shape[1:] != (FINGERS, 3):
+            raise InputError(
+                f"{name}: expected numbers, (n, 4, 3), got {array.dtype} {array.shape}"
+            )
     points, normals = arrays[POINTS], arrays[NORMALS]
     names = arrays.get(NAMES, np.arange(len(points)))
     if names.ndim != 1 or not len(points) == len(normals) == len(names):

@@ -16,7 +16,7 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
 
     Returns:
         By table and column, arrays with a row per row: contact points, say, are (n, 4, 3) [m].
-        Missing numbers are NaN, or 0 in columns of whole numbers; missing text is None.
+        Missing numbers are NaN, or -1 in columns of whole numbers; missing text is None.
 
     Raises:
         InputError: There is no such split, no finished dataset, or a file is damaged.

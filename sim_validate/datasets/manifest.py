@@ -42,6 +42,8 @@ class Manifest:
     """Of packages, of the interpreter, and the hash of our own code."""
     units: int
     """Objects at frictions that were asked for; given grasps in parts."""
+    units_sha256: str
+    """Of the names of all units, which depend on all that decides rows."""
     quarantined: int
     """Of them, those that were left out."""
     files: tuple[Listed, ...]

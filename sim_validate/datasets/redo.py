@@ -10,13 +10,14 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any, cast
 
 from grasp_core.errors import GraspError
 from sim_validate.datasets.columns import KEYS, TABLES, Name
 from sim_validate.datasets.config import config_from_toml
-from sim_validate.datasets.finish import CONTACTS, TWIN
+from sim_validate.datasets.finish import CONFIG, CONTACTS, QUARANTINE, TWIN
 from sim_validate.datasets.given import read_given
 from sim_validate.datasets.making import made_of
 from sim_validate.datasets.manifest import Manifest
@@ -61,20 +62,30 @@ def sample_faults(folder: Path, manifest: Manifest, rows: Rows, sample: Sample) 
         rows: All of them.
         sample: Which units to do again.
     """
-    config = config_from_toml(folder / "config.toml")
+    config = config_from_toml(folder / CONFIG)
     exact = manifest.versions == dict(provenance())
-    bodies = {row["object_id"]: row for row in rows["objects"]}
+    objects = {row["object_id"]: row for row in rows["objects"]}
     given = read_given(folder / CONTACTS) if config.contacts else ()
-    units = _units(folder, bodies, config.frictions)
+    left_out = _left_out(folder)
+    units = list[tuple[str, float]]()
+    for object_id, friction in product(sorted(objects), sorted(config.frictions)):
+        gone = left_out.get((objects[object_id]["source_sha256"], friction))
+        if gone is None or (gone and len(gone) < len(given)):
+            units.append((object_id, friction))
+        elif _of_unit(rows, object_id, friction)["grasps"]:
+            name = objects[object_id]["source_name"]
+            yield f"{name} at friction {friction}: is quarantined, but has rows"
     for object_id, friction in drawn(units, sample):
-        about = bodies[object_id]
+        about = objects[object_id]
+        gone = left_out.get((about["source_sha256"], friction), set())
+        part = tuple(each for each in given if each.id not in gone)
         where = f"{about['source_name']} at friction {friction}"
         try:
             body = stored_body(folder, object_id, about["source_name"], config.faces)
             unit = WorkUnit(
-                about["source_name"], None, about["source_sha256"], friction, config, given
+                about["source_name"], None, about["source_sha256"], friction, config, part
             )
-            made = made_of(unit, body).rows
+            made = made_of(unit, body)
         except GraspError as error:
             yield f"{where}: cannot be done again ({error})"
             continue
@@ -82,24 +93,25 @@ def sample_faults(folder: Path, manifest: Manifest, rows: Rows, sample: Sample) 
         faults = [
             fault
             for name in TABLES
-            for fault in _differences(name, stored[name], as_read(name, made[name]), exact)
+            for fault in _differences(name, stored[name], as_read(name, made.rows[name]), exact)
         ]
+        if exact:
+            faults += [
+                f"{path}: is not what comes out again"
+                for path, text in made.files.items()
+                if read_text(folder / path) != text
+            ]
         yield from (f"{where}: {fault}" for fault in faults[:MOST_NAMED])
 
 
-def _units(
-    folder: Path, bodies: Mapping[str, Mapping[str, Any]], frictions: Sequence[float]
-) -> list[tuple[str, float]]:
-    """Objects and frictions that have rows, though perhaps no grasp."""
-    lines = read_text(folder / "quarantine.jsonl").splitlines()
-    left_out = {(Path(each["object"]).name, each["friction"]) for each in map(json.loads, lines)
-                if not each["reason"].startswith(TWIN)}  # fmt: skip
-    return [
-        (object_id, friction)
-        for object_id in sorted(bodies)
-        for friction in sorted(frictions)
-        if (bodies[object_id]["source_name"], friction) not in left_out
-    ]
+def _left_out(folder: Path) -> dict[tuple[str, float], set[str]]:
+    """Units that have no rows, with the given grasps that are missing if they are some."""
+    found: dict[tuple[str, float], set[str]] = {}
+    for line in read_text(folder / QUARANTINE).splitlines():
+        each = json.loads(line)
+        if not each["reason"].startswith(TWIN):
+            found.setdefault((each["source_sha256"], each["friction"]), set()).update(each["given"])
+    return found
 
 
 def drawn(units: Sequence[tuple[str, float]], sample: Sample) -> list[tuple[str, float]]:

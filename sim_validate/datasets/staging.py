@@ -46,7 +46,11 @@ class Staging:
         self.folder.mkdir(parents=True, exist_ok=True)
         for path in self.folder.iterdir():
             if path.name.startswith(UNFINISHED):
-                shutil.rmtree(path)
+                shutil.rmtree(path, ignore_errors=True)  # a worker of a killed driver may be at it
+
+    def remove(self) -> None:
+        """Remove everything, when it is in a finished dataset."""
+        shutil.rmtree(self.folder, ignore_errors=True)
 
     def write(self, unit: WorkUnit, made: Made) -> None:
         """Keep what came of a finished unit."""
@@ -109,7 +113,6 @@ class Staging:
             "files": {name: _sha256(data) for name, data in files.items()},
             **more,
         }
-        self.folder.mkdir(parents=True, exist_ok=True)
         made = Path(tempfile.mkdtemp(dir=self.folder, prefix=f"{UNFINISHED}{unit.id}."))
         try:
             for name, data in {**files, RECORD: json.dumps(record).encode()}.items():

@@ -23,7 +23,7 @@ from sim_validate.datasets.columns import KEYS, TABLES, Column, Name
 
 Columns: TypeAlias = dict[str, NDArray[Any]]
 TYPES = {"text": "string", "bool": "bool_", "int": "int64", "float": "float64"}
-MISSING: Mapping[str, float] = {"float": math.nan, "int": 0}
+MISSING: Mapping[str, float] = {"float": math.nan, "int": -1}
 """What stands for null in arrays."""
 GROUP_ROWS = 20_000
 """Rows that are written at a time, some tens of megabytes in memory."""
@@ -76,7 +76,8 @@ def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[
 
 def as_read(name: Name, rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Rows as they come back from a file: sorted, with null for what is no number."""
-    return _parquet().read_table(io.BytesIO(parquet_bytes(name, rows, {}))).to_pylist()
+    held = _pyarrow().BufferReader(parquet_bytes(name, rows, {}))
+    return _parquet().ParquetFile(held).read().to_pylist()
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
@@ -154,6 +155,8 @@ class TableFiles:
         table = table.sort_by([(key, "ascending") for key in keys])
         if table.group_by(keys).aggregate([]).num_rows < table.num_rows:
             raise InputError(f"{name}: two rows have the same {' and '.join(keys)}")
+        if not table.num_rows:
+            return
         part = self._parts.setdefault((name, split), _Part(self._folder / name, split))
         part.add(table.replace_schema_metadata(self._about))
 
@@ -213,7 +216,7 @@ class _Part:
 def read_columns(paths: Sequence[Path], name: Name) -> Columns:
     """The columns of a table's files, one after another, as arrays (rows, ..).
 
-    Numbers that are null are NaN in columns of floats, and 0 in columns of whole numbers; text and
+    Numbers that are null are NaN in columns of floats, and -1 in columns of whole numbers; text and
     truth values are objects, None where they are null.
 
     Raises:

@@ -5,6 +5,7 @@ driver. Limits are kept by the system, whatever a unit does: a timer ends a proc
 takes too long, also inside a call that never comes back, and memory beyond the limit is refused.
 """
 
+import errno
 import importlib
 import os
 import signal
@@ -19,11 +20,7 @@ from grasp_core.errors import GraspError
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.making import made_of
 from sim_validate.datasets.staging import Staging
-from sim_validate.datasets.units import WorkUnit, body_of, provenance, units_of
-
-
-class WorkerError(GraspError):
-    """A worker cannot do units for this driver."""
+from sim_validate.datasets.units import WorkerError, WorkUnit, body_of, provenance, units_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,15 +36,26 @@ Work: TypeAlias = Callable[[WorkUnit, Staging], None]
 
 
 def do_unit(unit: WorkUnit, staging: Staging) -> None:
-    """Make the rows of a unit and keep them, or the reason why there are none."""
+    """Make the rows of a unit and keep them, or the reason why there are none.
+
+    Raises:
+        WorkerError: The worker does not see the unit's mesh.
+        OSError: Nothing can be written.
+    """
     try:
-        made = made_of(unit, body_of(unit))
+        staging.write(unit, made_of(unit, body_of(unit)))
+    except WorkerError:
+        raise
     except GraspError as error:
         staging.quarantine(unit, str(error))
     except MemoryError:
         staging.quarantine(unit, "out of memory")
-    else:
-        staging.write(unit, made)
+    except OSError as error:
+        if error.errno != errno.ENOMEM:
+            raise
+        staging.quarantine(unit, "out of memory")
+    except Exception as error:  # a fault of ours with one object must not stop the others
+        staging.quarantine(unit, f"internal error: {type(error).__name__}: {error}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +118,9 @@ def _memory_kept(more: int | None) -> Generator[None]:
     _load()  # a library short of memory while it starts can hang
     resource: Any = importlib.import_module("resource")
     before, most = resource.getrlimit(resource.RLIMIT_AS)
-    resource.setrlimit(resource.RLIMIT_AS, (_address_space() + more, most))
+    set_before = [limit for limit in (before, most) if limit != resource.RLIM_INFINITY]
+    wanted = min([_address_space() + more, *set_before])
+    resource.setrlimit(resource.RLIMIT_AS, (wanted, most))
     try:
         yield
     finally:

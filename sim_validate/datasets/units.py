@@ -7,14 +7,15 @@ earlier run count exactly if they would come out the same.
 
 import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields, replace
 from functools import cache
+from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
 
-from grasp_core.errors import InputError
+from grasp_core.errors import GraspError, InputError
 from grasp_core.mesh import FORMATS
 from grasp_core.polyhedra import load_polyhedron
 from grasp_core.values import Polyhedron
@@ -29,6 +30,10 @@ PART = 25
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 APART = ("objects", "frictions", "contacts", "outward", *CREDITS)
 """Settings that each unit has for itself, or that decide no row."""
+
+
+class WorkerError(GraspError):
+    """A worker cannot do units for its driver."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,16 +61,25 @@ class WorkUnit:
         return hashlib.sha256(json.dumps(decisive).encode()).hexdigest()[:32]
 
 
+def units_sha256(units: Iterable[WorkUnit]) -> str:
+    """A hash of the names of units: two are equal only if all rows come out the same."""
+    return hashlib.sha256("".join(sorted(unit.id for unit in units)).encode()).hexdigest()
+
+
 @cache
 def provenance() -> Mapping[str, str]:
-    """Versions of all packages, and the hash of our own code: all that results can depend on."""
+    """Versions of all packages, and the hash of our own code.
+
+    Results depend on nothing else, but for how processors of a kind round.
+    """
     digest = hashlib.sha256()
     for package in PACKAGES:
         root = Path(str(files(package)))
         for path in sorted(root.rglob("*.py")):
             digest.update(f"{package}/{path.relative_to(root).as_posix()}\n".encode())
             digest.update(path.read_bytes())
-    return MappingProxyType(versions() | {"code_sha256": digest.hexdigest()})
+    more = {"pyarrow": version("pyarrow"), "code_sha256": digest.hexdigest()}
+    return MappingProxyType(versions() | more)
 
 
 def shared_settings(config: DatasetConfig) -> dict[str, object]:
@@ -85,12 +99,17 @@ def units_of(config: DatasetConfig) -> list[WorkUnit]:
     hashes = {name: _source_sha256(name) for name in config.objects}
     paths = {name: Path(name).resolve() if is_mesh_file(name) else None for name in hashes}
     units = [
-        WorkUnit(name, paths[name], hashes[name], friction, config, part)
+        WorkUnit(name, paths[name], hashes[name], friction, of_unit(config, name, friction), part)
         for name in config.objects
         for friction in config.frictions
         for part in _parts(config)
     ]
     return sorted(units, key=lambda unit: unit.id)
+
+
+def of_unit(config: DatasetConfig, name: str, friction: float) -> DatasetConfig:
+    """The settings of one unit, which do not grow with the number of objects."""
+    return replace(config, objects=(name,), frictions=(friction,))
 
 
 def _parts(config: DatasetConfig) -> list[tuple[GivenGrasp, ...]]:
@@ -106,14 +125,15 @@ def body_of(unit: WorkUnit) -> Polyhedron:
 
     Raises:
         MeshError: Its mesh is no solid.
-        InputError: Its mesh is not the one that the unit is about.
+        WorkerError: Its file is not there, or not the one that the unit is about.
     """
     if unit.path is None:
         return example_object(unit.object)
-    body = load_polyhedron(unit.path, unit=unit.config.unit, faces=unit.config.faces)
-    if body.source_sha256 != unit.source_sha256:
-        raise InputError(f"{unit.object}: was changed after the build began; build again")
-    return body
+    if not unit.path.is_file():
+        raise WorkerError(f"{unit.path}: is not there; driver and workers must share their meshes")
+    if _source_sha256(str(unit.path)) != unit.source_sha256:
+        raise WorkerError(f"{unit.path}: is not what the driver read; was it changed meanwhile?")
+    return load_polyhedron(unit.path, unit=unit.config.unit, faces=unit.config.faces)
 
 
 def is_mesh_file(name: str) -> bool:

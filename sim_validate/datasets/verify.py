@@ -6,15 +6,20 @@ from typing import Any
 
 import numpy as np
 
+from grasp_core.arrays import Array
 from grasp_core.closure import force_closure
-from grasp_core.errors import GraspError, InputError
-from grasp_core.mesh import nearest_on_surface
+from grasp_core.errors import GraspError, InputError, UndecidedError
+from grasp_core.on_mesh import Surface
+from grasp_core.values import FINGERS
 from sim_validate.datasets.columns import KEYS, TABLES, Name
-from sim_validate.datasets.manifest import MANIFEST, Listed, listed, read_manifest
+from sim_validate.datasets.config import config_from_toml
+from sim_validate.datasets.finish import CONFIG, QUARANTINE
+from sim_validate.datasets.manifest import MANIFEST, Listed, Manifest, listed, read_manifest
 from sim_validate.datasets.meshes import stored_surface
 from sim_validate.datasets.redo import Sample, sample_faults
-from sim_validate.datasets.rows import NOT_TRIED
+from sim_validate.datasets.rows import GIVEN, NOT_TRIED
 from sim_validate.datasets.tables import read_rows, require_pyarrow
+from sim_validate.files import read_text
 
 SAME_MARGIN = 1e-6
 """How far a closure margin may be from that of the contacts, relative to the friction."""
@@ -54,7 +59,10 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
         if len(found) != each.rows:
             faults.append(f"{each.path}: {len(found)} rows, listed are {each.rows}")
         rows[each.table] += found
-    faults += [*_row_faults(rows), *_mesh_faults(folder, rows)]
+        faults += _split_faults(each, found)
+    faults += _manifest_faults(folder, manifest)
+    frictions = config_from_toml(folder / CONFIG).frictions
+    faults += [*_row_faults(rows, frictions), *_mesh_faults(folder, rows)]
     if sample is not None and not faults:
         faults += sample_faults(folder, manifest, rows, sample)
     return faults
@@ -67,6 +75,7 @@ def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
         for path in folder.rglob("*")
         if path.is_file() and path.name not in (MANIFEST, ".lock")
     }
+    there = {name for name in there if not name.startswith("staging/")}  # of no more use
     yield from (f"{path}: not in the manifest" for path in sorted(there - names))
     for each in files:
         if each.path not in there:
@@ -79,7 +88,27 @@ def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
             yield f"{each.path}: its contents are not what was written (sha256 differs)"
 
 
-def _row_faults(rows: Mapping[Name, Sequence[Mapping[str, Any]]]) -> Iterator[str]:
+def _split_faults(file: Listed, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Whether a file's rows are of its split, which names of trials' grasps show elsewhere."""
+    if file.split is None or not Path(file.path).name.startswith(f"{file.split}-"):
+        yield f"{file.path}: is listed as of split {file.split}"
+    elif any(row.get("split", file.split) != file.split for row in rows):
+        yield f"{file.path}: has rows of another split"
+
+
+def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
+    """Whether the manifest's numbers are those of the files it lists."""
+    config = config_from_toml(folder / CONFIG)
+    if config.sha256 != manifest.config_sha256:
+        yield f"{CONFIG}: is not the configuration that the manifest names"
+    lines = len(read_text(folder / QUARANTINE).splitlines())
+    if lines != manifest.quarantined:
+        yield f"{QUARANTINE}: {lines} lines, the manifest says {manifest.quarantined}"
+
+
+def _row_faults(
+    rows: Mapping[Name, Sequence[Mapping[str, Any]]], frictions: Sequence[float]
+) -> Iterator[str]:
     for name in TABLES:
         keys = [tuple(row[key] for key in KEYS[name]) for row in rows[name]]
         if len(set(keys)) < len(keys):
@@ -92,36 +121,62 @@ def _row_faults(rows: Mapping[Name, Sequence[Mapping[str, Any]]]) -> Iterator[st
     yield from (f"trials: {name} is no grasp" for name in sorted(ended.keys() - names))
     for row in rows["grasps"]:
         name = row["grasp_id"]
-        faults = [*_reference_faults(row, splits, names), *_contact_faults(row)]
-        trials = ended.get(name, [])
-        held = None if row["outcome"] == NOT_TRIED else all(one == "held" for one in trials)
-        if len(trials) != row["trials"] or row["held"] != held:
-            faults.append("its trials say something else")
+        faults = [
+            *_reference_faults(row, splits, names),
+            *_outcome_faults(row, ended.get(name, [])),
+        ]
+        if row["control_of"] is None and row["friction"] not in frictions:
+            faults.append(f"friction {row['friction']} is none of the configuration's")
+        if row["outcome"] != NOT_TRIED:
+            faults += _contact_faults(row)
         yield from (f"grasps: {name}: {fault}" for fault in faults)
+
+
+def _outcome_faults(row: Mapping[str, Any], trials: Sequence[str]) -> Iterator[str]:
+    """Whether a row says what its trials say; one that was not tried claims nothing."""
+    if row["outcome"] == NOT_TRIED:
+        claims = [row[name] for name in ("held", "force_closed", "closure_margin")]
+        if row["label"] != GIVEN or any(claim is not None for claim in claims) or trials:
+            yield "was not tried, but claims something"
+        return
+    held = all(one == "held" for one in trials)
+    if not trials or len(trials) != row["trials"] or row["held"] != held:
+        yield "its trials say something else"
+    elif (row["outcome"] == "held") != held:
+        yield f"outcome {row['outcome']!r}, but held is {held}"
 
 
 def _mesh_faults(folder: Path, rows: Mapping[Name, Sequence[Mapping[str, Any]]]) -> Iterator[str]:
     """Whether meshes are those of their objects, and contacts are on them."""
-    points: dict[str, list[list[float]]] = {row["object_id"]: [] for row in rows["objects"]}
-    slack: dict[str, list[float]] = {row["object_id"]: [] for row in rows["objects"]}
+    claimed: dict[str, list[tuple[Array, Array | None, float]]] = {
+        row["object_id"]: [] for row in rows["objects"]
+    }
     for row in rows["grasps"]:
-        if row["outcome"] == NOT_TRIED:
+        of_object = claimed.get(row["object_id"])
+        if row["outcome"] == NOT_TRIED or of_object is None:
             continue
-        near = ON_SURFACE if row["control_of"] is None else NEAR_SURFACE
-        points.get(row["object_id"], []).extend(row["contact_points_m"][: row["contacts"]])
-        slack.get(row["object_id"], []).extend([near] * row["contacts"])
+        points, normals = row["contact_points_m"], row["contact_normals"]
+        for point, normal in list(zip(points, normals, strict=True))[: row["contacts"]]:
+            if row["control_of"] is None:
+                of_object.append((np.array(point), np.array(normal), ON_SURFACE))
+            else:  # some have a normal turned
+                of_object.append((np.array(point), None, NEAR_SURFACE))
     for row in rows["objects"]:
         try:
             vertices, triangles = stored_surface(folder, row["object_id"])
         except InputError as error:
             yield str(error)
             continue
-        contacts = np.array(points[row["object_id"]]).reshape(-1, 3)
-        nearest = nearest_on_surface(vertices, triangles, contacts)
-        away = np.linalg.norm(nearest - contacts, axis=1)
-        allowed = np.array(slack[row["object_id"]]) * row["radius_m"]
-        if (off := int((away > allowed).sum())) > 0:
-            yield f"grasps: {off} contacts of {row['source_name']} are not on the object"
+        surface = Surface(vertices, triangles)
+        on_it = [
+            surface.holds(point, normal, slack * row["radius_m"])
+            for point, normal, slack in claimed[row["object_id"]]
+        ]
+        if off := on_it.count(False):
+            yield (
+                f"grasps: {off} contacts of {row['source_name']} are not on the object, or not "
+                "with its normals"
+            )
 
 
 def _reference_faults(
@@ -137,18 +192,23 @@ def _reference_faults(
 def _contact_faults(row: Mapping[str, Any]) -> Iterator[str]:
     """Normals, and closure from the contacts alone."""
     count = row["contacts"]
+    closed = row["force_closed"]
+    if not 1 <= count <= FINGERS or closed is None or (closed and row["closure_margin"] is None):
+        yield "its contacts, or what is claimed of them, are missing"
+        return
     points = np.array(row["contact_points_m"][:count], dtype=np.float64)
     normals = np.array(row["contact_normals"][:count], dtype=np.float64)
     if not (np.abs(np.linalg.norm(normals, axis=1) - 1.0) <= UNIT).all():
         yield "a normal is no unit vector"
         return
-    if row["outcome"] == NOT_TRIED:
-        return
     try:
         certificate = force_closure(points, normals, row["friction"])
-    except GraspError as error:
-        if row["label"] == "grasp":
+    except UndecidedError as error:
+        if row["force_closed"]:
             yield f"closure cannot be decided ({error})"
+        return
+    except GraspError as error:
+        yield f"closure cannot be asked for ({error})"
         return
     if certificate.closed != row["force_closed"]:
         yield f"force-closed is {row['force_closed']}, the contacts say {certificate.closed}"

@@ -1,6 +1,6 @@
 """Tables of a dataset -> NumPy archives that hold no pickled objects, a file per table.
 
-As in `load_dataset`, numbers that are null are NaN in columns of floats and 0 in columns of whole
+As in `load_dataset`, numbers that are null are NaN in columns of floats and -1 in columns of whole
 numbers; text that is null is empty. Text is of fixed width. Truth values are 1 and 0, and -1 where
 they are null.
 """
@@ -18,7 +18,7 @@ from sim_validate.datasets.selection import Selection
 from sim_validate.datasets.tables import Columns, read_columns
 from sim_validate.files import write_arrays
 
-NULLS = {"float": "NaN", "int": "0", "text": "empty", "bool": "-1"}
+NULLS = {"float": "NaN", "int": "-1", "text": "empty", "bool": "-1"}
 """What stands for null in arrays, by kind of column."""
 
 

@@ -4,10 +4,15 @@ import hashlib
 from concurrent.futures import Future
 
 
+class WorkerEndedError(Exception):
+    """What an engine says when a process ended."""
+
+
 class Here:
     """Does each unit at once in this process."""
 
     workers = 1
+    ended = ("WorkerEndedError",)
 
     def __init__(self, before=lambda _: None):
         self.before = before

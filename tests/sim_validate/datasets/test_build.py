@@ -2,7 +2,9 @@ import dataclasses
 import hashlib
 import json
 import shutil
+import subprocess
 import sys
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -22,9 +24,10 @@ from sim_validate.datasets.tasks import Limits
 from sim_validate.datasets.units import units_of
 from sim_validate.datasets.verify import verify
 from sim_validate.engines import local_processes
-from tests.sim_validate.datasets.engines import Here, contents, silent
+from tests.sim_validate.datasets.engines import Here, WorkerEndedError, contents, silent
 
 pytest.importorskip("pyarrow")
+ROOT = Path(__file__).parents[3]
 CONFIG = DatasetConfig(
     objects=("tetrahedron", "wedge"), frictions=(0.4, 0.5), families=("concurrent",), limit=2
 )
@@ -147,7 +150,7 @@ def test_a_unit_that_ends_its_worker_is_tried_again_alone_then_quarantined(tmp_p
     def crash(unit):
         if unit.object == "wedge" and ends[unit.friction]:
             ends[unit.friction] -= 1
-            raise RuntimeError("the worker ended")
+            raise WorkerEndedError
 
     engine = Here(crash)
     built = build(CONFIG, tmp_path / "ds", engine, silent)
@@ -202,10 +205,111 @@ def test_folders_of_something_else_are_refused(copy, tmp_path):
         build(dataclasses.replace(CONFIG, limit=3), copy, Here(), silent)
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("all my work")
-    with pytest.raises(gc.InputError, match=r"holds thesis\.tex"):
+    with pytest.raises(gc.InputError, match=r"thesis\.tex: is there"):
         build(CONFIG, tmp_path / "mine", Here(), silent)
     with pytest.raises(gc.InputError, match="no dataset"):
         verify(tmp_path / "mine")
+
+
+@pytest.mark.parametrize("name", ["meshes/part.obj", "README.md", "data/x", "manifest.json"])
+def test_what_a_dataset_would_overwrite_in_a_folder_of_another_is_refused(tmp_path, name):
+    path = tmp_path / "mine" / name
+    path.parent.mkdir(parents=True)
+    path.write_text("mine")
+    with pytest.raises(gc.InputError, match="not of this dataset"):
+        build(CONFIG, tmp_path / "mine", Here(), silent)
+    assert path.read_text() == "mine"
+
+
+def test_meshes_inside_the_folder_are_refused(tmp_path):
+    path = tmp_path / "ds" / "meshes" / "box.stl"
+    path.parent.mkdir(parents=True)
+    trimesh.creation.box(extents=(0.04, 0.05, 0.06)).export(path)
+    config = dataclasses.replace(CONFIG, objects=(str(path),))
+    with pytest.raises(gc.InputError, match="holds nothing else"):
+        build(config, tmp_path / "ds", Here(), silent)
+    assert path.is_file()
+
+
+def test_a_finished_dataset_of_a_mesh_that_has_changed_is_refused(tmp_path):
+    path = tmp_path / "box.stl"
+    trimesh.creation.box(extents=(0.04, 0.05, 0.06)).export(path)
+    config = dataclasses.replace(CONFIG, objects=(str(path),), frictions=(0.5,))
+    build(config, tmp_path / "ds", Here(), silent)
+    assert build(config, tmp_path / "ds", Here(), silent).made == 0
+    trimesh.creation.box(extents=(0.04, 0.05, 0.07)).export(path)
+    with pytest.raises(gc.InputError, match="have changed since"):
+        build(config, tmp_path / "ds", Here(), silent)
+
+
+def test_a_dataset_without_any_grasp_is_one(tmp_path):
+    config = DatasetConfig(objects=("wedge",), frictions=(0.1,), families=("regulus",),
+                           cones="normal")  # fmt: skip
+    built = build(config, tmp_path / "ds", Here(), silent)
+    assert built.rows == {"objects": 1, "grasps": 0, "trials": 0}
+    assert verify(tmp_path / "ds", Sample(1.0)) == []
+    grasps = sim_validate.load_dataset(tmp_path / "ds")["grasps"]
+    assert grasps["contact_points_m"].shape == (0, 4, 3)
+
+
+def test_what_was_half_written_is_removed(dataset, tmp_path):
+    folder = tmp_path / "ds"
+    folder.mkdir()
+    (folder / ".config.toml.x7y").write_text("objects")
+    (folder / ".manifest.json.x7y").write_text("{")
+    build(CONFIG, folder, Here(), silent)
+    assert contents(folder) == contents(dataset)
+    (folder / "staging" / "old").mkdir(parents=True)
+    assert verify(folder) == []
+    build(CONFIG, folder, Here(), silent)
+    assert not (folder / "staging").exists()
+
+
+KILL = """
+import os, shutil, sys, pathlib
+left = int(sys.argv[2])
+def counted(plain):
+    def call(*args, **kwargs):
+        global left
+        if left == 0:
+            os._exit(9)
+        left -= 1
+        return plain(*args, **kwargs)
+    return call
+pathlib.Path.replace = counted(pathlib.Path.replace)
+pathlib.Path.rename = counted(pathlib.Path.rename)
+os.replace, os.unlink = counted(os.replace), counted(os.unlink)
+from tests.sim_validate.datasets.test_build import CONFIG
+from tests.sim_validate.datasets.engines import Here, silent
+from sim_validate.datasets.build import build
+build(CONFIG, pathlib.Path(sys.argv[1]), Here(), silent)
+print("done")
+"""
+
+
+@pytest.mark.slow
+def test_a_build_killed_at_any_step_of_its_end_goes_on(dataset, tmp_path):
+    staged = tmp_path / "staged"
+
+    def die(*_):
+        raise KilledError
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(build_module, "finish", die)
+        with pytest.raises(KilledError):
+            build(CONFIG, staged, Here(), silent)
+    killed = 0
+    for step in range(200):
+        folder = shutil.copytree(staged, tmp_path / f"at {step}")
+        command = [sys.executable, "-c", KILL, str(folder), str(step)]
+        ended = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, check=False)
+        build(CONFIG, folder, Here(), silent)
+        assert contents(folder) == contents(dataset)
+        if ended.returncode == 0:
+            break
+        assert ended.returncode == 9
+        killed += 1
+    assert killed >= 10
 
 
 def test_one_byte_changed_in_any_file_is_named(dataset, tmp_path):

@@ -13,8 +13,8 @@ from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.driver import drive
 from sim_validate.datasets.staging import Staging
-from sim_validate.datasets.tasks import Limits, WorkerError, do_unit
-from sim_validate.datasets.units import units_of
+from sim_validate.datasets.tasks import Limits, do_unit
+from sim_validate.datasets.units import WorkerError, units_of
 from sim_validate.engines import local_processes
 from tests.sim_validate.datasets.engines import Here, contents, silent
 

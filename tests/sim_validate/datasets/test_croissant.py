@@ -8,7 +8,7 @@ import pytest
 from sim_validate.cli import Exit, main
 from sim_validate.datasets.columns import KEYS, REFERENCES, TABLES
 from sim_validate.datasets.croissant import ASKED, CROISSANT, croissant_text, missing_fields
-from sim_validate.datasets.manifest import Manifest, read_manifest
+from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.tables import read_rows
 from tests.sim_validate.datasets.small import SMALL, build_small
 
@@ -154,7 +154,7 @@ def test_words_of_the_user_stay_words(folder, text):
 
 def test_a_dataset_without_rows_is_described(folder):
     manifest = read_manifest(folder)
-    empty = Manifest(manifest.config_sha256, manifest.versions, 3, 3, ())
+    empty = dataclasses.replace(manifest, units=3, quarantined=3, files=())
     record = json.loads(croissant_text(SMALL, empty))
     assert [each["@id"] for each in record["recordSet"]] == ["splits"]
 

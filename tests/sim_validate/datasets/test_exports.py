@@ -87,11 +87,11 @@ def cells(dataset):
 
 
 def same(found, stored, kind):
-    """Whether a value that was read is the one of the arrays, where null is NaN, 0 or None."""
+    """Whether a value that was read is the one of the arrays, where null is NaN, -1 or None."""
     if kind == "float":
         return math.isnan(stored) if found is None else found == stored
     if kind == "int":
-        return (0 if found is None else found) == stored
+        return (-1 if found is None else found) == stored
     return found == stored
 
 

@@ -53,7 +53,7 @@ def same_cells(expected, rows, name):
                 assert value == cell
                 count += 1
                 continue
-            missing = np.nan if column.kind == "float" else 0
+            missing = np.nan if column.kind == "float" else -1
             there = np.full(column.shape, missing) if cell is None else filled(cell, missing)
             assert there.shape == column.shape
             np.testing.assert_array_equal(there, value)
@@ -93,7 +93,7 @@ def test_pandas_loads_it_as_the_card_says_and_stacks_lists_to_arrays(beside):
         for column in TABLES[name]:
             values, there = expected[name][column.name], found[column.name]
             if column.shape:
-                missing = np.full(column.shape, np.nan if column.kind == "float" else 0)
+                missing = np.full(column.shape, np.nan if column.kind == "float" else -1)
                 stacked = names["stacked"](there, missing)
                 assert stacked.shape == (len(found), *column.shape)
                 np.testing.assert_array_equal(stacked, values)

@@ -3,17 +3,19 @@ import errno
 import os
 import shutil
 import subprocess
+import sys
 import time
 
 import pytest
+import trimesh
 
-from sim_validate.datasets import driver
+from sim_validate.datasets import driver, tasks
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.driver import drive
 from sim_validate.datasets.staging import Staging
-from sim_validate.datasets.tasks import Limits, Task, WorkerError, do_task
-from sim_validate.datasets.units import provenance, units_of
+from sim_validate.datasets.tasks import Limits, Task, do_task
+from sim_validate.datasets.units import WorkerError, provenance, units_of
 from sim_validate.engines import local_processes
 from tests.sim_validate.datasets.engines import Here, silent
 
@@ -72,7 +74,10 @@ def test_rows_that_do_not_arrive_end_the_run(staging):
         drive(units_of(CONFIG), staging, Elsewhere(), silent)
 
 
-@pytest.mark.parametrize("code", driver.NO_WRITING)
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO)
+
+
+@pytest.mark.parametrize("code", FULL)
 def test_a_full_disk_ends_the_run_and_later_it_goes_on(tmp_path, code):
     config = dataclasses.replace(CONFIG, frictions=(0.4, 0.5))
 
@@ -87,6 +92,63 @@ def test_a_full_disk_ends_the_run_and_later_it_goes_on(tmp_path, code):
     again = Here()
     assert build(config, tmp_path / "ds", again, silent).made == 1
     assert len(again.submitted) == 1
+
+
+def test_a_worker_that_cannot_begin_ends_the_run(tmp_path):
+    def lack(_):
+        raise ModuleNotFoundError("No module named 'sim_validate'")
+
+    with pytest.raises(WorkerError, match="cannot do units: ModuleNotFoundError: No module"):
+        build(CONFIG, tmp_path / "ds", Here(lack), silent)
+    assert build(CONFIG, tmp_path / "ds", Here(), silent).quarantined == 0
+
+
+def test_a_worker_that_does_not_see_a_mesh_ends_the_run(tmp_path):
+    path = tmp_path / "box.stl"
+    trimesh.creation.box(extents=(0.04, 0.05, 0.06)).export(path)
+    config = dataclasses.replace(CONFIG, objects=(str(path),))
+
+    def hide(_):
+        path.rename(tmp_path / "aside")
+
+    with pytest.raises(WorkerError, match="is not there"):
+        build(config, tmp_path / "ds", Here(hide), silent)
+    (tmp_path / "aside").rename(path)
+
+    def change(_):
+        path.write_bytes(path.read_bytes() + b" ")
+
+    with pytest.raises(WorkerError, match="not what the driver read"):
+        build(config, tmp_path / "ds", Here(change), silent)
+    assert not (tmp_path / "ds" / "manifest.json").exists()
+
+
+def test_a_fault_of_ours_with_one_object_does_not_stop_the_others(tmp_path, monkeypatch):
+    config = dataclasses.replace(CONFIG, objects=("tetrahedron", "wedge"))
+    plain = tasks.made_of
+
+    def faulty(unit, body):
+        if unit.object == "wedge":
+            raise ZeroDivisionError("a bug")
+        return plain(unit, body)
+
+    monkeypatch.setattr(tasks, "made_of", faulty)
+    built = build(config, tmp_path / "ds", Here(), silent)
+    assert (built.quarantined, built.rows["objects"]) == (1, 1)
+    left_out = (tmp_path / "ds" / "quarantine.jsonl").read_text()
+    assert "internal error: ZeroDivisionError: a bug" in left_out
+
+
+def test_a_lower_limit_of_memory_that_there_is_already_is_kept():
+    command = (
+        "import resource; from sim_validate.datasets.tasks import _memory_kept\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (3 * 2**30, 4 * 2**30))\n"
+        "with _memory_kept(2**40): print(resource.getrlimit(resource.RLIMIT_AS))"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", command], capture_output=True, text=True, check=True
+    )
+    assert ran.stdout.split() == [f"({3 * 2**30},", f"{4 * 2**30})"]
 
 
 def test_memory_is_limited_while_a_unit_is_done_and_no_longer(staging):
