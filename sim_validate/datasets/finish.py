@@ -99,14 +99,14 @@ def _write_tables(
     config: DatasetConfig, good: Sequence[Finished], staging: Staging, folder: Path
 ) -> list[Listed]:
     about = {"schema": str(SCHEMA), "config_sha256": config.sha256}
-    files = TableFiles(folder / DATA, about)
-    for _, same in groupby(good, key=lambda each: each.object_id):
-        of_object = list(same)
-        for name in TABLES:
-            chosen = of_object[:1] if name == "objects" else of_object
-            paths = [staging.table(each.unit, name) for each in chosen]
-            files.add(name, of_object[0].split, paths)
-    return [
-        replace(listed(folder, each.path), table=each.name, split=each.split, rows=each.rows)
-        for each in files.close()
-    ]
+    with TableFiles(folder / DATA, about) as files:
+        for _, same in groupby(good, key=lambda each: each.object_id):
+            of_object = list(same)
+            for name in TABLES:
+                chosen = of_object[:1] if name == "objects" else of_object
+                paths = [staging.table(each.unit, name) for each in chosen]
+                files.add(name, of_object[0].split, paths)
+        return [
+            replace(listed(folder, each.path), table=each.name, split=each.split, rows=each.rows)
+            for each in files.close()
+        ]

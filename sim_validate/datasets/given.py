@@ -77,7 +77,7 @@ def given_sha256(given: Sequence[GivenGrasp]) -> str:
 def _from_json(text: str, outward: bool) -> tuple[GivenGrasp, ...]:
     sets = contact_sets_from_json(text, Overrides(NO_FRICTION, outward=outward))
     stated = json.loads(text)
-    planned = "schema_version" in stated  # by us, and judged at any friction
+    planned = "schema" in stated  # by us, and judged at any friction
     own = any((each.friction != NO_FRICTION).any() for each in sets)
     if not planned and ("friction" in stated or own):
         raise InputError("friction: expected none in the file; a dataset has its own frictions")

@@ -9,11 +9,11 @@ import io
 import itertools
 import math
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, BinaryIO, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,13 +136,21 @@ class WrittenTable:
 class TableFiles:
     """Files of tables as they grow, for each table and split one after another.
 
-    Rows are kept back until there are enough for a group of rows, so memory does not grow.
+    Rows are kept back until there are enough for a group of rows, so memory does not grow. To be
+    used in a `with` block, at whose end no file is open, whatever happens.
     """
 
     def __init__(self, folder: Path, about: Mapping[str, str]) -> None:
         self._folder = folder
         self._about = dict(sorted(about.items()))
         self._parts: dict[tuple[Name, str], _Part] = {}
+
+    def __enter__(self) -> "TableFiles":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for part in self._parts.values():
+            part.abandon()
 
     def add(self, name: Name, split: str, paths: Iterable[Path]) -> None:
         """Add the rows of some files, whose keys come after all that were added before.
@@ -176,6 +184,7 @@ class _Part:
         self._folder, self._split = folder, split
         self._waiting: list[Any] = []
         self._writer: Any = None
+        self._stream: BinaryIO | None = None
         self._rows: list[int] = []
         folder.mkdir(parents=True, exist_ok=True)
 
@@ -187,8 +196,7 @@ class _Part:
     def close(self) -> list[tuple[Path, int]]:
         if self._waiting:
             self._flush()
-        if self._writer is not None:
-            self._writer.close()
+        self._end_file()
         files = len(self._rows)
         named = [self._folder / f"{self._split}-{i:05}-of-{files:05}.parquet" for i in range(files)]
         return [
@@ -204,13 +212,25 @@ class _Part:
         self._waiting.clear()
         if self._writer is None:
             path = self._path(len(self._rows))
-            self._writer = _parquet().ParquetWriter(path, table.schema, **PAGES)
+            self._stream = path.open("wb")
+            self._writer = _parquet().ParquetWriter(self._stream, table.schema, **PAGES)
             self._rows.append(0)
         self._writer.write_table(table, row_group_size=table.num_rows)
         self._rows[-1] += table.num_rows
         if self._rows[-1] >= FILE_ROWS:
+            self._end_file()
+
+    def _end_file(self) -> None:
+        if self._writer is not None and self._stream is not None:
             self._writer.close()
-            self._writer = None
+            self._stream.close()
+            self._writer = self._stream = None
+
+    def abandon(self) -> None:
+        """Close what is open, for example because the disk is full."""
+        if self._stream is not None:
+            with suppress(OSError):
+                self._stream.close()
 
 
 def read_columns(paths: Sequence[Path], name: Name) -> Columns:
