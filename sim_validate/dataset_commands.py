@@ -13,7 +13,7 @@ from sim_validate.clusters import dask_workers, ray_workers
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
-from sim_validate.datasets.croissant import CROISSANT, missing_fields
+from sim_validate.datasets.describing.croissant import CROISSANT, missing_fields
 from sim_validate.datasets.driver import Engine
 from sim_validate.datasets.exports.formats import export
 from sim_validate.datasets.manifest import read_manifest
@@ -82,7 +82,7 @@ def verify_dataset(command: dataset_flags.Verify, reporter: Reporter) -> int:
         reporter.warn(fault)
     say_cut(len(faults), reporter)
     reporter.say(
-        f"{command.dataset}: {'nothing is wrong' if not faults else f'{len(faults)} faults'}"
+        f"{command.dataset}: {'nothing is wrong' if not faults else f'faults: {len(faults)}'}"
     )
     reporter.document({"dataset": str(command.dataset), "faults": faults})
     return cli.Exit.NEGATIVE if faults else cli.Exit.GOOD

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grasp_core.errors import InputError
-from sim_validate.datasets.card import CARD
 from sim_validate.datasets.columns import Name
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
-from sim_validate.datasets.croissant import CROISSANT
+from sim_validate.datasets.describing.card import CARD
+from sim_validate.datasets.describing.croissant import CROISSANT
 from sim_validate.datasets.driver import Engine, drive
 from sim_validate.datasets.finish import CONFIG, CONTACTS, DATA, EXTRAS, QUARANTINE, finish
 from sim_validate.datasets.manifest import MANIFEST, read_manifest
@@ -88,8 +88,15 @@ def build(
 
 @contextmanager
 def _alone(folder: Path) -> Generator[None]:
-    """Keep other builds out of a folder."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Keep other builds out of a folder.
+
+    Raises:
+        InputError: There cannot be such a folder, or another build is at work.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out {folder}: no folder can be made there ({error})") from error
     with (folder / LOCK).open("a") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -132,7 +139,7 @@ def _as_built(folder: Path, units: Sequence[WorkUnit], made: int = 0) -> Built:
     """What a finished dataset holds.
 
     Raises:
-        InputError: It was made from other meshes or contacts, or by other versions.
+        InputError: It was made from other meshes or contacts, or by other versions, or damaged.
     """
     manifest = read_manifest(folder)
     if manifest.units_sha256 != units_sha256(units):
@@ -140,4 +147,11 @@ def _as_built(folder: Path, units: Sequence[WorkUnit], made: int = 0) -> Built:
             f"{folder}: is finished, but its meshes or contacts have changed since, or the "
             "versions of packages; give another --out to make it again"
         )
+    for each in manifest.files:
+        path = folder / each.path
+        if not path.is_file() or path.stat().st_size != each.bytes:
+            raise InputError(
+                f"{path}: is missing or damaged, though the dataset was finished (see `dataset "
+                "verify`); give another --out to make it again"
+            )
     return Built(len(units), made, manifest.quarantined, manifest.rows())

@@ -61,6 +61,7 @@ def drive(
         OSError: Rows cannot be written.
     """
     own = dict(provenance())
+    told = -1
     waiting = deque(Task(unit, staging, own, limits, work) for unit in units)
     again, finished = list[Task](), 0
     under_way: dict[Future[None], Task] = {}
@@ -76,7 +77,9 @@ def drive(
             else:
                 again.append(task)
         interrupts.check()
-        report(finished, len(units))
+        if finished > told:
+            told = finished
+            report(finished, len(units))
     for task in again:
         _try_alone(task, engine)
         finished += 1

@@ -12,10 +12,10 @@ from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
-from sim_validate.datasets.card import CARD, card_text
 from sim_validate.datasets.columns import TABLES
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
-from sim_validate.datasets.croissant import CROISSANT, croissant_text
+from sim_validate.datasets.describing.card import CARD, card_text
+from sim_validate.datasets.describing.croissant import CROISSANT, croissant_text
 from sim_validate.datasets.given import given_text
 from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest, listed, write_manifest
 from sim_validate.datasets.staging import Finished, Staging

@@ -74,7 +74,7 @@ class _Making:
                 limit=config.limit, seed=config.seed,
             )  # fmt: skip
             for grasp in planned.grasps:
-                self.found.add(grasp, self._tried(grasp))
+                self.found.add(grasp, self._tried(grasp, self.body))
 
     def judge(self) -> None:
         """The given grasps, those that can be tried."""
@@ -93,16 +93,16 @@ class _Making:
         """
         friction = self.unit.friction
         seated = seat(self.body, given.points, given.normals)
-        grasp = grasp_of(self.body, seated, friction, given.id)
+        grasp = grasp_of(seated, friction, given.id)
         if isinstance(grasp, Grasp):
-            self.found.add_given(given, grasp, self._tried(grasp), seated.moved_m)
+            self.found.add_given(given, grasp, self._tried(grasp, seated.body), seated.moved_m)
             return
         control = Control(GIVEN, seated.contacts, friction, grasp)
-        verdict = try_control(self.body, control, self.agenda, Setup())
+        verdict = try_control(seated.body, control, self.agenda, Setup())
         self.found.add_open(given, verdict, seated.moved_m)
 
-    def _tried(self, grasp: Grasp) -> Verdict:
-        verdict = validate(self.body, grasp, self.unit.friction, agenda=self.agenda)
+    def _tried(self, grasp: Grasp, body: Polyhedron) -> Verdict:
+        verdict = validate(body, grasp, self.unit.friction, agenda=self.agenda)
         if self.unit.config.scenes:
             self.files[f"scenes/{self.found.name(grasp.id)}.xml"] = verdict.scene.xml
         return verdict

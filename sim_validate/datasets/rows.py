@@ -77,7 +77,9 @@ class GraspRows:
 
     def add_given(self, given: GivenGrasp, grasp: Grasp, verdict: Verdict, moved_m: float) -> None:
         """Write down a given grasp that is force-closed, with the same."""
-        about = {"name": given.name, "label": GIVEN, "moved_m": moved_m}
+        about: dict[str, Any] = {"name": given.name, "label": GIVEN, "moved_m": moved_m}
+        if self.body.patches is not None:
+            about["faces"] = None  # those of the contacts are the grasp's own
         self._add_closed(grasp, verdict, about)
 
     def add_open(self, given: GivenGrasp, verdict: ControlVerdict, moved_m: float) -> None:

@@ -64,11 +64,30 @@ def test_contacts_on_patches_are_on_the_true_surface():
     lean /= np.linalg.norm(lean, axis=1, keepdims=True)
     seated = seat(body, grasp.positions - 1e-4 * grasp.normals, lean)
     assert 0.5e-4 < seated.moved_m < 2e-4
-    found = grasp_of(body, seated, 0.5, "mine")
+    found = grasp_of(seated, 0.5, "mine")
     assert isinstance(found, gc.Grasp)
-    check_on_faces(body, found)
+    check_on_faces(seated.body, found)
     vertices = nearest_on_surface(body.vertices, body.triangles, found.positions)
     np.testing.assert_allclose(vertices, found.positions, atol=1e-12)
+
+
+def test_a_curved_surface_is_judged_everywhere():
+    rng = np.random.default_rng(5)
+    mesh = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
+    body = gc.Polyhedron.from_mesh(mesh.vertices, mesh.faces, faces="patches")
+    corners = body.vertices[body.triangles]
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    for _ in range(25):
+        chosen = rng.integers(len(corners), size=4)
+        shares = rng.dirichlet(np.ones(3), size=4)
+        points = np.einsum("ki,kij->kj", shares, corners[chosen])
+        seated = seat(body, points, -outward[chosen])
+        assert seated.moved_m <= 1e-12
+        for contact, normal in zip(seated.contacts, outward[chosen], strict=True):
+            np.testing.assert_allclose(contact.normal, -normal, atol=1e-12)
+            assert face_under(seated.body, contact) is not None
+        assert len(seated.body.faces) == len(body.faces) + 4
 
 
 def test_a_contact_beyond_an_edge_goes_to_the_edge():
@@ -108,14 +127,14 @@ def test_a_grasp_or_the_proof_that_there_is_none():
     body = example_object("tetrahedron")
     points = np.array([face.centroid for face in body.faces])
     seated = seat(body, points, body.normals)
-    grasp = grasp_of(body, seated, 0.5, "mine")
+    grasp = grasp_of(seated, 0.5, "mine")
     assert isinstance(grasp, gc.Grasp)
     assert grasp.critical_friction < 0.5
     assert gc.force_closure(grasp, friction=0.5).closed
     assert gc.force_closure(grasp, friction=0.5).margin == pytest.approx(grasp.closure_margin)
     pairs = body.faces[0].polygon
     spots = np.array([pairs[0], pairs[1], pairs[2], pairs.mean(axis=0)])
-    flat = grasp_of(body, seat(body, spots, [body.normals[0]] * 4), 0.5, "flat")
+    flat = grasp_of(seat(body, spots, [body.normals[0]] * 4), 0.5, "flat")
     assert not isinstance(flat, gc.Grasp)
     assert not flat.closed
     assert flat.verify()

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_validate.datasets.columns import TABLES, Column, Name
-from sim_validate.datasets.exports.flat_files import write_about
+from sim_validate.datasets.exports.flat_files import write_tables
 from sim_validate.datasets.selection import Selection
 from sim_validate.datasets.tables import Columns, read_columns
 from sim_validate.files import write_arrays
@@ -30,11 +30,11 @@ def write_npz(
     Raises:
         InputError: The dataset is damaged.
     """
-    for done, name in enumerate(TABLES, start=1):
+
+    def write(name: Name) -> None:
         write_arrays(folder / f"{name}.npz", plain_columns(chosen, name))
-        report(done, len(TABLES))
-    write_about(chosen, folder)
-    return chosen.counts()
+
+    return write_tables(chosen, folder, report, write)
 
 
 def plain_columns(chosen: Selection, name: Name) -> Columns:

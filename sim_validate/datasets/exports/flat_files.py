@@ -35,11 +35,11 @@ def write_csv(
     Raises:
         InputError: The dataset is damaged.
     """
-    for done, name in enumerate(TABLES, start=1):
+
+    def write(name: Name) -> None:
         write_lines(folder / f"{name}.csv", _csv_lines(chosen, name))
-        report(done, len(TABLES))
-    write_about(chosen, folder)
-    return chosen.counts()
+
+    return write_tables(chosen, folder, report, write)
 
 
 def write_jsonl(
@@ -50,19 +50,35 @@ def write_jsonl(
     Raises:
         InputError: The dataset is damaged.
     """
-    for done, name in enumerate(TABLES, start=1):
+
+    def write(name: Name) -> None:
         lines = (json.dumps(row, allow_nan=False) + "\n" for row in chosen.rows(name))
         write_lines(folder / f"{name}.jsonl", lines)
+
+    return write_tables(chosen, folder, report, write)
+
+
+def write_tables(
+    chosen: Selection,
+    folder: Path,
+    report: Callable[[int, int], None],
+    write: Callable[[Name], None],
+) -> dict[Name, int]:
+    """Write a file for each table, and what made the dataset and its columns mean beside them.
+
+    Args:
+        chosen: What is asked for.
+        folder: Where.
+        report: Told how many tables are written, and of how many.
+        write: Writes one of them.
+    """
+    for done, name in enumerate(TABLES, start=1):
+        write(name)
         report(done, len(TABLES))
-    write_about(chosen, folder)
-    return chosen.counts()
-
-
-def write_about(chosen: Selection, folder: Path) -> None:
-    """Write what made a dataset, and what its columns mean, where a format has no place for it."""
     columns = {name: [asdict(column) for column in table] for name, table in TABLES.items()}
     about = {"dataset": chosen.facts(), "columns": columns}
     write_text(folder / "about.json", json.dumps(about, indent=1) + "\n")
+    return chosen.counts()
 
 
 def _csv_lines(chosen: Selection, name: Name) -> Iterator[str]:

@@ -17,7 +17,7 @@ from sim_validate.datasets import build as build_module
 from sim_validate.datasets import tables
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.manifest import read_manifest, write_manifest
+from sim_validate.datasets.manifest import listed, read_manifest, write_manifest
 from sim_validate.datasets.redo import Sample, drawn
 from sim_validate.datasets.tables import parquet_bytes, read_rows
 from sim_validate.datasets.tasks import Limits
@@ -242,6 +242,22 @@ def test_a_finished_dataset_of_a_mesh_that_has_changed_is_refused(tmp_path):
         build(config, tmp_path / "ds", Here(), silent)
 
 
+def test_a_finished_dataset_that_is_damaged_is_not_taken_for_one(copy):
+    path = next(copy.glob("meshes/*.obj"))
+    path.write_text(path.read_text() + "#")
+    with pytest.raises(gc.InputError, match="missing or damaged"):
+        build(CONFIG, copy, Here(), silent)
+    path.unlink()
+    with pytest.raises(gc.InputError, match="missing or damaged"):
+        build(CONFIG, copy, Here(), silent)
+
+
+def test_a_folder_that_cannot_be_made_is_said(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(gc.InputError, match=r"--out .* no folder can be made"):
+        build(CONFIG, tmp_path / "file", Here(), silent)
+
+
 def test_a_dataset_without_any_grasp_is_one(tmp_path):
     config = DatasetConfig(objects=("wedge",), frictions=(0.1,), families=("regulus",),
                            cones="normal")  # fmt: skip
@@ -345,6 +361,19 @@ def forged(folder, name, change):
     write_manifest(folder, dataclasses.replace(manifest, files=(*others, changed)))
 
 
+def untried(rows):
+    rows[0].update(label="given", outcome="not_tried", held=None, trials=0)
+
+
+def leaning(rows):
+    """A normal that is not the surface's, with the margin it gives."""
+    row = rows[0]
+    normal = np.array(row["contact_normals"][0]) + np.array([0.1, 0.0, 0.05])
+    row["contact_normals"][0] = (normal / np.linalg.norm(normal)).tolist()
+    points, normals = row["contact_points_m"], row["contact_normals"]
+    row["closure_margin"] = gc.force_closure(points, normals, row["friction"]).margin
+
+
 @pytest.mark.parametrize(
     ("name", "change", "message"),
     [
@@ -362,6 +391,15 @@ def forged(folder, name, change):
             lambda rows: rows[0]["contact_points_m"].__setitem__(0, [1.0, 0.0, 0.0]),
             "not on the object",
         ),
+        ("grasps", untried, "was not tried, but claims something"),
+        ("grasps", lambda rows: rows[0].update(trials=0), "its trials say something else"),
+        ("grasps", lambda rows: rows[0].update(friction=-1.0), "none of the configuration's"),
+        ("grasps", lambda rows: rows[0].update(label="given", friction=-1.0), "cannot be asked"),
+        ("grasps", lambda rows: rows[0].update(contacts=0), "are missing"),
+        ("grasps", lambda rows: rows[0].update(closure_margin=None), "are missing"),
+        ("grasps", lambda rows: rows[0].update(outcome="slipped"), "outcome 'slipped'"),
+        ("grasps", leaning, "not with its normals"),
+        ("grasps", lambda rows: rows[0].update(split="validation"), "rows of another split"),
         ("trials", lambda rows: rows.pop(), "its trials say something else"),
         ("trials", lambda rows: rows[0].update(grasp_id="nobody"), "nobody is no grasp"),
         ("trials", lambda rows: rows[0].update(outcome="slipped"), "its trials say something else"),
@@ -418,6 +456,44 @@ def test_a_grasp_that_was_left_out_is_named(copy):
         forged(copy, name, lambda rows: rows.__setitem__(slice(None), list(filter(kept, rows))))
     assert verify(copy) == []
     assert any(gone in fault and "not there" in fault for fault in verify(copy, Sample(1.0)))
+
+
+def test_objects_of_the_same_file_name_are_told_apart(tmp_path):
+    for folder, sides in (("a", (0.04, 0.05, 0.06)), ("b", (0.04, 0.05, 0.07))):
+        (tmp_path / folder).mkdir()
+        trimesh.creation.box(extents=sides).export(tmp_path / folder / "model.obj")
+    bad = tmp_path / "b" / "model.obj"
+    bad.write_text(bad.read_text().rpartition("f ")[0])
+    paths = (str(tmp_path / "a" / "model.obj"), str(bad))
+    config = dataclasses.replace(CONFIG, objects=paths, frictions=(0.5,))
+    built = build(config, tmp_path / "ds", Here(), silent)
+    assert built.quarantined == 1
+    assert verify(tmp_path / "ds", Sample(1.0)) == []
+    forged(tmp_path / "ds", "trials", lambda rows: shifted(rows, "displacement_m"))
+    assert any("displacement_m" in fault for fault in verify(tmp_path / "ds", Sample(1.0)))
+
+
+def test_what_is_quarantined_has_no_rows(copy):
+    (row, *_) = all_rows(copy, "objects")
+    line = {"object": "x", "source_sha256": row["source_sha256"], "given": [], "reason": "no"}
+    lines = [json.dumps(line | {"friction": friction}) for friction in CONFIG.frictions]
+    path = copy / "quarantine.jsonl"
+    path.write_text("\n".join(lines) + "\n")
+    manifest = read_manifest(copy)
+    kept = [each for each in manifest.files if each.path != path.name]
+    files = (*kept, listed(copy, path))
+    write_manifest(copy, dataclasses.replace(manifest, files=files, quarantined=2))
+    assert sum("is quarantined, but has rows" in fault for fault in verify(copy, Sample(1.0))) == 2
+
+
+def test_settings_that_are_not_the_manifests_are_named(copy):
+    path = copy / "config.toml"
+    path.write_text(path.read_text().replace("limit = 2", "limit = 3"))
+    manifest = read_manifest(copy)
+    kept = [each for each in manifest.files if each.path != path.name]
+    files = (*kept, listed(copy, path))
+    write_manifest(copy, dataclasses.replace(manifest, files=files))
+    assert any("not the configuration" in fault for fault in verify(copy))
 
 
 def test_a_larger_sample_holds_a_smaller_one():

@@ -3,10 +3,10 @@ import re
 
 import pytest
 
-from sim_validate.datasets.card import CARD, card_text
 from sim_validate.datasets.columns import TABLES
+from sim_validate.datasets.describing.card import CARD, card_text
+from sim_validate.datasets.describing.statements import LABELS
 from sim_validate.datasets.manifest import read_manifest
-from sim_validate.datasets.statements import LABELS
 from sim_validate.datasets.tables import read_rows
 from sim_validate.datasets.verify import verify
 from tests.sim_validate.datasets.small import SMALL, build_small

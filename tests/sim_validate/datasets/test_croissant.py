@@ -7,7 +7,12 @@ import pytest
 
 from sim_validate.cli import Exit, main
 from sim_validate.datasets.columns import KEYS, REFERENCES, TABLES
-from sim_validate.datasets.croissant import ASKED, CROISSANT, croissant_text, missing_fields
+from sim_validate.datasets.describing.croissant import (
+    ASKED,
+    CROISSANT,
+    croissant_text,
+    missing_fields,
+)
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.tables import read_rows
 from tests.sim_validate.datasets.small import SMALL, build_small

@@ -9,10 +9,8 @@ from typing import Any, TypeAlias
 
 from sim_validate.datasets.columns import KEYS, REFERENCES, TABLES, Column, Name
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.licenses import known_license
-from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest
-from sim_validate.datasets.rows import SPLITS
-from sim_validate.datasets.statements import (
+from sim_validate.datasets.describing.licenses import known_license
+from sim_validate.datasets.describing.statements import (
     CONVENTIONS,
     KEYWORDS,
     LABELS,
@@ -25,6 +23,8 @@ from sim_validate.datasets.statements import (
     splitting,
     summary,
 )
+from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest
+from sim_validate.datasets.rows import SPLITS
 
 Json: TypeAlias = dict[str, Any]
 

@@ -8,10 +8,8 @@ from collections.abc import Iterable
 
 from sim_validate.datasets.columns import KEYS, REFERENCES, TABLES, Column, Name
 from sim_validate.datasets.config import DatasetConfig, config_to_toml, quoted
-from sim_validate.datasets.licenses import known_license
-from sim_validate.datasets.manifest import Manifest
-from sim_validate.datasets.rows import SPLITS
-from sim_validate.datasets.statements import (
+from sim_validate.datasets.describing.licenses import known_license
+from sim_validate.datasets.describing.statements import (
     CONVENTIONS,
     KEYWORDS,
     LABELS,
@@ -24,6 +22,8 @@ from sim_validate.datasets.statements import (
     splitting,
     summary,
 )
+from sim_validate.datasets.manifest import Manifest
+from sim_validate.datasets.rows import SPLITS
 
 CARD = "README.md"
 FIRST: Name = "grasps"
