@@ -12,6 +12,8 @@ from grasp_core.errors import MeshError, MeshRefusal
 
 FORMATS = ("obj", "stl", "ply", "off", "glb")
 MAX_FILE_BYTES = 64 * 2**20
+STL_HEADER, STL_TRIANGLE = 80, 50
+"""Bytes of a binary STL file before the number of triangles, and of each triangle."""
 
 
 def read_triangles(path: Path) -> tuple[Array, Indices, bytes]:
@@ -35,6 +37,8 @@ def read_triangles(path: Path) -> tuple[Array, Indices, bytes]:
         raise MeshError(MeshRefusal.TOO_MANY, message)
     if not data:
         raise MeshError(MeshRefusal.EMPTY, f"{path.name}: the file is empty")
+    if kind == "stl":
+        _check_stl(path.name, data)
     expected = _obj_triangle_count(path.name, data) if kind == "obj" else None
     vertices, triangles = _parsed(path.name, kind, data)
     if expected is not None and expected != len(triangles):
@@ -55,6 +59,22 @@ def _parsed(name: str, kind: str, data: bytes) -> tuple[Array, Indices]:
     if whole is None or not len(getattr(whole, "faces", ())):
         raise MeshError(MeshRefusal.EMPTY, f"{name}: holds no triangles")
     return np.asarray(whole.vertices, dtype=np.float64), np.asarray(whole.faces, dtype=np.int64)
+
+
+def _check_stl(name: str, data: bytes) -> None:
+    """Refuse what is neither of the two kinds of STL file.
+
+    Whether the parser finds text in other bytes depends on which libraries for guessing encodings
+    are installed.
+
+    Raises:
+        MeshError: It is neither.
+    """
+    text = data.lstrip()[:5].lower() == b"solid"
+    counted = int.from_bytes(data[STL_HEADER : STL_HEADER + 4], "little")
+    if not text and len(data) != STL_HEADER + 4 + STL_TRIANGLE * counted:
+        message = f"{name}: not a whole STL file; export it again"
+        raise MeshError(MeshRefusal.UNREADABLE, message)
 
 
 def _obj_triangle_count(name: str, data: bytes) -> int:
