@@ -22,6 +22,7 @@ from tyro.conf import (
 )
 
 from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError, UnfaithfulError
+from sim_validate.baseline_flags import Baseline
 from sim_validate.bounds import check
 from sim_validate.config_file import with_config
 from sim_validate.dataset_flags import Dataset
@@ -169,7 +170,7 @@ class Doctor:
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
-Command = Run | Plan | Validate | Scene | Analyze | Dataset | Inspect | Objects | Doctor
+Command = Run | Plan | Validate | Scene | Analyze | Dataset | Baseline | Inspect | Objects | Doctor
 
 
 def main(argv: Sequence[str] | None = None) -> int:

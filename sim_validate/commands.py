@@ -3,7 +3,7 @@
 from pkgutil import resolve_name
 from typing import Any
 
-from sim_validate import cli, dataset_flags
+from sim_validate import baseline_flags, cli, dataset_flags
 from sim_validate.console import Reporter
 
 ACTIONS: dict[type[Any], str] = {
@@ -16,6 +16,8 @@ ACTIONS: dict[type[Any], str] = {
     dataset_flags.Import: "dataset_commands:import_dataset",
     dataset_flags.Verify: "dataset_commands:verify_dataset",
     dataset_flags.Export: "dataset_commands:export_dataset",
+    baseline_flags.Record: "baseline_commands:record_baseline",
+    baseline_flags.Check: "baseline_commands:check_baseline",
     cli.Inspect: "object_commands:inspect_object",
     cli.Objects: "object_commands:list_objects",
     cli.Doctor: "doctor_command:check_installation",
@@ -27,5 +29,5 @@ def execute(command: cli.Command) -> int:
     """Carry out a command and return its exit code."""
     speech = command.speech
     reporter = Reporter(speech.quiet, speech.verbose, speech.json)
-    asked = command.action if isinstance(command, cli.Dataset) else command
+    asked = command.action if isinstance(command, cli.Dataset | cli.Baseline) else command
     return resolve_name(f"sim_validate.{ACTIONS[type(asked)]}")(asked, reporter)

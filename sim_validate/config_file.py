@@ -6,7 +6,7 @@ from typing import Any, cast
 
 from grasp_core.errors import InputError
 
-COMMAND_WORDS = {"dataset": 2}
+COMMAND_WORDS = {"dataset": 2, "baseline": 2}
 """Of how many words a command consists, where it is not one."""
 
 

@@ -1,6 +1,7 @@
 """A setup in TOML: tables `physics`, `fingers`, `hold`, `limit`, `friction`, any part of each."""
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, cast
@@ -43,6 +44,20 @@ def setup_from_file(path: Path, setup: Setup) -> Setup:
         tables = tomllib.loads(read_text(path))
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not TOML ({error})") from error
+    return setup_from_tables(tables, setup, str(path))
+
+
+def setup_from_tables(tables: Mapping[str, Any], setup: Setup, path: str) -> Setup:
+    """The setup, with the numbers of tables in place of its own.
+
+    Args:
+        tables: Settings by table.
+        setup: What holds where they say nothing.
+        path: Where they come from, for messages.
+
+    Raises:
+        InputError: There is no such setting, or its value is refused.
+    """
     for name, given in tables.items():
         if name not in OF_USERS or not isinstance(given, dict):
             raise InputError(f"{path}: tables are {', '.join(OF_USERS)}; got {name!r}")
@@ -51,7 +66,15 @@ def setup_from_file(path: Path, setup: Setup) -> Setup:
     return setup
 
 
-def _filled(path: Path, table: str, values: Any, given: dict[str, Any]) -> Any:
+def tables_of(setup: Setup) -> dict[str, dict[str, Any]]:
+    """What a file would say to have this setup."""
+    return {
+        table: {name: getattr(getattr(setup, table), name) for name in names}
+        for table, names in OF_USERS.items()
+    }
+
+
+def _filled(path: str, table: str, values: Any, given: dict[str, Any]) -> Any:
     """A frozen value with some of its fields replaced, each checked against its type."""
     for name in given:
         if name not in OF_USERS[table]:

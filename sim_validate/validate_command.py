@@ -1,7 +1,7 @@
 """The commands that simulate: grasps on the bench, verdicts to files and tables."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,18 +9,18 @@ import numpy as np
 from grasp_core.errors import InputError
 from grasp_core.reach import Finger
 from grasp_core.records import SavedGrasps, grasps_from_json
-from grasp_core.values import Grasp, Polyhedron
+from grasp_core.values import Grasp
 from scenes.fingertips import FingerSettings
 from sim_validate import cli, flags
 from sim_validate.console import TABLE_ROWS, Reporter
-from sim_validate.engines import each, processes
 from sim_validate.files import read_text, write_arrays, write_text
 from sim_validate.gate import require_faithful
+from sim_validate.jobs import Job, validated
 from sim_validate.plan_command import say_cut
 from sim_validate.rules import RULES
 from sim_validate.setup import Agenda, Setup
 from sim_validate.setup_file import setup_from_file
-from sim_validate.validation import Verdict, WrenchVerdict, validate
+from sim_validate.validation import Verdict, WrenchVerdict
 from sim_validate.verdict import Outcome
 from sim_validate.verdict_records import summary, trace_arrays, verdicts_to_json
 from sim_validate.wrench_file import weights, wrenches_from_file
@@ -106,21 +106,6 @@ def _agenda(testing: flags.Testing, seed: int, folder: Path | None) -> Agenda:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Job:
-    """One grasp to validate, as it travels to a worker."""
-
-    body: Polyhedron
-    grasp: Grasp
-    friction: float
-    agenda: Agenda
-    setup: Setup
-
-
-def _try(job: _Job) -> Verdict:
-    return validate(job.body, job.grasp, job.friction, agenda=job.agenda, setup=job.setup)
-
-
 def simulate_grasps(
     saved: SavedGrasps, testing: flags.Testing, folder: Path | None, reporter: Reporter
 ) -> int:
@@ -134,13 +119,11 @@ def simulate_grasps(
     gate = require_faithful(setup, saved.friction, saved.body.radius)
     for check in gate.checks:
         reporter.detail(str(check))
-    threads = max(1, testing.jobs // processes(len(saved.grasps), testing.jobs))
-    setup = replace(setup, threads=threads)
-    tasks = [_Job(saved.body, g, saved.friction, agenda, setup) for g in saved.grasps]
+    tasks = [Job(saved.body, g, saved.friction, agenda, setup) for g in saved.grasps]
     verdicts: list[Verdict] = []
     try:
         with reporter.progress("simulating") as steps:
-            for verdict in each(_try, tasks, jobs=testing.jobs):
+            for verdict in validated(tasks, testing.jobs):
                 verdicts.append(verdict)
                 if folder and agenda.keep_traces:
                     write_arrays(folder / "traces" / f"{verdict.id}.npz", trace_arrays(verdict))

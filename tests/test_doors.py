@@ -10,7 +10,7 @@ from typing import get_args
 
 import pytest
 
-from sim_validate import dataset_flags
+from sim_validate import baseline_flags, dataset_flags
 from sim_validate.cli import Command
 from sim_validate.commands import ACTIONS
 
@@ -115,6 +115,7 @@ def test_planning_without_kernels_needs_no_scipy():
 def test_every_command_has_its_function():
     flags = dataset_flags
     actions = {flags.Build, flags.Import, flags.Verify, flags.Export}
-    named = set(get_args(Command)) - {flags.Dataset} | actions
+    actions |= {baseline_flags.Record, baseline_flags.Check}
+    named = set(get_args(Command)) - {flags.Dataset, baseline_flags.Baseline} | actions
     assert set(ACTIONS) == named
     assert all(callable(resolve_name(f"sim_validate.{place}")) for place in ACTIONS.values())

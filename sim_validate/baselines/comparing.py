@@ -1,0 +1,179 @@
+"""Two baselines -> what became of each grasp: the same, better, worse, or not to be compared.
+
+With the same packages on the same kind of processor results are the same to the last digits, so
+every difference counts. Otherwise verdicts must be the same, but for grasps so close to their
+critical friction that a rounding may decide, and numbers may differ within bands.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from enum import StrEnum
+from math import radians
+from typing import Any, cast
+
+from sim_validate.baselines.values import Baseline, Entry
+
+DECISIVE = ("graspproof", "mujoco", "machine")
+"""Versions that must be the same for results to be the same."""
+SAME = 1e-9
+"""How far numbers may be apart then, relative to the larger: libraries below ours round."""
+
+
+class Status(StrEnum):
+    """What became of a grasp."""
+
+    SAME = "same"
+    WITHIN = "within bands"
+    """Numbers differ as other versions or processors make them differ."""
+    GREY = "grey zone"
+    """Another verdict, on a grasp that is too close to its critical friction to tell."""
+    IMPROVED = "improved"
+    REGRESSED = "regressed"
+    NOT_COMPARABLE = "not comparable"
+    """Another object, other contacts or settings: there is nothing to compare."""
+    MISSING = "missing"
+    """In the baseline, but not among the grasps."""
+    NEW = "new"
+    """Among the grasps, but not in the baseline."""
+
+
+FAILED = (Status.REGRESSED, Status.MISSING, Status.NEW)
+"""What fails a check, beside what cannot be compared."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bands:
+    """How far results of other versions or processors may differ."""
+
+    friction: float = 0.05
+    """Of critical frictions and limits, relative to the baseline's."""
+    displacement_m: float = 2e-4
+    rotation_rad: float = radians(0.2)
+    grey: float = 0.02
+    """Grasps whose critical friction is closer to the friction than this, relative to it, may
+    change their verdict."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What became of one grasp."""
+
+    id: str
+    status: Status
+    reasons: tuple[str, ...] = ()
+    before: Entry | None = None
+    after: Entry | None = None
+
+
+@dataclass(slots=True)
+class _Differences:
+    """What is worse and what is better, in words."""
+
+    worse: list[str] = field(default_factory=list[str])
+    better: list[str] = field(default_factory=list[str])
+
+    def add(self, text: str, *, worse: bool) -> None:
+        (self.worse if worse else self.better).append(text)
+
+
+def compare(before: Baseline, after: Baseline, bands: Bands = Bands()) -> tuple[Finding, ...]:
+    """What became of each grasp, sorted by id.
+
+    Args:
+        before: The baseline.
+        after: What was measured now.
+        bands: For other versions or processors.
+    """
+    exact = all(before.versions.get(name) == after.versions.get(name) for name in DECISIVE)
+    changed = tuple(_changed(before, after))
+    old = {entry.id: entry for entry in before.entries}
+    new = {entry.id: entry for entry in after.entries}
+    found = list[Finding]()
+    for name in sorted(old.keys() | new.keys()):
+        one, other = old.get(name), new.get(name)
+        if one is None:
+            found.append(Finding(name, Status.NEW, ("not in the baseline",), None, other))
+        elif other is None:
+            reasons = ("in the baseline, but not among the grasps",)
+            found.append(Finding(name, Status.MISSING, reasons, one, None))
+        else:
+            found.append(_compared(one, other, before.friction, changed, None if exact else bands))
+    return tuple(found)
+
+
+def _changed(before: Baseline, after: Baseline) -> Iterator[str]:
+    """Why two baselines cannot be compared."""
+    if before.content_sha256 != after.content_sha256:
+        yield f"the object is another one: {before.object} has changed"
+    if before.friction != after.friction:
+        yield f"friction: {before.friction} -> {after.friction}"
+    yield from _settings_changed("", dict(before.settings), dict(after.settings))
+
+
+def _settings_changed(where: str, before: Any, after: Any) -> Iterator[str]:
+    if isinstance(before, dict) and isinstance(after, dict):
+        one, other = cast("dict[str, Any]", before), cast("dict[str, Any]", after)
+        for name in sorted({*one, *other}):
+            inside = f"{where}.{name}" if where else name
+            yield from _settings_changed(inside, one.get(name), other.get(name))
+    elif before != after:
+        yield f"{where}: {before} -> {after}"
+
+
+def _compared(
+    one: Entry, other: Entry, friction: float, changed: tuple[str, ...], bands: Bands | None
+) -> Finding:
+    if one.contacts_sha256 != other.contacts_sha256:
+        changed = (*changed, "the contacts are others")
+    if changed:
+        return Finding(one.id, Status.NOT_COMPARABLE, changed, one, other)
+    if bands is not None and one.held != other.held and _is_grey(one, friction, bands):
+        reason = f"{one.outcome} -> {other.outcome}, at its critical friction"
+        return Finding(one.id, Status.GREY, (reason,), one, other)
+    verdicts, numbers = _verdicts(one, other), _numbers(one, other, bands)
+    worse, better = verdicts.worse + numbers.worse, verdicts.better + numbers.better
+    if worse:
+        return Finding(one.id, Status.REGRESSED, tuple(worse), one, other)
+    if better:
+        return Finding(one.id, Status.IMPROVED, tuple(better), one, other)
+    return Finding(one.id, Status.SAME if one == other else Status.WITHIN, (), one, other)
+
+
+def _is_grey(entry: Entry, friction: float, bands: Bands) -> bool:
+    return abs(friction - entry.critical_friction) <= bands.grey * friction
+
+
+def _verdicts(one: Entry, other: Entry) -> _Differences:
+    found = _Differences()
+    if one.outcome != other.outcome:
+        at = f" at {other.first_failure}" if other.first_failure else ""
+        found.add(f"{one.outcome} -> {other.outcome}{at}", worse=not other.held)
+    for name, text in (("controls_held", "negative controls that held"),
+                       ("mismatches", "contradictions of the analysis")):  # fmt: skip
+        before, after = getattr(one, name), getattr(other, name)
+        if before != after:
+            found.add(f"{text}: {before} -> {after}", worse=after > before)
+    return found
+
+
+def _numbers(one: Entry, other: Entry, bands: Bands | None) -> _Differences:
+    """Numbers that differ by more than they may; a larger one is worse but for limits."""
+    found = _Differences()
+    rows = (
+        ("critical_friction", "friction", 1.0), ("simulated_critical_friction", "friction", 1.0),
+        ("limit_n", "friction", -1.0), ("simulated_limit_n", "friction", -1.0),
+        ("displacement_m", "displacement_m", 1.0), ("rotation_rad", "rotation_rad", 1.0),
+    )  # fmt: skip
+    for name, band, sign in rows:
+        before, after = getattr(one, name), getattr(other, name)
+        if before is None or after is None:
+            if before != after:
+                found.add(f"{name}: {before} -> {after}", worse=after is None)
+            continue
+        size = max(abs(before), abs(after))
+        allowed = SAME * size
+        if bands is not None:
+            allowed = bands.friction * abs(before) if band == "friction" else getattr(bands, band)
+        if abs(after - before) > allowed:
+            found.add(f"{name}: {before:.6g} -> {after:.6g}", worse=sign * (after - before) > 0.0)
+    return found

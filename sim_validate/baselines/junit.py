@@ -1,0 +1,43 @@
+"""Findings -> a JUnit file, which build servers show as test results."""
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from xml.etree import ElementTree
+
+from sim_validate.baselines.comparing import FAILED, Finding, Status
+
+
+def junit_text(name: str, findings: Iterable[Finding], *, strict: bool) -> str:
+    """The text of a JUnit file with a case for each grasp.
+
+    Args:
+        name: Of the suite.
+        findings: What became of each grasp.
+        strict: Whether what is better fails, too.
+    """
+    listed = list(findings)
+    failing = (*FAILED, Status.IMPROVED) if strict else FAILED
+    suite = ElementTree.Element("testsuite", name=_printable(name), tests=str(len(listed)))
+    failures = errors = 0
+    for finding in listed:
+        case = ElementTree.SubElement(suite, "testcase", name=finding.id, classname="graspproof")
+        said = _printable("; ".join(finding.reasons))
+        if finding.status in failing:
+            failures += 1
+            ElementTree.SubElement(case, "failure", type=finding.status.value, message=said)
+        elif finding.status is Status.NOT_COMPARABLE:
+            errors += 1
+            ElementTree.SubElement(case, "error", type=finding.status.value, message=said)
+        if finding.after is not None:
+            kept = ElementTree.SubElement(case, "properties")
+            for key, value in asdict(finding.after).items():
+                ElementTree.SubElement(kept, "property", name=key, value=str(value))
+    suite.set("failures", str(failures))
+    suite.set("errors", str(errors))
+    ElementTree.indent(suite)
+    return ElementTree.tostring(suite, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _printable(text: str) -> str:
+    """Text without what XML cannot hold."""
+    return "".join(letter if letter.isprintable() else " " for letter in text)

@@ -1,0 +1,92 @@
+"""Grasps on the bench -> a baseline: verdicts now, with all that they depend on."""
+
+import json
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from grasp_core.errors import InputError
+from grasp_core.records import SavedGrasps
+from grasp_core.versions import versions
+from sim_validate.baselines.values import Baseline, entry_of
+from sim_validate.gate import require_faithful
+from sim_validate.jobs import Job, validated
+from sim_validate.setup import Agenda, NamedWrench, Setup
+from sim_validate.setup_file import setup_from_tables, tables_of
+
+
+def measured(
+    saved: SavedGrasps,
+    grasps_file: str,
+    setup: Setup,
+    agenda: Agenda,
+    processors: int,
+    report: Callable[[int, int], None],
+) -> Baseline:
+    """Simulate grasps and keep what their verdicts say.
+
+    Args:
+        saved: The grasps.
+        grasps_file: Where they are, from the baseline's folder.
+        setup: How trials are simulated.
+        agenda: Which ones.
+        processors: How many to use; nothing depends on it.
+        report: Told how many grasps are done, and of how many.
+
+    Raises:
+        InputError: There is no grasp, or one is refused.
+        UnfaithfulError: The simulator fails the gate.
+    """
+    if not saved.grasps:
+        raise InputError(f"{grasps_file}: holds no grasp")
+    require_faithful(setup, saved.friction, saved.body.radius)
+    jobs = [Job(saved.body, grasp, saved.friction, agenda, setup) for grasp in saved.grasps]
+    entries = list[Any]()
+    for grasp, verdict in zip(saved.grasps, validated(jobs, processors), strict=True):
+        entries.append(entry_of(grasp, verdict, saved.body.radius))
+        report(len(entries), len(jobs))
+    return Baseline(
+        grasps_file=grasps_file,
+        object=saved.body.name,
+        content_sha256=saved.body.content_sha256,
+        friction=saved.friction,
+        settings=settings_of(setup, agenda),
+        versions=versions(),
+        entries=tuple(sorted(entries, key=lambda entry: entry.id)),
+    )
+
+
+def settings_of(setup: Setup, agenda: Agenda) -> dict[str, Any]:
+    """How trials are simulated and which ones, as a baseline's file has it."""
+    settings = {
+        "setup": tables_of(setup),
+        "surface": setup.surface,
+        "random_wrenches": agenda.random_wrenches,
+        "wrenches": {each.name: each.wrench.tolist() for each in agenda.wrenches},
+        "limits": agenda.limits,
+        "seed": agenda.seed,
+    }
+    return json.loads(json.dumps(settings))
+
+
+def of_settings(settings: Mapping[str, Any], path: str) -> tuple[Setup, Agenda]:
+    """The setup and agenda that a baseline keeps.
+
+    Args:
+        settings: As `settings_of` gives them.
+        path: Where they come from, for messages.
+
+    Raises:
+        InputError: A setting is missing, unknown or refused.
+    """
+    try:
+        setup = setup_from_tables(settings["setup"], Setup(surface=settings["surface"]), path)
+        wrenches = tuple(NamedWrench(name, w) for name, w in settings["wrenches"].items())
+        agenda = Agenda(
+            random_wrenches=settings["random_wrenches"],
+            wrenches=wrenches,
+            limits=settings["limits"],
+            seed=settings["seed"],
+        )
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{path}: its settings are not those of a baseline ({error})") from error
+    return setup, agenda

@@ -1,0 +1,41 @@
+"""Grasps of one object, validated one after another or on several processes, in order."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from grasp_core.values import Grasp, Polyhedron
+from sim_validate.engines import each, processes
+from sim_validate.setup import Agenda, Setup
+from sim_validate.validation import Verdict, validate
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One grasp to validate, as it travels to a worker."""
+
+    body: Polyhedron
+    grasp: Grasp
+    friction: float
+    agenda: Agenda
+    setup: Setup
+
+
+def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
+    """Verdicts as they become ready, in order; they do not depend on how many processors there are.
+
+    Args:
+        jobs: What to validate.
+        processors: How many to use: as processes, and as threads of the simulator where there are
+            too few grasps for so many processes.
+
+    Raises:
+        InputError: A grasp is refused.
+        UnfaithfulError: The simulator fails the gate.
+    """
+    threads = max(1, processors // processes(len(jobs), processors))
+    tasks = [replace(job, setup=replace(job.setup, threads=threads)) for job in jobs]
+    return each(_try, tasks, jobs=processors)
+
+
+def _try(job: Job) -> Verdict:
+    return validate(job.body, job.grasp, job.friction, agenda=job.agenda, setup=job.setup)

@@ -1,0 +1,145 @@
+"""A baseline recorded and checked from the command line; every change is reported as what it is."""
+
+import json
+import shutil
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.records import plan_to_json
+from scenes.objects import example_object
+from sim_validate.cli import Exit, main
+from sim_validate.files import write_text
+
+
+def planned(folder, body=None, friction=0.5, limit=2):
+    body = body or example_object("wedge")
+    plan = gc.plan(body, friction, families=("concurrent",), limit=limit)
+    return write_text(folder / "grasps.json", plan_to_json(body, plan))
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recorded")
+    grasps = planned(folder)
+    line = ["baseline", "record", str(grasps), "-o", str(folder / "base.json"), "--jobs", "1"]
+    assert main([*line, "-q"]) == Exit.GOOD
+    return folder
+
+
+@pytest.fixture
+def copy(recorded, tmp_path):
+    return shutil.copytree(recorded, tmp_path / "copy")
+
+
+def check(folder, *more):
+    return main(["baseline", "check", str(folder / "base.json"), "--jobs", "1", *more])
+
+
+def statuses(capsys):
+    record = json.loads(capsys.readouterr().out)
+    return {each["id"]: (each["status"], " ".join(each["reasons"])) for each in record["grasps"]}
+
+
+def test_an_unchanged_baseline_is_the_same(recorded, capsys):
+    assert check(recorded, "--json") == Exit.GOOD
+    assert {status for status, _ in statuses(capsys).values()} == {"same"}
+
+
+def test_less_friction_is_not_comparable(copy, capsys):
+    path = copy / "grasps.json"
+    record = json.loads(path.read_text())
+    record["friction"] = 0.4
+    path.write_text(json.dumps(record))
+    assert check(copy, "--json") == Exit.INPUT
+    assert {found for found in statuses(capsys).values()} == {
+        ("not comparable", "friction: 0.5 -> 0.4")
+    }
+
+
+def test_a_face_that_moved_by_a_millimetre_is_not_comparable(copy, capsys):
+    body = example_object("wedge")
+    moved = body.vertices - 1e-3 * np.isclose(
+        body.vertices @ body.normals[0], body.faces[0].polygon[0] @ body.normals[0]
+    )[:, None] * body.normals[0]  # fmt: skip
+    planned(copy, gc.Polyhedron.from_mesh(moved, body.triangles))
+    assert check(copy, "--json") in (Exit.INPUT, Exit.NEGATIVE)
+    found = statuses(capsys)
+    assert all("the object is another one" in why or status in ("missing", "new")
+               for status, why in found.values())  # fmt: skip
+    assert any(status == "not comparable" for status, _ in found.values())
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("[physics]\niterations = 60\n", "setup.physics.iterations: "),
+        ("[fingers]\nradius_m = 0.004\n", "setup.fingers.radius_m: None -> 0.004"),
+    ],
+    ids=["solver settings", "a fingertip's radius"],
+)
+def test_other_settings_are_not_comparable(copy, capsys, text, reason):
+    setup = write_text(copy / "setup.toml", text)
+    assert check(copy, "--setup", str(setup), "--json") == Exit.INPUT
+    for status, why in statuses(capsys).values():
+        assert status == "not comparable"
+        assert why.startswith(reason)
+
+
+def altered(folder, **changed):
+    """The baseline as if the first grasp's verdict had been another one."""
+    path = folder / "base.json"
+    record = json.loads(path.read_text())
+    record["grasps"][0].update(changed)
+    path.write_text(json.dumps(record))
+    return record["grasps"][0]["id"]
+
+
+def test_a_regression_fails_and_says_why_also_in_junit(copy, capsys):
+    name = altered(copy, displacement_m=1e-9)
+    junit = copy / "junit.xml"
+    assert check(copy, "--junit", str(junit), "--json") == Exit.NEGATIVE
+    status, why = statuses(capsys)[name]
+    assert status == "regressed"
+    assert "displacement_m: 1e-09 -> " in why
+    suite = ElementTree.parse(junit).getroot()  # noqa: S314 - we wrote it
+    assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("2", "1", "0")
+    (failed,) = [case for case in suite if case.find("failure") is not None]
+    assert failed.get("name") == name
+    assert why in failed.find("failure").get("message")
+    kept = {each.get("name"): each.get("value") for each in failed.find("properties")}
+    assert kept["outcome"] == "held"
+
+
+def test_an_improvement_fails_only_where_it_is_asked_for(copy, capsys):
+    name = altered(copy, displacement_m=1.0)
+    assert check(copy, "--json") == Exit.GOOD
+    assert statuses(capsys)[name][0] == "improved"
+    assert check(copy, "--strict", "-q") == Exit.NEGATIVE
+
+
+def test_grasps_without_entry_and_entries_without_grasp_fail(copy, capsys):
+    planned(copy, limit=1)
+    assert check(copy, "--json") == Exit.NEGATIVE
+    assert "missing" in {status for status, _ in statuses(capsys).values()}
+    planned(copy, limit=3)
+    assert check(copy, "--json") == Exit.NEGATIVE
+    assert "new" in {status for status, _ in statuses(capsys).values()}
+
+
+def test_blessing_makes_what_was_measured_the_baseline(copy, recorded):
+    altered(copy, displacement_m=1e-9)
+    assert check(copy, "--bless", "-q") == Exit.GOOD
+    assert (copy / "base.json").read_text() == (recorded / "base.json").read_text()
+    assert check(copy, "-q") == Exit.GOOD
+
+
+def test_what_is_not_there_is_said(tmp_path, capsys):
+    assert check(tmp_path, "-q") == Exit.INPUT
+    assert "base.json" in capsys.readouterr().err
+    write_text(tmp_path / "empty.json", "{}")
+    line = ["baseline", "record", str(tmp_path / "empty.json"), "-o", str(tmp_path / "b.json")]
+    assert main(line) == Exit.INPUT
+    assert not (tmp_path / "b.json").exists()
