@@ -8,9 +8,9 @@ those of the analysis by rounding.
 import hashlib
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
-from itertools import product
+from itertools import islice
 from pathlib import Path
 from typing import Any, cast
 
@@ -23,8 +23,10 @@ from sim_validate.datasets.making import made_of
 from sim_validate.datasets.manifest import Manifest
 from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.rows import id_beginning
+from sim_validate.datasets.selection import Selection
 from sim_validate.datasets.tables import as_read
 from sim_validate.datasets.units import WorkUnit, provenance
+from sim_validate.datasets.walking import ObjectRows, by_object
 from sim_validate.files import read_text
 
 ROUNDING = 1e-6
@@ -40,8 +42,6 @@ MEASURED: Mapping[Name, tuple[str, ...]] = {
 MOST_NAMED = 20
 """Faults of one unit that are listed."""
 
-Rows = Mapping[Name, Sequence[Mapping[str, Any]]]
-
 
 @dataclass(frozen=True, slots=True)
 class Sample:
@@ -53,55 +53,83 @@ class Sample:
     """For which ones."""
 
 
-def sample_faults(folder: Path, manifest: Manifest, rows: Rows, sample: Sample) -> Iterator[str]:
+def sample_faults(folder: Path, manifest: Manifest, sample: Sample) -> Iterator[str]:
     """What comes out otherwise, a line each.
 
     Args:
         folder: Of the dataset.
         manifest: What made it.
-        rows: All of them.
         sample: Which units to do again.
+
+    Raises:
+        InputError: A file of the dataset is damaged.
     """
-    config = config_from_toml(folder / CONFIG)
-    exact = manifest.versions == dict(provenance())
-    objects = {row["object_id"]: row for row in rows["objects"]}
-    given = read_given(folder / CONTACTS) if config.contacts else ()
-    left_out = _left_out(folder)
-    units = list[tuple[str, float]]()
-    for object_id, friction in product(sorted(objects), sorted(config.frictions)):
-        gone = left_out.get((objects[object_id]["source_sha256"], friction))
-        if gone is None or (gone and len(gone) < len(given)):
-            units.append((object_id, friction))
-        elif _of_unit(rows, object_id, friction)["grasps"]:
-            name = objects[object_id]["source_name"]
-            yield f"{name} at friction {friction}: is quarantined, but has rows"
-    for object_id, friction in drawn(units, sample):
-        about = objects[object_id]
-        gone = left_out.get((about["source_sha256"], friction), set())
-        part = tuple(each for each in given if each.id not in gone)
-        where = f"{about['source_name']} at friction {friction}"
+    redoing = _Redoing(folder, manifest)
+    everything = Selection(folder, manifest, None)
+    units = [
+        (row["object_id"], friction)
+        for row in everything.rows("objects")
+        for friction in redoing.frictions(row)
+    ]
+    chosen = set(drawn(sorted(units), sample))
+    splits = sorted({each.split for each in manifest.files if each.split is not None})
+    for split in splits:
+        for rows in by_object(Selection(folder, manifest, split)):
+            for row in rows["objects"]:
+                yield from redoing.faults(row, rows, chosen)
+
+
+class _Redoing:
+    """Units of a dataset, done again."""
+
+    def __init__(self, folder: Path, manifest: Manifest) -> None:
+        self._folder = folder
+        self._config = config_from_toml(folder / CONFIG)
+        self._exact = manifest.versions == dict(provenance())
+        self._given = read_given(folder / CONTACTS) if self._config.contacts else ()
+        self._left_out = _left_out(folder)
+
+    def frictions(self, row: Mapping[str, Any]) -> list[float]:
+        """At which frictions an object has rows, though perhaps no grasp."""
+        return [f for f in self._config.frictions if not self._all_left_out(row, f)]
+
+    def faults(
+        self, row: Mapping[str, Any], rows: ObjectRows, chosen: Set[tuple[str, float]]
+    ) -> Iterator[str]:
+        """What is wrong with an object at the chosen frictions."""
+        for friction in self._config.frictions:
+            stored = _of_unit(rows, row["object_id"], friction)
+            where = f"{row['source_name']} at friction {friction}"
+            if self._all_left_out(row, friction):
+                if stored["grasps"]:
+                    yield f"{where}: is quarantined, but has rows"
+            elif (row["object_id"], friction) in chosen:
+                found = islice(self._unit_faults(row, friction, stored), MOST_NAMED)
+                yield from (f"{where}: {fault}" for fault in found)
+
+    def _all_left_out(self, row: Mapping[str, Any], friction: float) -> bool:
+        gone = self._left_out.get((row["source_sha256"], friction))
+        return gone is not None and len(gone) == len(self._given)
+
+    def _unit_faults(
+        self, row: Mapping[str, Any], friction: float, stored: ObjectRows
+    ) -> Iterator[str]:
+        name, source = row["source_name"], row["source_sha256"]
+        gone = self._left_out.get((source, friction), set())
+        given = tuple(each for each in self._given if each.id not in gone)
         try:
-            body = stored_body(folder, object_id, about["source_name"], config.faces)
-            unit = WorkUnit(
-                about["source_name"], None, about["source_sha256"], friction, config, part
-            )
-            made = made_of(unit, body)
+            body = stored_body(self._folder, row["object_id"], name, self._config.faces)
+            made = made_of(WorkUnit(name, None, source, friction, self._config, given), body)
         except GraspError as error:
-            yield f"{where}: cannot be done again ({error})"
-            continue
-        stored = _of_unit(rows, object_id, friction)
-        faults = [
-            fault
-            for name in TABLES
-            for fault in _differences(name, stored[name], as_read(name, made.rows[name]), exact)
-        ]
-        if exact:
-            faults += [
-                f"{path}: is not what comes out again"
-                for path, text in made.files.items()
-                if read_text(folder / path) != text
-            ]
-        yield from (f"{where}: {fault}" for fault in faults[:MOST_NAMED])
+            yield f"cannot be done again ({error})"
+            return
+        for table in TABLES:
+            now = as_read(table, made.rows[table])
+            yield from _differences(table, stored[table], now, self._exact)
+        if self._exact:
+            for path, text in made.files.items():
+                if read_text(self._folder / path) != text:
+                    yield f"{path}: is not what comes out again"
 
 
 def _left_out(folder: Path) -> dict[tuple[str, float], set[str]]:
@@ -123,7 +151,7 @@ def drawn(units: Sequence[tuple[str, float]], sample: Sample) -> list[tuple[str,
     return sorted(units, key=place)[: math.ceil(sample.share * len(units))]
 
 
-def _of_unit(rows: Rows, object_id: str, friction: float) -> Rows:
+def _of_unit(rows: ObjectRows, object_id: str, friction: float) -> ObjectRows:
     beginning = id_beginning(object_id, friction)
     return {
         "objects": [row for row in rows["objects"] if row["object_id"] == object_id],

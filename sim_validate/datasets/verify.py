@@ -11,14 +11,16 @@ from grasp_core.closure import force_closure
 from grasp_core.errors import GraspError, InputError, UndecidedError
 from grasp_core.on_mesh import Surface
 from grasp_core.values import FINGERS
-from sim_validate.datasets.columns import KEYS, TABLES, Name
+from sim_validate.datasets.columns import KEYS, TABLES
 from sim_validate.datasets.config import config_from_toml
 from sim_validate.datasets.finish import CONFIG, QUARANTINE
 from sim_validate.datasets.manifest import MANIFEST, Listed, Manifest, listed, read_manifest
 from sim_validate.datasets.meshes import stored_surface
 from sim_validate.datasets.redo import Sample, sample_faults
 from sim_validate.datasets.rows import GIVEN, NOT_TRIED
-from sim_validate.datasets.tables import read_rows, require_pyarrow
+from sim_validate.datasets.selection import Selection
+from sim_validate.datasets.tables import require_pyarrow
+from sim_validate.datasets.walking import ObjectRows, by_object
 from sim_validate.files import read_text
 
 SAME_MARGIN = 1e-6
@@ -48,24 +50,31 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
     manifest = read_manifest(folder)
     if faults := list(_file_faults(folder, manifest.files)):
         return faults
-    rows: dict[Name, list[dict[str, Any]]] = {name: [] for name in TABLES}
-    for each in manifest.files:
-        if each.table is None:
-            continue
-        try:
-            found = read_rows(folder / each.path)
-        except InputError as error:
-            return [str(error)]
-        if len(found) != each.rows:
-            faults.append(f"{each.path}: {len(found)} rows, listed are {each.rows}")
-        rows[each.table] += found
-        faults += _split_faults(each, found)
-    faults += _manifest_faults(folder, manifest)
-    frictions = config_from_toml(folder / CONFIG).frictions
-    faults += [*_row_faults(rows, frictions), *_mesh_faults(folder, rows)]
-    if sample is not None and not faults:
-        faults += sample_faults(folder, manifest, rows, sample)
+    faults = list(_manifest_faults(folder, manifest))
+    try:
+        faults += _content_faults(folder, manifest)
+        if sample is not None and not faults:
+            faults += sample_faults(folder, manifest, sample)
+    except InputError as error:
+        faults.append(str(error))
     return faults
+
+
+def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
+    """What is wrong with rows and meshes, an object at a time.
+
+    Raises:
+        InputError: A file is damaged, or has not as many rows as the manifest says.
+    """
+    frictions = config_from_toml(folder / CONFIG).frictions
+    for each in manifest.files:
+        if each.table and not Path(each.path).name.startswith(f"{each.split}-"):
+            yield f"{each.path}: is listed as of split {each.split}"
+    for split in sorted({each.split for each in manifest.files if each.split is not None}):
+        for rows in by_object(Selection(folder, manifest, split)):
+            yield from _split_faults(split, rows)
+            yield from _row_faults(rows, frictions)
+            yield from _mesh_faults(folder, rows)
 
 
 def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
@@ -88,12 +97,11 @@ def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
             yield f"{each.path}: its contents are not what was written (sha256 differs)"
 
 
-def _split_faults(file: Listed, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Whether a file's rows are of its split, which names of trials' grasps show elsewhere."""
-    if file.split is None or not Path(file.path).name.startswith(f"{file.split}-"):
-        yield f"{file.path}: is listed as of split {file.split}"
-    elif any(row.get("split", file.split) != file.split for row in rows):
-        yield f"{file.path}: has rows of another split"
+def _split_faults(split: str, rows: ObjectRows) -> Iterator[str]:
+    """Whether rows are in files of their split."""
+    for name in ("objects", "grasps"):
+        if any(row["split"] != split for row in rows[name]):
+            yield f"{name}: files of {split} have rows of another split"
 
 
 def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
@@ -106,9 +114,7 @@ def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
         yield f"{QUARANTINE}: {lines} lines, the manifest says {manifest.quarantined}"
 
 
-def _row_faults(
-    rows: Mapping[Name, Sequence[Mapping[str, Any]]], frictions: Sequence[float]
-) -> Iterator[str]:
+def _row_faults(rows: ObjectRows, frictions: Sequence[float]) -> Iterator[str]:
     for name in TABLES:
         keys = [tuple(row[key] for key in KEYS[name]) for row in rows[name]]
         if len(set(keys)) < len(keys):
@@ -146,7 +152,7 @@ def _outcome_faults(row: Mapping[str, Any], trials: Sequence[str]) -> Iterator[s
         yield f"outcome {row['outcome']!r}, but held is {held}"
 
 
-def _mesh_faults(folder: Path, rows: Mapping[Name, Sequence[Mapping[str, Any]]]) -> Iterator[str]:
+def _mesh_faults(folder: Path, rows: ObjectRows) -> Iterator[str]:
     """Whether meshes are those of their objects, and contacts are on them."""
     claimed: dict[str, list[tuple[Array, Array | None, float]]] = {
         row["object_id"]: [] for row in rows["objects"]
