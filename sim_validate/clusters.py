@@ -23,6 +23,8 @@ OBJECT_STORE_BYTES = 200 * 2**20
 RAY_SETTINGS = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
 """Nothing is told to anybody, and no GPU is hidden from what else runs here."""
 
+ANY_PORT = "127.0.0.1:0"
+"""Where a Dask scheduler started here shows its state: to this machine, at a port that is free."""
 ANSWER_S = 10.0
 """How long a Dask scheduler may take to answer [s]."""
 
@@ -117,8 +119,8 @@ def _dask_client(distributed: Any, workers: int, address: str | None) -> Generat
         settings = {"distributed.scheduler.allowed-failures": 0}
         with importlib.import_module("dask").config.set(settings):
             cluster = distributed.LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50,
-                memory_limit=0,
+                n_workers=workers, threads_per_worker=1, memory_limit=0,
+                dashboard_address=ANY_PORT, silence_logs=50,
             )  # fmt: skip
         with cluster, distributed.Client(cluster) as client:
             yield client

@@ -87,7 +87,7 @@ def test_a_worker_with_other_packages_ends_the_run(engine, tmp_path, monkeypatch
 
 def test_a_running_dask_cluster_is_used_and_several_threads_are_refused(alone, tmp_path):
     distributed = pytest.importorskip("distributed")
-    settings = {"dashboard_address": None, "silence_logs": 50, "n_workers": 1}
+    settings = {"dashboard_address": "127.0.0.1:0", "silence_logs": 50, "n_workers": 1}
     with distributed.LocalCluster(threads_per_worker=1, **settings) as cluster:
         with dask_workers(9, cluster.scheduler_address) as started:
             assert started.workers == 1
