@@ -80,7 +80,7 @@ def test_a_regression_says_what_was_and_what_is(blessed, tmp_path):
             (tmp_path / path.name).write_bytes(path.read_bytes())
     baseline = tmp_path / "wedge.baseline.json"
     record = json.loads(baseline.read_text())
-    record["grasps"][0].update(displacement_m=1e-9)
+    record["grasps"][0].update(limit_n=1e3)
     record["grasps"].append(record["grasps"][1] | {"id": "gone"})
     baseline.write_text(json.dumps(record))
     code, said = pytest_in(tmp_path)
@@ -88,7 +88,7 @@ def test_a_regression_says_what_was_and_what_is(blessed, tmp_path):
     assert "2 failed, 1 passed" in said
     name = record["grasps"][0]["id"]
     assert f"{name}: regressed" in said
-    assert "displacement_m: 1e-09 -> " in said
+    assert "limit_n: 1000 -> " in said
     assert "predicted" in said
     assert f"graspproof baseline check {baseline}" in said
     assert "gone: missing" in said

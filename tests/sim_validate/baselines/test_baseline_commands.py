@@ -98,12 +98,12 @@ def altered(folder, **changed):
 
 
 def test_a_regression_fails_and_says_why_also_in_junit(copy, capsys):
-    name = altered(copy, displacement_m=1e-9)
+    name = altered(copy, limit_n=1e3)
     junit = copy / "junit.xml"
     assert check(copy, "--junit", str(junit), "--json") == Exit.NEGATIVE
     status, why = statuses(capsys)[name]
     assert status == "regressed"
-    assert "displacement_m: 1e-09 -> " in why
+    assert "limit_n: 1000 -> " in why
     suite = ElementTree.parse(junit).getroot()  # noqa: S314 - we wrote it
     assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("2", "1", "0")
     (failed,) = [case for case in suite if case.find("failure") is not None]
@@ -130,7 +130,7 @@ def test_grasps_without_entry_and_entries_without_grasp_fail(copy, capsys):
 
 
 def test_blessing_makes_what_was_measured_the_baseline(copy, recorded):
-    altered(copy, displacement_m=1e-9)
+    altered(copy, limit_n=1e3)
     assert check(copy, "--bless", "-q") == Exit.GOOD
     assert (copy / "base.json").read_text() == (recorded / "base.json").read_text()
     assert check(copy, "-q") == Exit.GOOD

@@ -86,7 +86,7 @@ def test_small_differences_count_with_the_same_versions_only(changed):
 
 
 def test_the_last_digits_do_not_count():
-    close = now(critical_friction=0.2 * (1.0 + 5e-10), limit_n=3.0 * (1.0 - 5e-10))
+    close = now(critical_friction=0.2 * (1.0 + 5e-10), displacement_m=1e-5 + 5e-7)
     assert found(close).status is Status.WITHIN
 
 
