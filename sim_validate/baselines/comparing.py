@@ -1,8 +1,8 @@
 """Two baselines -> what became of each grasp: the same, better, worse, or not to be compared.
 
-With the same versions on the same architecture results are the same but for how processors of a kind
-round, so every other difference counts. Otherwise verdicts must be the same, but for grasps close
-to their critical friction, which a rounding may decide, and numbers may differ within bands.
+With the same versions on the same architecture results differ only by how processors round, so
+every other difference counts. Otherwise verdicts must be the same, but for grasps close to their
+critical friction, which a rounding may decide, and numbers may differ within bands.
 """
 
 from collections.abc import Iterator

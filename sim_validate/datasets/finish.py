@@ -20,7 +20,7 @@ from sim_validate.datasets.given import given_text
 from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest, listed, write_manifest
 from sim_validate.datasets.staging import Finished, Staging
 from sim_validate.datasets.tables import TableFiles
-from sim_validate.datasets.units import WorkUnit, provenance, units_sha256
+from sim_validate.datasets.units import WorkUnit, arithmetic, provenance, units_sha256
 from sim_validate.files import write_text
 
 DATA = "data"
@@ -57,6 +57,7 @@ def finish(
     manifest = Manifest(
         config_sha256=config.sha256,
         versions=dict(provenance()),
+        arithmetic=arithmetic(),
         units=len(units),
         units_sha256=units_sha256(units),
         quarantined=len(quarantined),

@@ -40,6 +40,8 @@ class Manifest:
     config_sha256: str
     versions: dict[str, str]
     """Of packages, of the interpreter, and the hash of our own code."""
+    arithmetic: str
+    """A hash of how the driver's processor rounds."""
     units: int
     """Objects at frictions that were asked for; given grasps in parts."""
     units_sha256: str
