@@ -91,8 +91,8 @@ def arithmetic() -> str:
     rng = np.random.default_rng(0)
     digest = hashlib.sha256()
     for size in (3, 6, 12, 24, 64):
-        A = rng.normal(size=(size, size))
-        answers: tuple[Any, ...] = (A @ A.T, np.linalg.solve(A, A[0]), np.linalg.inv(A))
+        A: Any = rng.normal(size=(size, size))
+        answers: Any = (A @ A.T, np.linalg.solve(A, A[0]), np.linalg.inv(A))
         for answer in answers:
             digest.update(answer.tobytes())
     return digest.hexdigest()
