@@ -1,0 +1,14 @@
+"""Settings of a dataset of two objects at two frictions, and its rows."""
+
+from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.tables import read_rows
+
+CONFIG = DatasetConfig(
+    objects=("tetrahedron", "wedge"), frictions=(0.4, 0.5), families=("concurrent",), limit=2
+)
+
+
+def all_rows(folder, name):
+    return [
+        row for path in sorted(folder.glob(f"data/{name}/*.parquet")) for row in read_rows(path)
+    ]
