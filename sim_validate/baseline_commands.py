@@ -11,27 +11,26 @@ from sim_validate import baseline_flags, cli
 from sim_validate.baselines.baseline_file import baseline_from_json, baseline_to_json
 from sim_validate.baselines.comparing import FAILED, Finding, Status, compare
 from sim_validate.baselines.junit import junit_text
-from sim_validate.baselines.measuring import measured, of_settings
+from sim_validate.baselines.measuring import measured, of_settings, setup_for
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.files import read_text, write_text
-from sim_validate.flags import Fingers
 from sim_validate.plan_command import say_cut
-from sim_validate.setup import Agenda, Setup
+from sim_validate.setup import Agenda
 from sim_validate.setup_file import setup_from_file
-from sim_validate.validate_command import finger_settings, planned_fingers
+from sim_validate.validate_command import noise_of
 from sim_validate.wrench_file import wrenches_from_file
 
 
 def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
     """Write a baseline."""
     saved = _read(command.grasps, command.limit)
-    setup = Setup(fingers=finger_settings(planned_fingers(Fingers(), saved.finger)))
-    if command.setup is not None:
-        setup = setup_from_file(command.setup, setup)
+    setup = setup_for(saved, command.setup)
     agenda = Agenda(
         random_wrenches=command.random_wrenches,
         wrenches=() if command.wrenches is None else wrenches_from_file(command.wrenches),
         limits=command.limits,
+        trials=command.repeats.trials,
+        noise=noise_of(command.repeats),
         seed=saved.seed if command.seed is None else command.seed,
     )
     where = os.path.relpath(command.grasps.resolve(), command.out.resolve().parent)

@@ -8,7 +8,7 @@ from tyro.conf import OmitArgPrefixes, Positional, arg, subcommand
 
 from sim_validate.bounds import at_least
 from sim_validate.engines import available_cores
-from sim_validate.flags import Count, Seed, Speech
+from sim_validate.flags import Count, Repeats, Seed, Speech
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +29,7 @@ class Record:
     """Also hold so many random wrenches."""
     limits: Literal["none", "ramp", "bisection"] = "none"
     """Also find the largest multiple of each wrench in simulation."""
+    repeats: OmitArgPrefixes[Repeats] = field(default_factory=Repeats)
     seed: Seed | None = None
     """For everything random; the one planned with if not given."""
     jobs: Count = field(default_factory=available_cores)

@@ -124,6 +124,24 @@ class Fingers:
 
 
 @dataclass(frozen=True, slots=True)
+class Repeats:
+    """Whether to repeat with noise, and how much: standard deviations of normal distributions."""
+
+    trials: Annotated[int, at_least(0, up_to=100_000)] = 0
+    """Also repeat all holds so many times with noise, and say how often the grasp held."""
+    noise_shift: Annotated[float, at_least(0.0, up_to=1.0)] = 0.01
+    """Of the object's position along each axis, in object radii."""
+    noise_turn_deg: Annotated[float, at_least(0.0, up_to=45.0)] = 1.0
+    """Of its orientation about each axis."""
+    noise_normal_deg: Annotated[float, at_least(0.0, up_to=45.0)] = 1.0
+    """Of the surface's normal at each contact."""
+    noise_friction: Annotated[float, at_least(0.0, up_to=1.0)] = 0.05
+    """Of the friction, relative to it."""
+    noise_mass: Annotated[float, at_least(0.0, up_to=1.0)] = 0.05
+    """Of the mass, and with it of every load, relative to them."""
+
+
+@dataclass(frozen=True, slots=True)
 class Testing:
     """What to simulate, and how."""
 
@@ -143,6 +161,7 @@ class Testing:
     planned forces."""
     also_judge_by: UseAppendAction[tuple[RuleName, ...]] = ()
     """Show what the acceptance rule of another tool makes of the same trials; may be repeated."""
+    repeats: OmitArgPrefixes[Repeats] = Repeats()
     traces: bool = False
     """With --out: also write how each contact moved over time."""
     surface: Literal["pads", "mesh"] = "pads"

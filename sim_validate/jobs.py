@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 from grasp_core.values import Grasp, Polyhedron
 from sim_validate.engines import each, processes
+from sim_validate.grasp_verdict import Verdict
 from sim_validate.setup import Agenda, Setup
-from sim_validate.validation import Verdict, validate
+from sim_validate.validation import validate
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,16 +1,17 @@
 """Which wrenches a grasp is tested with, how far each is resisted, and the planned forces."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
 from grasp_core.resisted_wrenches import WrenchBody, WrenchLimit, axis_wrenches
-from grasp_core.values import Grasp, Polyhedron, contact_frictions
+from grasp_core.values import Contact, Grasp, Polyhedron, contact_frictions
 from grasp_core.wrenches import normal_and_tangential
 from sim_validate.limits import part
 from sim_validate.schedules import Load
-from sim_validate.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, Setup
+from sim_validate.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, NamedWrench, Setup
 
 NO_PUSH = 1e-9
 """Normal forces below this, in largest ones, are none."""
@@ -44,22 +45,53 @@ def planned_loads(
         agenda: Which wrenches.
         setup: The largest normal force, and the share of the limit that is applied.
     """
-    resisted = WrenchBody(
-        grasp.positions - body.center_of_mass,
-        grasp.normals,
-        contact_frictions(friction, len(grasp.contacts)),
-        setup.fingers.max_normal_force_n,
-    )
+    resisted = _resisted(body, grasp.contacts, friction, setup)
     share = setup.hold.load_share
     relative = [
-        _load(name, found, share * found.limit, idle, grasp)
+        _load(name, found, share * found.limit, idle, grasp.normals)
         for name, found in _relative(resisted, body.radius, agenda)
     ]
     own = [
-        _load(named.name, resisted.limit(named.wrench), 1.0, idle, grasp)
+        _load(named.name, resisted.limit(named.wrench), 1.0, idle, grasp.normals)
         for named in agenda.wrenches
     ]
     return (*relative, *own)
+
+
+def loads_as_they_are(
+    body: Polyhedron,
+    contacts: Sequence[Contact],
+    friction: float,
+    idle: Load,
+    wrenches: Sequence[NamedWrench],
+    setup: Setup,
+) -> tuple[PlannedLoad, ...]:
+    """Given wrenches as loads on contacts.
+
+    Args:
+        body: The object.
+        contacts: In force closure at this friction.
+        friction: Coulomb coefficient at every contact.
+        idle: No wrench, and the forces of the gentle grasp.
+        wrenches: To hold as they are.
+        setup: The largest normal force.
+    """
+    resisted = _resisted(body, contacts, friction, setup)
+    normals = np.array([contact.normal for contact in contacts])
+    return tuple(
+        _load(named.name, resisted.limit(named.wrench), 1.0, idle, normals) for named in wrenches
+    )
+
+
+def _resisted(
+    body: Polyhedron, contacts: Sequence[Contact], friction: float, setup: Setup
+) -> WrenchBody:
+    return WrenchBody(
+        np.array([contact.position for contact in contacts]) - body.center_of_mass,
+        np.array([contact.normal for contact in contacts]),
+        contact_frictions(friction, len(contacts)),
+        setup.fingers.max_normal_force_n,
+    )
 
 
 def _relative(
@@ -76,14 +108,16 @@ def _relative(
     return [*zip(AXIS_NAMES, axes, strict=True), (WEAKEST, weakest), *others]
 
 
-def _load(name: str, found: WrenchLimit, multiple: float, idle: Load, grasp: Grasp) -> PlannedLoad:
+def _load(
+    name: str, found: WrenchLimit, multiple: float, idle: Load, normals: Array
+) -> PlannedLoad:
     """A multiple of a wrench with forces between those at rest and those at the limit."""
     wrench = to_digits(multiple * found.wrench)
     predicted = found.limit / multiple
     limit = Load(predicted * wrench, to_digits(found.forces))
     planned = part(idle, limit, 1.0 / predicted) if predicted > 0.0 else Load(wrench, idle.forces)
     load = Load(wrench, planned.forces)
-    return PlannedLoad(name, load, predicted, limit, _needed(load.forces, grasp.normals))
+    return PlannedLoad(name, load, predicted, limit, _needed(load.forces, normals))
 
 
 def _needed(forces: Array, normals: Array) -> float:

@@ -13,7 +13,7 @@ import pytest
 if TYPE_CHECKING:
     from sim_validate.baselines.comparing import Finding
     from sim_validate.baselines.suite import Suite
-    from sim_validate.validation import Verdict
+    from sim_validate.grasp_verdict import Verdict
 
 ENDING = ".grasps.toml"
 

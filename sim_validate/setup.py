@@ -14,6 +14,7 @@ from grasp_core.values import Contact, Grasp, Polyhedron
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, Surface, build_scene
 from scenes.physics import PhysicsSettings
+from sim_validate.noise import Noise
 from sim_validate.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.rules import rules_named
 
@@ -96,16 +97,19 @@ class Agenda:
     controls: bool = True
     rules: tuple[str, ...] = ()
     """Acceptance rules of other tools by which the same traces are also judged."""
+    trials: int = 0
+    """Repeat all holds so many times with noise."""
+    noise: Noise = field(default_factory=Noise)
     keep_traces: bool = False
     seed: int = 0
-    """Chooses random wrenches, and how contacts are moved for a negative control."""
+    """Chooses random wrenches, noise, and how contacts are moved for a negative control."""
 
     def __post_init__(self) -> None:
         """Refuse what no trial can be made of, and names that two would share."""
         if self.limits not in get_args(LimitSearch):
             raise InputError(f"limits must be one of {get_args(LimitSearch)}, got {self.limits!r}")
-        if self.random_wrenches < 0 or self.seed < 0:
-            raise InputError("random_wrenches and seed must not be negative")
+        if min(self.random_wrenches, self.trials, self.seed) < 0:
+            raise InputError("random_wrenches, trials and seed must not be negative")
         rules_named(self.rules)
         drawn = (RANDOM.format(place) for place in range(self.random_wrenches))
         taken = {*AXIS_NAMES, WEAKEST, *drawn}

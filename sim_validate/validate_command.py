@@ -15,15 +15,17 @@ from sim_validate import cli, flags
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.files import read_text, write_arrays, write_text
 from sim_validate.gate import require_faithful
+from sim_validate.grasp_verdict import Verdict
 from sim_validate.jobs import Job, validated
+from sim_validate.noise import Noise
 from sim_validate.plan_command import say_cut
 from sim_validate.rules import RULES
 from sim_validate.setup import Agenda, Setup
 from sim_validate.setup_file import setup_from_file
-from sim_validate.validation import Verdict, WrenchVerdict
 from sim_validate.verdict import Outcome
 from sim_validate.verdict_records import summary, trace_arrays, verdicts_to_json
 from sim_validate.wrench_file import weights, wrenches_from_file
+from sim_validate.wrench_verdict import WrenchVerdict
 
 
 def validate_file(command: cli.Validate, reporter: Reporter) -> int:
@@ -68,6 +70,17 @@ def finger_settings(given: flags.Fingers) -> FingerSettings:
     )
 
 
+def noise_of(given: flags.Repeats) -> Noise:
+    """What the flags say about noise."""
+    return Noise(
+        shift=given.noise_shift,
+        turn_deg=given.noise_turn_deg,
+        normal_deg=given.noise_normal_deg,
+        friction=given.noise_friction,
+        mass=given.noise_mass,
+    )
+
+
 def prepared(testing: flags.Testing, seed: int, folder: Path | None) -> tuple[Setup, Agenda]:
     """What the flags and files say about trials, checked before anything runs.
 
@@ -101,6 +114,8 @@ def _agenda(testing: flags.Testing, seed: int, folder: Path | None) -> Agenda:
         limits=testing.limits,
         independent=testing.independent,
         rules=testing.also_judge_by,
+        trials=testing.repeats.trials,
+        noise=noise_of(testing.repeats),
         keep_traces=testing.traces,
         seed=seed,
     )
@@ -169,6 +184,7 @@ def _show(
     reporter.table("verdicts", columns, rows)
     say_cut(len(verdicts), reporter)
     _show_bounds(verdicts, reporter)
+    _show_robustness(verdicts, reporter)
     _show_rules(verdicts, reporter)
     totals = summary(verdicts)
     reporter.say(
@@ -204,6 +220,24 @@ def _show_bounds(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
         )  # fmt: skip
     columns = ("grasp", "mu*", "rigid tips", "fixed squeeze", "residual")
     reporter.table("without planned forces (bounds)", columns, rows)
+
+
+def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
+    """How often grasps held with noise, if asked for."""
+    rows: list[tuple[str, ...]] = []
+    for verdict in verdicts[:TABLE_ROWS]:
+        if (found := verdict.robustness) is None:
+            return
+        lower, upper = found.interval
+        count = len(found.trials)
+        failed = (trial for trial in found.trials if trial.outcome is not Outcome.HELD)
+        first = next((f"{one.number}: {one.wrench or one.outcome.value}" for one in failed), "")
+        rows.append(
+            (verdict.id, f"{found.held} of {count}", str(found.predicted),
+             f"{100.0 * lower:.3g} to {100.0 * upper:.3g} %", first)
+        )  # fmt: skip
+    columns = ("grasp", "held", "predicted", "95 % interval", "first that did not")
+    reporter.table("repeats with noise", columns, rows)
 
 
 def _show_rules(verdicts: Sequence[Verdict], reporter: Reporter) -> None:

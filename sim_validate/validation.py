@@ -8,11 +8,10 @@ control holds.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from grasp_core.arrays import Array
 from grasp_core.closure import force_closure
 from grasp_core.critical import critical_friction
 from grasp_core.errors import InputError, UndecidedError
@@ -22,113 +21,20 @@ from scenes.fingertips import clashes
 from scenes.mjcf import Scene
 from sim_validate.control_trials import ControlVerdict, try_control
 from sim_validate.controls import negative_controls
-from sim_validate.gate import Gate, require_faithful
+from sim_validate.gate import require_faithful
+from sim_validate.grasp_verdict import Verdict
 from sim_validate.independent import Bounds, independent_bounds
 from sim_validate.limits import SimulatedLimit, bisected_limits, ramped_limits
 from sim_validate.loads import PlannedLoad, planned_loads
 from sim_validate.released import CriticalFriction, released_friction
 from sim_validate.rig import Rig, squeezed
+from sim_validate.robustness import Robustness, robustness
 from sim_validate.rules import FORCE_AXES, accepted, rules_named
-from sim_validate.setup import Agenda, Setup
+from sim_validate.setup import Agenda, NamedWrench, Setup
 from sim_validate.simulate import Bench
 from sim_validate.traces import Trace
-from sim_validate.verdict import LET_GO, HoldVerdict, Outcome, invalid_start, judge
-
-AGREEMENT = 0.02
-"""How far simulated limits and critical frictions may be off, relative to the predicted ones: five
-times the worst that was measured."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class WrenchVerdict:
-    """One wrench, predicted and simulated."""
-
-    name: str
-    wrench: Array
-    """Applied external wrench, (6,) [N, N m], torque about the centre of mass."""
-    predicted_limit: float
-    """Largest multiple of the applied wrench that the analysis says is resisted."""
-    required_friction: float
-    """What the planned forces need."""
-    hold: HoldVerdict
-    simulated_limit: SimulatedLimit | None = None
-    """Where the object lets go, in predicted limits; None if not measured, or not found."""
-    trace: Trace | None = None
-
-    @property
-    def contradiction(self) -> str:
-        """How simulation contradicts the analysis, in words; empty if it does not."""
-        outcome, predicted = self.hold.outcome, self.predicted_limit
-        wrong = Outcome.HELD if predicted < 1.0 - AGREEMENT else None
-        if (outcome in LET_GO and predicted > 1.0 + AGREEMENT) or outcome is wrong:
-            return (f"{self.name}: {outcome.value}, though the predicted limit is "
-                    f"{predicted:.4g} times the wrench")  # fmt: skip
-        if self.simulated_limit and abs(self.simulated_limit.share - 1.0) > AGREEMENT:
-            return f"{self.name}: let go at {self.simulated_limit.share:.4g} of the predicted limit"
-        return ""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Verdict:
-    """What simulation says about a grasp."""
-
-    id: str
-    friction: float
-    critical_friction: CriticalFriction
-    wrenches: tuple[WrenchVerdict, ...]
-    controls: tuple[ControlVerdict, ...]
-    bounds: Bounds | None
-    """What was found without planned forces, if asked for."""
-    accepted_by: dict[str, bool]
-    """What rules of other tools say, by name."""
-    gate: Gate
-    scene: Scene
-    setup: Setup
-    agenda: Agenda
-
-    @property
-    def outcome(self) -> Outcome:
-        """`held`, or how the first wrench that did not hold ended."""
-        ends = (trial.hold.outcome for trial in self.wrenches)
-        return next((end for end in ends if end is not Outcome.HELD), Outcome.HELD)
-
-    @property
-    def held(self) -> bool:
-        """Whether every wrench held."""
-        return self.outcome is Outcome.HELD
-
-    @property
-    def controls_failed(self) -> bool:
-        """Whether the simulator let go of every control."""
-        return all(control.failed for control in self.controls)
-
-    @property
-    def mismatches(self) -> tuple[str, ...]:
-        """Where simulation contradicts the analysis, in words."""
-        found = [trial.contradiction for trial in self.wrenches if trial.contradiction]
-        if self.agenda.critical_friction and (fault := _disagreement(self.critical_friction)):
-            found.append(f"critical friction: {fault}")
-        if self.agenda.limits != "none":
-            found += [f"{trial.name}: the limit was not found near the predicted one"
-                      for trial in self.wrenches if trial.simulated_limit is None]  # fmt: skip
-        if self.bounds is not None and not self.bounds.agree(self.critical_friction.predicted):
-            found.append("bounds found without planned forces are on the wrong side")
-        return tuple(found)
-
-    @property
-    def good(self) -> bool:
-        """Whether every wrench held, every control was let go, and nothing was contradicted."""
-        return self.held and self.controls_failed and not self.mismatches
-
-
-def _disagreement(friction: CriticalFriction) -> str:
-    """What is wrong with a simulated critical friction, if something is."""
-    simulated, predicted = friction.simulated, friction.predicted
-    if simulated is None:
-        return "not found near the predicted one"
-    if simulated > 0.0 and abs(simulated - predicted) > AGREEMENT * predicted:
-        return f"{simulated:.4g} in simulation, {predicted:.4g} predicted"
-    return ""
+from sim_validate.verdict import invalid_start, judge
+from sim_validate.wrench_verdict import WrenchVerdict
 
 
 def validate(
@@ -170,6 +76,7 @@ def validate(
         wrenches=wrenches,
         controls=trial.controls(),
         bounds=trial.bounds(),
+        robustness=trial.robustness(),
         accepted_by=trial.accepted_by(),
         gate=gate,
         scene=scene,
@@ -280,6 +187,15 @@ class _Bout:
         limits = [planned.limit for planned in self.loads]
         critical = self.grasp.critical_friction
         return independent_bounds(self.body, self.grasp, critical, self.rig, limits)
+
+    def robustness(self) -> Robustness | None:
+        """What noise makes of it, if asked for: the same fingertips hold the same wrenches."""
+        if not self.agenda.trials:
+            return None
+        fingers = replace(self.setup.fingers, radius_m=self.layout.drive.radius_m)
+        setup = replace(self.setup, fingers=fingers, surface="pads")  # surfaces lean otherwise
+        loads = [NamedWrench(planned.name, planned.load.wrench) for planned in self.loads]
+        return robustness(self.body, self.grasp, self.friction, loads, self.agenda, setup)
 
     def accepted_by(self) -> dict[str, bool]:
         """What rules of other tools make of the same traces."""

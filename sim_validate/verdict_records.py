@@ -11,9 +11,11 @@ from grasp_core.values import Polyhedron
 from grasp_core.versions import versions
 from sim_validate.control_trials import ControlVerdict
 from sim_validate.gate import Gate
+from sim_validate.grasp_verdict import Verdict
+from sim_validate.robustness import Robustness
 from sim_validate.setup_file import OF_USERS
-from sim_validate.validation import Verdict, WrenchVerdict
-from sim_validate.verdict import HoldVerdict
+from sim_validate.verdict import HoldVerdict, Outcome
+from sim_validate.wrench_verdict import WrenchVerdict
 
 SCHEMA = 1
 
@@ -92,6 +94,7 @@ def _verdict_record(body: Polyhedron, verdict: Verdict) -> dict[str, object]:
             control.control.name: _control_record(body, control) for control in verdict.controls
         },
         "bounds": None if bounds is None else asdict(bounds),
+        "robustness": _robustness_record(verdict.robustness),
         "accepted_by": verdict.accepted_by,
         "settings": _settings(verdict),
         "versions": versions(),
@@ -147,6 +150,24 @@ def _control_record(body: Polyhedron, verdict: ControlVerdict) -> dict[str, obje
         ],
         "accepted_by": verdict.accepted_by,
     }
+
+
+def _robustness_record(found: Robustness | None) -> dict[str, object] | None:
+    if found is None:
+        return None
+    return {
+        "trials": len(found.trials),
+        "held": found.held,
+        "predicted": found.predicted,
+        "pass_rate": found.held / len(found.trials),
+        "pass_rate_interval": list(found.interval),
+        "noise": asdict(found.noise),
+        "not_held": [
+            {"trial": each.number, "predicted": each.predicted, "outcome": each.outcome.value,
+             "wrench": each.wrench, "reason": each.reason}
+            for each in found.trials if each.outcome is not Outcome.HELD
+        ],
+    }  # fmt: skip
 
 
 def _settings(verdict: Verdict) -> dict[str, object]:

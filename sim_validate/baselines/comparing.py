@@ -12,6 +12,7 @@ from math import radians
 from typing import Any, cast
 
 from sim_validate.baselines.values import Baseline, Entry
+from sim_validate.proportions import differ
 
 DECISIVE = ("graspproof", "mujoco", "machine")
 """Versions that must be the same for results to be the same."""
@@ -50,9 +51,11 @@ class Bands:
     grey: float = 0.02
     """Grasps whose critical friction is closer to the friction than this, relative to it, may
     change their verdict."""
+    exact: bool = False
+    """Whether as many repeats with noise must hold; else the counts may differ by chance."""
 
 
-ROUNDING = Bands(friction=1e-6, displacement_m=1e-6, rotation_rad=1e-5, grey=0.0)
+ROUNDING = Bands(friction=1e-6, displacement_m=1e-6, rotation_rad=1e-5, grey=0.0, exact=True)
 """What kinds of processors may differ by with the same versions. Measured with linear algebra for
 another one: motions of some 1e-8 m and 1e-6 rad by .6 %, all else to nine digits."""
 
@@ -135,12 +138,14 @@ def _compared(
     if one.held != other.held and _is_grey(one, friction, bands):
         reason = f"{one.outcome} -> {other.outcome}, at its critical friction"
         return Finding(one.id, Status.GREY, (reason,), one, other)
-    verdicts, numbers = _verdicts(one, other), _numbers(one, other, bands)
-    worse, better = verdicts.worse + numbers.worse, verdicts.better + numbers.better
-    if worse:
-        return Finding(one.id, Status.REGRESSED, tuple(worse), one, other)
-    if better:
-        return Finding(one.id, Status.IMPROVED, tuple(better), one, other)
+    found = _Differences()
+    _compare_verdicts(one, other, found)
+    _compare_numbers(one, other, bands, found)
+    _compare_repeats(one, other, bands, found)
+    if found.worse:
+        return Finding(one.id, Status.REGRESSED, tuple(found.worse), one, other)
+    if found.better:
+        return Finding(one.id, Status.IMPROVED, tuple(found.better), one, other)
     return Finding(one.id, Status.SAME if one == other else Status.WITHIN, (), one, other)
 
 
@@ -148,8 +153,7 @@ def _is_grey(entry: Entry, friction: float, bands: Bands) -> bool:
     return abs(friction - entry.critical_friction) <= bands.grey * friction
 
 
-def _verdicts(one: Entry, other: Entry) -> _Differences:
-    found = _Differences()
+def _compare_verdicts(one: Entry, other: Entry, found: _Differences) -> None:
     if one.outcome != other.outcome:
         at = f" at {other.first_failure}" if other.first_failure else ""
         found.add(f"{one.outcome} -> {other.outcome}{at}", worse=not other.held)
@@ -158,12 +162,19 @@ def _verdicts(one: Entry, other: Entry) -> _Differences:
         before, after = getattr(one, name), getattr(other, name)
         if before != after:
             found.add(f"{text}: {before} -> {after}", worse=after > before)
-    return found
 
 
-def _numbers(one: Entry, other: Entry, bands: Bands) -> _Differences:
+def _compare_repeats(one: Entry, other: Entry, bands: Bands, found: _Differences) -> None:
+    """How many repeats with noise held: a count where the draws are the same, else a sample."""
+    before, after = one.noisy_held, other.noisy_held
+    counts = (before, one.noisy_trials), (after, other.noisy_trials)
+    if before != after and (bands.exact or differ(*counts)):
+        text = f"held with noise: {before} of {one.noisy_trials} -> {after}"
+        found.add(text, worse=after < before)
+
+
+def _compare_numbers(one: Entry, other: Entry, bands: Bands, found: _Differences) -> None:
     """Numbers that differ by more than they may; a larger one is worse but for limits."""
-    found = _Differences()
     rows = (
         ("critical_friction", "friction", 1.0), ("simulated_critical_friction", "friction", 1.0),
         ("limit_n", "friction", -1.0), ("simulated_limit_n", "friction", -1.0),
@@ -178,4 +189,3 @@ def _numbers(one: Entry, other: Entry, bands: Bands) -> _Differences:
         allowed = bands.friction * abs(before) if band == "friction" else getattr(bands, band)
         if abs(after - before) > allowed:
             found.add(f"{name}: {before:.6g} -> {after:.6g}", worse=sign * (after - before) > 0.0)
-    return found

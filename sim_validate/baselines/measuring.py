@@ -2,16 +2,21 @@
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError
 from grasp_core.records import SavedGrasps
 from grasp_core.versions import versions
 from sim_validate.baselines.values import Baseline, entry_of
+from sim_validate.flags import Fingers
 from sim_validate.gate import require_faithful
 from sim_validate.jobs import Job, validated
+from sim_validate.noise import Noise
 from sim_validate.setup import Agenda, NamedWrench, Setup
-from sim_validate.setup_file import setup_from_tables, tables_of
+from sim_validate.setup_file import setup_from_file, setup_from_tables, tables_of
+from sim_validate.validate_command import finger_settings, planned_fingers
 
 
 def measured(
@@ -55,6 +60,16 @@ def measured(
     )
 
 
+def setup_for(saved: SavedGrasps, path: Path | None) -> Setup:
+    """How grasps are simulated: with the fingertips they were planned for, as a file has it.
+
+    Raises:
+        InputError: The file is missing or refused.
+    """
+    setup = Setup(fingers=finger_settings(planned_fingers(Fingers(), saved.finger)))
+    return setup if path is None else setup_from_file(path, setup)
+
+
 def settings_of(setup: Setup, agenda: Agenda) -> dict[str, Any]:
     """How trials are simulated and which ones, as a baseline's file has it."""
     settings = {
@@ -63,6 +78,8 @@ def settings_of(setup: Setup, agenda: Agenda) -> dict[str, Any]:
         "random_wrenches": agenda.random_wrenches,
         "wrenches": {each.name: each.wrench.tolist() for each in agenda.wrenches},
         "limits": agenda.limits,
+        "trials": agenda.trials,
+        "noise": asdict(agenda.noise),
         "seed": agenda.seed,
     }
     return json.loads(json.dumps(settings))
@@ -85,6 +102,8 @@ def of_settings(settings: Mapping[str, Any], path: str) -> tuple[Setup, Agenda]:
             random_wrenches=settings["random_wrenches"],
             wrenches=wrenches,
             limits=settings["limits"],
+            trials=settings["trials"],
+            noise=Noise(**settings["noise"]),
             seed=settings["seed"],
         )
     except (KeyError, TypeError, AttributeError) as error:

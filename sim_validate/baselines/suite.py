@@ -2,7 +2,7 @@
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,18 +10,16 @@ from grasp_core.errors import InputError
 from grasp_core.records import SavedGrasps, grasps_from_json
 from sim_validate.baselines.baseline_file import baseline_from_json, baseline_to_json
 from sim_validate.baselines.comparing import Finding, compare
-from sim_validate.baselines.measuring import measured, of_settings
+from sim_validate.baselines.measuring import measured, of_settings, setup_for
 from sim_validate.baselines.values import Baseline
 from sim_validate.files import read_text, write_text
-from sim_validate.flags import Fingers
-from sim_validate.setup import Agenda, Setup
-from sim_validate.setup_file import setup_from_file
-from sim_validate.validate_command import finger_settings, planned_fingers
+from sim_validate.noise import Noise
+from sim_validate.setup import Agenda
 
 ENDING = ".grasps.toml"
 KINDS: Mapping[str, type] = {
     "grasps": str, "baseline": str, "setup": str, "limits": str, "strict": bool,
-    "random_wrenches": int, "seed": int,
+    "random_wrenches": int, "trials": int, "noise": dict, "seed": int,
 }  # fmt: skip
 """Settings of the file, and what they are."""
 
@@ -40,6 +38,9 @@ class Suite:
     limits: str = "none"
     """How limits are found in simulation, in a new baseline."""
     random_wrenches: int = 0
+    trials: int = 0
+    """Repeats with noise, in a new baseline."""
+    noise: Noise = field(default_factory=Noise)
     seed: int | None = None
 
     def ids(self) -> list[str]:
@@ -90,15 +91,14 @@ class Suite:
             UnfaithfulError: The simulator fails the gate.
         """
         saved = self._saved()
-        setup = Setup(fingers=finger_settings(planned_fingers(Fingers(), saved.finger)))
-        if self.setup is not None:
-            setup = setup_from_file(self.setup, setup)
         agenda = Agenda(
             random_wrenches=self.random_wrenches,
             limits=self.limits,  # pyright: ignore[reportArgumentType] - checked there
+            trials=self.trials,
+            noise=self.noise,
             seed=saved.seed if self.seed is None else self.seed,
         )
-        found = measured(saved, self.grasps.name, setup, agenda, 1, _silent)
+        found = measured(saved, self.grasps.name, setup_for(saved, self.setup), agenda, 1, _silent)
         write_text(self.baseline, baseline_to_json(found))
         return found
 
@@ -129,8 +129,19 @@ def suite_from_toml(path: Path) -> Suite:
     for name in ("grasps", "baseline", "setup"):
         if name in settings:
             settings[name] = path.parent / settings[name]
-    known = {each.name for each in fields(Suite)}
-    return Suite(**{name: value for name, value in settings.items() if name in known})
+    if "noise" in settings:
+        settings["noise"] = _noise(settings["noise"], path)
+    return Suite(**settings)
+
+
+def _noise(given: Mapping[str, Any], path: Path) -> Noise:
+    known = [each.name for each in fields(Noise)]
+    for name, value in given.items():
+        if name not in known:
+            raise InputError(f"{path}: noise: has {', '.join(known)}; got {name!r}")
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InputError(f"{path}: noise.{name}: expected a number, got {value!r}")
+    return Noise(**given)
 
 
 def _silent(_: int, __: int) -> None:

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from grasp_core.values import Grasp
+from sim_validate.grasp_verdict import Verdict
 from sim_validate.setup import WEAKEST
-from sim_validate.validation import Verdict, WrenchVerdict
+from sim_validate.wrench_verdict import WrenchVerdict
 
 DIGITS = 12
 """Of numbers that are kept: more than differ between runs with the same versions."""
@@ -46,6 +47,10 @@ class Entry:
     displacement_m: float
     """Largest motion of the object in any trial."""
     rotation_rad: float
+    noisy_trials: int
+    """Repeats with noise."""
+    noisy_held: int
+    """How many of them held."""
 
     @property
     def held(self) -> bool:
@@ -87,7 +92,7 @@ def entry_of(grasp: Grasp, verdict: Verdict, radius_m: float) -> Entry:
     failures = [trial.name for trial in verdict.wrenches if trial.hold.outcome.value != "held"]
     weakest = next(trial for trial in verdict.wrenches if trial.name == WEAKEST)
     predicted, simulated = _limits(weakest, radius_m)
-    friction = verdict.critical_friction
+    friction, repeats = verdict.critical_friction, verdict.robustness
     found = Entry(
         id=grasp.id,
         contacts_sha256=contacts_sha256(grasp),
@@ -101,6 +106,8 @@ def entry_of(grasp: Grasp, verdict: Verdict, radius_m: float) -> Entry:
         simulated_limit_n=simulated,
         displacement_m=max(trial.hold.displacement_m for trial in verdict.wrenches),
         rotation_rad=max(trial.hold.rotation_rad for trial in verdict.wrenches),
+        noisy_trials=0 if repeats is None else len(repeats.trials),
+        noisy_held=0 if repeats is None else repeats.held,
     )
     return replace(found, **{name: _rounded(getattr(found, name)) for name in NUMBERS})
 

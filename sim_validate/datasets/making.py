@@ -14,8 +14,9 @@ from sim_validate.datasets.given import GivenGrasp
 from sim_validate.datasets.meshes import mesh_path, mesh_text
 from sim_validate.datasets.rows import GIVEN, GraspRows, Rows, object_row
 from sim_validate.datasets.units import WorkUnit
+from sim_validate.grasp_verdict import Verdict
 from sim_validate.setup import Agenda, Setup
-from sim_validate.validation import Verdict, validate
+from sim_validate.validation import validate
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,8 +13,9 @@ from sim_validate.control_trials import ControlVerdict
 from sim_validate.datasets.columns import Name
 from sim_validate.datasets.given import GivenGrasp
 from sim_validate.datasets.units import WorkUnit
-from sim_validate.validation import Verdict, WrenchVerdict
+from sim_validate.grasp_verdict import Verdict
 from sim_validate.verdict import HoldVerdict, Outcome
+from sim_validate.wrench_verdict import WrenchVerdict
 
 Row: TypeAlias = Mapping[str, Any]
 Rows: TypeAlias = Mapping[Name, tuple[Row, ...]]

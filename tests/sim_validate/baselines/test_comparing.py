@@ -20,6 +20,8 @@ ENTRY = Entry(
     simulated_limit_n=2.99,
     displacement_m=1e-5,
     rotation_rad=1e-4,
+    noisy_trials=100,
+    noisy_held=80,
 )
 BEFORE = Baseline(
     grasps_file="grasps.json",
@@ -60,6 +62,7 @@ def test_nothing_changed():
         ({"simulated_limit_n": 2.5}, "simulated_limit_n"),
         ({"displacement_m": 1e-3}, "displacement_m"),
         ({"rotation_rad": 0.01}, "rotation_rad"),
+        ({"noisy_held": 50}, "held with noise: 80 of 100 -> 50"),
     ],
 )
 @pytest.mark.parametrize("header", [{}, OTHERS], ids=["same versions", "others"])
@@ -78,6 +81,7 @@ def test_what_is_worse_is_a_regression_and_the_other_way_round_an_improvement(
     [
         {"critical_friction": 0.205}, {"simulated_critical_friction": 0.205}, {"limit_n": 2.95},
         {"displacement_m": 1.5e-4}, {"rotation_rad": 2e-3},
+        {"noisy_held": 75},
     ],
 )  # fmt: skip
 def test_small_differences_count_with_the_same_versions_only(changed):

@@ -1,0 +1,193 @@
+"""How often a grasp holds although nothing is quite as planned: repeats with seeded noise.
+
+Each repeat draws noise, lets the analysis say which of the nominal loads are still resisted, and
+simulates them all, with forces planned for the contacts as they are then: it asks whether the
+grasp still can hold, not whether fingers notice. Contacts that lost force closure are loaded like
+a negative control. Analysis and simulation must agree in every repeat; how many hold is a count,
+and comes with an interval.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure import force_closure
+from grasp_core.errors import UndecidedError
+from grasp_core.values import Contact, Grasp, Polyhedron
+from scenes.fingertips import clashes
+from scenes.mjcf import Scene, to_text
+from sim_validate.control_trials import try_control
+from sim_validate.controls import Control
+from sim_validate.loads import loads_as_they_are
+from sim_validate.noise import Disturbed, Noise, disturbed
+from sim_validate.proportions import interval
+from sim_validate.rig import squeezed
+from sim_validate.setup import Agenda, NamedWrench, Setup
+from sim_validate.simulate import Bench
+from sim_validate.verdict import Outcome, invalid_start, judge
+from sim_validate.wrench_verdict import WrenchVerdict
+
+OPEN = "noise"
+"""Contacts that noise has opened, as a control."""
+
+
+@dataclass(frozen=True, slots=True)
+class NoisyTrial:
+    """A repeat with noise."""
+
+    number: int
+    predicted: bool | None
+    """Whether the analysis says that every load is resisted; None if that is too close to call."""
+    outcome: Outcome
+    """`held`, or how the first load that did not hold ended."""
+    wrench: str
+    """That load's name; empty if all held, or if nothing was loaded."""
+    reason: str
+    contradictions: tuple[str, ...]
+    """Where simulation contradicts the analysis, in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class Robustness:
+    """Repeats with noise, as statistics."""
+
+    noise: Noise
+    trials: tuple[NoisyTrial, ...]
+
+    @property
+    def held(self) -> int:
+        """How many repeats held every load."""
+        return sum(trial.outcome is Outcome.HELD for trial in self.trials)
+
+    @property
+    def predicted(self) -> int:
+        """How many of them hold every load by analysis."""
+        return sum(trial.predicted is True for trial in self.trials)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Where the share of repeats that hold is with 95 % confidence."""
+        return interval(self.held, len(self.trials))
+
+    @property
+    def contradictions(self) -> tuple[str, ...]:
+        """Where simulation contradicts the analysis, in words."""
+        return tuple(
+            f"trial {trial.number}: {text}"
+            for trial in self.trials
+            for text in trial.contradictions
+        )
+
+
+def robustness(
+    body: Polyhedron, grasp: Grasp, friction: float, loads: Sequence[NamedWrench],
+    agenda: Agenda, setup: Setup,
+) -> Robustness:  # fmt: skip
+    """Repeat the holds of a grasp with noise.
+
+    Args:
+        body: The object.
+        grasp: In force closure at this friction.
+        friction: Coulomb coefficient that was planned with.
+        loads: What each repeat must hold.
+        agenda: How many repeats, with how much noise, and the seed.
+        setup: How trials are simulated, with the radius that fingertips have.
+    """
+    trials = tuple(
+        noisy_trial(body, disturbed_in(body, grasp, friction, agenda, number), loads, number, setup)
+        for number in range(agenda.trials)
+    )
+    return Robustness(agenda.noise, trials)
+
+
+def disturbed_in(
+    body: Polyhedron, grasp: Grasp, friction: float, agenda: Agenda, number: int
+) -> Disturbed:
+    """What noise makes of a grasp in one repeat."""
+    return disturbed(body, grasp, friction, agenda.noise, (agenda.seed, number))
+
+
+def noisy_trial(
+    body: Polyhedron, case: Disturbed, loads: Sequence[NamedWrench], number: int, setup: Setup
+) -> NoisyTrial:
+    """Simulate one repeat."""
+    if case.missed:
+        reason = f"finger {case.missed[0]} misses its face"
+        return NoisyTrial(number, False, Outcome.LOST_CONTACT, "", reason, ())
+    positions, normals = _arrays(case.contacts)
+    try:
+        certificate = force_closure(positions, normals, case.friction)
+    except UndecidedError as error:
+        return NoisyTrial(number, None, Outcome.ERROR, "", str(error), ())
+    if not certificate.closed:
+        control = Control(OPEN, case.contacts, case.friction, certificate)
+        return _opened(body, control, number, setup)
+    verdicts = held_loads(body, case, loads, setup)
+    first = next((each for each in verdicts if each.hold.outcome is not Outcome.HELD), None)
+    return NoisyTrial(
+        number=number,
+        predicted=all(each.predicted_limit >= 1.0 for each in verdicts),
+        outcome=Outcome.HELD if first is None else first.hold.outcome,
+        wrench="" if first is None else first.name,
+        reason="" if first is None else first.hold.reason,
+        contradictions=tuple(each.contradiction for each in verdicts if each.contradiction),
+    )
+
+
+def held_loads(
+    body: Polyhedron, case: Disturbed, loads: Sequence[NamedWrench], setup: Setup,
+    *, keep_traces: bool = False,
+) -> tuple[WrenchVerdict, ...]:  # fmt: skip
+    """Every load on the contacts of a repeat, in force closure.
+
+    Args:
+        body: The object.
+        case: What noise made of the grasp.
+        loads: What is to be held, but for the mass.
+        setup: How trials are simulated.
+        keep_traces: Whether verdicts come with what moved.
+    """
+    scene = heavier(setup.scene(body, case.contacts, case.friction), case.mass)
+    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+    rig = squeezed(bench, setup, scene.layout.squeeze_forces, case.friction)
+    heavy = [NamedWrench(each.name, case.mass * each.wrench) for each in loads]
+    planned = loads_as_they_are(body, case.contacts, case.friction, rig.idle, heavy, setup)
+    overlap = clashes(body, *_arrays(case.landed), scene.layout.drive.radius_m)
+    found = list[WrenchVerdict]()
+    for each, trace in zip(planned, rig.hold([one.load for one in planned]), strict=True):
+        hold = judge(trace, scene.layout, setup.hold)
+        found.append(
+            WrenchVerdict(
+                each.name, each.load.wrench, each.predicted_limit, each.required_friction,
+                invalid_start(hold, overlap) if overlap else hold,
+                trace=trace if keep_traces else None,
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def heavier(scene: Scene, factor: float) -> Scene:
+    """A scene with an object of more mass."""
+    layout = replace(
+        scene.layout,
+        mass_kg=factor * scene.layout.mass_kg,
+        inertia_kg_m2=factor * scene.layout.inertia_kg_m2,
+    )
+    return replace(scene, xml=to_text(layout, scene.physics, scene.surface), layout=layout)
+
+
+def _opened(body: Polyhedron, control: Control, number: int, setup: Setup) -> NoisyTrial:
+    """Contacts that are not in force closure: as a control they must let go."""
+    verdict = try_control(body, control, Agenda(), setup)
+    first = verdict.tried[0]
+    held = ("contacts without force closure held",) if verdict.held else ()
+    return NoisyTrial(number, False, first.hold.outcome, first.name, first.hold.reason, held)
+
+
+def _arrays(contacts: Sequence[Contact]) -> tuple[Array, Array]:
+    return (
+        np.array([contact.position for contact in contacts]),
+        np.array([contact.normal for contact in contacts]),
+    )
