@@ -181,9 +181,11 @@ def heavier(scene: Scene, factor: float) -> Scene:
 def _opened(body: Polyhedron, control: Control, number: int, setup: Setup) -> NoisyTrial:
     """Contacts that are not in force closure: as a control they must let go."""
     verdict = try_control(body, control, Agenda(), setup)
+    if verdict.held:
+        wrong = ("contacts without force closure held",)
+        return NoisyTrial(number, False, Outcome.HELD, "", "", wrong)
     first = verdict.tried[0]
-    held = ("contacts without force closure held",) if verdict.held else ()
-    return NoisyTrial(number, False, first.hold.outcome, first.name, first.hold.reason, held)
+    return NoisyTrial(number, False, first.hold.outcome, first.name, first.hold.reason, ())
 
 
 def _arrays(contacts: Sequence[Contact]) -> tuple[Array, Array]:

@@ -116,14 +116,7 @@ def suite_from_toml(path: Path) -> Suite:
         given = tomllib.loads(read_text(path))
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not TOML: {error}") from error
-    for name, value in given.items():
-        kind = KINDS.get(name)
-        if kind is None:
-            raise InputError(f"{path}: {name}: no such setting; there are {', '.join(KINDS)}")
-        if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-            raise InputError(f"{path}: {name}: expected {kind.__name__}, got {value!r}")
-    if "grasps" not in given:
-        raise InputError(f"{path}: grasps: expected the path of a grasps.json")
+    _check(given, path)
     usual = path.name.removesuffix(ENDING) + ".baseline.json"
     settings: dict[str, Any] = {"baseline": usual, **given}
     for name in ("grasps", "baseline", "setup"):
@@ -132,6 +125,17 @@ def suite_from_toml(path: Path) -> Suite:
     if "noise" in settings:
         settings["noise"] = _noise(settings["noise"], path)
     return Suite(**settings)
+
+
+def _check(given: Mapping[str, Any], path: Path) -> None:
+    for name, value in given.items():
+        kind = KINDS.get(name)
+        if kind is None:
+            raise InputError(f"{path}: {name}: no such setting; there are {', '.join(KINDS)}")
+        if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+            raise InputError(f"{path}: {name}: expected {kind.__name__}, got {value!r}")
+    if "grasps" not in given:
+        raise InputError(f"{path}: grasps: expected the path of a grasps.json")
 
 
 def _noise(given: Mapping[str, Any], path: Path) -> Noise:
