@@ -23,7 +23,7 @@ from tyro.conf import (
 
 from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError, UnfaithfulError
 from sim_validate.baseline_flags import Baseline
-from sim_validate.bounds import check
+from sim_validate.bounds import at_least, check
 from sim_validate.config_file import with_config
 from sim_validate.dataset_flags import Dataset
 from sim_validate.engines import available_cores
@@ -124,6 +124,27 @@ class Scene:
 
 
 @dataclass(frozen=True, slots=True)
+class Replay:
+    """Simulate one trial of a file again: what moved, sample by sample, and a clip."""
+
+    source: Positional[Path]
+    """A baseline, verdicts.json or grasps.json, the folder of a run, or a dataset."""
+    grasp: str | None = None
+    """Id of the grasp; may be left out where there is one only."""
+    wrench: str | None = None
+    """Name of the wrench; the first that was not held, or else the weakest, if not given."""
+    control: str | None = None
+    """Replay a negative control made from the grasp, by name."""
+    trial: Annotated[int, at_least(0)] | None = None
+    """Replay a repeat with noise, by number."""
+    grasps: Path | None = None
+    """The grasps.json that verdicts or a baseline are about, if it is not where they say."""
+    out: Path | None = None
+    """Folder for scene.xml, trace.csv and, where graphics are available, clip.gif."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+
+
+@dataclass(frozen=True, slots=True)
 class Analyze:
     """Judge contacts from elsewhere: closure with its certificate, quality, wrench limits."""
 
@@ -170,7 +191,19 @@ class Doctor:
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
-Command = Run | Plan | Validate | Scene | Analyze | Dataset | Baseline | Inspect | Objects | Doctor
+Command = (
+    Run
+    | Plan
+    | Validate
+    | Scene
+    | Replay
+    | Analyze
+    | Dataset
+    | Baseline
+    | Inspect
+    | Objects
+    | Doctor
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -11,6 +11,7 @@ ACTIONS: dict[type[Any], str] = {
     cli.Plan: "plan_command:plan_file",
     cli.Validate: "validate_command:validate_file",
     cli.Scene: "scene_command:write_scenes",
+    cli.Replay: "replay_command:replay_trial",
     cli.Analyze: "analyze_command:analyze_file",
     dataset_flags.Build: "dataset_commands:build_dataset",
     dataset_flags.Import: "dataset_commands:import_dataset",

@@ -14,7 +14,7 @@ from grasp_core.forces import closest_forces, least_friction_forces
 from grasp_core.resisted_wrenches import axis_wrenches
 from grasp_core.values import Polyhedron
 from sim_validate.controls import Control
-from sim_validate.rig import squeezed
+from sim_validate.rig import Rig, squeezed
 from sim_validate.rules import FORCE_AXES, accepted, rules_named
 from sim_validate.schedules import Load
 from sim_validate.setup import AXIS_NAMES, Agenda, Setup
@@ -25,6 +25,18 @@ from sim_validate.verdict import LET_GO, HoldVerdict, Outcome, judge
 SEPARATING = "separating"
 """The wrench that a control's certificate says is not resisted."""
 UNLOADED = "unloaded"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ControlLoad:
+    """A load that a control is to let go."""
+
+    name: str
+    load: Load
+    settling: float
+    """Friction while things settle."""
+    required_friction: float | None
+    """What the planned forces need; None where no forces balance the wrench."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,36 +83,44 @@ def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup
         agenda: Rules of other tools that also judge it, and whether traces are kept.
         setup: How trials are simulated.
     """
+    rig, loads = control_case(body, control, setup)
+    rules = rules_named(agenda.rules)
+    pulls = _pulls(body, control, setup) if rules else ()
+    every = (*loads, *pulls)
+    traces = rig.hold([each.load for each in every], [each.settling for each in every])
+    layout = rig.bench.scene.layout
+    tried = tuple(
+        ControlTrial(
+            each.name, each.load.wrench, each.required_friction, judge(trace, layout, setup.hold),
+            trace if agenda.keep_traces else None,
+        )
+        for each, trace in zip(loads, traces, strict=False)
+    )  # fmt: skip
+    others = traces[len(loads) :]
+    return ControlVerdict(
+        control, tried, {rule.name: accepted(rule, others, layout, setup.hold) for rule in rules}
+    )
+
+
+def control_case(
+    body: Polyhedron, control: Control, setup: Setup
+) -> tuple[Rig, tuple[ControlLoad, ...]]:
+    """A control in the grip of its fingers, and the loads that it must not hold.
+
+    Args:
+        body: The object.
+        control: With its proof.
+        setup: How trials are simulated.
+    """
     fingers = replace(setup.fingers, radius_m=None)
     on_pads = replace(setup, fingers=fingers, surface="pads")
     scene = on_pads.scene(body, control.contacts, control.friction)
     plan = _Planner(body, control, setup)
-    idle, needed = plan.forces(np.zeros(6))
+    idle = plan.load(UNLOADED, np.zeros(6))
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
-    rig = squeezed(bench, setup, idle, control.friction, plan.settling(needed))
-    names, wrenches = zip(*_hopeless(body, control, setup), strict=True)
-    rules = rules_named(agenda.rules)
-    pulls = _pulls(body, setup) if rules else []
-    planned = [plan.forces(wrench) for wrench in (*wrenches, *pulls)]
-    traces = rig.hold(
-        [Load(wrench, f) for wrench, (f, _) in zip((*wrenches, *pulls), planned, strict=True)],
-        [plan.settling(friction) for _, friction in planned],
-    )
-    tried = tuple(
-        ControlTrial(
-            name, wrench, friction, judge(trace, scene.layout, setup.hold),
-            trace if agenda.keep_traces else None,
-        )
-        for name, wrench, (_, friction), trace in zip(
-            names, wrenches, planned[: len(names)], traces[: len(names)], strict=True
-        )
-    )  # fmt: skip
-    others = traces[len(names) :]
-    return ControlVerdict(
-        control,
-        tried,
-        {rule.name: accepted(rule, others, scene.layout, setup.hold) for rule in rules},
-    )
+    rig = squeezed(bench, setup, idle.load.forces, control.friction, idle.settling)
+    hopeless = _hopeless(body, control, setup)
+    return rig, tuple(plan.load(name, wrench) for name, wrench in hopeless)
 
 
 def _hopeless(body: Polyhedron, control: Control, setup: Setup) -> list[tuple[str, Array]]:
@@ -114,11 +134,12 @@ def _hopeless(body: Polyhedron, control: Control, setup: Setup) -> list[tuple[st
     return loads
 
 
-def _pulls(body: Polyhedron, setup: Setup) -> list[Array]:
+def _pulls(body: Polyhedron, control: Control, setup: Setup) -> tuple[ControlLoad, ...]:
     """The six forces that other tools apply, as large as the separating wrench."""
+    plan = _Planner(body, control, setup)
     size = setup.hold.control_load * setup.fingers.max_normal_force_n
     named = zip(AXIS_NAMES, axis_wrenches(body.radius), strict=True)
-    return [size * wrench for name, wrench in named if name in FORCE_AXES]
+    return tuple(plan.load(name, size * wrench) for name, wrench in named if name in FORCE_AXES)
 
 
 class _Planner:
@@ -134,7 +155,13 @@ class _Planner:
         self.limits = (setup.hold.least_normal_share * largest, largest)
         self.center, self.protocol = body.center_of_mass, setup.hold
 
-    def forces(self, wrench: Array) -> tuple[Array, float | None]:
+    def load(self, name: str, wrench: Array) -> ControlLoad:
+        """A wrench with forces planned for it."""
+        forces, needed = self._forces(wrench)
+        settling = self.protocol.settling_friction * max(self.contacts[2], needed or 0.0)
+        return ControlLoad(name, Load(wrench, forces), settling, needed)
+
+    def _forces(self, wrench: Array) -> tuple[Array, float | None]:
         """Planned forces, (k, 3), and the friction they need; None where nothing balances."""
         limits, center = self.limits, self.center
         balanced = least_friction_forces(*self.contacts, wrench, normal_force=limits, center=center)
@@ -143,7 +170,3 @@ class _Planner:
         return to_digits(
             closest_forces(*self.contacts, wrench, normal_force=limits, center=center)
         ), None
-
-    def settling(self, needed: float | None) -> float:
-        """Friction while things settle."""
-        return self.protocol.settling_friction * max(self.contacts[2], needed or 0.0)

@@ -7,7 +7,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, to_digits
 from grasp_core.resisted_wrenches import WrenchBody, WrenchLimit, axis_wrenches
-from grasp_core.values import Contact, Grasp, Polyhedron, contact_frictions
+from grasp_core.values import Contact, Polyhedron, contact_frictions
 from grasp_core.wrenches import normal_and_tangential
 from sim_validate.limits import part
 from sim_validate.schedules import Load
@@ -33,26 +33,31 @@ class PlannedLoad:
 
 
 def planned_loads(
-    body: Polyhedron, grasp: Grasp, friction: float, idle: Load, agenda: Agenda, setup: Setup
+    body: Polyhedron,
+    contacts: Sequence[Contact],
+    friction: float,
+    idle: Load,
+    agenda: Agenda,
+    setup: Setup,
 ) -> tuple[PlannedLoad, ...]:
     """The loads of an agenda, in its order: axes, weakest, random, a user's own.
 
     Args:
         body: The object.
-        grasp: In force closure at this friction.
+        contacts: In force closure at this friction.
         friction: Coulomb coefficient at every contact.
         idle: No wrench, and the forces of the gentle grasp.
         agenda: Which wrenches.
         setup: The largest normal force, and the share of the limit that is applied.
     """
-    resisted = _resisted(body, grasp.contacts, friction, setup)
+    resisted, normals = _resisted(body, contacts, friction, setup), _normals(contacts)
     share = setup.hold.load_share
     relative = [
-        _load(name, found, share * found.limit, idle, grasp.normals)
+        _load(name, found, share * found.limit, idle, normals)
         for name, found in _relative(resisted, body.radius, agenda)
     ]
     own = [
-        _load(named.name, resisted.limit(named.wrench), 1.0, idle, grasp.normals)
+        _load(named.name, resisted.limit(named.wrench), 1.0, idle, normals)
         for named in agenda.wrenches
     ]
     return (*relative, *own)
@@ -76,8 +81,7 @@ def loads_as_they_are(
         wrenches: To hold as they are.
         setup: The largest normal force.
     """
-    resisted = _resisted(body, contacts, friction, setup)
-    normals = np.array([contact.normal for contact in contacts])
+    resisted, normals = _resisted(body, contacts, friction, setup), _normals(contacts)
     return tuple(
         _load(named.name, resisted.limit(named.wrench), 1.0, idle, normals) for named in wrenches
     )
@@ -88,10 +92,14 @@ def _resisted(
 ) -> WrenchBody:
     return WrenchBody(
         np.array([contact.position for contact in contacts]) - body.center_of_mass,
-        np.array([contact.normal for contact in contacts]),
+        _normals(contacts),
         contact_frictions(friction, len(contacts)),
         setup.fingers.max_normal_force_n,
     )
+
+
+def _normals(contacts: Sequence[Contact]) -> Array:
+    return np.array([contact.normal for contact in contacts])
 
 
 def _relative(

@@ -14,6 +14,16 @@ from sim_validate.traces import Trace, trace
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Watched:
+    """One hold from the closed fingers to its end."""
+
+    joints: Array
+    """As in `Motion`, (n, 7 + 3k)."""
+    trace: Trace
+    """From the moment friction was lowered."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Rig:
     """An object in the grip of its fingers, unloaded."""
 
@@ -36,16 +46,27 @@ class Rig:
             settling_frictions: Friction until then, one for each load; a multiple of that to hold
                 at if None.
         """
+        return self._traces(self._holds(loads, settling_frictions))
+
+    def watch(self, load: Load, settling_friction: float | None = None) -> Watched:
+        """One load, held as above, with all that moved since the fingers closed."""
+        settling = None if settling_friction is None else [settling_friction]
+        (schedule,) = self._holds([load], settling)
+        (motion,) = self.bench.run([schedule], self.closed and self.closed.state)
+        (found,) = self._traced([schedule], [motion])
+        before = [] if self.closed is None else [self.closed.joints[-1:]]
+        return Watched(np.concatenate([*before, motion.joints]), found)
+
+    def _holds(
+        self, loads: Sequence[Load], settling_frictions: Sequence[float] | None
+    ) -> list[Schedule]:
         protocol, clock = self.setup.hold, self.bench.clock
         usual = protocol.settling_friction * self.friction
-        return self._traces(
-            [
-                schedules.hold(self.idle, load, (high, self.friction), clock, protocol)
-                for load, high in zip(
-                    loads, settling_frictions or [usual] * len(loads), strict=True
-                )
-            ]
-        )
+        settling = settling_frictions or [usual] * len(loads)
+        return [
+            schedules.hold(self.idle, load, (high, self.friction), clock, protocol)
+            for load, high in zip(loads, settling, strict=True)
+        ]
 
     def ramp(
         self, limits: Sequence[Load], shares: tuple[float, float]
@@ -69,7 +90,9 @@ class Rig:
         )
 
     def _traces(self, trials: Sequence[Schedule]) -> tuple[Trace, ...]:
-        motions = self.bench.run(trials, self.closed and self.closed.state)
+        return self._traced(trials, self.bench.run(trials, self.closed and self.closed.state))
+
+    def _traced(self, trials: Sequence[Schedule], motions: Sequence[Motion]) -> tuple[Trace, ...]:
         layout = self.bench.scene.layout
         return tuple(
             trace(motion.after(self.closed) if self.closed else motion, layout, trial.watched)

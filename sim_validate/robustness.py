@@ -7,7 +7,7 @@ a negative control. Analysis and simulation must agree in every repeat; how many
 and comes with an interval.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,10 +20,10 @@ from scenes.fingertips import clashes
 from scenes.mjcf import Scene, to_text
 from sim_validate.control_trials import try_control
 from sim_validate.controls import Control
-from sim_validate.loads import loads_as_they_are
+from sim_validate.loads import PlannedLoad, loads_as_they_are
 from sim_validate.noise import Disturbed, Noise, disturbed
 from sim_validate.proportions import interval
-from sim_validate.rig import squeezed
+from sim_validate.rig import Rig, squeezed
 from sim_validate.setup import Agenda, NamedWrench, Setup
 from sim_validate.simulate import Bench
 from sim_validate.verdict import Outcome, invalid_start, judge
@@ -124,7 +124,7 @@ def noisy_trial(
     if not certificate.closed:
         control = Control(OPEN, case.contacts, case.friction, certificate)
         return _opened(body, control, number, setup)
-    verdicts = held_loads(body, case, loads, setup)
+    verdicts = tuple(_held_loads(body, case, loads, setup))
     first = next((each for each in verdicts if each.hold.outcome is not Outcome.HELD), None)
     return NoisyTrial(
         number=number,
@@ -136,36 +136,36 @@ def noisy_trial(
     )
 
 
-def held_loads(
-    body: Polyhedron, case: Disturbed, loads: Sequence[NamedWrench], setup: Setup,
-    *, keep_traces: bool = False,
-) -> tuple[WrenchVerdict, ...]:  # fmt: skip
-    """Every load on the contacts of a repeat, in force closure.
+def _held_loads(
+    body: Polyhedron, case: Disturbed, loads: Sequence[NamedWrench], setup: Setup
+) -> Iterator[WrenchVerdict]:
+    rig, planned = noisy_case(body, case, loads, setup)
+    layout = rig.bench.scene.layout
+    overlap = clashes(body, *_arrays(case.landed), layout.drive.radius_m)
+    for each, trace in zip(planned, rig.hold([one.load for one in planned]), strict=True):
+        hold = judge(trace, layout, setup.hold)
+        yield WrenchVerdict(
+            each.name, each.load.wrench, each.predicted_limit, each.required_friction,
+            invalid_start(hold, overlap) if overlap else hold,
+        )  # fmt: skip
+
+
+def noisy_case(
+    body: Polyhedron, case: Disturbed, loads: Sequence[NamedWrench], setup: Setup
+) -> tuple[Rig, tuple[PlannedLoad, ...]]:
+    """The contacts of a repeat, in force closure, in the grip of their fingers, and the loads.
 
     Args:
         body: The object.
         case: What noise made of the grasp.
         loads: What is to be held, but for the mass.
         setup: How trials are simulated.
-        keep_traces: Whether verdicts come with what moved.
     """
     scene = heavier(setup.scene(body, case.contacts, case.friction), case.mass)
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
     rig = squeezed(bench, setup, scene.layout.squeeze_forces, case.friction)
     heavy = [NamedWrench(each.name, case.mass * each.wrench) for each in loads]
-    planned = loads_as_they_are(body, case.contacts, case.friction, rig.idle, heavy, setup)
-    overlap = clashes(body, *_arrays(case.landed), scene.layout.drive.radius_m)
-    found = list[WrenchVerdict]()
-    for each, trace in zip(planned, rig.hold([one.load for one in planned]), strict=True):
-        hold = judge(trace, scene.layout, setup.hold)
-        found.append(
-            WrenchVerdict(
-                each.name, each.load.wrench, each.predicted_limit, each.required_friction,
-                invalid_start(hold, overlap) if overlap else hold,
-                trace=trace if keep_traces else None,
-            )
-        )  # fmt: skip
-    return tuple(found)
+    return rig, loads_as_they_are(body, case.contacts, case.friction, rig.idle, heavy, setup)
 
 
 def heavier(scene: Scene, factor: float) -> Scene:

@@ -127,7 +127,7 @@ class _Bout:
         self.agenda, self.setup, self.layout = agenda, setup, scene.layout
         self.bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
         self.rig: Rig = squeezed(self.bench, setup, self.layout.squeeze_forces, friction)
-        self.loads = planned_loads(body, grasp, friction, self.rig.idle, agenda, setup)
+        self.loads = planned_loads(body, grasp.contacts, friction, self.rig.idle, agenda, setup)
         self.traces = self.rig.hold([planned.load for planned in self.loads])
 
     def wrenches(self) -> tuple[WrenchVerdict, ...]:

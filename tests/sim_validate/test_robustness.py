@@ -25,7 +25,7 @@ def repeated(body, grasp, friction, **changed):
 
 
 def test_analysis_and_simulation_agree_on_every_repeat():
-    """With noise that opens contacts, lowers friction below what is needed, and lets fingers miss."""
+    """With noise that opens contacts, makes loads too large, and lets fingers miss."""
     held = let_go = missed = 0
     much = Noise(shift=0.02, turn_deg=3.0, normal_deg=3.0, friction=0.3, mass=0.3)
     for name in ("wedge", "screwdriver", "mug"):

@@ -1,0 +1,125 @@
+"""What moved in a scene -> a clip, drawn in a process of its own, where graphics are available.
+
+Motions of a grasp that holds are micrometres: they can be shown larger than they are. Since the
+first sample, shifts and turns of the object about the point between the contacts, and the slides
+of the fingertips, are multiplied by one factor, so that who moves with whom stays visible.
+"""
+
+import importlib
+import math
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.errors import GraspError
+from scenes.mjcf import Scene
+
+SIZE = (480, 360)
+"""Of the picture [pixels]."""
+RATE = 25.0
+"""Frames per second."""
+VISIBLE = 0.1
+"""Motion that is easily seen, in grasp sizes."""
+MOST = 1000.0
+"""Times that motions are multiplied."""
+PATIENCE_S = 300.0
+
+
+class GraphicsError(GraspError):
+    """Nothing can be drawn on this machine."""
+
+
+def write_clip(scene: Scene, joints: Array, path: Path, caption: str) -> Path:
+    """Draw what moved in a scene, a frame for each sample.
+
+    Args:
+        scene: What was simulated.
+        joints: Position and quaternion of the object's frame, then the slides of the fingertips
+            along the axes of their contacts, (n, 7 + 3k) [m].
+        path: Of the GIF file to write.
+        caption: Written into the picture.
+
+    Raises:
+        GraphicsError: No graphics library draws here; the message has its words.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        job, out = Path(folder) / "job.npz", Path(folder) / "clip.gif"
+        np.savez(
+            job, xml=scene.xml, joints=joints, size=SIZE, radius=scene.layout.radius_m, rate=RATE,
+            caption=caption,
+        )  # fmt: skip
+        said = ""
+        for graphics in _graphics():
+            said = _drawn(job, out, graphics)
+            if not said:
+                path.write_bytes(out.read_bytes())
+                return path
+    raise GraphicsError(f"no graphics: {said}; with a display or libEGL there would be a clip")
+
+
+def _graphics() -> Iterator[str]:
+    """What MuJoCo may draw with, in the order to try."""
+    chosen = os.environ.get("MUJOCO_GL")
+    if chosen is not None:
+        yield chosen
+    elif sys.platform == "linux":
+        yield from ("egl", "osmesa", *(["glfw"] if os.environ.get("DISPLAY") else []))
+    else:
+        yield ""
+
+
+def _drawn(job: Path, out: Path, graphics: str) -> str:
+    """Draw in another process; what went wrong, empty if nothing."""
+    command = [sys.executable, "-m", "scenes.frames", str(job), str(out)]
+    settings = {**os.environ, "MUJOCO_GL": graphics}
+    try:
+        ran = subprocess.run(  # noqa: S603 - our own program
+            command, env=settings, capture_output=True, timeout=PATIENCE_S, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return f"{graphics} took more than {PATIENCE_S:g} s"
+    if ran.returncode == 0 and out.is_file():
+        return ""
+    words = ran.stderr.decode(errors="replace").strip().splitlines()
+    return f"{graphics}: {words[-1] if words else f'ended with {ran.returncode}'}"
+
+
+def magnified(joints: Array, scene: Scene) -> tuple[Array, float]:
+    """Motions made large enough to be seen.
+
+    Args:
+        joints: As for `write_clip`, (n, 7 + 3k).
+        scene: Where they come from.
+
+    Returns:
+        The same from the planned pose on, with every motion since the first sample multiplied,
+        and by how much: one significant digit, at least 1.
+    """
+    center, size = scene.layout.center, scene.layout.grasp_size_m
+    rotation: Any = importlib.import_module("scipy.spatial.transform").Rotation
+    poses = rotation.from_quat(joints[:, 3:7], scalar_first=True)
+    turns = (poses * poses[0].inv()).as_rotvec()
+    centers = joints[:, :3] + poses.apply(center)
+    shifts, slides = centers - centers[0], joints[:, 7:] - joints[0, 7:]
+    largest = float((np.linalg.norm(shifts, axis=1) + size * np.linalg.norm(turns, axis=1)).max())
+    factor = _rounded_down(VISIBLE * size / max(largest, VISIBLE * size / MOST))
+    larger = rotation.from_rotvec(factor * turns)
+    places = center + factor * shifts - larger.apply(center)
+    quaternions = larger.as_quat(scalar_first=True)
+    return np.column_stack([places, quaternions, factor * slides]), factor
+
+
+def _rounded_down(factor: float) -> float:
+    """The next smaller number of one significant digit, at least 1."""
+    if factor < 1.0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(factor))
+    return math.floor(factor / power) * power

@@ -1,0 +1,1 @@
+"""One trial of a file, simulated again, with all that moved."""
