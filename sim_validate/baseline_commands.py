@@ -1,6 +1,5 @@
 """The commands about baselines: to record one, and to check whether stability has changed."""
 
-import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -9,9 +8,9 @@ from pathlib import Path
 from grasp_core.records import SavedGrasps, grasps_from_json
 from sim_validate import baseline_flags, cli
 from sim_validate.baselines.baseline_file import baseline_from_json, baseline_to_json
-from sim_validate.baselines.comparing import FAILED, Finding, Status, compare
+from sim_validate.baselines.comparing import Finding, Status, compare, failing
 from sim_validate.baselines.junit import junit_text
-from sim_validate.baselines.measuring import measured, of_settings, setup_for
+from sim_validate.baselines.measuring import measured, of_settings, seen_from, setup_for
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.files import read_text, write_text
 from sim_validate.plan_command import say_cut
@@ -33,9 +32,10 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
         noise=noise_of(command.repeats),
         seed=saved.seed if command.seed is None else command.seed,
     )
-    where = os.path.relpath(command.grasps.resolve(), command.out.resolve().parent)
+    where = seen_from(command.out, command.grasps)
     with reporter.progress("simulating") as steps:
-        found = measured(saved, Path(where).as_posix(), setup, agenda, command.jobs, steps.update)
+        done = measured(saved, where, setup, agenda, command.jobs, steps.update)
+    found = done.baseline
     write_text(command.out, baseline_to_json(found))
     held = sum(entry.held for entry in found.entries)
     reporter.say(f"wrote {command.out}: {held} of {len(found.entries)} grasps held")
@@ -52,7 +52,8 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     if command.setup is not None:
         setup = setup_from_file(command.setup, setup)
     with reporter.progress("simulating") as steps:
-        after = measured(saved, before.grasps_file, setup, agenda, command.jobs, steps.update)
+        done = measured(saved, before.grasps_file, setup, agenda, command.jobs, steps.update)
+    after = done.baseline
     findings = compare(before, after)
     if command.junit is not None:
         text = junit_text(str(command.baseline), findings, strict=command.strict)
@@ -68,7 +69,7 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
 def exit_code(findings: Sequence[Finding], *, strict: bool) -> int:
     """1 if a grasp fails the check, 4 if one cannot be compared, else 0."""
     came = {finding.status for finding in findings}
-    if came & {*FAILED, *([Status.IMPROVED] if strict else [])}:
+    if came & {*failing(strict=strict)}:
         return cli.Exit.NEGATIVE
     return cli.Exit.INPUT if Status.NOT_COMPARABLE in came else cli.Exit.GOOD
 

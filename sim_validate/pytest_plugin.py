@@ -1,9 +1,9 @@
 """A pytest plugin: grasps of `*.grasps.toml` files as tests, and `assert_stable` for those in code.
 
-Nothing but pytest is imported until such a file or the fixture is used.
+Nothing but pytest is imported until such a file, the fixtures or the marker are used.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,11 +11,20 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from sim_validate.baselines.comparing import Finding
     from sim_validate.baselines.suite import Suite
     from sim_validate.grasp_verdict import Verdict
 
 ENDING = ".grasps.toml"
+MARKER = (
+    "grasp(file=None, *, object=None, friction=0.5, limit=1, families, cones, seed, unit): run the "
+    "test with each grasp of a grasps.json, or planned for an object, as its fixture `grasp_case`"
+)
+LINES = pytest.StashKey[list[dict[str, Any]]]()
+"""What became of grasps: in one test, and of the whole run."""
+
+
+class UnstableError(AssertionError):
+    """A grasp is not as stable as it must be."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -26,6 +35,18 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="make what is measured now the baselines of *.grasps.toml files",
     )
+    group.addoption(
+        "--grasp-report",
+        metavar="DIR",
+        help="write what became of every grasp to DIR/index.html and DIR/report.json",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Make the marker known."""
+    config.addinivalue_line("markers", MARKER)
+    config.stash[LINES] = []
+    config.pluginmanager.register(_Collecting(config))
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
@@ -36,6 +57,56 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
     return kind.from_parent(parent, path=file_path)
 
 
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run a marked test with each of its grasps."""
+    marker = metafunc.definition.get_closest_marker("grasp")
+    if marker is None or "grasp_case" not in metafunc.fixturenames:
+        return
+    from grasp_core.errors import GraspError
+    from sim_validate.baselines.grasp_cases import grasp_cases
+
+    settings = dict(marker.kwargs)
+    file = marker.args[0] if marker.args else settings.pop("file", None)
+    try:
+        cases = grasp_cases(metafunc.definition.path.parent, file, settings)
+    except GraspError as error:
+        pytest.fail(str(error), pytrace=False)
+    metafunc.parametrize("grasp_case", cases, ids=[case.grasp.id for case in cases])
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item,
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Give what became of grasps to the report, which travels between processes."""
+    report = yield
+    if report.when == "call":
+        report.grasps = item.stash.get(LINES, [])  # type: ignore[attr-defined]
+    return report
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Write the report, where all that was tested has come together."""
+    folder = session.config.getoption("--grasp-report")
+    if folder is None or hasattr(session.config, "workerinput"):
+        return
+    from sim_validate.baselines.report_page import write_report
+
+    write_report(Path(folder), session.config.stash[LINES])
+
+
+class _Collecting:
+    """Brings together what became of grasps in all tests."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        self._lines = config.stash[LINES]
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Take what a test, here or in another process, has to say."""
+        self._lines += getattr(report, "grasps", [])
+
+
 class GraspsFile(pytest.File):
     """Grasps that must stay as they were."""
 
@@ -44,12 +115,13 @@ class GraspsFile(pytest.File):
         from grasp_core.errors import GraspError
         from sim_validate.baselines.suite import suite_from_toml
 
+        bless = self.config.getoption("--grasp-bless")
         try:
             suite = suite_from_toml(self.path)
-            names = ["bless"] if self.config.getoption("--grasp-bless") else suite.ids()
+            names = ["bless"] if bless else suite.ids()
         except GraspError as error:
             raise self.CollectError(str(error)) from error
-        kind: Any = BlessItem if self.config.getoption("--grasp-bless") else GraspItem
+        kind: Any = BlessItem if bless else GraspItem
         for name in names:
             yield kind.from_parent(self, name=name, suite=suite)
 
@@ -77,16 +149,22 @@ class GraspItem(_SuiteItem):
 
     def runtest(self) -> None:
         """Fail where the grasp is worse, missing or new, or cannot be compared."""
-        from sim_validate.baselines.comparing import FAILED, Status
+        from sim_validate.baselines.comparing import Status, failing
+        from sim_validate.baselines.explaining import explained
 
-        finding = self.suite.finding(self.name)
+        finding, verdict = self.suite.tested(self.name)
+        fails = finding.status in (*failing(strict=self.suite.strict), Status.NOT_COMPARABLE)
+        told = fails or finding.status is not Status.SAME
+        why = explained(finding, verdict, self.suite.baseline) if told else ""
         self.user_properties.append(("status", finding.status.value))
         if finding.after is not None:
             self.user_properties += list(asdict(finding.after).items())
-        better = (Status.IMPROVED,) if self.suite.strict else ()
-        failing = (*FAILED, Status.NOT_COMPARABLE, *better)
-        if finding.status in failing:
-            raise UnstableError(_explained(finding, self.suite.baseline))
+        before, after = (
+            None if entry is None else asdict(entry) for entry in (finding.before, finding.after)
+        )
+        _note(self, finding.id, finding.status.value, why, before, after)
+        if fails:
+            raise UnstableError(f"{why}\n  to accept it: pytest --grasp-bless {self.path}")
 
 
 class BlessItem(_SuiteItem):
@@ -96,76 +174,61 @@ class BlessItem(_SuiteItem):
         """Write the baseline."""
         found = self.suite.bless()
         self.user_properties.append(("grasps", len(found.entries)))
+        for entry in found.entries:
+            _note(self, entry.id, "blessed", "", None, asdict(entry))
 
 
-class UnstableError(AssertionError):
-    """A grasp is not as stable as it must be."""
-
-
-def _explained(finding: "Finding", baseline: Path) -> str:
-    """What became of a grasp: predicted, simulated, baseline, and how to see it again."""
-    lines = [f"{finding.id}: {finding.status.value}", *(f"  {why}" for why in finding.reasons)]
-    for title, entry in (("baseline", finding.before), ("now", finding.after)):
-        if entry is None:
-            continue
-        failed = f" at {entry.first_failure}" if entry.first_failure else ""
-        simulated = _number(entry.simulated_critical_friction)
-        lines += [
-            f"  {title}: {entry.outcome}{failed}, moved {entry.displacement_m:.3g} m",
-            f"    critical friction {entry.critical_friction:.6g} predicted, {simulated} simulated",
-            f"    weakest wrench {entry.limit_n:.6g} N predicted, "
-            f"{_number(entry.simulated_limit_n)} simulated",
-        ]
-    lines.append(f"  graspproof baseline check {baseline}  # pytest --grasp-bless accepts it")
-    return "\n".join(lines)
-
-
-def _number(value: float | None) -> str:
-    return "not measured" if value is None else f"{value:.6g}"
+@pytest.fixture
+def grasp_case(request: pytest.FixtureRequest) -> Any:
+    """The grasp that a test marked with `grasp` is run with."""
+    pytest.fail(f"{request.node.name}: grasp_case needs @pytest.mark.grasp(...)", pytrace=False)
 
 
 @pytest.fixture
 def assert_stable(
-    record_property: Callable[[str, object], None],
+    request: pytest.FixtureRequest, record_property: Callable[[str, object], None]
 ) -> Callable[..., "Verdict"]:
     """A function that simulates a grasp and fails the test unless it holds as predicted."""
 
-    def check(body: Any, grasp: Any, friction: float = 0.5, **settings: Any) -> "Verdict":
+    def check(body: Any, grasp: Any = None, friction: float = 0.5, **asked: Any) -> "Verdict":
         """Simulate a grasp with its negative controls.
 
         Args:
-            body: The object.
+            body: The object; or a `grasp_case`, and nothing else of these three.
             grasp: On its faces.
             friction: Coulomb coefficient.
-            settings: `agenda` and `setup`, as `sim_validate.validate` takes them.
+            asked: Fields of `Demands`: `wrenches` to hold as they are, `trials` with `noise`,
+                `min_pass_rate` of them, `min_margin` of the friction over the critical one,
+                `random_wrenches`, `seed`, `setup`.
 
         Raises:
-            UnstableError: A wrench was not held, a control was, or the analysis is contradicted.
+            UnstableError: A wrench was not held, a control was, the analysis is contradicted, or
+                less is reached than is asked for.
         """
-        from sim_validate.validation import validate
+        from sim_validate.baselines.stability import Demands, checked
+        from sim_validate.baselines.values import entry_of
 
-        verdict = validate(body, grasp, friction, **settings)
-        record_property(f"{grasp.id}.outcome", verdict.outcome.value)
-        record_property(f"{grasp.id}.critical_friction", verdict.critical_friction.predicted)
-        simulated = verdict.critical_friction.simulated
-        record_property(f"{grasp.id}.simulated_critical_friction", simulated)
-        if not verdict.good:
-            raise UnstableError(_why(verdict))
+        if grasp is None:
+            body, grasp, friction = body.body, body.grasp, body.friction
+        verdict, why = checked(body, grasp, friction, Demands(**asked))
+        entry = asdict(entry_of(grasp, verdict, body.radius))
+        for name, value in entry.items():
+            record_property(f"{grasp.id}.{name}", value)
+        _note(request.node, grasp.id, "unstable" if why else "stable", why, None, entry)
+        if why:
+            raise UnstableError(why)
         return verdict
 
     return check
 
 
-def _why(verdict: "Verdict") -> str:
-    """What did not hold, or held and must not."""
-    lines = [f"{verdict.id} at friction {verdict.friction}: {verdict.outcome.value}"]
-    for trial in verdict.wrenches:
-        if trial.hold.outcome.value != "held":
-            lines.append(
-                f"  {trial.name} {trial.wrench.tolist()}: {trial.hold.outcome.value} "
-                f"({trial.hold.reason}), predicted limit {trial.predicted_limit:.4g} times it"
-            )
-            break
-    lines += [f"  control {each.control.name} held" for each in verdict.controls if each.held]
-    lines += [f"  {text}" for text in verdict.mismatches]
-    return "\n".join(lines)
+def _note(
+    item: pytest.Item, grasp: str, status: str, why: str,
+    before: dict[str, Any] | None, after: dict[str, Any] | None,
+) -> None:  # fmt: skip
+    """Remember what became of a grasp in a test."""
+    line = {
+        "test": item.nodeid, "grasp": grasp, "status": status, "why": why,
+        "before": before, "after": after,
+    }  # fmt: skip
+    item.stash.setdefault(LINES, []).append(line)

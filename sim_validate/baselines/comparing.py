@@ -37,7 +37,11 @@ class Status(StrEnum):
 
 
 FAILED = (Status.REGRESSED, Status.MISSING, Status.NEW)
-"""What fails a check, beside what cannot be compared."""
+
+
+def failing(*, strict: bool) -> tuple[Status, ...]:
+    """What fails a check, beside what cannot be compared; if strict, what is better, too."""
+    return (*FAILED, Status.IMPROVED) if strict else FAILED
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from xml.etree import ElementTree
 
-from sim_validate.baselines.comparing import FAILED, Finding, Status
+from sim_validate.baselines.comparing import Finding, Status, failing
 
 
 def junit_text(name: str, findings: Iterable[Finding], *, strict: bool) -> str:
@@ -16,13 +16,12 @@ def junit_text(name: str, findings: Iterable[Finding], *, strict: bool) -> str:
         strict: Whether what is better fails, too.
     """
     listed = list(findings)
-    failing = (*FAILED, Status.IMPROVED) if strict else FAILED
     suite = ElementTree.Element("testsuite", name=_printable(name), tests=str(len(listed)))
     failures = errors = 0
     for finding in listed:
         case = ElementTree.SubElement(suite, "testcase", name=finding.id, classname="graspproof")
         said = _printable("; ".join(finding.reasons))
-        if finding.status in failing:
+        if finding.status in failing(strict=strict):
             failures += 1
             ElementTree.SubElement(case, "failure", type=finding.status.value, message=said)
         elif finding.status is Status.NOT_COMPARABLE:

@@ -1,8 +1,9 @@
 """Grasps on the bench -> a baseline: verdicts now, with all that they depend on."""
 
 import json
+import os
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,21 @@ from grasp_core.versions import versions
 from sim_validate.baselines.values import Baseline, entry_of
 from sim_validate.flags import Fingers
 from sim_validate.gate import require_faithful
+from sim_validate.grasp_verdict import Verdict
 from sim_validate.jobs import Job, validated
 from sim_validate.noise import Noise
 from sim_validate.setup import Agenda, NamedWrench, Setup
 from sim_validate.setup_file import setup_from_file, setup_from_tables, tables_of
 from sim_validate.validate_command import finger_settings, planned_fingers
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """Verdicts on the grasps of a file, and what a baseline keeps of them."""
+
+    baseline: Baseline
+    verdicts: Mapping[str, Verdict]
+    """By grasp."""
 
 
 def measured(
@@ -26,7 +37,7 @@ def measured(
     agenda: Agenda,
     processors: int,
     report: Callable[[int, int], None],
-) -> Baseline:
+) -> Measured:
     """Simulate grasps and keep what their verdicts say.
 
     Args:
@@ -45,11 +56,12 @@ def measured(
         raise InputError(f"{grasps_file}: holds no grasp")
     require_faithful(setup, saved.friction, saved.body.radius)
     jobs = [Job(saved.body, grasp, saved.friction, agenda, setup) for grasp in saved.grasps]
-    entries = list[Any]()
+    verdicts = dict[str, Verdict]()
     for grasp, verdict in zip(saved.grasps, validated(jobs, processors), strict=True):
-        entries.append(entry_of(grasp, verdict, saved.body.radius))
-        report(len(entries), len(jobs))
-    return Baseline(
+        verdicts[grasp.id] = verdict
+        report(len(verdicts), len(jobs))
+    entries = [entry_of(grasp, verdicts[grasp.id], saved.body.radius) for grasp in saved.grasps]
+    baseline = Baseline(
         grasps_file=grasps_file,
         object=saved.body.name,
         content_sha256=saved.body.content_sha256,
@@ -58,6 +70,7 @@ def measured(
         versions=versions(),
         entries=tuple(sorted(entries, key=lambda entry: entry.id)),
     )
+    return Measured(baseline, verdicts)
 
 
 def setup_for(saved: SavedGrasps, path: Path | None) -> Setup:
@@ -68,6 +81,11 @@ def setup_for(saved: SavedGrasps, path: Path | None) -> Setup:
     """
     setup = Setup(fingers=finger_settings(planned_fingers(Fingers(), saved.finger)))
     return setup if path is None else setup_from_file(path, setup)
+
+
+def seen_from(baseline: Path, grasps: Path) -> str:
+    """The path of grasps from a baseline's folder."""
+    return Path(os.path.relpath(grasps.resolve(), baseline.resolve().parent)).as_posix()
 
 
 def settings_of(setup: Setup, agenda: Agenda) -> dict[str, Any]:

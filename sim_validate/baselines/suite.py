@@ -10,9 +10,10 @@ from grasp_core.errors import InputError
 from grasp_core.records import SavedGrasps, grasps_from_json
 from sim_validate.baselines.baseline_file import baseline_from_json, baseline_to_json
 from sim_validate.baselines.comparing import Finding, compare
-from sim_validate.baselines.measuring import measured, of_settings, setup_for
+from sim_validate.baselines.measuring import Measured, measured, of_settings, seen_from, setup_for
 from sim_validate.baselines.values import Baseline
 from sim_validate.files import read_text, write_text
+from sim_validate.grasp_verdict import Verdict
 from sim_validate.noise import Noise
 from sim_validate.setup import Agenda
 
@@ -64,8 +65,8 @@ class Suite:
             raise InputError(f"{self.baseline}: there is no baseline yet: pytest --grasp-bless")
         return baseline_from_json(read_text(self.baseline), str(self.baseline))
 
-    def finding(self, name: str) -> Finding:
-        """What became of a grasp, simulated now.
+    def tested(self, name: str) -> tuple[Finding, Verdict | None]:
+        """What became of a grasp, and the verdict on it now, if it is still there.
 
         Raises:
             InputError: A file or the grasp is refused.
@@ -77,11 +78,11 @@ class Suite:
         entries = tuple(entry for entry in before.entries if entry.id == name)
         if one:
             chosen = SavedGrasps(saved.body, saved.friction, saved.seed, one, saved.finger)
-            after = measured(chosen, before.grasps_file, setup, agenda, 1, _silent)
+            done = measured(chosen, before.grasps_file, setup, agenda, 1, _silent)
         else:
-            after = replace(before, entries=())
-        (found,) = compare(replace(before, entries=entries), after)
-        return found
+            done = Measured(replace(before, entries=()), {})
+        (found,) = compare(replace(before, entries=entries), done.baseline)
+        return found, done.verdicts.get(name)
 
     def bless(self) -> Baseline:
         """Simulate all grasps and write the baseline.
@@ -98,7 +99,9 @@ class Suite:
             noise=self.noise,
             seed=saved.seed if self.seed is None else self.seed,
         )
-        found = measured(saved, self.grasps.name, setup_for(saved, self.setup), agenda, 1, _silent)
+        setup = setup_for(saved, self.setup)
+        where = seen_from(self.baseline, self.grasps)
+        found = measured(saved, where, setup, agenda, 1, _silent).baseline
         write_text(self.baseline, baseline_to_json(found))
         return found
 

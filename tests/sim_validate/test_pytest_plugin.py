@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from xml.etree import ElementTree
@@ -9,8 +10,9 @@ from xml.etree import ElementTree
 import pytest
 
 import grasp_core as gc
-from grasp_core.records import plan_to_json
+from grasp_core.records import grasps_from_json, plan_to_json
 from scenes.objects import example_object
+from sim_validate.cli import Exit, main
 from sim_validate.files import write_text
 
 CODE = """
@@ -25,11 +27,52 @@ def test_it_holds(assert_stable):
 
 def test_it_does_not(assert_stable):
     import dataclasses
-    from sim_validate.setup import Agenda, NamedWrench
+    from sim_validate.setup import NamedWrench
     body = scenes.example_object("wedge")
     grasp = gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps[0]
     push = NamedWrench("push", [0.0, 0.0, 900.0, 0.0, 0.0, 0.0])
-    assert_stable(body, grasp, 0.5, agenda=Agenda(wrenches=(push,)))
+    assert_stable(body, grasp, 0.5, wrenches=[push])
+"""
+
+
+MARKED = """
+import pytest
+import scenes
+
+@pytest.mark.grasp("grasps.json")
+def test_of_a_file(grasp_case, assert_stable):
+    assert assert_stable(grasp_case).held
+
+@pytest.mark.grasp(object="wedge", friction=0.4, limit=1, families=("pencil",))
+def test_planned(grasp_case, assert_stable):
+    assert grasp_case.friction == 0.4
+    assert grasp_case.grasp.family == "pencil"
+
+@pytest.mark.grasp(object="box.obj", unit="mm")
+def test_a_mesh(grasp_case):
+    assert grasp_case.body.radius < 0.1
+
+def test_unmarked(grasp_case):
+    pass
+"""
+BOX = "\n".join(
+    [f"v {x} {y} {z}" for x in (0, 30) for y in (0, 20) for z in (0, 10)]
+    + ["f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"]
+)
+DEMANDS = """
+import pytest
+
+pytestmark = pytest.mark.grasp(object="wedge")
+
+def test_good_enough(grasp_case, assert_stable):
+    assert_stable(grasp_case, min_margin=0.3, trials=5, min_pass_rate=0.5)
+
+def test_close_to_slipping(grasp_case, assert_stable):
+    assert_stable(grasp_case, min_margin=0.49)
+
+def test_often_dropped(grasp_case, assert_stable):
+    from sim_validate.noise import Noise
+    assert_stable(grasp_case, trials=20, noise=Noise(mass=0.5), min_pass_rate=0.99)
 """
 
 
@@ -41,6 +84,12 @@ def pytest_in(folder, *arguments):
         line, cwd=folder, env=plain, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False
     )
     return ran.returncode, ran.stdout.decode()
+
+
+def copied(project, folder):
+    for path in project.iterdir():
+        if path.is_file():
+            (folder / path.name).write_bytes(path.read_bytes())
 
 
 @pytest.fixture(scope="module")
@@ -75,9 +124,7 @@ def test_they_pass_on_several_workers_too(blessed):
 
 
 def test_a_regression_says_what_was_and_what_is(blessed, tmp_path):
-    for path in blessed.iterdir():
-        if path.is_file():
-            (tmp_path / path.name).write_bytes(path.read_bytes())
+    copied(blessed, tmp_path)
     baseline = tmp_path / "wedge.baseline.json"
     record = json.loads(baseline.read_text())
     record["grasps"][0].update(limit_n=1e3)
@@ -91,8 +138,96 @@ def test_a_regression_says_what_was_and_what_is(blessed, tmp_path):
     assert "limit_n: 1000 -> " in said
     assert "predicted" in said
     assert f"graspproof baseline check {baseline}" in said
+    assert f"graspproof replay {baseline} --grasp {name} --out replay" in said
     assert "gone: missing" in said
     assert "Traceback" not in said
+
+
+def test_a_grasp_that_slips_says_at_which_wrench_and_how_to_replay_it(blessed, tmp_path):
+    """A wrench in the baseline's settings that no finger can hold."""
+    copied(blessed, tmp_path)
+    baseline = tmp_path / "wedge.baseline.json"
+    record = json.loads(baseline.read_text())
+    record["settings"]["wrenches"] = {"far too much": [0.0, 0.0, 90.0, 0.0, 0.0, 0.0]}
+    baseline.write_text(json.dumps(record))
+    code, said = pytest_in(tmp_path)
+    assert code == 1
+    assert "held -> slipped at far too much" in said
+    assert "first wrench that was not held: far too much [0.0, 0.0, 90.0" in said
+    assert "predicted limit 0." in said
+    line = next(line for line in said.splitlines() if "graspproof replay" in line)
+    words = shlex.split(line.split("graspproof ", 1)[1])
+    assert words[-4:-1] == ["--wrench", "far too much", "--out"]
+    assert main([*words[:-1], str(tmp_path / "replay"), "-q"]) == Exit.NEGATIVE
+    assert (tmp_path / "replay" / "trace.csv").is_file()
+
+
+@pytest.mark.parametrize("workers", [(), ("-n", "2")], ids=["alone", "xdist"])
+def test_a_report_has_a_line_for_each_grasp(blessed, tmp_path, workers):
+    copied(blessed, tmp_path)
+    baseline = tmp_path / "wedge.baseline.json"
+    record = json.loads(baseline.read_text())
+    record["grasps"][0].update(limit_n=1e3)
+    baseline.write_text(json.dumps(record))
+    write_text(tmp_path / "test_mine.py", CODE)
+    code, said = pytest_in(tmp_path, "--grasp-report", "out/report", *workers)
+    assert code == 1, said
+    found = json.loads((tmp_path / "out" / "report" / "report.json").read_text())["grasps"]
+    assert sorted(line["status"] for line in found) == ["regressed", "same", "stable", "unstable"]
+    regressed = next(line for line in found if line["status"] == "regressed")
+    assert regressed["before"]["limit_n"] == 1e3
+    assert regressed["after"]["limit_n"] < 10.0
+    assert "graspproof replay" in regressed["why"]
+    page = (tmp_path / "out" / "report" / "index.html").read_text()
+    assert page.count("<tr") == 5
+    assert "was 1000" in page
+    assert "1 regressed, 1 same, 1 stable, 1 unstable" in page
+
+
+def test_marked_tests_run_with_each_grasp(blessed, tmp_path):
+    copied(blessed, tmp_path)
+    write_text(tmp_path / "test_marked.py", MARKED)
+    write_text(tmp_path / "box.obj", BOX)
+    code, said = pytest_in(tmp_path, "-v", "--strict-markers", "test_marked.py")
+    assert code == 1, said
+    names = [grasp.id for grasp in grasps_from_json((tmp_path / "grasps.json").read_text()).grasps]
+    for name in names:
+        assert f"test_of_a_file[{name}] PASSED" in said
+    assert said.count("test_planned[p-") == 1
+    assert said.count("test_a_mesh[") == 1
+    assert "test_unmarked: grasp_case needs @pytest.mark.grasp" in said
+    assert f"{2 + len(names)} passed, 1 error" in said
+
+
+@pytest.mark.parametrize(
+    ("marker", "message"),
+    [
+        ("", "needs a grasps.json, or object="),
+        ("object='no-such'", "no-such"),
+        ("object='wedge', taste=1", "got 'taste'"),
+        ("'grasps.json', limit=1", "takes friction here; got 'limit'"),
+        ("object='box', cones='normal', families=('pencil',)", "there is no grasp of box"),
+    ],
+)
+def test_a_wrong_marker_is_named(tmp_path, marker, message):
+    write_text(
+        tmp_path / "test_it.py",
+        f"import pytest\n@pytest.mark.grasp({marker})\ndef test_it(grasp_case): pass\n",
+    )
+    code, said = pytest_in(tmp_path)
+    assert code == 2
+    assert message in said
+    assert "Traceback" not in said
+
+
+def test_more_can_be_asked_for(tmp_path):
+    write_text(tmp_path / "test_demands.py", DEMANDS)
+    code, said = pytest_in(tmp_path)
+    assert code == 1, said
+    assert "2 failed, 1 passed" in said
+    assert "less than 0.49 above the predicted critical one" in said
+    assert "asked for are 0.99" in said
+    assert "of 20 held (" in said
 
 
 def test_without_a_baseline_it_is_said_how_to_make_one(blessed, tmp_path):

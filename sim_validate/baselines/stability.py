@@ -1,0 +1,80 @@
+"""Whether a grasp is as stable as a test asks for."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from grasp_core.values import Grasp, Polyhedron
+from sim_validate.baselines.explaining import unstable
+from sim_validate.grasp_verdict import Verdict
+from sim_validate.noise import Noise
+from sim_validate.setup import Agenda, NamedWrench, Setup
+from sim_validate.validation import validate
+
+
+@dataclass(frozen=True, slots=True)
+class Demands:
+    """What a grasp is tried with, beside the usual wrenches and controls, and must reach."""
+
+    wrenches: Sequence[NamedWrench] = ()
+    """To hold as they are."""
+    trials: int = 0
+    """Repeats with noise."""
+    noise: Noise = field(default_factory=Noise)
+    min_pass_rate: float = 0.0
+    """Least share of repeats that must hold."""
+    min_margin: float = 0.0
+    """Least distance of the friction from the critical one, by analysis and in simulation."""
+    random_wrenches: int = 0
+    seed: int = 0
+    setup: Setup = field(default_factory=Setup)
+    """How trials are simulated."""
+
+
+def checked(
+    body: Polyhedron, grasp: Grasp, friction: float, demands: Demands
+) -> tuple[Verdict, str]:
+    """Simulate a grasp and say what is wrong with it.
+
+    Args:
+        body: The object.
+        grasp: In force closure at this friction.
+        friction: Coulomb coefficient.
+        demands: What it must reach.
+
+    Returns:
+        The verdict, and what is wrong, empty if nothing is.
+
+    Raises:
+        InputError: The grasp or a setting is refused.
+        UnfaithfulError: The simulator fails the gate.
+    """
+    agenda = Agenda(
+        random_wrenches=demands.random_wrenches,
+        wrenches=tuple(demands.wrenches),
+        trials=demands.trials,
+        noise=demands.noise,
+        seed=demands.seed,
+    )
+    verdict = validate(body, grasp, friction, agenda=agenda, setup=demands.setup)
+    said, lacking = unstable(verdict), list(_lacking(verdict, demands))
+    if lacking and not said:
+        said = f"{verdict.id} at friction {verdict.friction}: less than is asked for"
+    return verdict, "\n  ".join([said, *lacking])
+
+
+def _lacking(verdict: Verdict, demands: Demands) -> Iterator[str]:
+    """What is less than asked for."""
+    found = verdict.robustness
+    if found is not None and found.held < demands.min_pass_rate * len(found.trials):
+        lower, upper = found.interval
+        yield (
+            f"with noise {found.held} of {len(found.trials)} held ({lower:.3g} to {upper:.3g} of "
+            f"all with 95 % confidence), asked for are {demands.min_pass_rate:g}"
+        )
+    critical = verdict.critical_friction
+    for how, value in (("predicted", critical.predicted), ("simulated", critical.simulated)):
+        if value is not None and verdict.friction - value < demands.min_margin:
+            yield (
+                f"friction {verdict.friction:g} is less than {demands.min_margin:g} above the "
+                f"{how} critical one, {value:.6g}"
+            )
