@@ -16,6 +16,7 @@ from sim_validate.gate import require_faithful
 from sim_validate.grasp_verdict import Verdict
 from sim_validate.jobs import Job, validated
 from sim_validate.noise import Noise
+from sim_validate.rounding import arithmetic
 from sim_validate.setup import Agenda, NamedWrench, Setup
 from sim_validate.setup_file import setup_from_file, setup_from_tables, tables_of
 from sim_validate.validate_command import finger_settings, planned_fingers
@@ -68,6 +69,7 @@ def measured(
         friction=saved.friction,
         settings=settings_of(setup, agenda),
         versions=versions(),
+        arithmetic=arithmetic(),
         entries=tuple(sorted(entries, key=lambda entry: entry.id)),
     )
     return Measured(baseline, verdicts)

@@ -13,7 +13,7 @@ from sim_validate.setup import WEAKEST
 from sim_validate.wrench_verdict import WrenchVerdict
 
 DIGITS = 12
-"""Of numbers that are kept: more than differ between runs with the same versions."""
+"""Of numbers that are kept."""
 NUMBERS = (
     "critical_friction", "simulated_critical_friction", "limit_n", "simulated_limit_n",
     "displacement_m", "rotation_rad",
@@ -71,6 +71,8 @@ class Baseline:
     settings: Mapping[str, Any]
     """How trials were simulated, and which."""
     versions: Mapping[str, str]
+    arithmetic: str
+    """A hash of how the process rounds that measured them."""
     entries: tuple[Entry, ...]
     """Sorted by id."""
 

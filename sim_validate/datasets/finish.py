@@ -20,8 +20,9 @@ from sim_validate.datasets.given import given_text
 from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest, listed, write_manifest
 from sim_validate.datasets.staging import Finished, Staging
 from sim_validate.datasets.tables import TableFiles
-from sim_validate.datasets.units import WorkUnit, arithmetic, provenance, units_sha256
+from sim_validate.datasets.units import WorkUnit, provenance, units_sha256
 from sim_validate.files import write_text
+from sim_validate.rounding import arithmetic
 
 DATA = "data"
 TWIN = "the same object as"

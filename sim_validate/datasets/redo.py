@@ -28,9 +28,10 @@ from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.rows import id_beginning
 from sim_validate.datasets.selection import Selection
 from sim_validate.datasets.tables import as_read
-from sim_validate.datasets.units import WorkUnit, arithmetic, provenance
+from sim_validate.datasets.units import WorkUnit, provenance
 from sim_validate.datasets.walking import ObjectRows, Row, by_object
 from sim_validate.files import read_text
+from sim_validate.rounding import arithmetic
 
 ROUNDING = 1e-6
 """How far numbers may be apart that other packages or processors round, relative to the larger."""

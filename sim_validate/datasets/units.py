@@ -14,9 +14,6 @@ from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
-
-import numpy as np
 
 from grasp_core.errors import GraspError, InputError
 from grasp_core.mesh import FORMATS
@@ -83,19 +80,6 @@ def provenance() -> Mapping[str, str]:
             digest.update(path.read_bytes())
     more = {"pyarrow": version("pyarrow"), "code_sha256": digest.hexdigest()}
     return MappingProxyType(versions() | more)
-
-
-@cache
-def arithmetic() -> str:
-    """A hash of what linear algebra gives here: the same on processors that round alike."""
-    rng = np.random.default_rng(0)
-    digest = hashlib.sha256()
-    for size in (3, 6, 12, 24, 64):
-        A: Any = rng.normal(size=(size, size))
-        answers: Any = (A @ A.T, np.linalg.solve(A, A[0]), np.linalg.inv(A))
-        for answer in answers:
-            digest.update(answer.tobytes())
-    return digest.hexdigest()
 
 
 def shared_settings(config: DatasetConfig) -> dict[str, object]:

@@ -30,9 +30,11 @@ BEFORE = Baseline(
     friction=0.5,
     settings={"setup": {"physics": {"timestep_s": 0.001}}, "seed": 0},
     versions={"graspproof": "1", "mujoco": "4.0.0", "machine": "x86_64", "numpy": "2"},
+    arithmetic="as here",
     entries=(ENTRY,),
 )
 OTHERS = {"versions": {**BEFORE.versions, "mujoco": "4.1.0"}}
+ROUNDING = {"arithmetic": "as elsewhere"}
 
 
 def now(header=None, **changed):
@@ -65,7 +67,7 @@ def test_nothing_changed():
         ({"noisy_held": 50}, "held with noise: 80 of 100 -> 50"),
     ],
 )
-@pytest.mark.parametrize("header", [{}, OTHERS], ids=["same versions", "others"])
+@pytest.mark.parametrize("header", [{}, ROUNDING, OTHERS], ids=["same", "rounding", "others"])
 def test_what_is_worse_is_a_regression_and_the_other_way_round_an_improvement(
     changed, reason, header
 ):
@@ -86,11 +88,25 @@ def test_what_is_worse_is_a_regression_and_the_other_way_round_an_improvement(
 )  # fmt: skip
 def test_small_differences_count_with_the_same_versions_only(changed):
     assert found(now(**changed)).status is Status.REGRESSED
+    assert found(now(ROUNDING, **changed)).status is Status.REGRESSED
     assert found(now(OTHERS, **changed)).status is Status.WITHIN
 
 
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"critical_friction": 0.2 * (1.0 + 5e-7)}, {"simulated_critical_friction": 0.2005},
+        {"limit_n": 3.0 - 1e-6}, {"simulated_limit_n": 2.98}, {"displacement_m": 1e-5 + 5e-7},
+        {"rotation_rad": 1e-4 + 5e-6},
+    ],
+)  # fmt: skip
+def test_what_rounding_does_counts_on_processors_that_round_alike_only(changed):
+    assert found(now(**changed)).status is Status.REGRESSED
+    assert found(now(ROUNDING, **changed)).status is Status.WITHIN
+
+
 def test_the_last_digits_do_not_count():
-    close = now(critical_friction=0.2 * (1.0 + 5e-10), displacement_m=1e-5 + 5e-7)
+    close = now(critical_friction=0.2 * (1.0 + 5e-10), displacement_m=1e-5 + 5e-13)
     assert found(close).status is Status.WITHIN
 
 
