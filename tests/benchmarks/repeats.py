@@ -22,7 +22,7 @@ from pathlib import Path
 
 from grasp_core.records import grasps_from_json
 from sim_validate.baselines.baseline_file import baseline_from_json
-from sim_validate.baselines.comparing import Finding, compare
+from sim_validate.baselines.comparing import compare
 from sim_validate.baselines.measuring import measured, of_settings
 
 FOLDER = Path(__file__).parents[1] / "stability"
@@ -43,36 +43,34 @@ def main() -> int:
         begun, counts = time.perf_counter(), Counter()
         with load(busy):
             for _ in range(asked.times):
-                for name in asked.objects:
-                    counts.update(check(name))
+                counts.update(check(asked.objects))
         others += sum(count for status, count in counts.items() if status != "same")
         said = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
-        print(
-            f"{title}: {asked.times} times: {said} ({time.perf_counter() - begun:.0f} s)",
-            flush=True,
-        )
+        took = time.perf_counter() - begun
+        print(f"{title}: {asked.times} times: {said} ({took:.0f} s)", flush=True)
     return int(others > 0)
 
 
-def checked(name: str) -> list[str]:
-    """What became of each grasp of an object, in this process."""
+def checked(names: list[str]) -> list[str]:
+    """What became of each grasp of some objects, in this process."""
+    return [status for name in names for status in statuses(name)]
+
+
+def statuses(name: str) -> list[str]:
     path = FOLDER / name / f"{name}.baseline.json"
     before = baseline_from_json(path.read_text(), str(path))
     saved = grasps_from_json((path.parent / before.grasps_file).read_text())
     setup, agenda = of_settings(before.settings, str(path))
     after = measured(saved, before.grasps_file, setup, agenda, 1, lambda *_: None).baseline
-    return [status(finding) for finding in compare(before, after)]
+    return [" ".join([each.status.value, *each.reasons]) for each in compare(before, after)]
 
 
-def status(finding: Finding) -> str:
-    return " ".join([finding.status.value, *finding.reasons])
-
-
-def by_pytest(name: str) -> list[str]:
+def by_pytest(names: list[str]) -> list[str]:
     """The same by the plugin, on several workers."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "pytest", "-q", "-n", str(WORKERS), "-p", "no:cacheprovider",
-                   "--grasp-report", folder, str(FOLDER / name)]  # fmt: skip
+        flags = ("-q", "-n", str(WORKERS), "-p", "no:cacheprovider", "--grasp-report", folder)
+        paths = [str(FOLDER / name) for name in names]
+        command = [sys.executable, "-m", "pytest", *flags, *paths]
         subprocess.run(command, stdout=subprocess.DEVNULL, check=False)
         found = json.loads((Path(folder) / "report.json").read_text())["grasps"]
     return [line["status"] for line in found]
