@@ -1,0 +1,102 @@
+"""What the README and docs/baselines.md say about baselines, done as they say it."""
+
+import dataclasses
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from sim_validate.baselines.comparing import EXACT, ROUNDING, Bands, Status
+from sim_validate.baselines.suite import KINDS, suite_from_toml
+from sim_validate.baselines.values import Entry
+from sim_validate.cli import Exit, main
+from sim_validate.noise import Noise
+from tests.sim_validate.test_pytest_plugin import pytest_in
+
+ROOT = Path(__file__).parent.parent
+PAGE = (ROOT / "docs" / "baselines.md").read_text()
+README = re.search(r"## Baselines\n(.*?)\n## ", (ROOT / "README.md").read_text(), re.DOTALL)[1]
+
+
+def block(text, language):
+    (found,) = re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+    return found
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """A folder in which the README's commands were run."""
+    monkeypatch.chdir(tmp_path)
+    lines = block(README, "sh").splitlines()
+    assert len(lines) == 3
+    for line in lines:
+        assert main([*shlex.split(line)[1:], "-q"]) == Exit.GOOD
+    return tmp_path
+
+
+def test_the_readme_in_a_project_of_somebody_else(project):
+    assert (project / "results.xml").is_file()
+    (project / "wedge.baseline.json").unlink()
+    (project / "wedge.grasps.toml").write_text(block(README, "toml"))
+    (project / "test_mine.py").write_text(block(README, "py"))
+    code, said = pytest_in(project, "--grasp-bless", "wedge.grasps.toml")
+    assert code == 0, said
+    assert (project / "wedge.baseline.json").is_file()
+    code, said = pytest_in(project, "--strict-markers", "-W", "error", "--grasp-report", "report")
+    assert code == 0, said
+    assert "5 passed" in said
+    assert "3 same, 2 stable" in (project / "report" / "index.html").read_text()
+
+
+def test_the_tests_of_the_page_pass(project):
+    (project / "test_page.py").write_text(block(PAGE, "python"))
+    code, said = pytest_in(project, "test_page.py", "--strict-markers", "-W", "error")
+    assert code == 0, said
+    assert "5 passed" in said
+
+
+def test_all_settings_are_shown(tmp_path):
+    path = tmp_path / "wedge.grasps.toml"
+    path.write_text(block(PAGE, "toml"))
+    suite = suite_from_toml(path)
+    assert set(re.findall(r"^\[?(\w+)", block(PAGE, "toml"), re.MULTILINE)) >= set(KINDS)
+    assert suite.baseline == tmp_path / "wedge.baseline.json"
+    assert suite.noise == dataclasses.replace(Noise(), friction=0.1)
+
+
+def test_all_fields_and_all_answers_are_described():
+    for field in dataclasses.fields(Entry):
+        assert f"`{field.name}`" in PAGE
+    for status in Status:
+        assert f"`{status.value}`" in PAGE
+
+
+def test_the_bands_are_those_of_the_page():
+    rows = dict(re.findall(r"^\| ([^|]+) \| (.+) \|$", PAGE, re.MULTILINE))
+    by_analysis = rows["critical friction and limits, by analysis"]
+    assert by_analysis.split(" | ") == ["1e-9 of them", "1e-6 of them + 1e-7", "5 %"]
+    assert [EXACT.predicted, ROUNDING.predicted, Bands().predicted] == [1e-9, 1e-6, 0.05]
+    assert [EXACT.least, ROUNDING.least] == [0.0, 1e-7]
+    assert rows["the same in simulation"].split(" | ")[1] == ".5 % + 1e-7"
+    assert [EXACT.simulated, ROUNDING.simulated, Bands().simulated] == [1e-9, 5e-3, 0.05]
+    assert rows["displacement, rotation"] == "1e-12 | 1 um, 1e-5 rad | .2 mm, .2 deg"
+    assert [ROUNDING.displacement_m, ROUNDING.rotation_rad] == [1e-6, 1e-5]
+    assert Bands().displacement_m == 2e-4
+    assert [ROUNDING.grey, Bands().grey] == [1e-4, 0.02]
+
+
+def test_noise_is_as_the_page_says():
+    said = re.findall(r"\| `--noise-[^|]*\| [^|]* \| ([^|]*) \|", PAGE)
+    assert [text.split()[0] for text in said] == [".01", "1", "5", "5"]
+    assert Noise() == Noise(0.01, 1.0, 1.0, 0.05, 0.05)
+
+
+@pytest.mark.slow
+def test_repeated_checks_are_the_same_each_time():
+    command = [sys.executable, "-m", "tests.benchmarks.repeats", "--times", "2"]
+    ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stdout
+    assert ran.stdout.count("2 times: 24 same (") == 3
