@@ -294,6 +294,13 @@ def four(items: Iterable[Item]) -> tuple[Item, Item, Item, Item]:
     return listed
 
 
+def stacked(contacts: Iterable[Contact]) -> tuple[Array, Array]:
+    """Positions and inward normals of contacts, each (k, 3)."""
+    listed = tuple(contacts)
+    positions = np.array([contact.position for contact in listed])
+    return positions, np.array([contact.normal for contact in listed])
+
+
 def contact_arrays(positions: ArrayLike | Grasp, normals: ArrayLike | None) -> tuple[Array, Array]:
     """Positions and inward normals, each (k, 3), from a grasp or from two arrays.
 

@@ -78,7 +78,8 @@ def _graphics() -> Iterator[str]:
 
 def _drawn(job: Path, out: Path, graphics: str) -> str:
     """Draw in another process; what went wrong, empty if nothing."""
-    command = [sys.executable, "-m", "scenes.frames", str(job), str(out)]
+    program = str(Path(__file__).with_name("frames.py"))
+    command = [sys.executable, "-P", program, str(job), str(out)]
     settings = {**os.environ, "MUJOCO_GL": graphics}
     try:
         ran = subprocess.run(  # noqa: S603 - our own program

@@ -1,6 +1,6 @@
 """A scene and what moved in it -> an animated picture; a program of its own.
 
-Run as `python -m scenes.frames JOB.npz OUT.gif`, by `scenes.clips` only: which graphics MuJoCo uses
+Run as `python -P frames.py JOB.npz OUT.gif`, by `scenes.clips` only: which graphics MuJoCo uses
 is chosen when it is first imported, and a driver that is broken may end the whole process.
 """
 

@@ -3,16 +3,17 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
 
-from grasp_core.records import SavedGrasps, grasps_from_json
 from sim_validate import baseline_flags, cli
-from sim_validate.baselines.baseline_file import baseline_from_json, baseline_to_json
-from sim_validate.baselines.comparing import Finding, Status, compare, failing
+from sim_validate.baselines.baseline_file import check_writable, read_baseline, write_baseline
+from sim_validate.baselines.checking import Checked, check
+from sim_validate.baselines.comparing import Finding, Status, failing
 from sim_validate.baselines.junit import junit_text
-from sim_validate.baselines.measuring import measured, of_settings, seen_from, setup_for
+from sim_validate.baselines.measuring import complete, measured, seen_from
+from sim_validate.baselines.settings import of_settings, setup_for
 from sim_validate.console import TABLE_ROWS, Reporter
-from sim_validate.files import read_text, write_text
+from sim_validate.files import write_text
+from sim_validate.grasps_file import read_grasps
 from sim_validate.plan_command import say_cut
 from sim_validate.setup import Agenda
 from sim_validate.setup_file import setup_from_file
@@ -22,8 +23,8 @@ from sim_validate.wrench_file import wrenches_from_file
 
 def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
     """Write a baseline."""
-    saved = _read(command.grasps, command.limit)
-    setup = setup_for(saved, command.setup)
+    check_writable(command.out)
+    saved = read_grasps(command.grasps)
     agenda = Agenda(
         random_wrenches=command.random_wrenches,
         wrenches=() if command.wrenches is None else wrenches_from_file(command.wrenches),
@@ -32,11 +33,11 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
         noise=noise_of(command.repeats),
         seed=saved.seed if command.seed is None else command.seed,
     )
-    where = seen_from(command.out, command.grasps)
+    setup, about = setup_for(saved, command.setup), seen_from(command.out, command.grasps)
     with reporter.progress("simulating") as steps:
-        done = measured(saved, where, setup, agenda, command.jobs, steps.update)
-    found = done.baseline
-    write_text(command.out, baseline_to_json(found))
+        done = measured(saved, (about, command.limit), setup, agenda, command.jobs, steps.update)
+    found = complete(done)
+    write_baseline(command.out, found)
     held = sum(entry.held for entry in found.entries)
     reporter.say(f"wrote {command.out}: {held} of {len(found.entries)} grasps held")
     reporter.document({"baseline": str(command.out), "grasps": len(found.entries), "held": held})
@@ -45,25 +46,24 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
 
 def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     """Say what became of the grasps of a baseline."""
-    before = baseline_from_json(read_text(command.baseline), str(command.baseline))
+    before = read_baseline(command.baseline)
     path = command.grasps or command.baseline.parent / before.grasps_file
-    saved = _read(path)
+    saved = read_grasps(path)
     setup, agenda = of_settings(before.settings, str(command.baseline))
     if command.setup is not None:
         setup = setup_from_file(command.setup, setup)
+    where = seen_from(command.baseline, path)
     with reporter.progress("simulating") as steps:
-        done = measured(saved, before.grasps_file, setup, agenda, command.jobs, steps.update)
-    after = done.baseline
-    findings = compare(before, after)
+        done = check(before, saved, where, (setup, agenda), command.jobs, steps.update)
     if command.junit is not None:
-        text = junit_text(str(command.baseline), findings, strict=command.strict)
+        text = junit_text(str(command.baseline), done.findings, strict=command.strict)
         write_text(command.junit, text)
-    _show(findings, reporter)
+    _show(done, reporter)
     if command.bless:
-        write_text(command.baseline, baseline_to_json(after))
+        write_baseline(command.baseline, complete(done.measured))
         reporter.say(f"wrote {command.baseline}")
         return cli.Exit.GOOD
-    return exit_code(findings, strict=command.strict)
+    return exit_code(done.findings, strict=command.strict)
 
 
 def exit_code(findings: Sequence[Finding], *, strict: bool) -> int:
@@ -74,22 +74,23 @@ def exit_code(findings: Sequence[Finding], *, strict: bool) -> int:
     return cli.Exit.INPUT if Status.NOT_COMPARABLE in came else cli.Exit.GOOD
 
 
-def _read(path: Path, limit: int | None = None) -> SavedGrasps:
-    saved = grasps_from_json(read_text(path))
-    return SavedGrasps(saved.body, saved.friction, saved.seed, saved.grasps[:limit], saved.finger)
-
-
-def _show(findings: Sequence[Finding], reporter: Reporter) -> None:
-    told = [finding for finding in findings if finding.status is not Status.SAME]
-    rows = [(each.id, each.status.value, "; ".join(each.reasons)) for each in told]
+def _show(done: Checked, reporter: Reporter) -> None:
+    told = [finding for finding in done.findings if finding.status is not Status.SAME]
+    rows = [(each.id, each.status.value, _why(each)) for each in told]
     if rows:
         reporter.table("what became of grasps", ("grasp", "status", "why"), rows[:TABLE_ROWS])
         say_cut(len(rows), reporter)
-    counts = Counter(finding.status.value for finding in findings)
+    counts = Counter(finding.status.value for finding in done.findings)
     reporter.say(", ".join(f"{count} {name}" for name, count in sorted(counts.items())))
-    reporter.document(
-        {"counts": dict(counts), "grasps": [_record(finding) for finding in findings]}
-    )
+    reporter.say(f"compared {done.how}")
+    listed = [_record(finding) for finding in done.findings]
+    reporter.document({"counts": dict(counts), "compared": done.how, "grasps": listed})
+
+
+def _why(finding: Finding) -> str:
+    """The reasons; then, where they are not what differs, that."""
+    more = [text for text in finding.differences if text not in finding.reasons]
+    return "; ".join([*finding.reasons, *more])
 
 
 def _record(finding: Finding) -> dict[str, object]:
@@ -97,6 +98,7 @@ def _record(finding: Finding) -> dict[str, object]:
         "id": finding.id,
         "status": finding.status.value,
         "reasons": list(finding.reasons),
+        "differences": list(finding.differences),
         "before": None if finding.before is None else asdict(finding.before),
         "after": None if finding.after is None else asdict(finding.after),
     }

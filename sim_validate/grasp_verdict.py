@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 
+from grasp_core.values import Contact
 from scenes.mjcf import Scene
 from sim_validate.control_trials import ControlVerdict
 from sim_validate.gate import Gate
 from sim_validate.independent import Bounds
+from sim_validate.noise.repeats import Robustness
 from sim_validate.released import CriticalFriction
-from sim_validate.robustness import Robustness
 from sim_validate.setup import Agenda, Setup
 from sim_validate.verdict import Outcome
 from sim_validate.wrench_verdict import AGREEMENT, WrenchVerdict
@@ -18,6 +19,7 @@ class Verdict:
     """What simulation says about a grasp."""
 
     id: str
+    contacts: tuple[Contact, ...]
     friction: float
     critical_friction: CriticalFriction
     wrenches: tuple[WrenchVerdict, ...]
@@ -34,10 +36,14 @@ class Verdict:
     agenda: Agenda
 
     @property
+    def failures(self) -> tuple[WrenchVerdict, ...]:
+        """The wrenches that were not held, in order."""
+        return tuple(trial for trial in self.wrenches if trial.hold.outcome is not Outcome.HELD)
+
+    @property
     def outcome(self) -> Outcome:
-        """`held`, or how the first wrench that did not hold ended."""
-        ends = (trial.hold.outcome for trial in self.wrenches)
-        return next((end for end in ends if end is not Outcome.HELD), Outcome.HELD)
+        """`held`, or how the first wrench that was not held ended."""
+        return self.failures[0].hold.outcome if self.failures else Outcome.HELD
 
     @property
     def held(self) -> bool:

@@ -33,10 +33,20 @@ def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
         InputError: A grasp is refused.
         UnfaithfulError: The simulator fails the gate.
     """
+    return each(verdict_of, with_threads(jobs, processors), jobs=processors)
+
+
+def with_threads(jobs: Sequence[Job], processors: int) -> list[Job]:
+    """Jobs whose simulations share the processors that are too many for so few of them."""
     threads = max(1, processors // processes(len(jobs), processors))
-    tasks = [replace(job, setup=replace(job.setup, threads=threads)) for job in jobs]
-    return each(_try, tasks, jobs=processors)
+    return [replace(job, setup=replace(job.setup, threads=threads)) for job in jobs]
 
 
-def _try(job: Job) -> Verdict:
+def verdict_of(job: Job) -> Verdict:
+    """Validate one grasp.
+
+    Raises:
+        InputError: The grasp is refused.
+        UnfaithfulError: The simulator fails the gate.
+    """
     return validate(job.body, job.grasp, job.friction, agenda=job.agenda, setup=job.setup)

@@ -7,11 +7,11 @@ import numpy as np
 
 from grasp_core.arrays import Array, to_digits
 from grasp_core.resisted_wrenches import WrenchBody, WrenchLimit, axis_wrenches
-from grasp_core.values import Contact, Polyhedron, contact_frictions
+from grasp_core.values import Contact, Polyhedron, contact_frictions, stacked
 from grasp_core.wrenches import normal_and_tangential
 from sim_validate.limits import part
 from sim_validate.schedules import Load
-from sim_validate.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, NamedWrench, Setup
+from sim_validate.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, Setup
 
 NO_PUSH = 1e-9
 """Normal forces below this, in largest ones, are none."""
@@ -50,16 +50,14 @@ def planned_loads(
         agenda: Which wrenches.
         setup: The largest normal force, and the share of the limit that is applied.
     """
-    resisted, normals = _resisted(body, contacts, friction, setup), _normals(contacts)
+    resisted, (_, normals) = _resisted(body, contacts, friction, setup), stacked(contacts)
     share = setup.hold.load_share
     relative = [
         _load(name, found, share * found.limit, idle, normals)
         for name, found in _relative(resisted, body.radius, agenda)
     ]
-    own = [
-        _load(named.name, resisted.limit(named.wrench), 1.0, idle, normals)
-        for named in agenda.wrenches
-    ]
+    named = [(each.name, each.wrench) for each in agenda.wrenches]
+    own = loads_as_they_are(body, contacts, friction, idle, named, setup)
     return (*relative, *own)
 
 
@@ -68,7 +66,7 @@ def loads_as_they_are(
     contacts: Sequence[Contact],
     friction: float,
     idle: Load,
-    wrenches: Sequence[NamedWrench],
+    wrenches: Sequence[tuple[str, Array]],
     setup: Setup,
 ) -> tuple[PlannedLoad, ...]:
     """Given wrenches as loads on contacts.
@@ -78,28 +76,25 @@ def loads_as_they_are(
         contacts: In force closure at this friction.
         friction: Coulomb coefficient at every contact.
         idle: No wrench, and the forces of the gentle grasp.
-        wrenches: To hold as they are.
+        wrenches: To hold as they are, by name, (6,) each [N, N m].
         setup: The largest normal force.
     """
-    resisted, normals = _resisted(body, contacts, friction, setup), _normals(contacts)
+    resisted, (_, normals) = _resisted(body, contacts, friction, setup), stacked(contacts)
     return tuple(
-        _load(named.name, resisted.limit(named.wrench), 1.0, idle, normals) for named in wrenches
+        _load(name, resisted.limit(wrench), 1.0, idle, normals) for name, wrench in wrenches
     )
 
 
 def _resisted(
     body: Polyhedron, contacts: Sequence[Contact], friction: float, setup: Setup
 ) -> WrenchBody:
+    positions, normals = stacked(contacts)
     return WrenchBody(
-        np.array([contact.position for contact in contacts]) - body.center_of_mass,
-        _normals(contacts),
+        positions - body.center_of_mass,
+        normals,
         contact_frictions(friction, len(contacts)),
         setup.fingers.max_normal_force_n,
     )
-
-
-def _normals(contacts: Sequence[Contact]) -> Array:
-    return np.array([contact.normal for contact in contacts])
 
 
 def _relative(

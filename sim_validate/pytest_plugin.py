@@ -4,7 +4,6 @@ Nothing but pytest is imported until such a file, the fixtures or the marker are
 """
 
 from collections.abc import Callable, Generator, Iterator
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +19,9 @@ MARKER = (
     "test with each grasp of a grasps.json, or planned for an object, as its fixture `grasp_case`"
 )
 LINES = pytest.StashKey[list[dict[str, Any]]]()
-"""What became of grasps: in one test, and of the whole run."""
+"""What became of grasps: in one phase of a test, and in the whole run."""
+TRAVELS = "_graspproof"
+"""Attribute of reports that has the same."""
 
 
 class UnstableError(AssertionError):
@@ -65,13 +66,14 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     from grasp_core.errors import GraspError
     from sim_validate.baselines.grasp_cases import grasp_cases
 
-    settings = dict(marker.kwargs)
-    file = marker.args[0] if marker.args else settings.pop("file", None)
+    wrong = ""
     try:
-        cases = grasp_cases(metafunc.definition.path.parent, file, settings)
+        cases = grasp_cases(metafunc.definition.path.parent, marker.args, marker.kwargs)
+        metafunc.parametrize("grasp_case", cases, ids=[case.grasp.id for case in cases])
     except GraspError as error:
-        pytest.fail(str(error), pytrace=False)
-    metafunc.parametrize("grasp_case", cases, ids=[case.grasp.id for case in cases])
+        wrong = str(error)
+    if wrong:  # outside, so that the report shows it once
+        pytest.fail(wrong, pytrace=False)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -80,8 +82,9 @@ def pytest_runtest_makereport(
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Give what became of grasps to the report, which travels between processes."""
     report = yield
-    if report.when == "call":
-        report.grasps = item.stash.get(LINES, [])  # type: ignore[attr-defined]
+    if lines := item.stash.get(LINES, None):
+        setattr(report, TRAVELS, lines)
+        del item.stash[LINES]
     return report
 
 
@@ -104,7 +107,7 @@ class _Collecting:
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Take what a test, here or in another process, has to say."""
-        self._lines += getattr(report, "grasps", [])
+        self._lines += getattr(report, TRAVELS, [])
 
 
 class GraspsFile(pytest.File):
@@ -118,7 +121,7 @@ class GraspsFile(pytest.File):
         bless = self.config.getoption("--grasp-bless")
         try:
             suite = suite_from_toml(self.path)
-            names = ["bless"] if bless else suite.ids()
+            names = ["bless"] if bless else suite.ids
         except GraspError as error:
             raise self.CollectError(str(error)) from error
         kind: Any = BlessItem if bless else GraspItem
@@ -149,19 +152,24 @@ class GraspItem(_SuiteItem):
 
     def runtest(self) -> None:
         """Fail where the grasp is worse, missing or new, or cannot be compared."""
+        from grasp_core.errors import GraspError
         from sim_validate.baselines.comparing import Status, failing
         from sim_validate.baselines.explaining import explained
+        from sim_validate.baselines.values import plain
 
-        finding, verdict = self.suite.tested(self.name)
-        fails = finding.status in (*failing(strict=self.suite.strict), Status.NOT_COMPARABLE)
+        suite = self.suite
+        try:
+            done = suite.tested(self.name)
+        except GraspError as error:
+            _note(self, self.name, "refused", str(error), None, None)
+            raise
+        (finding,) = done.findings
+        fails = finding.status in (*failing(strict=suite.strict), Status.NOT_COMPARABLE)
         told = fails or finding.status is not Status.SAME
-        why = explained(finding, verdict, self.suite.baseline) if told else ""
-        self.user_properties.append(("status", finding.status.value))
-        if finding.after is not None:
-            self.user_properties += list(asdict(finding.after).items())
-        before, after = (
-            None if entry is None else asdict(entry) for entry in (finding.before, finding.after)
-        )
+        files = suite.baseline, suite.grasps
+        why = explained(finding, done.verdicts.get(self.name), files, done.how) if told else ""
+        before, after = plain(finding.before), plain(finding.after)
+        self.user_properties += [("status", finding.status.value), *(after or {}).items()]
         _note(self, finding.id, finding.status.value, why, before, after)
         if fails:
             raise UnstableError(f"{why}\n  to accept it: pytest --grasp-bless {self.path}")
@@ -172,10 +180,12 @@ class BlessItem(_SuiteItem):
 
     def runtest(self) -> None:
         """Write the baseline."""
+        from sim_validate.baselines.values import plain
+
         found = self.suite.bless()
         self.user_properties.append(("grasps", len(found.entries)))
         for entry in found.entries:
-            _note(self, entry.id, "blessed", "", None, asdict(entry))
+            _note(self, entry.id, "blessed", "", None, plain(entry))
 
 
 @pytest.fixture
@@ -190,13 +200,12 @@ def assert_stable(
 ) -> Callable[..., "Verdict"]:
     """A function that simulates a grasp and fails the test unless it holds as predicted."""
 
-    def check(body: Any, grasp: Any = None, friction: float = 0.5, **asked: Any) -> "Verdict":
+    def check(*case: Any, friction: float | None = None, **asked: Any) -> "Verdict":
         """Simulate a grasp with its negative controls.
 
         Args:
-            body: The object; or a `grasp_case`, and nothing else of these three.
-            grasp: On its faces.
-            friction: Coulomb coefficient.
+            case: A `grasp_case`; or the object, a grasp on its faces, and the friction.
+            friction: Coulomb coefficient, in place of the case's, or .5.
             asked: Fields of `Demands`: `wrenches` to hold as they are, `trials` with `noise`,
                 `min_pass_rate` of them, `min_margin` of the friction over the critical one,
                 `random_wrenches`, `seed`, `setup`.
@@ -204,17 +213,19 @@ def assert_stable(
         Raises:
             UnstableError: A wrench was not held, a control was, the analysis is contradicted, or
                 less is reached than is asked for.
+            InputError: The grasp or what is asked for is refused.
         """
-        from sim_validate.baselines.stability import Demands, checked
-        from sim_validate.baselines.values import entry_of
+        from sim_validate.baselines.grasp_cases import case_of
+        from sim_validate.baselines.stability import checked, demands_of
+        from sim_validate.baselines.values import entry_of, plain
 
-        if grasp is None:
-            body, grasp, friction = body.body, body.grasp, body.friction
-        verdict, why = checked(body, grasp, friction, Demands(**asked))
-        entry = asdict(entry_of(grasp, verdict, body.radius))
-        for name, value in entry.items():
-            record_property(f"{grasp.id}.{name}", value)
-        _note(request.node, grasp.id, "unstable" if why else "stable", why, None, entry)
+        chosen = case_of(case, friction)
+        verdict, why = checked(chosen, demands_of(asked))
+        name = chosen.grasp.id
+        entry = plain(entry_of(chosen.grasp, verdict, chosen.body.radius)) or {}
+        for key, value in entry.items():
+            record_property(f"{name}.{key}", value)
+        _note(request.node, name, "unstable" if why else "stable", why, None, entry)
         if why:
             raise UnstableError(why)
         return verdict

@@ -3,7 +3,9 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from scenes.clips import GraphicsError, magnified, write_clip
+import numpy as np
+
+from scenes.clips import RATE, GraphicsError, magnified, write_clip
 from scenes.mjcf import write_scene
 from sim_validate import cli
 from sim_validate.console import Reporter
@@ -12,10 +14,13 @@ from sim_validate.replaying.bench import Replayed, replayed
 from sim_validate.replaying.sources import recorded_in
 from sim_validate.replaying.values import Recorded, Wanted
 from sim_validate.verdict import LET_GO, Outcome
+from sim_validate.verdict_records import finite
 
 SHOWN = 12
 """Rows of the trace that are shown; its file has all."""
 MICRO = 1e6
+SLOWER = 1.0 / (RATE * 0.01)
+"""Clips show a sample of ten milliseconds in each frame."""
 
 
 def replay_trial(command: cli.Replay, reporter: Reporter) -> int:
@@ -26,7 +31,8 @@ def replay_trial(command: cli.Replay, reporter: Reporter) -> int:
     said = recorded.outcome_of(found.name)
     _show(recorded, found, said, reporter)
     files = [] if command.out is None else list(_written(found, command, reporter))
-    reporter.document(_record(recorded, found, said) | {"files": [str(path) for path in files]})
+    record = _record(recorded, found, said) | {"files": [str(path) for path in files]}
+    reporter.document(finite(record))
     return cli.Exit.GOOD if _as_it_must(found, said) else cli.Exit.NEGATIVE
 
 
@@ -42,7 +48,7 @@ def _show(recorded: Recorded, found: Replayed, said: str | None, reporter: Repor
     trace, hold = found.watched.trace, found.hold
     step = max(1, len(trace.times_s) // SHOWN)
     rows = [
-        (f"{trace.times_s[row] - trace.times_s[0]:.3f}",
+        (f"{trace.times_s[row]:.3f}",
          *(f"{MICRO * value[row]:.3g}" for value in (trace.displacements_m, trace.rotations_rad)),
          *(f"{MICRO * value[row].max():.3g}" for value in (trace.slips_m, trace.gaps_m)))
         for row in range(0, len(trace.times_s), step)
@@ -65,8 +71,10 @@ def _written(found: Replayed, command: cli.Replay, reporter: Reporter) -> Iterat
     folder.mkdir(parents=True, exist_ok=True)
     yield write_scene(found.scene, folder / "scene.xml")
     yield write_text(folder / "trace.csv", trace_text(found))
-    joints, factor = magnified(found.watched.joints, found.scene)
+    known = np.isfinite(found.watched.joints).all(axis=1)
+    joints, factor = magnified(found.watched.joints[known], found.scene)
     motion = f"motion {factor:g} times as large" if factor > 1.0 else "true to scale"
+    motion += f", {SLOWER:g} times slower"
     caption = f"{found.name}: {found.hold.outcome.value}, {motion}"
     try:
         yield write_clip(found.scene, joints, folder / "clip.gif", caption)

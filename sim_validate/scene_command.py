@@ -1,17 +1,17 @@
 """The command that writes grasps as scenes."""
 
 from grasp_core.errors import InputError
-from grasp_core.records import grasps_from_json
 from scenes.mjcf import build_scene
 from sim_validate import cli
 from sim_validate.console import Reporter
-from sim_validate.files import read_text, write_text
+from sim_validate.files import write_text
+from sim_validate.grasps_file import read_grasps
 from sim_validate.validate_command import finger_settings, planned_fingers
 
 
 def write_scenes(command: cli.Scene, reporter: Reporter) -> int:
     """Write the scenes of a file's grasps, or print a single one."""
-    saved = grasps_from_json(read_text(command.grasps))
+    saved = read_grasps(command.grasps)
     chosen = [grasp for grasp in saved.grasps if command.grasp in (None, grasp.id)]
     if not chosen:
         ids = ", ".join(grasp.id for grasp in saved.grasps[:5])

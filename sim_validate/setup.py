@@ -8,13 +8,13 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from grasp_core.arrays import Array, frozen
+from grasp_core.arrays import Array, frozen, to_digits
 from grasp_core.errors import InputError
 from grasp_core.values import Contact, Grasp, Polyhedron
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, Surface, build_scene
 from scenes.physics import PhysicsSettings
-from sim_validate.noise import Noise
+from sim_validate.noise.draws import Noise
 from sim_validate.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.rules import rules_named
 
@@ -64,7 +64,8 @@ class NamedWrench:
 
     def __post_init__(self) -> None:
         """Refuse what could not be tested, or not be told apart in a file."""
-        object.__setattr__(self, "wrench", frozen(self.wrench, (6,), "wrench"))
+        given = frozen(self.wrench, (6,), "wrench")
+        object.__setattr__(self, "wrench", frozen(to_digits(given), (6,), "wrench"))
         size = float(np.abs(self.wrench).max())
         if not SMALLEST <= size <= LARGEST:
             raise InputError(

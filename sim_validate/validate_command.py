@@ -8,16 +8,17 @@ import numpy as np
 
 from grasp_core.errors import InputError
 from grasp_core.reach import Finger
-from grasp_core.records import SavedGrasps, grasps_from_json
+from grasp_core.records import SavedGrasps
 from grasp_core.values import Grasp
 from scenes.fingertips import FingerSettings
 from sim_validate import cli, flags
 from sim_validate.console import TABLE_ROWS, Reporter
-from sim_validate.files import read_text, write_arrays, write_text
+from sim_validate.files import write_arrays, write_text
 from sim_validate.gate import require_faithful
 from sim_validate.grasp_verdict import Verdict
+from sim_validate.grasps_file import read_grasps
 from sim_validate.jobs import Job, validated
-from sim_validate.noise import Noise
+from sim_validate.noise.draws import Noise
 from sim_validate.plan_command import say_cut
 from sim_validate.rules import RULES
 from sim_validate.setup import Agenda, Setup
@@ -30,7 +31,7 @@ from sim_validate.wrench_verdict import WrenchVerdict
 
 def validate_file(command: cli.Validate, reporter: Reporter) -> int:
     """Simulate the grasps of a file."""
-    saved = grasps_from_json(read_text(command.grasps))
+    saved = read_grasps(command.grasps)
     if not saved.grasps:
         absence = f"{command.grasps} holds no grasp"
         reporter.say(absence)
@@ -71,7 +72,14 @@ def finger_settings(given: flags.Fingers) -> FingerSettings:
 
 
 def noise_of(given: flags.Repeats) -> Noise:
-    """What the flags say about noise."""
+    """What the flags say about noise.
+
+    Raises:
+        InputError: There is noise, but no repeat to put it on.
+    """
+    plain = flags.Repeats()
+    if not given.trials and given != plain:
+        raise InputError("--noise-... is for repeats: give --trials, too")
     return Noise(
         shift=given.noise_shift,
         turn_deg=given.noise_turn_deg,

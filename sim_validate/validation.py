@@ -26,11 +26,11 @@ from sim_validate.grasp_verdict import Verdict
 from sim_validate.independent import Bounds, independent_bounds
 from sim_validate.limits import SimulatedLimit, bisected_limits, ramped_limits
 from sim_validate.loads import PlannedLoad, planned_loads
+from sim_validate.noise.repeats import Robustness, for_repeats, robustness
 from sim_validate.released import CriticalFriction, released_friction
 from sim_validate.rig import Rig, squeezed
-from sim_validate.robustness import Robustness, robustness
 from sim_validate.rules import FORCE_AXES, accepted, rules_named
-from sim_validate.setup import Agenda, NamedWrench, Setup
+from sim_validate.setup import Agenda, Setup
 from sim_validate.simulate import Bench
 from sim_validate.traces import Trace
 from sim_validate.verdict import invalid_start, judge
@@ -71,6 +71,7 @@ def validate(
     wrenches = trial.wrenches()
     return Verdict(
         id=grasp.id,
+        contacts=grasp.contacts,
         friction=friction,
         critical_friction=trial.critical(),
         wrenches=wrenches,
@@ -192,9 +193,8 @@ class _Bout:
         """What noise makes of it, if asked for: the same fingertips hold the same wrenches."""
         if not self.agenda.trials:
             return None
-        fingers = replace(self.setup.fingers, radius_m=self.layout.drive.radius_m)
-        setup = replace(self.setup, fingers=fingers, surface="pads")  # surfaces lean otherwise
-        loads = [NamedWrench(planned.name, planned.load.wrench) for planned in self.loads]
+        setup = for_repeats(self.setup, self.bench.scene)
+        loads = [(planned.name, planned.load.wrench) for planned in self.loads]
         return robustness(self.body, self.grasp, self.friction, loads, self.agenda, setup)
 
     def accepted_by(self) -> dict[str, bool]:

@@ -7,12 +7,13 @@ from dataclasses import asdict
 from typing import Any, cast
 
 from grasp_core.arrays import Array
+from grasp_core.contact_hash import contacts_sha256
 from grasp_core.values import Polyhedron
 from grasp_core.versions import versions
 from sim_validate.control_trials import ControlVerdict
 from sim_validate.gate import Gate
 from sim_validate.grasp_verdict import Verdict
-from sim_validate.robustness import Robustness
+from sim_validate.noise.repeats import Robustness
 from sim_validate.setup_file import OF_USERS
 from sim_validate.verdict import HoldVerdict, Outcome
 from sim_validate.wrench_verdict import WrenchVerdict
@@ -85,6 +86,7 @@ def _verdict_record(body: Polyhedron, verdict: Verdict) -> dict[str, object]:
     bounds = verdict.bounds
     return {
         "id": verdict.id,
+        "contacts_sha256": contacts_sha256(verdict.contacts),
         "outcome": verdict.outcome.value,
         "held": verdict.held,
         "mismatches": list(verdict.mismatches),

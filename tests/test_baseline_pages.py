@@ -13,7 +13,7 @@ from sim_validate.baselines.comparing import EXACT, ROUNDING, Bands, Status
 from sim_validate.baselines.suite import KINDS, suite_from_toml
 from sim_validate.baselines.values import Entry
 from sim_validate.cli import Exit, main
-from sim_validate.noise import Noise
+from sim_validate.noise.draws import Noise
 from tests.sim_validate.test_pytest_plugin import pytest_in
 
 ROOT = Path(__file__).parent.parent

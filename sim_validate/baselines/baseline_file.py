@@ -2,12 +2,18 @@
 
 import json
 from dataclasses import asdict, fields
+from pathlib import Path
 from typing import Any, cast
 
+from pydantic import TypeAdapter, ValidationError
+
 from grasp_core.errors import InputError
-from sim_validate.baselines.values import Baseline, Entry
+from sim_validate.baselines.values import Baseline
+from sim_validate.files import read_text, write_text
 
 SCHEMA = 1
+MARK = '"grasps_file"'
+"""What only baselines have."""
 
 
 def baseline_to_json(baseline: Baseline) -> str:
@@ -17,8 +23,8 @@ def baseline_to_json(baseline: Baseline) -> str:
         **{each.name: getattr(baseline, each.name) for each in fields(Baseline)},
     }
     del header["entries"]
-    head = json.dumps(header, indent=1, sort_keys=True).removesuffix("\n}")
-    lines = ",\n  ".join(json.dumps(asdict(entry)) for entry in baseline.entries)
+    head = json.dumps(header, indent=1, sort_keys=True, allow_nan=False).removesuffix("\n}")
+    lines = ",\n  ".join(json.dumps(asdict(entry), allow_nan=False) for entry in baseline.entries)
     return f'{head},\n "grasps": [\n  {lines}\n ]\n}}\n'
 
 
@@ -36,38 +42,44 @@ def baseline_from_json(text: str, path: str) -> Baseline:
         found: object = json.loads(text)
     except json.JSONDecodeError as error:
         raise InputError(f"{path}: not JSON ({error})") from error
-    if not isinstance(found, dict):
-        raise InputError(f"{path}: expected an object")
+    if not isinstance(found, dict) or "grasps_file" not in found:
+        raise InputError(f"{path}: is no baseline, which `graspproof baseline record` writes")
     record = cast("dict[str, Any]", found)
-    if record.get("schema") != SCHEMA:
-        raise InputError(f"{path}: schema: expected {SCHEMA}, got {record.get('schema')!r}")
-    names = {each.name for each in fields(Baseline)} - {"entries"}
-    if odd := sorted((record.keys() - {"schema", "grasps"}) ^ names):
-        raise InputError(f"{path}: {odd[0]}: is missing, or not known")
-    listed = record.pop("grasps", None)
-    if not isinstance(listed, list) or not listed:
-        raise InputError(f"{path}: grasps: expected a list of one or more")
-    entries = tuple(_entry(each, f"{path}: grasps[{i}]") for i, each in enumerate(listed))  # pyright: ignore
-    if len({entry.id for entry in entries}) < len(entries):
-        raise InputError(f"{path}: grasps: two have the same id")
-    return Baseline(**{name: record[name] for name in names}, entries=entries)
+    if record.pop("schema", None) != SCHEMA:
+        raise InputError(f"{path}: schema: expected {SCHEMA}")
+    record["entries"] = record.pop("grasps", None) or None  # a file with none checks nothing
+    try:
+        return TypeAdapter(Baseline).validate_json(json.dumps(record))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]).replace("entries", "grasps", 1)
+        raise InputError(f"{path}: {where}: {first['msg']}") from error
 
 
-def _entry(given: Any, where: str) -> Entry:
-    kinds = {each.name: getattr(each.type, "__name__", str(each.type)) for each in fields(Entry)}
-    if not isinstance(given, dict) or set(cast("dict[str, Any]", given)) != set(kinds):
-        raise InputError(f"{where}: expected {', '.join(kinds)}")
-    record = cast("dict[str, Any]", given)
-    for name, value in record.items():
-        if not _fits(value, kinds[name]):
-            raise InputError(f"{where}.{name}: expected {kinds[name]}, got {value!r}")
-    return Entry(**record)
+def read_baseline(path: Path) -> Baseline:
+    """The baseline of a file.
+
+    Raises:
+        InputError: It is missing or refused.
+    """
+    return baseline_from_json(read_text(path), str(path))
 
 
-def _fits(value: object, kind: str) -> bool:
-    if value is None:
-        return "None" in kind
-    if isinstance(value, bool):
-        return False
-    wanted = str if "str" in kind else int if "int" in kind else (int, float)
-    return isinstance(value, wanted)
+def write_baseline(path: Path, baseline: Baseline) -> None:
+    """Write a baseline to a new file, or over another baseline.
+
+    Raises:
+        InputError: The file is something else.
+    """
+    check_writable(path)
+    write_text(path, baseline_to_json(baseline))
+
+
+def check_writable(path: Path) -> None:
+    """Refuse a path at which something else than a baseline is, of whatever version.
+
+    Raises:
+        InputError: Something is.
+    """
+    if path.exists() and MARK not in read_text(path):
+        raise InputError(f"{path}: is no baseline, and will not be overwritten")

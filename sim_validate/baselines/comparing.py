@@ -6,17 +6,20 @@ into steps of theirs. Otherwise verdicts must be the same, but for grasps close 
 friction, which a trifle may decide, and numbers may differ within wider bands.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from enum import StrEnum
 from math import radians
 from typing import Any, cast
 
+from sim_validate.baselines.differences import Bands, Difference, differences
 from sim_validate.baselines.values import Baseline, Entry
-from sim_validate.proportions import differ
+from sim_validate.verdict import LET_GO, Outcome
 
 DECISIVE = ("graspproof", "mujoco", "machine")
-"""Versions that must be the same for results to be the same."""
+"""Versions of which others may change any result."""
+ASIDE = ("python",)
+"""Versions that change none."""
 
 
 class Status(StrEnum):
@@ -45,41 +48,22 @@ def failing(*, strict: bool) -> tuple[Status, ...]:
     return (*FAILED, Status.IMPROVED) if strict else FAILED
 
 
-@dataclass(frozen=True, slots=True)
-class Bands:
-    """How far results of other versions or processors may differ."""
-
-    predicted: float = 0.05
-    """Of critical frictions and limits by analysis, relative to the baseline's."""
-    simulated: float = 0.05
-    """Of those in simulation."""
-    least: float = 1e-7
-    """Differences of any of these that never count: critical frictions are proved to that."""
-    displacement_m: float = 2e-4
-    rotation_rad: float = radians(0.2)
-    grey: float = 0.02
-    """Grasps whose critical friction is closer to the friction than this, relative to it, may
-    change their verdict."""
-    exact: bool = False
-    """Whether as many repeats with noise must hold; else the counts may differ by chance."""
-
-
 EXACT = Bands(
-    predicted=1e-9,
-    simulated=1e-9,
-    least=0.0,
-    displacement_m=1e-12,
-    rotation_rad=1e-12,
-    grey=0.0,
-    exact=True,
-)
+    predicted=1e-9, simulated=1e-9, least=0.0, displacement_m=1e-12, rotation_rad=1e-12,
+    grey=0.0, exact=True,
+)  # fmt: skip
 """With the same versions and rounding: what is lost in writing numbers down."""
 ROUNDING = Bands(
-    predicted=1e-6, simulated=5e-3, displacement_m=1e-6, rotation_rad=1e-5, grey=1e-4, exact=True
-)
+    predicted=1e-6, simulated=5e-3, least=1e-7, displacement_m=1e-6, rotation_rad=1e-5,
+    grey=1e-4, exact=True,
+)  # fmt: skip
 """With the same versions: with linear algebra for another processor, or without compiled loops, no
 verdict of sixty grasps changed, predicted limits were the same to nine digits, critical frictions
 to 5e-9, motions of some 1e-8 m to .6 %, and what is sought by halving to two steps of .13 %."""
+OTHER_VERSIONS = Bands(
+    predicted=0.05, simulated=0.05, least=1e-7, displacement_m=2e-4, rotation_rad=radians(0.2),
+    grey=0.02, exact=False,
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,55 +73,76 @@ class Finding:
     id: str
     status: Status
     reasons: tuple[str, ...] = ()
+    """Why, in words."""
+    differences: tuple[str, ...] = ()
+    """Everything that is not as it was, in words."""
     before: Entry | None = None
     after: Entry | None = None
 
 
-@dataclass(slots=True)
-class _Differences:
-    """What is worse and what is better, in words."""
+def bands_between(before: Baseline, after: Baseline) -> tuple[Bands, str]:
+    """How far results may differ, and because of what, in words."""
+    names = sorted({*before.versions, *after.versions} - {*ASIDE})
+    others = [
+        f"{name} {before.versions.get(name)} -> {after.versions.get(name)}"
+        for name in names
+        if before.versions.get(name) != after.versions.get(name)
+    ]
+    if any(name in DECISIVE and before.versions.get(name) != after.versions.get(name)
+           for name in names):  # fmt: skip
+        return OTHER_VERSIONS, f"with the bands of other versions: {', '.join(others)}"
+    if others or before.arithmetic != after.arithmetic:
+        why = ", ".join([*others, *(["another processor"] if not others else [])])
+        return ROUNDING, f"with the bands of rounding: {why}"
+    return EXACT, "exactly"
 
-    worse: list[str] = field(default_factory=list[str])
-    better: list[str] = field(default_factory=list[str])
 
-    def add(self, text: str, *, worse: bool) -> None:
-        (self.worse if worse else self.better).append(text)
-
-
-def compare(before: Baseline, after: Baseline, bands: Bands = Bands()) -> tuple[Finding, ...]:
+def compare(
+    before: Baseline, after: Baseline, refused: Mapping[str, str] | None = None
+) -> tuple[Finding, ...]:
     """What became of each grasp, sorted by id.
 
     Args:
         before: The baseline.
         after: What was measured now.
-        bands: For other versions or processors.
+        refused: Why grasps could not be simulated, by id.
     """
-    if any(before.versions.get(name) != after.versions.get(name) for name in DECISIVE):
-        allowed = bands
-    else:
-        allowed = EXACT if before.arithmetic == after.arithmetic else ROUNDING
+    refused = refused or {}
+    bands, _ = bands_between(before, after)
     changed = tuple(_changed(before, after))
+    another = before.content_sha256 != after.content_sha256
     old = {entry.id: entry for entry in before.entries}
     new = {entry.id: entry for entry in after.entries}
     found = list[Finding]()
-    for name in sorted(old.keys() | new.keys()):
+    for name in sorted({*old, *new, *refused}):
         one, other = old.get(name), new.get(name)
-        if one is None:
-            found.append(Finding(name, Status.NEW, ("not in the baseline",), None, other))
-        elif other is None:
-            reasons = ("in the baseline, but not among the grasps",)
-            found.append(Finding(name, Status.MISSING, reasons, one, None))
+        if one is not None and other is not None:
+            found.append(_compared(one, other, before.friction, changed, bands))
+        elif name in refused:
+            status = Status.NOT_COMPARABLE if changed else Status.REGRESSED
+            why = (*changed, f"refused: {refused[name]}")
+            found.append(Finding(name, status, why, (), one, other))
+        elif another:
+            found.append(Finding(name, Status.NOT_COMPARABLE, changed, (), one, other))
+        elif one is None:
+            found.append(Finding(name, Status.NEW, ("not in the baseline",), (), one, other))
         else:
-            found.append(_compared(one, other, before.friction, changed, allowed))
+            reasons = ("in the baseline, but not among the grasps",)
+            found.append(Finding(name, Status.MISSING, reasons, (), one, other))
     return tuple(found)
 
 
 def _changed(before: Baseline, after: Baseline) -> Iterator[str]:
     """Why two baselines cannot be compared."""
     if before.content_sha256 != after.content_sha256:
-        yield f"the object is another one: {before.object} has changed"
+        same = before.object == after.object
+        named = f"{before.object} has changed" if same else f"{before.object} -> {after.object}"
+        yield f"the object is another one: {named}"
     if before.friction != after.friction:
         yield f"friction: {before.friction} -> {after.friction}"
+    if before.planned_radius_m != after.planned_radius_m:
+        radii = f"{before.planned_radius_m} -> {after.planned_radius_m}"
+        yield f"fingertips that were planned for: radius_m {radii}"
     yield from _settings_changed("", dict(before.settings), dict(after.settings))
 
 
@@ -154,63 +159,33 @@ def _settings_changed(where: str, before: Any, after: Any) -> Iterator[str]:
 def _compared(
     one: Entry, other: Entry, friction: float, changed: tuple[str, ...], bands: Bands
 ) -> Finding:
+    every = differences(one, other, bands)
+    texts = tuple(each.text for each in every)
     if one.contacts_sha256 != other.contacts_sha256:
         changed = (*changed, "the contacts are others")
     if changed:
-        return Finding(one.id, Status.NOT_COMPARABLE, changed, one, other)
-    if one.held != other.held and _is_grey(one, friction, bands):
-        reason = f"{one.outcome} -> {other.outcome}, at its critical friction"
-        return Finding(one.id, Status.GREY, (reason,), one, other)
-    found = _Differences()
-    _compare_verdicts(one, other, found)
-    _compare_numbers(one, other, bands, found)
-    _compare_repeats(one, other, bands, found)
-    if found.worse:
-        return Finding(one.id, Status.REGRESSED, tuple(found.worse), one, other)
-    if found.better:
-        return Finding(one.id, Status.IMPROVED, tuple(found.better), one, other)
-    return Finding(one.id, Status.SAME if one == other else Status.WITHIN, (), one, other)
+        return Finding(one.id, Status.NOT_COMPARABLE, changed, texts, one, other)
+    grey = _is_grey(one, other, friction, bands)
+    counting = [each for each in every if each.counts and not (grey and each.of_holding)]
+    status = _status(counting, grey=grey, same=one == other)
+    reasons = tuple(each.text for each in counting if each.worse is (status is Status.REGRESSED))
+    if status is Status.GREY:
+        reasons = (f"{one.outcome} -> {other.outcome}, at its critical friction",)
+    return Finding(one.id, status, reasons, texts, one, other)
 
 
-def _is_grey(entry: Entry, friction: float, bands: Bands) -> bool:
-    return abs(friction - entry.critical_friction) <= bands.grey * friction
+def _status(counting: list[Difference], *, grey: bool, same: bool) -> Status:
+    if any(each.worse for each in counting):
+        return Status.REGRESSED
+    if grey:
+        return Status.GREY
+    if counting:
+        return Status.IMPROVED
+    return Status.SAME if same else Status.WITHIN
 
 
-def _compare_verdicts(one: Entry, other: Entry, found: _Differences) -> None:
-    if one.outcome != other.outcome:
-        at = f" at {other.first_failure}" if other.first_failure else ""
-        found.add(f"{one.outcome} -> {other.outcome}{at}", worse=not other.held)
-    for name, text in (("controls_held", "negative controls that held"),
-                       ("mismatches", "contradictions of the analysis")):  # fmt: skip
-        before, after = getattr(one, name), getattr(other, name)
-        if before != after:
-            found.add(f"{text}: {before} -> {after}", worse=after > before)
-
-
-def _compare_repeats(one: Entry, other: Entry, bands: Bands, found: _Differences) -> None:
-    """How many repeats with noise held: a count where the draws are the same, else a sample."""
-    before, after = one.noisy_held, other.noisy_held
-    counts = (before, one.noisy_trials), (after, other.noisy_trials)
-    if before != after and (bands.exact or differ(*counts)):
-        text = f"held with noise: {before} of {one.noisy_trials} -> {after}"
-        found.add(text, worse=after < before)
-
-
-def _compare_numbers(one: Entry, other: Entry, bands: Bands, found: _Differences) -> None:
-    """Numbers that differ by more than they may; a larger one is worse but for limits."""
-    rows = (
-        ("critical_friction", "predicted", 1.0), ("simulated_critical_friction", "simulated", 1.0),
-        ("limit_n", "predicted", -1.0), ("simulated_limit_n", "simulated", -1.0),
-        ("displacement_m", "displacement_m", 1.0), ("rotation_rad", "rotation_rad", 1.0),
-    )  # fmt: skip
-    for name, band, sign in rows:
-        before, after = getattr(one, name), getattr(other, name)
-        if before is None or after is None:
-            if before != after:
-                found.add(f"{name}: {before} -> {after}", worse=after is None)
-            continue
-        relative = band in ("predicted", "simulated")
-        allowed = getattr(bands, band) * (abs(before) if relative else 1.0)
-        allowed += bands.least if relative else 0.0
-        if abs(after - before) > allowed:
-            found.add(f"{name}: {before:.12g} -> {after:.12g}", worse=sign * (after - before) > 0.0)
+def _is_grey(one: Entry, other: Entry, friction: float, bands: Bands) -> bool:
+    """Whether wrenches that were held are let go, or the other way round, on the brink."""
+    brink = abs(friction - one.critical_friction) <= bands.grey * friction
+    decided = all(entry.outcome in (Outcome.HELD, *LET_GO) for entry in (one, other))
+    return brink and decided and one.held != other.held

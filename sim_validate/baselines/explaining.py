@@ -7,48 +7,43 @@ from pathlib import Path
 from sim_validate.baselines.comparing import Finding
 from sim_validate.baselines.values import Entry
 from sim_validate.grasp_verdict import Verdict
-from sim_validate.verdict import Outcome
 from sim_validate.wrench_verdict import WrenchVerdict
 
 
-def explained(finding: Finding, verdict: Verdict | None, baseline: Path) -> str:
+def explained(finding: Finding, verdict: Verdict | None, files: tuple[Path, Path], how: str) -> str:
     """What became of a grasp: predicted, simulated, baseline, and the commands to go on with.
 
     Args:
         finding: What became of it.
         verdict: The one of now, if it could be simulated.
-        baseline: The file.
+        files: The baseline and the grasps.
+        how: They were compared, in words.
     """
     lines = [f"{finding.id}: {finding.status.value}", *(f"  {why}" for why in finding.reasons)]
+    lines += [f"  {text}" for text in finding.differences if text not in finding.reasons]
+    lines += [f"  compared {how}"] if how else []
     for title, entry in (("baseline", finding.before), ("now", finding.after)):
         lines += [] if entry is None else _numbers(title, entry)
-    failed = None if verdict is None else first_failure(verdict)
+    failed = verdict.failures[0] if verdict is not None and verdict.failures else None
     if failed is not None:
         lines.append(f"  first wrench that was not held: {in_words(failed)}")
-    quoted = shlex.quote(str(baseline))
+    baseline, grasps = (shlex.quote(str(path)) for path in files)
     if verdict is not None:
-        chosen = "" if failed is None else f" --wrench {shlex.quote(failed.name)}"
-        which = f"--grasp {shlex.quote(finding.id)}{chosen}"
-        lines.append(f"  to see it: graspproof replay {quoted} {which} --out replay")
-    lines.append(f"  all of them: graspproof baseline check {quoted}")
+        chosen = "" if failed is None else f" --wrench={shlex.quote(failed.name)}"
+        which = f"--grasp {shlex.quote(finding.id)}{chosen} --grasps {grasps}"
+        lines.append(f"  to see it: graspproof replay {baseline} {which} --out replay")
+    lines.append(f"  all of them: graspproof baseline check {baseline} --grasps {grasps}")
     return "\n".join(lines)
 
 
 def unstable(verdict: Verdict) -> str:
     """What did not hold, or held and must not; empty if everything is as it must be."""
     lines = [f"{verdict.id} at friction {verdict.friction}: {verdict.outcome.value}"]
-    failed = first_failure(verdict)
-    if failed is not None:
-        lines.append(f"  {in_words(failed)}")
-    lines += [f"  control {each.control.name} held" for each in verdict.controls if each.held]
+    lines += [f"  {in_words(failed)}" for failed in verdict.failures[:1]]
+    lines += [f"  control {each.control.name} was not let go"
+              for each in verdict.controls if not each.failed]  # fmt: skip
     lines += [f"  {text}" for text in verdict.mismatches]
     return "" if verdict.good else "\n".join(lines)
-
-
-def first_failure(verdict: Verdict) -> WrenchVerdict | None:
-    """The first wrench that was not held, if there is one."""
-    tried = verdict.wrenches
-    return next((trial for trial in tried if trial.hold.outcome is not Outcome.HELD), None)
 
 
 def in_words(trial: WrenchVerdict) -> str:
@@ -62,9 +57,9 @@ def in_words(trial: WrenchVerdict) -> str:
 
 
 def _numbers(title: str, entry: Entry) -> Iterator[str]:
-    failed = f" at {entry.first_failure}" if entry.first_failure else ""
+    failed = f" at {entry.not_held[0]}" if entry.not_held else ""
     simulated = number(entry.simulated_critical_friction)
-    yield f"  {title}: {entry.outcome}{failed}, moved {entry.displacement_m:.3g} m"
+    yield f"  {title}: {entry.outcome}{failed}, moved {number(entry.displacement_m)} m"
     yield f"    critical friction {entry.critical_friction:.6g} predicted, {simulated} simulated"
     limit = number(entry.simulated_limit_n)
     yield f"    weakest wrench {entry.limit_n:.6g} N predicted, {limit} simulated"

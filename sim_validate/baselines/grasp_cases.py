@@ -1,18 +1,19 @@
 """Grasps that a marked test is run with: those of a file, or planned on the spot."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError
 from grasp_core.planner import plan
 from grasp_core.polyhedra import load_polyhedron
-from grasp_core.records import grasps_from_json
 from grasp_core.values import Grasp, Polyhedron
-from scenes.objects import example_names, example_object
-from sim_validate.files import read_text
+from scenes.objects import example_object
+from sim_validate.grasps_file import read_grasps
 
+FRICTION = 0.5
+"""Unless another is given."""
 SETTINGS = ("object", "friction", "limit", "families", "cones", "seed", "unit")
 
 
@@ -25,32 +26,73 @@ class GraspCase:
     friction: float
 
 
-def grasp_cases(folder: Path, file: str | None, settings: Mapping[str, Any]) -> list[GraspCase]:
+def case_of(given: Sequence[Any], friction: float | None) -> GraspCase:
+    """A case from what a test gives: one, or an object, a grasp, and perhaps the friction.
+
+    Args:
+        given: In that order.
+        friction: In place of the case's own.
+
+    Raises:
+        InputError: It is something else.
+    """
+    kinds: list[type[Any]] = [type(each) for each in given]
+    if kinds == [GraspCase]:
+        case: GraspCase = given[0]
+        return case if friction is None else replace(case, friction=_number(friction))
+    if kinds[:2] == [Polyhedron, Grasp] and len(given) <= len(fields(GraspCase)):
+        named = [] if friction is None else [friction]
+        frictions = [*given[2:], *named]
+        if len(frictions) <= 1:
+            return GraspCase(given[0], given[1], _number(*frictions) if frictions else FRICTION)
+    got = ", ".join(kind.__name__ for kind in kinds)
+    raise InputError(f"expected a grasp_case, or an object, a grasp and the friction; got {got}")
+
+
+def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) -> list[GraspCase]:
     """The grasps of a marker.
 
     Args:
         folder: Paths start there.
-        file: A grasps.json; grasps are planned if None.
+        args: A grasps.json; grasps are planned if there is none.
         settings: `object` (a mesh file or a built-in object), `unit`, and what `plan` takes; with a
             file `friction` alone.
 
     Raises:
         InputError: A setting is unknown, missing or refused, or there is no grasp.
     """
-    known = ("friction",) if file is not None else SETTINGS
+    if len(args) > 1 or not all(isinstance(each, str) for each in args):
+        raise InputError(f"@pytest.mark.grasp takes one file of grasps, got {list(args)}")
+    known = ("friction",) if args else SETTINGS
     for name in settings:
         if name not in known:
-            raise InputError(f"@pytest.mark.grasp takes {', '.join(known)} here; got {name!r}")
-    if file is not None:
-        saved = grasps_from_json(read_text(folder / file))
-        body, grasps, friction = saved.body, saved.grasps, settings.get("friction", saved.friction)
+            beside = "beside a file takes" if args else "takes"
+            raise InputError(f"@pytest.mark.grasp {beside} {', '.join(known)}; got {name!r}")
+    friction = _number(settings.get("friction", FRICTION))
+    if args:
+        saved = read_grasps(folder / args[0])
+        body, grasps = saved.body, saved.grasps
+        friction = friction if "friction" in settings else saved.friction
     else:
-        wanted: dict[str, Any] = {"friction": 0.5, "limit": 1, **settings}
-        body, friction = _body(folder, wanted), wanted["friction"]
-        grasps = plan(body, **wanted).grasps
+        wanted: dict[str, Any] = {"limit": 1, **settings, "friction": friction}
+        body = _body(folder, wanted)
+        grasps = _planned(body, wanted)
     if not grasps:
         raise InputError(f"@pytest.mark.grasp: there is no grasp of {body.name}")
     return [GraspCase(body, grasp, friction) for grasp in grasps]
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"friction must be a number, got {value!r}")
+    return float(value)
+
+
+def _planned(body: Polyhedron, wanted: Mapping[str, Any]) -> Sequence[Grasp]:
+    try:
+        return plan(body, **wanted).grasps
+    except (TypeError, ValueError) as error:
+        raise InputError(f"@pytest.mark.grasp: a setting is of the wrong kind: {error}") from error
 
 
 def _body(folder: Path, wanted: dict[str, Any]) -> Polyhedron:
@@ -58,6 +100,6 @@ def _body(folder: Path, wanted: dict[str, Any]) -> Polyhedron:
     name, unit = wanted.pop("object", None), wanted.pop("unit", "m")
     if not isinstance(name, str):
         raise InputError("@pytest.mark.grasp needs a grasps.json, or object=...")
-    if name in example_names():
-        return example_object(name)
-    return load_polyhedron(folder / name, unit=unit)
+    if Path(name).suffix:
+        return load_polyhedron(folder / name, unit=unit)
+    return example_object(name)

@@ -17,7 +17,7 @@ Line: TypeAlias = Mapping[str, Any]
 PAGE, DATA = "index.html", "report.json"
 COLUMNS = ("test", "grasp", "what became of it", "outcome", "critical friction", "in simulation",
            "weakest wrench, N", "in simulation", "moved, um", "held with noise", "why")  # fmt: skip
-CALM = ("same", "within bands", "stable")
+CALM = ("same", "within bands", "stable", "blessed")
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem; color: #223; }
 table { border-collapse: collapse; } th, td { padding: .3rem .7rem; text-align: left; }
@@ -77,7 +77,8 @@ def _row(table: ElementTree.Element, line: Line) -> None:
         if before and _said(name, before) != _said(name, after):
             _add(cell, "div", f"was {_said(name, before)}").set("class", "was")
     trials = after.get("noisy_trials")
-    _add(row, "td", f"{after['noisy_held']} of {trials}" if trials else "")
+    held = trials - len(after["noisy_not_held"]) if trials else 0
+    _add(row, "td", f"{held} of {trials}" if trials else "")
     _add(_add(row, "td"), "pre", str(line["why"]))
 
 

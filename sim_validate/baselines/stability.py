@@ -1,19 +1,26 @@
 """Whether a grasp is as stable as a test asks for."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any
 
-from grasp_core.values import Grasp, Polyhedron
+from grasp_core.errors import InputError
+from grasp_core.values import LARGEST_FRICTION
 from sim_validate.baselines.explaining import unstable
+from sim_validate.baselines.grasp_cases import GraspCase
 from sim_validate.grasp_verdict import Verdict
-from sim_validate.noise import Noise
+from sim_validate.noise.draws import Noise
 from sim_validate.setup import Agenda, NamedWrench, Setup
 from sim_validate.validation import validate
 
 
 @dataclass(frozen=True, slots=True)
 class Demands:
-    """What a grasp is tried with, beside the usual wrenches and controls, and must reach."""
+    """What a grasp is tried with, beside the usual wrenches and controls, and must reach.
+
+    Raises:
+        InputError: A number is none, or out of its range, or a share of no repeats is asked for.
+    """
 
     wrenches: Sequence[NamedWrench] = ()
     """To hold as they are."""
@@ -29,16 +36,36 @@ class Demands:
     setup: Setup = field(default_factory=Setup)
     """How trials are simulated."""
 
+    def __post_init__(self) -> None:
+        for name, most in (("min_pass_rate", 1.0), ("min_margin", LARGEST_FRICTION)):
+            value = getattr(self, name)
+            if not (isinstance(value, int | float) and 0.0 <= value <= most):
+                raise InputError(f"{name} must be from 0 to {most:g}, got {value!r}")
+        if self.min_pass_rate > 0.0 and not self.trials:
+            raise InputError("min_pass_rate is a share of repeats with noise: give trials, too")
+        for each in self.wrenches:
+            if not isinstance(each, NamedWrench):  # pyright: ignore[reportUnnecessaryIsInstance]
+                raise InputError(f"wrenches must be NamedWrench values, got {each!r}")
 
-def checked(
-    body: Polyhedron, grasp: Grasp, friction: float, demands: Demands
-) -> tuple[Verdict, str]:
+
+def demands_of(asked: Mapping[str, Any]) -> Demands:
+    """What a test asks for by name.
+
+    Raises:
+        InputError: There is no such demand, or its value is refused.
+    """
+    known = [each.name for each in fields(Demands)]
+    for name in asked:
+        if name not in known:
+            raise InputError(f"assert_stable takes {', '.join(known)}; got {name!r}")
+    return Demands(**asked)
+
+
+def checked(case: GraspCase, demands: Demands) -> tuple[Verdict, str]:
     """Simulate a grasp and say what is wrong with it.
 
     Args:
-        body: The object.
-        grasp: In force closure at this friction.
-        friction: Coulomb coefficient.
+        case: The grasp on its object, and the friction.
         demands: What it must reach.
 
     Returns:
@@ -55,7 +82,7 @@ def checked(
         noise=demands.noise,
         seed=demands.seed,
     )
-    verdict = validate(body, grasp, friction, agenda=agenda, setup=demands.setup)
+    verdict = validate(case.body, case.grasp, case.friction, agenda=agenda, setup=demands.setup)
     said, lacking = unstable(verdict), list(_lacking(verdict, demands))
     if lacking and not said:
         said = f"{verdict.id} at friction {verdict.friction}: less than is asked for"

@@ -2,59 +2,73 @@
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError
-from grasp_core.records import SavedGrasps, grasps_from_json
-from sim_validate.baselines.baseline_file import baseline_from_json, baseline_to_json
-from sim_validate.baselines.comparing import Finding, compare
-from sim_validate.baselines.measuring import Measured, measured, of_settings, seen_from, setup_for
+from grasp_core.records import SavedGrasps
+from sim_validate.baselines.baseline_file import check_writable, read_baseline, write_baseline
+from sim_validate.baselines.checking import Checked, check_one, silent
+from sim_validate.baselines.measuring import (
+    complete,
+    measured,
+    seen_from,
+    with_planned_fingers,
+)
+from sim_validate.baselines.settings import noise_from_table, of_settings, setup_for
 from sim_validate.baselines.values import Baseline
-from sim_validate.files import read_text, write_text
-from sim_validate.grasp_verdict import Verdict
-from sim_validate.noise import Noise
-from sim_validate.setup import Agenda
+from sim_validate.files import read_text
+from sim_validate.grasps_file import read_grasps
+from sim_validate.noise.draws import Noise
+from sim_validate.setup import Agenda, Setup
+from sim_validate.wrench_file import wrenches_from_file
 
 ENDING = ".grasps.toml"
 KINDS: Mapping[str, type] = {
-    "grasps": str, "baseline": str, "setup": str, "limits": str, "strict": bool,
+    "grasps": str, "baseline": str, "strict": bool, "setup": str, "wrenches": str, "limits": str,
     "random_wrenches": int, "trials": int, "noise": dict, "seed": int,
 }  # fmt: skip
 """Settings of the file, and what they are."""
+PATHS = ("grasps", "baseline", "setup", "wrenches")
+DIRECT = ("limits", "random_wrenches", "trials", "seed")
+"""Fields of an agenda as the file has them."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Suite:
-    """Grasps that must stay as they were."""
+    """Grasps that must stay as they were; settings that are None are the baseline's."""
 
+    path: Path
+    """Of the file that says so."""
     grasps: Path
     """A grasps.json."""
     baseline: Path
     strict: bool = False
     """Whether what is better fails, too."""
     setup: Path | None = None
-    """TOML file of simulation settings, for a new baseline."""
-    limits: str = "none"
-    """How limits are found in simulation, in a new baseline."""
-    random_wrenches: int = 0
-    trials: int = 0
-    """Repeats with noise, in a new baseline."""
-    noise: Noise = field(default_factory=Noise)
+    """TOML file of simulation settings."""
+    wrenches: Path | None = None
+    """JSON file of wrenches to hold beside the usual ones."""
+    limits: str | None = None
+    """How limits are found in simulation."""
+    random_wrenches: int | None = None
+    trials: int | None = None
+    """Repeats with noise."""
+    noise: Noise | None = None
     seed: int | None = None
 
-    def ids(self) -> list[str]:
-        """Of all grasps, in the file or in the baseline.
+    @cached_property
+    def saved(self) -> SavedGrasps:
+        """The grasps.
 
         Raises:
-            InputError: A file is missing or refused.
+            InputError: Their file is missing or refused.
         """
-        kept = (
-            {entry.id for entry in self.kept().entries} if self.baseline.is_file() else set[str]()
-        )
-        return sorted(kept | {grasp.id for grasp in self._saved().grasps})
+        return read_grasps(self.grasps)
 
+    @cached_property
     def kept(self) -> Baseline:
         """The baseline.
 
@@ -63,50 +77,67 @@ class Suite:
         """
         if not self.baseline.is_file():
             raise InputError(f"{self.baseline}: there is no baseline yet: pytest --grasp-bless")
-        return baseline_from_json(read_text(self.baseline), str(self.baseline))
+        return read_baseline(self.baseline)
 
-    def tested(self, name: str) -> tuple[Finding, Verdict | None]:
-        """What became of a grasp, and the verdict on it now, if it is still there.
+    @property
+    def ids(self) -> list[str]:
+        """Of all grasps, in the file or in the baseline.
 
         Raises:
-            InputError: A file or the grasp is refused.
+            InputError: A file is missing or refused.
+        """
+        kept = self.kept if self.baseline.is_file() else None
+        ours = {grasp.id for grasp in self.saved.grasps[: kept and kept.limit]}
+        return sorted(ours if kept is None else ours | {entry.id for entry in kept.entries})
+
+    @property
+    def where(self) -> str:
+        """The path of the grasps from the baseline's folder."""
+        return seen_from(self.baseline, self.grasps)
+
+    def tested(self, name: str) -> Checked:
+        """What became of one grasp, simulated with the baseline's settings and those of the file.
+
+        Raises:
+            InputError: A file is refused.
             UnfaithfulError: The simulator fails the gate.
         """
-        before, saved = self.kept(), self._saved()
-        setup, agenda = of_settings(before.settings, str(self.baseline))
-        one = tuple(grasp for grasp in saved.grasps if grasp.id == name)
-        entries = tuple(entry for entry in before.entries if entry.id == name)
-        if one:
-            chosen = SavedGrasps(saved.body, saved.friction, saved.seed, one, saved.finger)
-            done = measured(chosen, before.grasps_file, setup, agenda, 1, _silent)
-        else:
-            done = Measured(replace(before, entries=()), {})
-        (found,) = compare(replace(before, entries=entries), done.baseline)
-        return found, done.verdicts.get(name)
+        before = self.kept
+        return check_one(before, self.saved, self.where, self._settings(before), name)
 
     def bless(self) -> Baseline:
-        """Simulate all grasps and write the baseline.
+        """Simulate all grasps and write the baseline, with the settings that it has.
 
         Raises:
             InputError: A file or a grasp is refused.
             UnfaithfulError: The simulator fails the gate.
         """
-        saved = self._saved()
-        agenda = Agenda(
-            random_wrenches=self.random_wrenches,
-            limits=self.limits,  # pyright: ignore[reportArgumentType] - checked there
-            trials=self.trials,
-            noise=self.noise,
-            seed=saved.seed if self.seed is None else self.seed,
-        )
-        setup = setup_for(saved, self.setup)
-        where = seen_from(self.baseline, self.grasps)
-        found = measured(saved, where, setup, agenda, 1, _silent).baseline
-        write_text(self.baseline, baseline_to_json(found))
+        check_writable(self.baseline)
+        before, saved = self.kept if self.baseline.is_file() else None, self.saved
+        setup, agenda = self._settings(before)
+        if before is not None:
+            setup = with_planned_fingers(setup, before, saved)
+        about = self.where, before and before.limit
+        found = complete(measured(saved, about, setup, agenda, 1, silent))
+        write_baseline(self.baseline, found)
         return found
 
-    def _saved(self) -> SavedGrasps:
-        return grasps_from_json(read_text(self.grasps))
+    def _settings(self, before: Baseline | None) -> tuple[Setup, Agenda]:
+        """The baseline's, or the usual ones, with those of the file in their place."""
+        if before is None:
+            setup, agenda = setup_for(self.saved, None), Agenda(seed=self.saved.seed)
+        else:
+            setup, agenda = of_settings(before.settings, str(self.baseline))
+        if self.setup is not None:
+            setup = setup_for(self.saved, self.setup)
+        given: dict[str, Any] = {name: getattr(self, name) for name in (*DIRECT, "noise")}
+        if self.wrenches is not None:
+            given["wrenches"] = wrenches_from_file(self.wrenches)
+        try:
+            asked = {name: value for name, value in given.items() if value is not None}
+            return setup, replace(agenda, **asked)
+        except InputError as error:
+            raise InputError(f"{self.path}: {error}") from error
 
 
 def suite_from_toml(path: Path) -> Suite:
@@ -122,12 +153,15 @@ def suite_from_toml(path: Path) -> Suite:
     _check(given, path)
     usual = path.name.removesuffix(ENDING) + ".baseline.json"
     settings: dict[str, Any] = {"baseline": usual, **given}
-    for name in ("grasps", "baseline", "setup"):
+    for name in PATHS:
         if name in settings:
             settings[name] = path.parent / settings[name]
     if "noise" in settings:
-        settings["noise"] = _noise(settings["noise"], path)
-    return Suite(**settings)
+        try:
+            settings["noise"] = noise_from_table(settings["noise"])
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
+    return Suite(path=path, **settings)
 
 
 def _check(given: Mapping[str, Any], path: Path) -> None:
@@ -139,17 +173,3 @@ def _check(given: Mapping[str, Any], path: Path) -> None:
             raise InputError(f"{path}: {name}: expected {kind.__name__}, got {value!r}")
     if "grasps" not in given:
         raise InputError(f"{path}: grasps: expected the path of a grasps.json")
-
-
-def _noise(given: Mapping[str, Any], path: Path) -> Noise:
-    known = [each.name for each in fields(Noise)]
-    for name, value in given.items():
-        if name not in known:
-            raise InputError(f"{path}: noise: has {', '.join(known)}; got {name!r}")
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise InputError(f"{path}: noise.{name}: expected a number, got {value!r}")
-    return Noise(**given)
-
-
-def _silent(_: int, __: int) -> None:
-    """Nobody is told."""

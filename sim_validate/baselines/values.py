@@ -1,15 +1,20 @@
 """What is kept of verdicts, to compare later ones with: a header, and an entry for each grasp."""
 
-import hashlib
+import json
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import asdict
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
 
+from grasp_core.contact_hash import contacts_sha256
 from grasp_core.values import Grasp
 from sim_validate.grasp_verdict import Verdict
 from sim_validate.setup import WEAKEST
+from sim_validate.verdict import Outcome
 from sim_validate.wrench_verdict import WrenchVerdict
 
 DIGITS = 12
@@ -19,55 +24,81 @@ NUMBERS = (
     "displacement_m", "rotation_rad",
 )  # fmt: skip
 """What is measured."""
+STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+Count = Annotated[int, Field(ge=0)]
+Size = Annotated[float, Field(ge=0.0)]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, config=STRICT)
 class Entry:
-    """What is kept of the verdict on one grasp."""
+    """What is kept of the verdict on one grasp; what could not be measured is None."""
 
     id: str
     contacts_sha256: str
     """Of positions and normals, in finger order."""
-    outcome: str
-    """`held`, or how the first wrench that did not hold ended."""
-    first_failure: str
-    """That wrench's name, empty if all held."""
-    controls_held: int
-    """Negative controls that held: none must."""
-    mismatches: int
+    outcome: Outcome
+    """`held`, or how the first wrench that was not held ended."""
+    wrenches: Count
+    """How many there were."""
+    not_held: tuple[str, ...]
+    """Names of those that were not held, in order."""
+    controls: Count
+    """How many negative controls there were."""
+    controls_let_go: Count
+    """How many of them ended as they must."""
+    mismatches: Count
     """In how many ways simulation contradicts the analysis."""
-    critical_friction: float
-    simulated_critical_friction: float | None
-    """None if it was not found."""
-    limit_n: float
+    critical_friction: Size
+    simulated_critical_friction: Size | None
+    limit_n: Size
     """Largest multiple of the weakest wrench that is resisted, by analysis: its size [N], torques
     over the object's radius."""
-    simulated_limit_n: float | None
-    """The same in simulation; None if not measured."""
-    displacement_m: float
+    simulated_limit_n: Size | None
+    """The same in simulation."""
+    displacement_m: Size | None
     """Largest motion of the object in any trial."""
-    rotation_rad: float
-    noisy_trials: int
+    rotation_rad: Size | None
+    noisy_trials: Count
     """Repeats with noise."""
-    noisy_held: int
-    """How many of them held."""
+    noisy_not_held: tuple[Count, ...]
+    """Numbers of those that were not held."""
+    noisy_close: tuple[Count, ...]
+    """Numbers of those with a load that is within a trifle of what can be resisted."""
+
+    def __post_init__(self) -> None:
+        """Refuse what contradicts itself."""
+        if self.held == bool(self.not_held):
+            raise ValueError(f"outcome {self.outcome.value}, but not held are {self.not_held}")
+        if self.controls_let_go > self.controls or len(self.not_held) > self.wrenches:
+            raise ValueError("more ended in some way than there were")
+        if any(number >= self.noisy_trials for number in (*self.noisy_not_held, *self.noisy_close)):
+            raise ValueError("there were not so many repeats with noise")
 
     @property
     def held(self) -> bool:
         """Whether every wrench held."""
-        return not self.first_failure
+        return self.outcome is Outcome.HELD
+
+    @property
+    def noisy_held(self) -> int:
+        """How many repeats with noise held."""
+        return self.noisy_trials - len(self.noisy_not_held)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, config=STRICT)
 class Baseline:
     """Verdicts on the grasps of one object, and all that they depend on."""
 
     grasps_file: str
     """Where the grasps are, from the baseline's folder."""
+    limit: Annotated[int, Field(ge=1)] | None
+    """How many of them, the first ones; None for all."""
     object: str
     content_sha256: str
     """Of the object's mesh."""
-    friction: float
+    friction: Size
+    planned_radius_m: Size | None
+    """Of the fingertips that the grasps were planned for, if for any."""
     settings: Mapping[str, Any]
     """How trials were simulated, and which."""
     versions: Mapping[str, str]
@@ -76,11 +107,15 @@ class Baseline:
     entries: tuple[Entry, ...]
     """Sorted by id."""
 
+    def __post_init__(self) -> None:
+        """Refuse two entries of one grasp."""
+        if len({entry.id for entry in self.entries}) < len(self.entries):
+            raise ValueError("two grasps have the same id")
 
-def contacts_sha256(grasp: Grasp) -> str:
-    """A hash of the contacts of a grasp."""
-    numbers = np.concatenate([grasp.positions.ravel(), grasp.normals.ravel()]) + 0.0
-    return hashlib.sha256(numbers.astype("<f8").tobytes()).hexdigest()
+
+def plain(entry: Entry | None) -> dict[str, Any] | None:
+    """An entry as plain values, which travel between processes and into any file."""
+    return None if entry is None else json.loads(json.dumps(asdict(entry), allow_nan=False))
 
 
 def entry_of(grasp: Grasp, verdict: Verdict, radius_m: float) -> Entry:
@@ -91,31 +126,40 @@ def entry_of(grasp: Grasp, verdict: Verdict, radius_m: float) -> Entry:
         verdict: What simulation says about it.
         radius_m: Of the object.
     """
-    failures = [trial.name for trial in verdict.wrenches if trial.hold.outcome.value != "held"]
     weakest = next(trial for trial in verdict.wrenches if trial.name == WEAKEST)
     predicted, simulated = _limits(weakest, radius_m)
     friction, repeats = verdict.critical_friction, verdict.robustness
-    found = Entry(
+    noisy = () if repeats is None else repeats.trials
+    holds = [trial.hold for trial in verdict.wrenches]
+    measured = {
+        "critical_friction": friction.predicted,
+        "simulated_critical_friction": friction.simulated,
+        "limit_n": predicted,
+        "simulated_limit_n": simulated,
+        "displacement_m": float(np.max([hold.displacement_m for hold in holds])),
+        "rotation_rad": float(np.max([hold.rotation_rad for hold in holds])),
+    }
+    return Entry(
         id=grasp.id,
-        contacts_sha256=contacts_sha256(grasp),
-        outcome=verdict.outcome.value,
-        first_failure=failures[0] if failures else "",
-        controls_held=sum(control.held for control in verdict.controls),
+        contacts_sha256=contacts_sha256(grasp.contacts),
+        outcome=verdict.outcome,
+        wrenches=len(verdict.wrenches),
+        not_held=tuple(trial.name for trial in verdict.failures),
+        controls=len(verdict.controls),
+        controls_let_go=sum(control.failed for control in verdict.controls),
         mismatches=len(verdict.mismatches),
-        critical_friction=friction.predicted,
-        simulated_critical_friction=friction.simulated,
-        limit_n=predicted,
-        simulated_limit_n=simulated,
-        displacement_m=max(trial.hold.displacement_m for trial in verdict.wrenches),
-        rotation_rad=max(trial.hold.rotation_rad for trial in verdict.wrenches),
-        noisy_trials=0 if repeats is None else len(repeats.trials),
-        noisy_held=0 if repeats is None else repeats.held,
+        noisy_trials=len(noisy),
+        noisy_not_held=tuple(t.number for t in noisy if t.outcome is not Outcome.HELD),
+        noisy_close=tuple(trial.number for trial in noisy if trial.close),
+        **{name: _rounded(value) for name, value in measured.items()},  # pyright: ignore
     )
-    return replace(found, **{name: _rounded(getattr(found, name)) for name in NUMBERS})
 
 
 def _rounded(value: float | None) -> float | None:
-    return None if value is None else float(f"{value:.{DIGITS}g}")
+    """To the digits that are kept; None for what no file can hold."""
+    if value is None or not math.isfinite(value):
+        return None
+    return float(f"{value:.{DIGITS}g}")
 
 
 def _limits(trial: WrenchVerdict, radius_m: float) -> tuple[float, float | None]:

@@ -4,23 +4,21 @@ Trials of a scene do not touch each other, so one by itself moves as it did amon
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from grasp_core.closure import force_closure
 from grasp_core.errors import InputError
-from grasp_core.values import Contact, Grasp, Polyhedron
+from grasp_core.values import Contact, Grasp, Polyhedron, stacked
 from scenes.fingertips import clashes
 from scenes.mjcf import Scene
 from sim_validate.control_trials import control_case
 from sim_validate.controls import Control
 from sim_validate.loads import PlannedLoad, planned_loads
+from sim_validate.noise.repeats import OPEN, disturbed_in, for_repeats, noisy_case
 from sim_validate.replaying.values import Recorded
 from sim_validate.rig import Rig, Watched, squeezed
-from sim_validate.robustness import OPEN, disturbed_in, noisy_case
 from sim_validate.schedules import Load
-from sim_validate.setup import WEAKEST, NamedWrench, Setup
+from sim_validate.setup import WEAKEST, Setup
 from sim_validate.simulate import Bench
 from sim_validate.verdict import HoldVerdict, invalid_start, judge
 
@@ -67,15 +65,13 @@ def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
 
     Args:
         recorded: What a file says.
-        wrench: Its name; the first that was not held, or else the weakest one, if None.
+        wrench: Its name; the first that was not held, or else the hardest to hold, if None.
 
     Raises:
         InputError: There is no such wrench, or nothing to simulate.
     """
     case = _case(recorded)
-    name = wrench or recorded.usual
-    if name is None or (wrench is None and name not in case.loads):
-        name = WEAKEST if WEAKEST in case.loads else next(iter(case.loads))
+    name = wrench or recorded.usual or _likeliest(recorded, case)
     if name not in case.loads:
         known = ", ".join(case.loads)
         raise InputError(f"{recorded.name}: no wrench {name!r}; there are {known}")
@@ -95,6 +91,13 @@ def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
     )
 
 
+def _likeliest(recorded: Recorded, case: _Case) -> str:
+    """The wrench that is hardest to hold."""
+    if recorded.trial is None and WEAKEST in case.loads:
+        return WEAKEST
+    return min(case.loads, key=lambda name: case.loads[name].predicted_limit or 0.0)
+
+
 def _case(recorded: Recorded) -> _Case:
     body, setup = recorded.body, recorded.setup
     if recorded.control is not None:
@@ -112,21 +115,16 @@ def _case(recorded: Recorded) -> _Case:
 def _noisy(
     recorded: Recorded, grasp: Grasp, trial: int, planned: Sequence[PlannedLoad], scene: Scene
 ) -> _Case:
-    """A repeat with noise, with the fingertips of the grasp itself."""
-    body = recorded.body
-    fingers = replace(recorded.setup.fingers, radius_m=scene.layout.drive.radius_m)
-    setup = replace(recorded.setup, fingers=fingers, surface="pads")
+    body, setup = recorded.body, for_repeats(recorded.setup, scene)
     case = disturbed_in(body, grasp, recorded.friction, recorded.agenda, trial)
     if case.missed:
         raise InputError(
             f"{recorded.name}: nothing to simulate: finger {case.missed[0]} misses its face"
         )
-    positions = np.array([contact.position for contact in case.contacts])
-    normals = np.array([contact.normal for contact in case.contacts])
-    if not force_closure(positions, normals, case.friction).closed:
+    if not force_closure(*stacked(case.contacts), case.friction).closed:
         return _opened(body, OPEN, case.contacts, case.friction, setup)
-    wrenches = [NamedWrench(each.name, each.load.wrench) for each in planned]
-    rig, heavy = noisy_case(body, case, wrenches, setup)
+    loads = [(each.name, each.load.wrench) for each in planned]
+    rig, heavy = noisy_case(body, case, loads, setup)
     return _Case(rig, _as_planned(heavy), _overlap(body, case.landed, rig.bench.scene))
 
 
@@ -134,9 +132,7 @@ def _opened(
     body: Polyhedron, name: str, contacts: tuple[Contact, ...], friction: float, setup: Setup
 ) -> _Case:
     """Contacts without force closure, as a control."""
-    positions = np.array([contact.position for contact in contacts])
-    normals = np.array([contact.normal for contact in contacts])
-    certificate = force_closure(positions, normals, friction)
+    certificate = force_closure(*stacked(contacts), friction)
     if certificate.closed:
         raise InputError(f"{name}: its contacts are in force closure at friction {friction}")
     control = Control(name, contacts, friction, certificate)
@@ -158,6 +154,4 @@ def _as_planned(planned: Sequence[PlannedLoad]) -> dict[str, _Held]:
 
 
 def _overlap(body: Polyhedron, contacts: Sequence[Contact], scene: Scene) -> tuple[str, ...]:
-    positions = np.array([contact.position for contact in contacts])
-    normals = np.array([contact.normal for contact in contacts])
-    return clashes(body, positions, normals, scene.layout.drive.radius_m)
+    return clashes(body, *stacked(contacts), scene.layout.drive.radius_m)

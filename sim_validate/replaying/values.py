@@ -39,8 +39,8 @@ class Recorded:
     """The grasp, where it is known as one."""
     trial: int | None = None
     """The repeat with noise, if it is one."""
-    outcomes: Mapping[str, str] = field(default_factory=dict[str, str])
-    """How trials ended, by wrench, as far as the file says."""
+    outcomes: Mapping[str, str | None] = field(default_factory=dict[str, str | None])
+    """How trials ended, by wrench; None where the file only says that it was not held."""
     others: str | None = None
     """How all others ended; None if the file does not say."""
 

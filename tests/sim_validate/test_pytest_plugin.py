@@ -71,7 +71,7 @@ def test_close_to_slipping(grasp_case, assert_stable):
     assert_stable(grasp_case, min_margin=0.49)
 
 def test_often_dropped(grasp_case, assert_stable):
-    from sim_validate.noise import Noise
+    from sim_validate.noise.draws import Noise
     assert_stable(grasp_case, trials=20, noise=Noise(mass=0.5), min_pass_rate=0.99)
 """
 
@@ -137,8 +137,9 @@ def test_a_regression_says_what_was_and_what_is(blessed, tmp_path):
     assert f"{name}: regressed" in said
     assert "limit_n: 1000 -> " in said
     assert "predicted" in said
-    assert f"graspproof baseline check {baseline}" in said
-    assert f"graspproof replay {baseline} --grasp {name} --out replay" in said
+    grasps = tmp_path / "grasps.json"
+    assert f"graspproof baseline check {baseline} --grasps {grasps}" in said
+    assert f"replay {baseline} --grasp {name} --grasps {grasps} --out replay" in said
     assert "gone: missing" in said
     assert "Traceback" not in said
 
@@ -157,7 +158,7 @@ def test_a_grasp_that_slips_says_at_which_wrench_and_how_to_replay_it(blessed, t
     assert "predicted limit 0." in said
     line = next(line for line in said.splitlines() if "graspproof replay" in line)
     words = shlex.split(line.split("graspproof ", 1)[1])
-    assert words[-4:-1] == ["--wrench", "far too much", "--out"]
+    assert "--wrench=far too much" in words
     assert main([*words[:-1], str(tmp_path / "replay"), "-q"]) == Exit.NEGATIVE
     assert (tmp_path / "replay" / "trace.csv").is_file()
 
@@ -203,9 +204,14 @@ def test_marked_tests_run_with_each_grasp(blessed, tmp_path):
     ("marker", "message"),
     [
         ("", "needs a grasps.json, or object="),
-        ("object='no-such'", "no-such"),
         ("object='wedge', taste=1", "got 'taste'"),
-        ("'grasps.json', limit=1", "takes friction here; got 'limit'"),
+        ("'grasps.json', limit=1", "beside a file takes friction; got 'limit'"),
+        ("'a.json', 'b.json'", "takes one file of grasps"),
+        ("3", "takes one file of grasps"),
+        ("'nowhere.json'", "nowhere.json"),
+        ("object='wedg'", "did you mean wedge"),
+        ("object='wedge', friction='0.5'", "friction must be a number, got '0.5'"),
+        ("object='wedge', limit='2'", "a setting is of the wrong kind"),
         ("object='box', cones='normal', families=('pencil',)", "there is no grasp of box"),
     ],
 )
@@ -218,6 +224,7 @@ def test_a_wrong_marker_is_named(tmp_path, marker, message):
     assert code == 2
     assert message in said
     assert "Traceback" not in said
+    assert "During handling" not in said
 
 
 def test_more_can_be_asked_for(tmp_path):
@@ -278,3 +285,131 @@ def test_nothing_heavy_is_imported():
     code, said = pytest_in(tmp_path)
     assert code == 0, said
     assert "1 passed" in said
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        ("assert_stable(grasp_case, min_pass_rate=0.9)", "give trials, too"),
+        ("assert_stable(grasp_case, trials=2, min_pass_rate=80)", "from 0 to 1, got 80"),
+        ("assert_stable(grasp_case, min_margin=float('nan'))", "min_margin must be from 0"),
+        ("assert_stable(grasp_case, min_margin='0.2')", "min_margin must be from 0"),
+        ("assert_stable(grasp_case, trial=2)", "assert_stable takes wrenches, trials"),
+        ("assert_stable(grasp_case, wrenches=[[1, 2]])", "must be NamedWrench values"),
+        ("assert_stable(grasp_case.grasp)", "expected a grasp_case"),
+        ("assert_stable(grasp_case, friction=0.01)", "needs friction above"),
+    ],
+)
+def test_demands_that_are_none_are_refused(tmp_path, call, message):
+    write_text(
+        tmp_path / "test_it.py",
+        "import pytest\n@pytest.mark.grasp(object='wedge')\n"
+        f"def test_it(grasp_case, assert_stable):\n    {call}\n",
+    )
+    code, said = pytest_in(tmp_path)
+    assert code == 1
+    assert message in said
+
+
+def test_other_frictions_and_grasps_from_anywhere(tmp_path):
+    write_text(
+        tmp_path / "test_it.py",
+        """
+import pytest
+@pytest.mark.grasp(object='wedge')
+def test_it(grasp_case, assert_stable):
+    body, grasp = grasp_case.body, grasp_case.grasp
+    assert assert_stable(grasp_case, friction=0.3).friction == 0.3
+    assert assert_stable(body, grasp).friction == 0.5
+    assert assert_stable(body, grasp, 0.4).friction == 0.4
+    assert assert_stable(body, grasp, friction=0.4).friction == 0.4
+""",
+    )
+    code, said = pytest_in(tmp_path)
+    assert code == 0, said
+
+
+def test_blessing_keeps_what_the_baseline_was_made_with(blessed, tmp_path):
+    copied(blessed, tmp_path)
+    task = {"wrenches": [{"name": "lift", "force_n": [0, 0, -0.1]}]}
+    write_text(tmp_path / "task.json", json.dumps(task))
+    grasps, baseline = (str(tmp_path / name) for name in ("grasps.json", "wedge.baseline.json"))
+    asked = ("--wrenches", str(tmp_path / "task.json"), "--trials", "2", "--seed", "7")
+    assert main(["baseline", "record", grasps, "-o", baseline, *asked, "-q"]) == Exit.GOOD
+    before = (tmp_path / "wedge.baseline.json").read_text()
+    code, said = pytest_in(tmp_path, "--grasp-bless")
+    assert code == 0, said
+    assert (tmp_path / "wedge.baseline.json").read_text() == before
+    assert '"lift"' in before
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ("trials = 3", "trials: 0 -> 3"),
+        ("seed = 5", "seed: 0 -> 5"),
+        ('wrenches = "task.json"', "wrenches.lift: None -> "),
+        ('setup = "setup.toml"', "setup.hold.hold_s: 0.4 -> 0.3"),
+    ],
+)
+def test_settings_that_the_baseline_was_not_made_with_are_not_compared(
+    blessed, tmp_path, line, reason
+):
+    copied(blessed, tmp_path)
+    task = {"wrenches": [{"name": "lift", "force_n": [0, 0, -0.1]}]}
+    write_text(tmp_path / "task.json", json.dumps(task))
+    write_text(tmp_path / "setup.toml", "[hold]\nhold_s = 0.3\n")
+    write_text(tmp_path / "wedge.grasps.toml", f'grasps = "grasps.json"\n{line}\n')
+    code, said = pytest_in(tmp_path)
+    assert code == 1
+    assert "not comparable" in said
+    assert reason in said
+    code, said = pytest_in(tmp_path, "--grasp-bless")
+    assert code == 0, said
+    code, said = pytest_in(tmp_path)
+    assert code == 0, said
+
+
+def test_what_fails_before_a_test_begins_is_in_the_report_once(tmp_path):
+    write_text(
+        tmp_path / "test_it.py",
+        """
+import pytest
+import grasp_core as gc
+import scenes
+from sim_validate import NamedWrench
+
+@pytest.fixture
+def held(assert_stable):
+    body = scenes.example_object("wedge")
+    grasp = gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps[0]
+    assert_stable(body, grasp, wrenches=[NamedWrench("push", [0, 0, 900, 0, 0, 0])])
+
+def test_it(held):
+    pass
+""",
+    )
+    code, said = pytest_in(tmp_path, "--grasp-report", "report")
+    assert code == 1, said
+    found = json.loads((tmp_path / "report" / "report.json").read_text())["grasps"]
+    assert [line["status"] for line in found] == ["unstable"]
+
+
+def test_other_projects_see_nothing_of_it(tmp_path):
+    write_text(
+        tmp_path / "conftest.py",
+        """
+def pytest_runtest_logreport(report):
+    assert not any("grasp" in name for name in vars(report)), vars(report)
+""",
+    )
+    write_text(tmp_path / "test_plain.py", "def test_it(): pass\n")
+    code, said = pytest_in(tmp_path, "-W", "error")
+    assert code == 0, said
+    after = said.split("collected 1 item")[1]
+    assert "grasp" not in after
+    assert {path.name for path in tmp_path.iterdir()} <= {
+        "conftest.py",
+        "test_plain.py",
+        "__pycache__",
+    }

@@ -4,15 +4,18 @@ import dataclasses
 
 import pytest
 
-from sim_validate.baselines.comparing import Bands, Status, compare
+from sim_validate.baselines.comparing import OTHER_VERSIONS, Status, bands_between, compare
 from sim_validate.baselines.values import Baseline, Entry
+from sim_validate.verdict import Outcome
 
 ENTRY = Entry(
     id="c-0-1-2-3",
     contacts_sha256="1f",
-    outcome="held",
-    first_failure="",
-    controls_held=0,
+    outcome=Outcome.HELD,
+    wrenches=13,
+    not_held=(),
+    controls=4,
+    controls_let_go=4,
     mismatches=0,
     critical_friction=0.2,
     simulated_critical_friction=0.2001,
@@ -21,13 +24,16 @@ ENTRY = Entry(
     displacement_m=1e-5,
     rotation_rad=1e-4,
     noisy_trials=100,
-    noisy_held=80,
+    noisy_not_held=(3, 50),
+    noisy_close=(7, 50),
 )
 BEFORE = Baseline(
     grasps_file="grasps.json",
+    limit=None,
     object="wedge",
     content_sha256="ab",
     friction=0.5,
+    planned_radius_m=None,
     settings={"setup": {"physics": {"timestep_s": 0.001}}, "seed": 0},
     versions={"graspproof": "1", "mujoco": "4.0.0", "machine": "x86_64", "numpy": "2"},
     arithmetic="as here",
@@ -35,6 +41,7 @@ BEFORE = Baseline(
 )
 OTHERS = {"versions": {**BEFORE.versions, "mujoco": "4.1.0"}}
 ROUNDING = {"arithmetic": "as elsewhere"}
+SLIPPED = {"outcome": Outcome.SLIPPED, "not_held": ("weakest",)}
 
 
 def now(header=None, **changed):
@@ -50,13 +57,26 @@ def found(after, before=BEFORE):
 def test_nothing_changed():
     assert found(now()).status is Status.SAME
     assert found(now({"versions": {**BEFORE.versions, "numpy": "3"}})).status is Status.SAME
+    assert found(now(OTHERS)).status is Status.SAME
+
+
+def test_it_is_said_how_things_are_compared():
+    exact, numpy = now(), now({"versions": {**BEFORE.versions, "numpy": "3"}})
+    assert bands_between(BEFORE, exact)[1] == "exactly"
+    assert bands_between(BEFORE, numpy)[1] == "with the bands of rounding: numpy 2 -> 3"
+    assert bands_between(BEFORE, now(ROUNDING))[1].endswith("another processor")
+    assert bands_between(BEFORE, now(OTHERS))[1].endswith("mujoco 4.0.0 -> 4.1.0")
+    assert "python" not in bands_between(BEFORE, now({"versions": {"python": "3"}}))[1]
 
 
 @pytest.mark.parametrize(
     ("changed", "reason"),
     [
-        ({"outcome": "slipped", "first_failure": "+force_x"}, "held -> slipped at +force_x"),
-        ({"controls_held": 1}, "negative controls that held: 0 -> 1"),
+        ({"outcome": Outcome.SLIPPED, "not_held": ("+force_x",)}, "held -> slipped at +force_x"),
+        ({"outcome": Outcome.DIVERGED, "not_held": ("lift",)}, "held -> diverged at lift"),
+        ({"controls_let_go": 3}, "negative controls that were not let go: 0 -> 1"),
+        ({"controls": 3, "controls_let_go": 3}, "negative controls: 4 -> 3"),
+        ({"wrenches": 12}, "wrenches: 13 -> 12"),
         ({"mismatches": 2}, "contradictions"),
         ({"critical_friction": 0.22}, "critical_friction: 0.2 -> 0.22"),
         ({"simulated_critical_friction": None}, "simulated_critical_friction: 0.2001 -> None"),
@@ -64,7 +84,9 @@ def test_nothing_changed():
         ({"simulated_limit_n": 2.5}, "simulated_limit_n"),
         ({"displacement_m": 1e-3}, "displacement_m"),
         ({"rotation_rad": 0.01}, "rotation_rad"),
-        ({"noisy_held": 50}, "held with noise: 80 of 100 -> 50"),
+        ({"displacement_m": None}, "displacement_m: 1e-05 -> None"),
+        ({"noisy_not_held": (3, 9, 50)}, "repeats with noise no longer held: 9"),
+        ({"noisy_trials": 99}, "repeats with noise: 100 -> 99"),
     ],
 )
 @pytest.mark.parametrize("header", [{}, ROUNDING, OTHERS], ids=["same", "rounding", "others"])
@@ -83,13 +105,16 @@ def test_what_is_worse_is_a_regression_and_the_other_way_round_an_improvement(
     [
         {"critical_friction": 0.205}, {"simulated_critical_friction": 0.205}, {"limit_n": 2.95},
         {"displacement_m": 1.5e-4}, {"rotation_rad": 2e-3},
-        {"noisy_held": 75},
+        {"noisy_not_held": (3,)}, {"noisy_not_held": (3, 7, 50)},
     ],
 )  # fmt: skip
 def test_small_differences_count_with_the_same_versions_only(changed):
-    assert found(now(**changed)).status is Status.REGRESSED
-    assert found(now(ROUNDING, **changed)).status is Status.REGRESSED
-    assert found(now(OTHERS, **changed)).status is Status.WITHIN
+    for header in ({}, ROUNDING):
+        assert found(now(header, **changed)).status in (Status.REGRESSED, Status.IMPROVED)
+    within = found(now(OTHERS, **changed))
+    assert within.status is Status.WITHIN
+    assert not within.reasons
+    assert len(within.differences) == 1
 
 
 @pytest.mark.parametrize(
@@ -110,16 +135,60 @@ def test_the_last_digits_do_not_count():
     assert found(close).status is Status.WITHIN
 
 
+def on_the_brink(friction=0.202):
+    return dataclasses.replace(BEFORE, friction=friction)
+
+
 @pytest.mark.parametrize("friction", [0.5, 0.202, 0.198])
 def test_another_verdict_at_the_critical_friction_is_grey_with_other_versions(friction):
     header = {"friction": friction}
-    before = dataclasses.replace(BEFORE, **header)
-    slips = {"outcome": "slipped", "first_failure": "weakest"}
-    close = abs(friction - 0.2) <= Bands().grey * friction
+    before = on_the_brink(friction)
+    close = abs(friction - 0.2) <= OTHER_VERSIONS.grey * friction
     assert close == (friction != 0.5)
     wanted = Status.GREY if close else Status.REGRESSED
-    assert found(now(header | OTHERS, **slips), before).status is wanted
-    assert found(now(header, **slips), before).status is Status.REGRESSED
+    with_it = {"displacement_m": 0.1, "rotation_rad": 1.0, "mismatches": 1}
+    assert found(now(header | OTHERS, **SLIPPED, **with_it), before).status is wanted
+    assert found(now(header, **SLIPPED), before).status is Status.REGRESSED
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"outcome": Outcome.DIVERGED}, {"outcome": Outcome.INVALID_START},
+        {"controls_let_go": 3}, {"mismatches": 2}, {"critical_friction": 0.9},
+        {"simulated_critical_friction": None}, {"noisy_not_held": (3, 4, 50)}, {"limit_n": 1.0},
+    ],
+)  # fmt: skip
+def test_the_grey_zone_excuses_nothing_else(damage):
+    after = now({"friction": 0.202} | OTHERS, **(SLIPPED | damage))
+    assert found(after, on_the_brink()).status is Status.REGRESSED
+
+
+def test_where_it_slips_first_counts_and_each_wrench_does():
+    before = dataclasses.replace(BEFORE, entries=(dataclasses.replace(ENTRY, **SLIPPED),))
+    elsewhere = now(outcome=Outcome.SLIPPED, not_held=("+force_x",))
+    assert found(elsewhere, before).status is Status.REGRESSED
+    more = found(now(outcome=Outcome.SLIPPED, not_held=("weakest", "lift")), before)
+    assert more.status is Status.REGRESSED
+    assert more.reasons == ("no longer held: lift",)
+
+
+def test_grasps_that_are_refused_now_have_regressed():
+    nothing = dataclasses.replace(BEFORE, entries=())
+    (finding,) = compare(BEFORE, nothing, {ENTRY.id: "no room"})
+    assert (finding.status, finding.reasons) == (Status.REGRESSED, ("refused: no room",))
+    slippery = dataclasses.replace(nothing, friction=0.1)
+    (finding,) = compare(BEFORE, slippery, {ENTRY.id: "not closed"})
+    assert finding.status is Status.NOT_COMPARABLE
+    assert finding.reasons == ("friction: 0.5 -> 0.1", "refused: not closed")
+
+
+def test_grasps_of_another_object_are_not_just_missing():
+    other = dataclasses.replace(ENTRY, id="a-new-one")
+    header = {"content_sha256": "cd", "object": "cup"}
+    listed = compare(BEFORE, dataclasses.replace(BEFORE, entries=(other,), **header))
+    assert {finding.status for finding in listed} == {Status.NOT_COMPARABLE}
+    assert listed[0].reasons == ("the object is another one: wedge -> cup",)
 
 
 @pytest.mark.parametrize(
@@ -127,6 +196,7 @@ def test_another_verdict_at_the_critical_friction_is_grey_with_other_versions(fr
     [
         ({"content_sha256": "cd"}, {}, "the object is another one"),
         ({"friction": 0.4}, {}, "friction: 0.5 -> 0.4"),
+        ({"planned_radius_m": 0.004}, {}, "planned for: radius_m None -> 0.004"),
         ({"settings": {"setup": {"physics": {"timestep_s": 0.002}}, "seed": 0}}, {},
          "setup.physics.timestep_s: 0.001 -> 0.002"),
         ({"settings": {**BEFORE.settings, "seed": 1}}, {}, "seed: 0 -> 1"),
@@ -134,9 +204,9 @@ def test_another_verdict_at_the_critical_friction_is_grey_with_other_versions(fr
     ],
 )  # fmt: skip
 def test_what_is_another_trial_is_not_compared(header, changed, reason):
-    worse = {"outcome": "slipped", "first_failure": "weakest"}
-    finding = found(now(header, **changed, **worse))
+    finding = found(now(header, **changed, **SLIPPED))
     assert finding.status is Status.NOT_COMPARABLE
+    assert "held -> slipped at weakest" in finding.differences
     assert finding.reasons == (reason,) or reason in finding.reasons[0]
 
 

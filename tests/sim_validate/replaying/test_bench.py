@@ -6,7 +6,7 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from sim_validate.noise import Noise
+from sim_validate.noise.draws import Noise
 from sim_validate.replaying.bench import replayed
 from sim_validate.replaying.values import Recorded
 from sim_validate.setup import Agenda, NamedWrench, Setup
@@ -15,7 +15,7 @@ from tests.sim_validate.rigs import grasps
 
 AGENDA = Agenda(
     random_wrenches=2, wrenches=(NamedWrench("too much", [0.0, 0.0, 90.0, 0.0, 0.0, 0.0]),),
-    critical_friction=False, trials=25, noise=Noise(0.02, 3.0, 3.0, 0.3, 0.3), seed=3,
+    critical_friction=False, trials=25, noise=Noise(0.04, 3.0, 3.0, 0.3, 0.3), seed=3,
 )  # fmt: skip
 
 

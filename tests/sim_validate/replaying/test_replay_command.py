@@ -6,6 +6,7 @@ import pytest
 
 from sim_validate.cli import Exit, main
 
+BEHIND = '{"verdicts": [], "object": {"content_sha256": ""}, "friction": 1}'
 NOISE = ("--noise-shift", ".02", "--noise-turn-deg", "3", "--noise-friction", ".3")
 
 
@@ -153,7 +154,11 @@ def test_dataset_rows(tmp_path, replay, capsys):
         ("x.json", "[]", "expected a baseline, verdicts or grasps"),
         ("x.json", "{}", "expected a baseline, verdicts or grasps"),
         ("x.json", '{"verdicts": []}', "is not what `graspproof validate` writes"),
-        ("x.json", '{"verdicts": [], "object": {"content_sha256": "1"}}', "grasps are not there"),
+        (
+            "x.json",
+            '{"verdicts": [], "object": {"content_sha256": ""}, "friction": 1}',
+            "not there",
+        ),
     ],
 )
 def test_other_files_are_refused(tmp_path, capsys, name, text, message):
@@ -169,6 +174,11 @@ def test_other_files_are_refused(tmp_path, capsys, name, text, message):
         (("--grasp", "no"), "no grasp no; there is "),
         (("--grasp", "FIRST", "--control", "no"), "has no control 'no'; there is "),
         (("--grasp", "FIRST", "--wrench", "no"), "no wrench 'no'; there are "),
+        (
+            ("--grasp", "FIRST", "--trial", "0"),
+            "no repeat 0 with noise; there were none",
+        ),
+        (("--grasp", "FIRST", "--trial", "0", "--control", "x"), "give one"),
     ],
 )
 def test_what_is_not_there_is_named(folder, capsys, flags, message):
@@ -183,3 +193,48 @@ def test_grasps_of_another_object_are_refused(folder, tmp_path, capsys):
     other = str(tmp_path / "grasps.json")
     assert main(["replay", str(folder), "--grasp", "x", "--grasps", other]) == Exit.INPUT
     assert "its object is another one" in capsys.readouterr().err
+
+
+def test_other_contacts_under_the_same_id_are_refused(folder, tmp_path, capsys):
+    for name in ("b.json", "verdicts.json"):
+        text = (folder / name).read_text()
+        record = json.loads(text)
+        first = record["grasps" if name == "b.json" else "verdicts"][0]
+        path = tmp_path / name
+        path.write_text(text.replace(first["contacts_sha256"], "0" * 64))
+        grasps = str(folder / "grasps.json")
+        asked = ["replay", str(path), "--grasp", first["id"], "--grasps", grasps]
+        assert main(asked) == Exit.INPUT
+        assert "is about other contacts" in capsys.readouterr().err
+
+
+def test_a_wrench_with_a_minus_sign_is_named_with_an_equals_sign(folder, replay):
+    name = verdicts_in(folder)[0]["id"]
+    assert replay(folder, "--grasp", name, "--wrench=-force_x")["wrench"] == "-force_x"
+
+
+def test_wrenches_of_a_user_come_back_bit_for_bit(folder, tmp_path, replay):
+    grasps = folder / "grasps.json"
+    asked = ("--weight-n", "1.7", "--down", "1", "2", "3", "--limit", "1", "--out", str(tmp_path))
+    assert main(["validate", str(grasps), *asked, "-q"]) == Exit.GOOD
+    (verdict,) = verdicts_in(tmp_path)
+    (trial,) = [each for each in verdict["wrenches"] if each["name"] == "weight_0"]
+    about = ("--grasps", grasps, "--grasp", verdict["id"], "--wrench", "weight_0")
+    found = replay(tmp_path, *about)
+    for key in ("predicted_limit", "displacement_m", "rotation_rad"):
+        assert found[key] == trial[key]
+
+
+def test_a_trial_that_diverges_is_replayed_as_far_as_it_goes(folder, tmp_path, replay):
+    """A gigantic wrench: no clip of what is no number, and no crash."""
+    task = tmp_path / "task.json"
+    huge = {"name": "huge", "force_n": [0, 0, 1e9]}
+    task.write_text(json.dumps({"wrenches": [huge]}))
+    grasps = str(folder / "grasps.json")
+    asked = ("--wrenches", str(task), "--limit", "1", "--out", str(tmp_path), "-q")
+    assert main(["validate", grasps, *asked]) == Exit.NEGATIVE
+    (verdict,) = verdicts_in(tmp_path)
+    about = ("--grasps", grasps, "--grasp", verdict["id"], "--wrench", "huge")
+    found = replay(tmp_path, *about, "--out", tmp_path / "out")
+    assert found["outcome"] == "diverged"
+    assert (tmp_path / "out" / "trace.csv").is_file()

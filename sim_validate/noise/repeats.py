@@ -9,26 +9,27 @@ and comes with an interval.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
+from typing import TypeAlias
 
 from grasp_core.arrays import Array
 from grasp_core.closure import force_closure
 from grasp_core.errors import UndecidedError
-from grasp_core.values import Contact, Grasp, Polyhedron
+from grasp_core.values import Grasp, Polyhedron, stacked
 from scenes.fingertips import clashes
 from scenes.mjcf import Scene, to_text
 from sim_validate.control_trials import try_control
 from sim_validate.controls import Control
 from sim_validate.loads import PlannedLoad, loads_as_they_are
-from sim_validate.noise import Disturbed, Noise, disturbed
-from sim_validate.proportions import interval
+from sim_validate.noise.draws import Disturbed, Noise, disturbed
+from sim_validate.noise.proportions import interval
 from sim_validate.rig import Rig, squeezed
-from sim_validate.setup import Agenda, NamedWrench, Setup
+from sim_validate.setup import Agenda, Setup
 from sim_validate.simulate import Bench
-from sim_validate.verdict import Outcome, invalid_start, judge
-from sim_validate.wrench_verdict import WrenchVerdict
+from sim_validate.verdict import LET_GO, Outcome, invalid_start, judge
+from sim_validate.wrench_verdict import AGREEMENT, WrenchVerdict
 
+NamedLoad: TypeAlias = tuple[str, Array]
+"""A wrench (6,) [N, N m] by its name, torque about the centre of mass."""
 OPEN = "noise"
 """Contacts that noise has opened, as a control."""
 
@@ -46,7 +47,9 @@ class NoisyTrial:
     """That load's name; empty if all held, or if nothing was loaded."""
     reason: str
     contradictions: tuple[str, ...]
-    """Where simulation contradicts the analysis, in words."""
+    """Where simulation contradicts the analysis, or says nothing about it, in words."""
+    close: bool = False
+    """Whether a load is within a trifle of what the analysis says is resisted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +85,7 @@ class Robustness:
 
 
 def robustness(
-    body: Polyhedron, grasp: Grasp, friction: float, loads: Sequence[NamedWrench],
+    body: Polyhedron, grasp: Grasp, friction: float, loads: Sequence[NamedLoad],
     agenda: Agenda, setup: Setup,
 ) -> Robustness:  # fmt: skip
     """Repeat the holds of a grasp with noise.
@@ -93,13 +96,19 @@ def robustness(
         friction: Coulomb coefficient that was planned with.
         loads: What each repeat must hold.
         agenda: How many repeats, with how much noise, and the seed.
-        setup: How trials are simulated, with the radius that fingertips have.
+        setup: How trials are simulated: as `for_repeats` says.
     """
     trials = tuple(
         noisy_trial(body, disturbed_in(body, grasp, friction, agenda, number), loads, number, setup)
         for number in range(agenda.trials)
     )
     return Robustness(agenda.noise, trials)
+
+
+def for_repeats(setup: Setup, scene: Scene) -> Setup:
+    """How repeats are simulated: with the fingertips of the grasp itself, on leaning pads."""
+    fingers = replace(setup.fingers, radius_m=scene.layout.drive.radius_m)
+    return replace(setup, fingers=fingers, surface="pads")
 
 
 def disturbed_in(
@@ -110,13 +119,13 @@ def disturbed_in(
 
 
 def noisy_trial(
-    body: Polyhedron, case: Disturbed, loads: Sequence[NamedWrench], number: int, setup: Setup
+    body: Polyhedron, case: Disturbed, loads: Sequence[NamedLoad], number: int, setup: Setup
 ) -> NoisyTrial:
     """Simulate one repeat."""
     if case.missed:
         reason = f"finger {case.missed[0]} misses its face"
         return NoisyTrial(number, False, Outcome.LOST_CONTACT, "", reason, ())
-    positions, normals = _arrays(case.contacts)
+    positions, normals = stacked(case.contacts)
     try:
         certificate = force_closure(positions, normals, case.friction)
     except UndecidedError as error:
@@ -126,22 +135,30 @@ def noisy_trial(
         return _opened(body, control, number, setup)
     verdicts = tuple(_held_loads(body, case, loads, setup))
     first = next((each for each in verdicts if each.hold.outcome is not Outcome.HELD), None)
+    silent = () if first is None else _silent(first.hold.outcome)
     return NoisyTrial(
         number=number,
         predicted=all(each.predicted_limit >= 1.0 for each in verdicts),
         outcome=Outcome.HELD if first is None else first.hold.outcome,
         wrench="" if first is None else first.name,
         reason="" if first is None else first.hold.reason,
-        contradictions=tuple(each.contradiction for each in verdicts if each.contradiction),
+        contradictions=(*(each.contradiction for each in verdicts if each.contradiction), *silent),
+        close=any(abs(each.predicted_limit - 1.0) <= AGREEMENT for each in verdicts),
     )
 
 
+def _silent(outcome: Outcome) -> tuple[str, ...]:
+    """Endings that say nothing about the object; fingertips without room are none of them."""
+    says = (Outcome.HELD, *LET_GO, Outcome.INVALID_START)
+    return () if outcome in says else (f"{outcome.value}: neither held nor let go",)
+
+
 def _held_loads(
-    body: Polyhedron, case: Disturbed, loads: Sequence[NamedWrench], setup: Setup
+    body: Polyhedron, case: Disturbed, loads: Sequence[NamedLoad], setup: Setup
 ) -> Iterator[WrenchVerdict]:
     rig, planned = noisy_case(body, case, loads, setup)
     layout = rig.bench.scene.layout
-    overlap = clashes(body, *_arrays(case.landed), layout.drive.radius_m)
+    overlap = clashes(body, *stacked(case.landed), layout.drive.radius_m)
     for each, trace in zip(planned, rig.hold([one.load for one in planned]), strict=True):
         hold = judge(trace, layout, setup.hold)
         yield WrenchVerdict(
@@ -151,7 +168,7 @@ def _held_loads(
 
 
 def noisy_case(
-    body: Polyhedron, case: Disturbed, loads: Sequence[NamedWrench], setup: Setup
+    body: Polyhedron, case: Disturbed, loads: Sequence[NamedLoad], setup: Setup
 ) -> tuple[Rig, tuple[PlannedLoad, ...]]:
     """The contacts of a repeat, in force closure, in the grip of their fingers, and the loads.
 
@@ -164,7 +181,7 @@ def noisy_case(
     scene = heavier(setup.scene(body, case.contacts, case.friction), case.mass)
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
     rig = squeezed(bench, setup, scene.layout.squeeze_forces, case.friction)
-    heavy = [NamedWrench(each.name, case.mass * each.wrench) for each in loads]
+    heavy = [(name, case.mass * wrench) for name, wrench in loads]
     return rig, loads_as_they_are(body, case.contacts, case.friction, rig.idle, heavy, setup)
 
 
@@ -185,11 +202,5 @@ def _opened(body: Polyhedron, control: Control, number: int, setup: Setup) -> No
         wrong = ("contacts without force closure held",)
         return NoisyTrial(number, False, Outcome.HELD, "", "", wrong)
     first = verdict.tried[0]
-    return NoisyTrial(number, False, first.hold.outcome, first.name, first.hold.reason, ())
-
-
-def _arrays(contacts: Sequence[Contact]) -> tuple[Array, Array]:
-    return (
-        np.array([contact.position for contact in contacts]),
-        np.array([contact.normal for contact in contacts]),
-    )
+    ended = first.hold.outcome
+    return NoisyTrial(number, False, ended, first.name, first.hold.reason, _silent(ended))

@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 
 import grasp_core as gc
 from grasp_core.on_faces import face_under
+from grasp_core.wrenches import contact_frames
 from sim_validate import flags
-from sim_validate.noise import Noise, disturbed
+from sim_validate.noise.draws import Noise, disturbed
 from tests.grasp_core.curved import curved_body
 from tests.sim_validate.rigs import grasps
 
@@ -20,7 +21,8 @@ POSE = dataclasses.replace(STILL, shift=0.01, turn_deg=2.0)
 
 def pose(body, noise, draw):
     """Where the object stands, by another way: a rotation about its centre of mass, and a shift."""
-    rng = np.random.default_rng(draw)
+    seed, number = draw
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1, number)))
     shift = noise.shift * body.radius * rng.normal(size=3)
     return Rotation.from_rotvec(math.radians(noise.turn_deg) * rng.normal(size=3)), shift
 
@@ -92,8 +94,28 @@ def test_noise_has_the_size_it_says():
     for found, wanted in ((frictions, 0.1), (masses, 0.2)):
         assert found.std() == pytest.approx(wanted, rel=0.06)
         assert abs(found.mean()) < 0.1 * wanted
-    shifts = np.array([pose(body, POSE, (0, place))[1] for place in range(500)])
-    np.testing.assert_allclose(shifts.std(axis=0), 0.01 * body.radius, rtol=0.1)
+    shifted = dataclasses.replace(STILL, shift=0.001)
+    landed = [disturbed(body, grasp, 0.5, shifted, (0, place)).landed for place in range(500)]
+    moved = np.array([[contact.position for contact in each] for each in landed])
+    along = np.einsum("nki,kij->nkj", moved - grasp.positions, contact_frames(grasp.normals))
+    np.testing.assert_allclose(along[..., 0], 0.0, atol=1e-12)
+    np.testing.assert_allclose(along[..., 1:].std(axis=0), 0.001 * body.radius, rtol=0.15)
+
+
+@pytest.mark.parametrize("size", [1.0, 20.0, 45.0])
+def test_normals_lean_as_far_as_is_drawn(size):
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    noise = dataclasses.replace(STILL, normal_deg=size)
+    leans, drawn = [], []
+    for number in range(50):
+        case = disturbed(body, grasp, 0.5, noise, (0, number))
+        rng = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(1, number)))
+        rng.normal(size=8)
+        drawn.append(np.radians(size) * np.linalg.norm(rng.normal(size=(4, 2)), axis=1))
+        normals = np.array([contact.normal for contact in case.contacts])
+        leans.append(np.arccos(np.clip(np.einsum("ki,ki->k", normals, grasp.normals), -1, 1)))
+    wrapped = np.arccos(np.cos(drawn))
+    np.testing.assert_allclose(leans, wrapped, atol=1e-7)
 
 
 def test_a_draw_depends_on_seed_and_number_only():

@@ -3,7 +3,7 @@
 The fingers come along their planned lines, but the object stands a little elsewhere, so each
 contact is where such a line enters the same face (on a curved object, the surface near it), if it
 does. There the surface leans a little from its model. Friction is the same at all contacts; mass
-scales the simulated mass and every load, as a weight would.
+scales the simulated mass and every load. Loads turn with the object.
 
 All is drawn from normal distributions; friction and mass are multiplied by the exponential of
 what is drawn. The draws of a trial depend on the seed and its number only, so that they are the
@@ -22,6 +22,8 @@ from grasp_core.values import Contact, Grasp, Polyhedron
 from grasp_core.wrenches import contact_frames
 from sim_validate.traces import rotated
 
+STREAM = 1
+"""Of random numbers; others with the same seed share none of them."""
 LARGEST = {"shift": 1.0, "turn_deg": 45.0, "normal_deg": 45.0, "friction": 1.0, "mass": 1.0}
 
 
@@ -77,7 +79,8 @@ def disturbed(
         noise: How much of it.
         draw: The seed, and the number of the trial.
     """
-    rng = np.random.default_rng(draw)
+    seed, number = draw
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(STREAM, number)))
     shift, turn = noise.shift * body.radius * rng.normal(size=3), rng.normal(size=3)
     slipperiness, heaviness = rng.normal(size=2)
     leaning = math.radians(noise.normal_deg) * rng.normal(size=(len(grasp.contacts), 2))
@@ -109,14 +112,13 @@ def _quaternion(rotation: Array) -> Array:
 
 
 def _leaning(normal: Array, lean: Array) -> Array:
-    """A normal turned about two axes across it by small angles [rad]."""
-    turned = normal + contact_frames(normal[None])[0, :, 1:] @ np.tan(lean)
-    return turned / float(np.linalg.norm(turned))
+    """A normal turned about an axis across it, given along the tangents [rad]."""
+    tangents = contact_frames(normal[None])[0, :, 1:]
+    return rotated(_quaternion(tangents @ lean), normal)
 
 
 def _landing(body: Polyhedron, face: int, point: Array, way: Array) -> Contact | None:
     """Where a line enters a face, or a curved object's surface, next to a point."""
-    corners = body.vertices[body.triangles[:, ::-1]]
     if body.patches is None:
         plane = body.faces[face]
         at = _crossing(plane.centroid[None], plane.normal[None], point, way)[0]
@@ -124,6 +126,7 @@ def _landing(body: Polyhedron, face: int, point: Array, way: Array) -> Contact |
             within(at, piece, plane.normal, 0.0) for piece in plane.pieces
         )
         return Contact(at, plane.normal) if inside else None
+    corners = body.vertices[body.triangles[:, ::-1]]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     sizes = np.linalg.norm(normals, axis=1)
     corners, normals = corners[sizes > 0.0], (normals[sizes > 0.0].T / sizes[sizes > 0.0]).T

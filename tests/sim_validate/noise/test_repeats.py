@@ -7,10 +7,10 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from sim_validate.noise import Noise
-from sim_validate.proportions import differ, interval
+from sim_validate.noise.draws import Noise
+from sim_validate.noise.proportions import differ, interval
+from sim_validate.noise.repeats import disturbed_in, heavier, noisy_trial
 from sim_validate.rig import squeezed
-from sim_validate.robustness import disturbed_in, heavier, noisy_trial
 from sim_validate.setup import Agenda, NamedWrench, Setup
 from sim_validate.verdict import Outcome
 from tests.sim_validate.rigs import grasps

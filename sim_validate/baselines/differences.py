@@ -1,0 +1,127 @@
+"""What is not as it was in the verdict on a grasp, whether it counts, and whether it is worse."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from sim_validate.baselines.values import Entry
+
+
+@dataclass(frozen=True, slots=True)
+class Bands:
+    """How far results may differ."""
+
+    predicted: float
+    """Of critical frictions and limits by analysis, relative to the baseline's."""
+    simulated: float
+    """Of those in simulation."""
+    least: float
+    """Differences of any of these that never count: critical frictions are proved to 1e-7."""
+    displacement_m: float
+    rotation_rad: float
+    grey: float
+    """Grasps whose critical friction is closer to the friction than this, relative to it, may
+    change their verdict."""
+    exact: bool
+    """Whether the same repeats with noise must hold; else those with a load close to the limit
+    may not."""
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One of them."""
+
+    text: str
+    worse: bool
+    counts: bool = True
+    of_holding: bool = False
+    """Whether it comes with wrenches that are held or not, and with nothing else."""
+
+
+def differences(one: Entry, other: Entry, bands: Bands) -> tuple[Difference, ...]:
+    """All of them.
+
+    Args:
+        one: Of the baseline.
+        other: Of now.
+        bands: How far numbers may differ without counting.
+    """
+    return (
+        *_of_wrenches(one, other),
+        *_of_controls(one, other),
+        *_of_numbers(one, other, bands),
+        *_of_repeats(one, other, bands),
+    )
+
+
+def _of_wrenches(one: Entry, other: Entry) -> Iterator[Difference]:
+    lost = [name for name in other.not_held if name not in one.not_held]
+    won = [name for name in one.not_held if name not in other.not_held]
+    if one.outcome is not other.outcome:
+        at = f" at {other.not_held[0]}" if other.not_held else ""
+        text = f"{one.outcome} -> {other.outcome}{at}"
+        yield Difference(text, worse=not other.held, of_holding=True)
+    if lost:
+        yield Difference(f"no longer held: {', '.join(lost)}", worse=True, of_holding=True)
+    if won:
+        yield Difference(f"held now: {', '.join(won)}", worse=False, of_holding=True)
+    if one.wrenches != other.wrenches:
+        text = f"wrenches: {one.wrenches} -> {other.wrenches}"
+        yield Difference(text, worse=other.wrenches < one.wrenches)
+    if one.mismatches != other.mismatches:
+        more = other.mismatches - one.mismatches
+        text = f"contradictions of the analysis: {one.mismatches} -> {other.mismatches}"
+        yield Difference(text, more > 0, of_holding=abs(more) <= len(lost) + len(won))
+
+
+def _of_controls(one: Entry, other: Entry) -> Iterator[Difference]:
+    before, after = (entry.controls - entry.controls_let_go for entry in (one, other))
+    if before != after:
+        text = f"negative controls that were not let go: {before} -> {after}"
+        yield Difference(text, worse=after > before)
+    if one.controls != other.controls:
+        text = f"negative controls: {one.controls} -> {other.controls}"
+        yield Difference(text, worse=other.controls < one.controls)
+
+
+def _of_numbers(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]:
+    """A larger number is worse, but for limits."""
+    rows = (
+        ("critical_friction", bands.predicted, bands.least, 1.0),
+        ("simulated_critical_friction", bands.simulated, bands.least, 1.0),
+        ("limit_n", bands.predicted, bands.least, -1.0),
+        ("simulated_limit_n", bands.simulated, bands.least, -1.0),
+        ("displacement_m", 0.0, bands.displacement_m, 1.0),
+        ("rotation_rad", 0.0, bands.rotation_rad, 1.0),
+    )
+    for name, relative, absolute, sign in rows:
+        before, after = getattr(one, name), getattr(other, name)
+        if before == after:
+            continue
+        moved = name in ("displacement_m", "rotation_rad")
+        if before is None or after is None:
+            yield Difference(f"{name}: {before} -> {after}", after is None, of_holding=moved)
+            continue
+        change = after - before
+        counts = not abs(change) <= relative * before + absolute
+        text = f"{name}: {before:.12g} -> {after:.12g}{_per_cent(change, before)}"
+        yield Difference(text, sign * change > 0.0, counts=counts, of_holding=moved)
+
+
+def _per_cent(change: float, before: float) -> str:
+    return f" ({100.0 * change / before:+.2g} %)" if before > 0.0 else ""
+
+
+def _of_repeats(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]:
+    """The draws are the same, so each repeat is compared with itself."""
+    if one.noisy_trials != other.noisy_trials:
+        text = f"repeats with noise: {one.noisy_trials} -> {other.noisy_trials}"
+        yield Difference(text, worse=other.noisy_trials < one.noisy_trials)
+        return
+    close = {*one.noisy_close, *other.noisy_close} if not bands.exact else set[int]()
+    before, after = {*one.noisy_not_held}, {*other.noisy_not_held}
+    for text, flipped, worse in (("no longer held", after - before, True),
+                                 ("held now", before - after, False)):  # fmt: skip
+        if flipped:
+            numbers = ", ".join(map(str, sorted(flipped)))
+            counts = bool(flipped - close)
+            yield Difference(f"repeats with noise {text}: {numbers}", worse, counts=counts)

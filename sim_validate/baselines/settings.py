@@ -1,0 +1,104 @@
+"""How trials are simulated and which ones, as a baseline's file keeps them."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from grasp_core.errors import InputError
+from grasp_core.records import SavedGrasps
+from scenes.mjcf import Surface
+from sim_validate.flags import Fingers
+from sim_validate.noise.draws import Noise
+from sim_validate.setup import Agenda, LimitSearch, NamedWrench, Setup
+from sim_validate.setup_file import setup_from_file, setup_from_tables, tables_of
+from sim_validate.validate_command import finger_settings, planned_fingers
+
+
+class _Settings(BaseModel):
+    """What a file keeps."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    setup: dict[str, Any]
+    surface: Surface
+    random_wrenches: int
+    wrenches: dict[str, tuple[float, float, float, float, float, float]]
+    limits: LimitSearch
+    trials: int
+    noise: dict[str, float]
+    seed: int
+
+
+def settings_of(setup: Setup, agenda: Agenda) -> dict[str, Any]:
+    """How trials are simulated and which ones, as a baseline's file has it."""
+    settings = {
+        "setup": tables_of(setup),
+        "surface": setup.surface,
+        "random_wrenches": agenda.random_wrenches,
+        "wrenches": {each.name: each.wrench.tolist() for each in agenda.wrenches},
+        "limits": agenda.limits,
+        "trials": agenda.trials,
+        "noise": asdict(agenda.noise),
+        "seed": agenda.seed,
+    }
+    return json.loads(json.dumps(settings))
+
+
+def of_settings(settings: Mapping[str, Any], path: str) -> tuple[Setup, Agenda]:
+    """The setup and agenda that a baseline keeps.
+
+    Args:
+        settings: As `settings_of` gives them.
+        path: Where they come from, for messages.
+
+    Raises:
+        InputError: A setting is missing, unknown or refused.
+    """
+    try:
+        given = _Settings.model_validate_json(json.dumps(settings))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise InputError(f"{path}: settings.{where}: {first['msg']}") from error
+    try:
+        setup = setup_from_tables(given.setup, Setup(surface=given.surface), path)
+        agenda = Agenda(
+            random_wrenches=given.random_wrenches,
+            wrenches=tuple(NamedWrench(name, w) for name, w in given.wrenches.items()),  # pyright: ignore[reportArgumentType] - an array is made of it
+            limits=given.limits,
+            trials=given.trials,
+            noise=noise_from_table(given.noise),
+            seed=given.seed,
+        )
+    except InputError as error:
+        raise InputError(f"{path}: settings: {error}") from error
+    return setup, agenda
+
+
+def noise_from_table(given: Mapping[str, Any]) -> Noise:
+    """Noise with some of its fields given.
+
+    Raises:
+        InputError: There is no such field, or its value is refused.
+    """
+    known = [each.name for each in fields(Noise)]
+    for name, value in given.items():
+        if name not in known:
+            raise InputError(f"noise has {', '.join(known)}; got {name!r}")
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InputError(f"noise.{name}: expected a number, got {value!r}")
+    return Noise(**given)
+
+
+def setup_for(saved: SavedGrasps, path: Path | None) -> Setup:
+    """How grasps are simulated: with the fingertips they were planned for, as a file has it.
+
+    Raises:
+        InputError: The file is missing or refused.
+    """
+    setup = Setup(fingers=finger_settings(planned_fingers(Fingers(), saved.finger)))
+    return setup if path is None else setup_from_file(path, setup)

@@ -1,0 +1,1 @@
+"""Grasps when nothing is quite as planned: seeded noise, and how often they hold with it."""

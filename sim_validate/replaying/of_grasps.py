@@ -1,0 +1,108 @@
+"""Grasps of a `grasps.json` as contact sets to replay: a grasp, or a control made from it."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+from grasp_core.contact_hash import contacts_sha256
+from grasp_core.critical import critical_friction
+from grasp_core.errors import InputError
+from grasp_core.records import SavedGrasps
+from grasp_core.values import Grasp
+from sim_validate.controls import negative_controls
+from sim_validate.grasps_file import read_grasps
+from sim_validate.replaying.values import Recorded, Wanted
+from sim_validate.setup import Agenda, Setup
+
+NAMED = 5
+"""Names that a message lists."""
+
+
+def grasps_behind(path: Path, content_sha256: str, friction: float) -> SavedGrasps:
+    """The grasps behind a file, at the friction that they were tried at.
+
+    Raises:
+        InputError: They are missing, or of another object.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: the grasps are not there; name their file with --grasps")
+    saved = read_grasps(path)
+    if saved.body.content_sha256 != content_sha256:
+        raise InputError(f"{path}: its object is another one than that of the file to replay")
+    return SavedGrasps(saved.body, friction, saved.seed, saved.grasps, saved.finger)
+
+
+def chosen_grasp(path: Path, saved: SavedGrasps, wanted: Wanted) -> Grasp:
+    """The grasp that is wanted.
+
+    Raises:
+        InputError: It is not there; the message, which begins with the path, lists some that are.
+    """
+    if wanted.grasp is None and len(saved.grasps) == 1:
+        return saved.grasps[0]
+    found = next((grasp for grasp in saved.grasps if grasp.id == wanted.grasp), None)
+    if found is None:
+        asked = "give --grasp ID" if wanted.grasp is None else f"no grasp {wanted.grasp}"
+        raise InputError(f"{path}: {asked}; there is {some(grasp.id for grasp in saved.grasps)}")
+    return found
+
+
+def of_grasp(
+    path: Path, saved: SavedGrasps, setup: Setup, agenda: Agenda, wanted: Wanted
+) -> Recorded:
+    """A grasp of a file, or a control made from it."""
+    grasp = chosen_grasp(path, saved, wanted)
+    found = Recorded(
+        grasp.id, saved.body, grasp.contacts, saved.friction, setup, agenda,
+        grasp=grasp, trial=wanted.trial,
+    )  # fmt: skip
+    if wanted.trial is not None:
+        return replace(found, name=f"{grasp.id} in trial {wanted.trial}")
+    if wanted.control is None:
+        return found
+    exact = replace(grasp, critical_friction=critical_friction(grasp))
+    controls = {
+        each.name: each
+        for each in negative_controls(saved.body, exact, saved.friction, agenda.seed)
+    }
+    if wanted.control not in controls:
+        raise InputError(
+            f"{path}: {grasp.id} has no control {wanted.control!r}; there is {some(controls)}"
+        )
+    control = controls[wanted.control]
+    return replace(
+        found,
+        name=f"{grasp.id}:{control.name}",
+        contacts=control.contacts,
+        friction=control.friction,
+        control=control.name,
+        grasp=None,
+    )
+
+
+def require_contacts(path: Path, grasp: Grasp, known: str) -> None:
+    """Refuse a grasp whose contacts are not those that a file is about.
+
+    Raises:
+        InputError: Their hash is another one than the file's.
+    """
+    if contacts_sha256(grasp.contacts) != known:
+        raise InputError(f"{path}: is about other contacts of {grasp.id} than the grasps have now")
+
+
+def require_repeat(path: Path, trial: int, trials: int) -> None:
+    """Refuse the number of a repeat with noise that a file does not have.
+
+    Raises:
+        InputError: There were fewer.
+    """
+    if trial >= trials:
+        said = f"they are 0 to {trials - 1}" if trials else "there were none (--trials)"
+        raise InputError(f"{path}: there is no repeat {trial} with noise; {said}")
+
+
+def some(names: Iterable[str]) -> str:
+    """The first of many names, for a message."""
+    listed = list(names)
+    more = f" and {len(listed) - NAMED} more" if len(listed) > NAMED else ""
+    return (", ".join(listed[:NAMED]) or "none") + more

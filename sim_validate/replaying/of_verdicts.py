@@ -1,0 +1,88 @@
+"""A `verdicts.json` as contact sets to replay, with how their trials ended."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from grasp_core.errors import InputError
+from sim_validate.noise.draws import Noise
+from sim_validate.replaying.of_grasps import (
+    chosen_grasp,
+    grasps_behind,
+    of_grasp,
+    require_contacts,
+    require_repeat,
+    some,
+)
+from sim_validate.replaying.values import Recorded, Wanted
+from sim_validate.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, NamedWrench, Setup
+from sim_validate.setup_file import OF_USERS, setup_from_tables
+from sim_validate.verdict import Outcome
+
+GRASPS = "grasps.json"
+
+
+def from_verdicts(path: Path, record: Mapping[str, Any], wanted: Wanted) -> Recorded:
+    """What verdicts say about a grasp, a control or a repeat.
+
+    Args:
+        path: Of the file, for messages; the grasps are beside it unless others are wanted.
+        record: What the file holds.
+        wanted: Which contact set.
+
+    Raises:
+        InputError: It is not what `validate` writes, or does not hold what is wanted.
+    """
+    try:
+        grasps = wanted.grasps or path.parent / GRASPS
+        content, friction = record["object"]["content_sha256"], record["friction"]
+        saved = grasps_behind(grasps, str(content), float(friction))
+        verdicts = {str(each["id"]): each for each in record["verdicts"]}
+        grasp = chosen_grasp(path, saved, wanted)
+        if grasp.id not in verdicts:
+            raise InputError(f"{path}: no verdict on {grasp.id}; there is {some(verdicts)}")
+        verdict = verdicts[grasp.id]
+        require_contacts(path, grasp, verdict["contacts_sha256"])
+        setup, agenda = _asked(path, verdict)
+        found = of_grasp(path, saved, setup, agenda, replace(wanted, grasp=grasp.id))
+        return _with_outcomes(path, found, verdict, wanted)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{path}: is not what `graspproof validate` writes ({error!r})") from error
+
+
+def _asked(path: Path, verdict: Mapping[str, Any]) -> tuple[Setup, Agenda]:
+    """How a verdict's trials were simulated, and which ones."""
+    settings = verdict["settings"]
+    tables = {name: settings[name] for name in OF_USERS}
+    setup = setup_from_tables(tables, Setup(surface=settings["surface"]), str(path))
+    count = settings["random_wrenches"]
+    ours = {*AXIS_NAMES, WEAKEST, *(RANDOM.format(place) for place in range(count))}
+    repeats = verdict.get("robustness")
+    agenda = Agenda(
+        random_wrenches=count,
+        wrenches=tuple(
+            NamedWrench(each["name"], each["wrench"])
+            for each in verdict["wrenches"]
+            if each["name"] not in ours
+        ),
+        noise=Noise() if repeats is None else Noise(**repeats["noise"]),
+        seed=settings["seed"],
+    )
+    return setup, agenda
+
+
+def _with_outcomes(
+    path: Path, found: Recorded, verdict: Mapping[str, Any], wanted: Wanted
+) -> Recorded:
+    """The same with how its trials ended."""
+    if wanted.trial is not None:
+        nothing: Mapping[str, Any] = {"trials": 0, "not_held": []}
+        repeats: Mapping[str, Any] = verdict["robustness"] or nothing
+        require_repeat(path, wanted.trial, repeats["trials"])
+        for each in repeats["not_held"]:
+            if each["trial"] == wanted.trial:
+                return replace(found, outcomes={each["wrench"]: each["outcome"]})
+        return replace(found, others=Outcome.HELD.value)
+    tried = verdict if wanted.control is None else verdict["controls"][wanted.control]
+    return replace(found, outcomes={each["name"]: each["outcome"] for each in tried["wrenches"]})
