@@ -113,7 +113,7 @@ class Suite:
             UnfaithfulError: The simulator fails the gate.
         """
         check_writable(self.baseline)
-        before, saved = self.kept if self.baseline.is_file() else None, self.saved
+        before, saved = self._kept_if_any(), self.saved
         setup, agenda = self._settings(before)
         if before is not None:
             setup = with_planned_fingers(setup, before, saved)
@@ -121,6 +121,17 @@ class Suite:
         found = complete(measured(saved, about, setup, agenda, 1, silent))
         write_baseline(self.baseline, found)
         return found
+
+    def _kept_if_any(self) -> Baseline | None:
+        """The baseline that is to be written anew.
+
+        Raises:
+            InputError: It is refused.
+        """
+        try:
+            return self.kept if self.baseline.is_file() else None
+        except InputError as error:
+            raise InputError(f"{error}; remove the file to begin a new baseline") from error
 
     def _settings(self, before: Baseline | None) -> tuple[Setup, Agenda]:
         """The baseline's, or the usual ones, with those of the file in their place."""
