@@ -1,6 +1,7 @@
 """What the README and docs/baselines.md say about baselines, done as they say it."""
 
 import dataclasses
+import math
 import re
 import shlex
 import subprocess
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_validate.baselines.comparing import EXACT, ROUNDING, Bands, Status
+from sim_validate.baselines.comparing import EXACT, OTHER_VERSIONS, ROUNDING, Status
 from sim_validate.baselines.suite import KINDS, suite_from_toml
 from sim_validate.baselines.values import Entry
 from sim_validate.cli import Exit, main
@@ -39,7 +40,6 @@ def project(tmp_path, monkeypatch):
 
 def test_the_readme_in_a_project_of_somebody_else(project):
     assert (project / "results.xml").is_file()
-    (project / "wedge.baseline.json").unlink()
     (project / "wedge.grasps.toml").write_text(block(README, "toml"))
     (project / "test_mine.py").write_text(block(README, "py"))
     code, said = pytest_in(project, "--grasp-bless", "wedge.grasps.toml")
@@ -78,14 +78,15 @@ def test_the_bands_are_those_of_the_page():
     rows = dict(re.findall(r"^\| ([^|]+) \| (.+) \|$", PAGE, re.MULTILINE))
     by_analysis = rows["critical friction and limits, by analysis"]
     assert by_analysis.split(" | ") == ["1e-9 of them", "1e-6 of them + 1e-7", "5 %"]
-    assert [EXACT.predicted, ROUNDING.predicted, Bands().predicted] == [1e-9, 1e-6, 0.05]
+    assert [EXACT.predicted, ROUNDING.predicted, OTHER_VERSIONS.predicted] == [1e-9, 1e-6, 0.05]
     assert [EXACT.least, ROUNDING.least] == [0.0, 1e-7]
     assert rows["the same in simulation"].split(" | ")[1] == ".5 % + 1e-7"
-    assert [EXACT.simulated, ROUNDING.simulated, Bands().simulated] == [1e-9, 5e-3, 0.05]
+    assert [EXACT.simulated, ROUNDING.simulated, OTHER_VERSIONS.simulated] == [1e-9, 5e-3, 0.05]
     assert rows["displacement, rotation"] == "1e-12 | 1 um, 1e-5 rad | .2 mm, .2 deg"
     assert [ROUNDING.displacement_m, ROUNDING.rotation_rad] == [1e-6, 1e-5]
-    assert Bands().displacement_m == 2e-4
-    assert [ROUNDING.grey, Bands().grey] == [1e-4, 0.02]
+    assert [EXACT.displacement_m, EXACT.rotation_rad] == [1e-12, 1e-12]
+    assert [OTHER_VERSIONS.displacement_m, OTHER_VERSIONS.rotation_rad] == [2e-4, math.radians(0.2)]
+    assert [ROUNDING.grey, OTHER_VERSIONS.grey] == [1e-4, 0.02]
 
 
 def test_noise_is_as_the_page_says():
