@@ -1,11 +1,9 @@
-"""How many of so many: what a count says about a share, and whether two counts say another."""
+"""How many of so many: what a count says about a share."""
 
 import importlib
 from typing import Any
 
 CONFIDENCE = 0.95
-SIGNIFICANT = 0.01
-"""Two counts differ if chance alone would put them so far apart more rarely than this."""
 
 
 def interval(count: int, of: int) -> tuple[float, float]:
@@ -17,12 +15,6 @@ def interval(count: int, of: int) -> tuple[float, float]:
     """
     found = _stats().binomtest(count, of).proportion_ci(CONFIDENCE, method="exact")
     return float(found.low), float(found.high)
-
-
-def differ(one: tuple[int, int], other: tuple[int, int]) -> bool:
-    """Whether two counts, each with how many were tried, are of different shares (Fisher)."""
-    table = [[count, of - count] for count, of in (one, other)]
-    return bool(_stats().fisher_exact(table).pvalue < SIGNIFICANT)
 
 
 def _stats() -> Any:

@@ -52,8 +52,8 @@ def test_a_verdict_has_the_fields_that_users_rely_on(here, capsys):
     document = json.loads(capsys.readouterr().out)
     (verdict,) = document["verdicts"]
     assert {
-        "id", "outcome", "held", "mismatches", "critical_friction", "wrenches", "controls",
-        "bounds", "accepted_by", "settings", "versions",
+        "id", "contacts_sha256", "outcome", "held", "mismatches", "critical_friction", "wrenches",
+        "controls", "bounds", "robustness", "accepted_by", "settings", "versions",
     } == set(verdict)  # fmt: skip
     assert verdict["mismatches"] == []
     friction = verdict["critical_friction"]

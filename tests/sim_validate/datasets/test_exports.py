@@ -27,7 +27,7 @@ from sim_validate.datasets.exports.isaac import yaml_number
 from sim_validate.datasets.rows import SPLITS
 from sim_validate.files import whole_folder
 from tests.sim_validate.datasets.engines import Here, silent
-from tests.sim_validate.datasets.test_build import forged
+from tests.sim_validate.datasets.test_verify import forged
 
 pytest.importorskip("pyarrow")
 FORMATS = tuple(EXPORTERS)
