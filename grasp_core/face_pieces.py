@@ -12,7 +12,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.lp import LinearProgram, Optimum, maximize
-from grasp_core.polygons import clip, convex_hull, edge_rows
+from grasp_core.polygons import clip, convex_hull, edge_rows, plane_frame
 from grasp_core.values import Polyhedron
 
 THINNEST = 1e-6
@@ -179,6 +179,11 @@ def piece_of(face: int, normal: Array, polygon: Array) -> FacePiece:
 def inscribed_disc_radius(polygon: Array, piece: FacePiece) -> float:
     """Radius of the largest disc in a convex polygon (k, 3) that lies on a piece."""
     return _inscribed_radius(*edge_rows((polygon - piece.origin) @ piece.frame))
+
+
+def inscribed_disc_radius_of(polygon: Array, normal: Array) -> float:
+    """Radius of the largest disc in a convex polygon (k, 3), counter-clockwise about a normal."""
+    return _inscribed_radius(*edge_rows((polygon - polygon[0]) @ plane_frame(normal)))
 
 
 def _inscribed_radius(E: Array, b: Array) -> float:

@@ -20,7 +20,7 @@ Method: TypeAlias = Literal["concurrent", "pencil", "regulus", "free"]
 """How grasps are looked for: by one of the paper's constructions, or free of any type."""
 FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
 """What counts as a face: flat parts, nearly flat patches, or what suits the surface."""
-RegionKind: TypeAlias = Literal["cone", "disc", "point"]
+RegionKind: TypeAlias = Literal["cone", "disc", "point", "certified"]
 FaceQuadruple: TypeAlias = tuple[int, int, int, int]
 """Indices of four faces, in finger order."""
 
@@ -201,7 +201,8 @@ class ContactRegion:
 
     kind: RegionKind
     """What certifies it: `cone` is the inverted force cone of a focus point cut with the face,
-    `disc` a disc around the contact of a pencil; `point` claims nothing but the contact."""
+    `disc` a disc around the contact of a pencil; `certified` a proof of its own (see
+    `certified_regions`); `point` claims nothing but the contact."""
     polygon: Array
     """Convex polygon on the face, (k, 3) [m]; of a disc, points of its border."""
     inscribed_radius: float

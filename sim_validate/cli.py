@@ -124,6 +124,29 @@ class Scene:
 
 
 @dataclass(frozen=True, slots=True)
+class Regions:
+    """Certify where fingers may stand, each anywhere in its own region, with a proof."""
+
+    grasps: Positional[Path]
+    """A grasps.json."""
+    grasp: str | None = None
+    """Id of one grasp; all of them if not given."""
+    limit: Count | None = None
+    """Only the first so many."""
+    friction: Positive | None = None
+    """Coulomb coefficient; the one planned for if not given."""
+    reserve: Annotated[float, at_least(0.0, up_to=0.99)] = 0.0
+    """Share of the friction that is not counted on."""
+    cones: Annotated[int, at_least(64, up_to=10_000_000)] = 200_000
+    """Size of a proof at most: larger ones prove larger regions, and take longer."""
+    jobs: Count = field(default_factory=available_cores)
+    """Largest number of processes; results do not depend on it."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+    out: Path | None = None
+    """Folder for regions.json and the proofs."""
+
+
+@dataclass(frozen=True, slots=True)
 class Replay:
     """Simulate one trial of a file again: what moved, sample by sample, and a clip."""
 
@@ -196,6 +219,7 @@ Command = (
     | Plan
     | Validate
     | Scene
+    | Regions
     | Replay
     | Analyze
     | Dataset

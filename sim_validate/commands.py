@@ -11,6 +11,7 @@ ACTIONS: dict[type[Any], str] = {
     cli.Plan: "plan_command:plan_file",
     cli.Validate: "validate_command:validate_file",
     cli.Scene: "scene_command:write_scenes",
+    cli.Regions: "regions_command:certify_file",
     cli.Replay: "replay_command:replay_trial",
     cli.Analyze: "analyze_command:analyze_file",
     dataset_flags.Build: "dataset_commands:build_dataset",

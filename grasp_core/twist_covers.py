@@ -1,0 +1,162 @@
+"""Regions for fingers that keep force closure wherever in them the contacts are: the proof.
+
+Solved: given convex regions K_i on planes, are contacts x_i in K_i force-closed for every choice?
+
+Criterion. Contacts are in force closure if each twist y = (a, b) other than zero is resisted by
+one of them: some force f in a friction cone C_i has positive power f.v at its contact, where the
+object moves with v = a + b x x. As the choice of one contact does not bind the others,
+
+    all choices are closed  <=>  for every y != 0 there is an i such that
+                                 min over x in K_i of max over f in C_i of f.(a + b x x) > 0.
+
+Cover. Fix i and f. The least power over K_i, h(y) = min over x of f.(a + b x x), is concave in y
+and h(t y) = t h(y) for t > 0, for it is the least of linear functions. So if h is positive on some
+rays of twists, it is so on the whole cone that they span. A *cover* is a list of cones, six rays
+each, with a contact and a force, whose cones fill all of R^6: if h > 0 on the rays of each, every
+choice of contacts is force-closed. The sixty-four orthants of six independent twists fill R^6. A
+cone is cut into two by a ray on one of its edges, the sum of its ends, in place of either end; so
+cones still fill R^6. Where f with unit normal part is n + g, a disc of radius r around p gives
+
+    h(y) = (n + g).(a + b x p) - r |b_t - b_n g|,
+
+b_t and b_n being the parts of b across and along the normal, and over a polygon the least is at a
+corner. A region that is thicker than its plane, as below a patch of a curved surface, loses the
+depth times |n.(g x b)| more.
+
+Completeness. If all choices are closed with something to spare, cutting the longest edges long
+enough ends with a cover; if a ray has no contact with h > 0 for any force, there is a choice that
+is not closed, as a best force and a worst point exist for each contact (h is concave in f and
+convex in x). Between the two only time decides.
+
+Source: with fixed forces the criterion is that of independent regions by primitive wrenches
+(Pollard, "Closure and quality equivalence for efficient synthesis of grasps from examples", 2004);
+covers by cones that are cut where needed are ours, as is their use for regions of reguli, for which
+Sudsang & Ponce (1995) have no method.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices, frozen, frozen_indices
+from grasp_core.errors import InputError
+
+TWIST = 6
+LEAF = 15
+"""Code of a cone that is not cut; smaller ones number its edges (0, 1), (0, 2), ... (4, 5)."""
+EDGES = tuple((i, j) for i in range(TWIST) for j in range(i + 1, TWIST))
+SLACK = 1e-12
+"""Of a power, relative to the lengths of twist and wrench: thousands of roundings."""
+LARGEST = 2.0**50
+"""Entries of rays up to this are exact: they are sums of whole numbers."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TwistCover:
+    """Cones of twists, on each of which one contact has a force with power.
+
+    The rays of a cone are whole numbers in the coordinates of `axes`, so that cutting is exact.
+    """
+
+    axes: Array
+    """Independent twists as rows, velocity of the points' origin before turning, (6, 6)."""
+    codes: Indices
+    """The tree, level by level from the sixty-four orthants: for each cone the number of the edge
+    that is cut, or `LEAF`, (n,)."""
+    contacts: Indices
+    """For each cone that is not cut, in the same order, the contact with power there, (m,)."""
+    forces: Array
+    """And the force on the object, with unit normal part, (m, 3)."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axes", frozen(self.axes, (TWIST, TWIST), "axes"))
+        for name in ("codes", "contacts"):
+            object.__setattr__(self, name, frozen_indices(getattr(self, name), (None,), name))
+        leaves = int(np.count_nonzero(self.codes == LEAF))
+        object.__setattr__(self, "forces", frozen(self.forces, (leaves, 3), "forces"))
+        if len(self.contacts) != leaves or self.codes.max(initial=0) > LEAF:
+            raise InputError(f"a cover of {leaves} cones needs as many contacts, and known codes")
+
+    def leaves(self) -> Iterator[tuple[slice, Array]]:
+        """The cones, level by level: where they are in the order of `contacts`, and rays (m, 6, 6).
+
+        Raises:
+            InputError: The codes are those of no tree.
+        """
+        cones, at, begun = orthants(), 0, 0
+        while len(cones):
+            codes = self.codes[at : at + len(cones)]
+            if len(codes) < len(cones):
+                raise InputError("the cover ends before its cones do")
+            uncut = codes == LEAF
+            count = int(np.count_nonzero(uncut))
+            yield slice(begun, begun + count), cones[uncut]
+            at, begun = at + len(cones), begun + count
+            cones = halves(cones[~uncut], codes[~uncut])
+        if at < len(self.codes):
+            raise InputError("the cover goes on after its cones have ended")
+
+    def verify(self, regions: Sequence[Array], normals: Array, friction: Array) -> bool:
+        """Whether all choices of contacts in regions are force-closed, in plain arithmetic.
+
+        Args:
+            regions: Corners of each contact's convex region, about the origin of points, (c, 3).
+            normals: Inward normals, (k, 3).
+            friction: (k,)
+        """
+        n = normals[self.contacts]
+        along = np.einsum("mi,mi->m", self.forces, n)
+        across = np.linalg.norm(self.forces - along[:, None] * n, axis=1)
+        if not (across <= friction[self.contacts] * along).all() or not self._independent():
+            return False
+        try:
+            return all(self._powerful(where, rays, regions) for where, rays in self.leaves())
+        except InputError:
+            return False
+
+    def _independent(self) -> bool:
+        lengths = np.linalg.norm(self.axes, axis=1)
+        if not (lengths > 0.0).all():
+            return False
+        return bool(np.linalg.svd(self.axes / lengths[:, None], compute_uv=False)[-1] > SLACK)
+
+    def _powerful(self, where: slice, rays: Array, regions: Sequence[Array]) -> bool:
+        """Whether each cone's force has power on its rays wherever its contact is."""
+        if rays.max(initial=0.0) > LARGEST or -rays.min(initial=0.0) > LARGEST:
+            return False
+        contacts, forces = self.contacts[where], self.forces[where]
+        for contact, region in enumerate(regions):
+            mine = np.flatnonzero(contacts == contact)
+            if not mine.size:
+                continue
+            twists = rays[mine] @ self.axes
+            f = forces[mine][:, None, :]
+            wrenches = np.concatenate(
+                [np.broadcast_to(f, (len(mine), len(region), 3)), np.cross(region[None], f)], axis=2
+            )
+            powers = np.einsum("mri,mci->mrc", twists, wrenches)
+            sizes = (
+                np.linalg.norm(twists, axis=2)[..., None]
+                * np.linalg.norm(wrenches, axis=2)[:, None]
+            )
+            if not (powers > SLACK * sizes).all():
+                return False
+        return True
+
+
+def orthants() -> Array:
+    """Rays of the sixty-four orthants, (64, 6, 6)."""
+    signs = 1.0 - 2.0 * (np.arange(1 << TWIST)[:, None] >> np.arange(TWIST) & 1)
+    return signs[:, :, None] * np.eye(TWIST)
+
+
+def halves(cones: Array, codes: Indices) -> Array:
+    """Cones (m, 6, 6) cut at the edges with these numbers, both parts next to each other."""
+    ends = np.array(EDGES)[codes]
+    rows = np.arange(len(cones))
+    middles = cones[rows, ends[:, 0]] + cones[rows, ends[:, 1]]
+    halves = np.repeat(cones, 2, axis=0)
+    halves[2 * rows, ends[:, 0]] = middles
+    halves[2 * rows + 1, ends[:, 1]] = middles
+    return halves

@@ -1,0 +1,133 @@
+"""Certified regions: every choice of contacts in them is force-closed, by the exact test."""
+
+import math
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+from grasp_core.certified_regions import certified_regions
+from grasp_core.on_faces import within
+from tests.grasp_core.curved import curved_body, inside
+from tests.judges import random_rotation
+
+FEW = 20_000
+CASES = [
+    ("tetrahedron", "concurrent"), ("wedge", "pencil"), ("mug", "regulus"), ("box", "concurrent"),
+    ("chamfered-box", "regulus"), ("hex-nut", "pencil"), ("cross", "free"),
+]  # fmt: skip
+
+
+def found(name, family, friction=0.5, cones=FEW, **more):
+    body = scenes.example_object(name)
+    grasp = gc.plan(body, friction, families=(family,), limit=1).grasps[0]
+    return body, grasp, certified_regions(body, grasp, friction, cones=cones, **more)
+
+
+@pytest.mark.parametrize(("name", "family"), CASES)
+def test_all_choices_in_the_regions_are_closed(name, family):
+    body, grasp, proved = found(name, family)
+    assert proved.verify()
+    assert proved.radius > 0.0
+    rng = np.random.default_rng(0)
+    for region, contact, face in zip(proved.regions, grasp.contacts, grasp.faces, strict=True):
+        assert region.kind == "certified"
+        normal = body.faces[face].normal
+        assert within(contact.position, region.polygon, normal, 1e-9)
+        for corner in region.polygon:
+            assert any(within(corner, piece, normal, 1e-9) for piece in body.faces[face].pieces)
+    drawn = np.array([inside(region.polygon, rng, 60) for region in proved.regions])
+    corners = [region.polygon[rng.integers(len(region.polygon), size=60)]
+               for region in proved.regions]  # fmt: skip
+    for positions in (*drawn.transpose(1, 0, 2), *np.transpose(corners, (1, 0, 2))):
+        assert gc.force_closure(positions, grasp.normals, 0.5).closed
+
+
+@pytest.mark.parametrize(
+    ("name", "family"),
+    [("tetrahedron", "concurrent"), ("wedge", "pencil"), ("octahedron", "regulus")],
+)
+def test_what_a_face_has_of_the_discs_is_inside(name, family):
+    body, grasp, proved = found(name, family)
+    for region, contact, face in zip(proved.regions, grasp.contacts, grasp.faces, strict=True):
+        normal = body.faces[face].normal
+        tangent = np.cross(normal, region.polygon[1] - region.polygon[0])
+        tangent /= np.linalg.norm(tangent)
+        for angle in np.linspace(0.0, 2.0 * np.pi, 50):
+            way = math.cos(angle) * tangent + math.sin(angle) * np.cross(normal, tangent)
+            point = contact.position + 0.999 * proved.radius * way
+            if any(within(point, piece, normal, 0.0) for piece in body.faces[face].pieces):
+                assert within(point, region.polygon, normal, 1e-9)
+
+
+def test_pencils_and_concurrent_grasps_get_more_than_their_own_discs():
+    for name, family, more in (("wedge", "pencil", 1.5), ("wedge", "concurrent", 0.95)):
+        _, grasp, proved = found(name, family)
+        smallest = min(region.inscribed_radius for region in proved.regions)
+        assert smallest > more * grasp.radius
+
+
+def test_reguli_get_regions_at_all():
+    _, grasp, proved = found("octahedron", "regulus")
+    assert grasp.radius == 0.0
+    assert min(region.inscribed_radius for region in proved.regions) > 0.0
+
+
+def test_more_cones_give_larger_regions():
+    radii = [found("tetrahedron", "concurrent", cones=cones)[2].radius
+             for cones in (3_000, 20_000, 100_000)]  # fmt: skip
+    assert radii[0] < radii[1] < radii[2]
+
+
+def test_a_reserve_of_friction_is_kept():
+    _, grasp, proved = found("wedge", "concurrent", reserve=0.4)
+    assert proved.friction == pytest.approx(0.3)
+    rng = np.random.default_rng(2)
+    drawn = np.array([inside(region.polygon, rng, 40) for region in proved.regions])
+    for positions in drawn.transpose(1, 0, 2):
+        assert gc.critical_friction(positions, grasp.normals) < 0.3
+    assert proved.radius < found("wedge", "concurrent")[2].radius
+
+
+def test_regions_turn_and_grow_with_the_object():
+    body, grasp, proved = found("wedge", "pencil")
+    rotation, scale, shift = random_rotation(np.random.default_rng(4)), 20.0, np.array([1, 2, 3])
+    moved = gc.Polyhedron.from_mesh(
+        scale * body.vertices @ rotation.T + shift, body.triangles, name="moved"
+    )
+    same = next(
+        each for each in gc.plan(moved, 0.5, families=("pencil",)).grasps
+        if np.allclose(each.positions, scale * grasp.positions @ rotation.T + shift, atol=1e-4)
+    )  # fmt: skip
+    again = certified_regions(moved, same, 0.5, cones=FEW)
+    assert again.radius == pytest.approx(scale * proved.radius, rel=0.15)
+
+
+def test_what_cannot_be_is_refused():
+    body = scenes.example_object("wedge")
+    (grasp,) = gc.plan(body, 0.5, limit=1).grasps
+    with pytest.raises(gc.InputError, match=r"not in force closure at friction 0\.01"):
+        certified_regions(body, grasp, 0.01)
+    with pytest.raises(gc.InputError, match="reserve"):
+        certified_regions(body, grasp, 0.5, reserve=1.0)
+    with pytest.raises(gc.InputError, match="friction"):
+        certified_regions(body, grasp, -0.5)
+    curved = curved_body()
+    (grasp,) = gc.plan(curved, 0.5, limit=1).grasps
+    with pytest.raises(gc.InputError, match="curved"):
+        certified_regions(curved, grasp, 0.5)
+
+
+def test_too_few_cones_prove_nothing():
+    body = scenes.example_object("wedge")
+    (grasp,) = gc.plan(body, 0.5, limit=1).grasps
+    assert certified_regions(body, grasp, 0.5, cones=64) is None
+
+
+def test_without_compiled_loops_there_are_regions_too(monkeypatch):
+    compiled = found("wedge", "pencil")[2]
+    monkeypatch.setattr("grasp_core.cover_search.compiled", lambda _: None)
+    plain = found("wedge", "pencil")[2]
+    assert plain.verify()
+    assert 0.5 * compiled.radius < plain.radius <= compiled.radius

@@ -1,0 +1,84 @@
+"""`graspproof regions`: regions and proofs that a stranger can re-check from the files alone."""
+
+import json
+
+import numpy as np
+import pytest
+
+from grasp_core.twist_covers import TwistCover
+from sim_validate.cli import Exit, main
+
+NAMES = ("axes", "codes", "contacts", "forces")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("regions")
+    assert main(["plan", "wedge", "--limit", "3", "--out", str(folder), "-q"]) == Exit.GOOD
+    asked = ["regions", str(folder / "grasps.json"), "--cones", "20000", "--out", str(folder), "-q"]
+    assert main(asked) == Exit.GOOD
+    return folder
+
+
+def test_every_grasp_has_regions_of_its_own(folder):
+    planned = json.loads((folder / "grasps.json").read_text())
+    found = json.loads((folder / "regions.json").read_text())
+    assert found["object"]["content_sha256"] == planned["object"]["content_sha256"]
+    assert [each["id"] for each in found["grasps"]] == [each["id"] for each in planned["grasps"]]
+    for grasp in found["grasps"]:
+        assert grasp["radius_m"] > 0.0
+        for region in grasp["regions"]:
+            assert region["kind"] == "certified"
+            assert region["area_m2"] >= np.pi * region["inscribed_radius_m"] ** 2
+            assert np.shape(region["polygon_m"])[1] == 3
+
+
+def test_the_proofs_can_be_checked_from_their_files(folder):
+    checked = 0
+    for path in sorted((folder / "proofs").iterdir()):
+        with np.load(path, allow_pickle=False) as kept:
+            proof = {name: kept[name] for name in kept.files}
+        cover = TwistCover(**{name: proof[name] for name in NAMES})
+        regions = [(proof[f"region{i}_m"] - proof["center_m"]) / proof["scale_m"] for i in range(4)]
+        friction = np.full(4, proof["friction"])
+        assert cover.verify(regions, proof["normals"], friction)
+        assert not cover.verify(regions, proof["normals"], 0.9 * friction)
+        assert not cover.verify([1.3 * region for region in regions], proof["normals"], friction)
+        checked += 1
+    assert checked == 3
+
+
+def test_processes_and_runs_agree(folder, tmp_path):
+    grasps = str(folder / "grasps.json")
+    for jobs in ("1", "2"):
+        out = tmp_path / jobs
+        asked = ["regions", grasps, "--cones", "20000", "--jobs", jobs, "--out", str(out), "-q"]
+        assert main(asked) == Exit.GOOD
+        assert (out / "regions.json").read_bytes() == (folder / "regions.json").read_bytes()
+
+
+def test_one_grasp_with_a_reserve(folder, capsys):
+    name = json.loads((folder / "grasps.json").read_text())["grasps"][0]["id"]
+    asked = ["regions", str(folder / "grasps.json"), "--grasp", name, "--cones", "20000", "--json"]
+    assert main([*asked, "--reserve", ".4"]) == Exit.GOOD
+    found = json.loads(capsys.readouterr().out)
+    (grasp,) = found["grasps"]
+    assert (grasp["id"], found["reserve"]) == (name, 0.4)
+    assert main(asked) == Exit.GOOD
+    (without,) = json.loads(capsys.readouterr().out)["grasps"]
+    assert grasp["radius_m"] < without["radius_m"]
+
+
+def test_where_nothing_can_be_proved_it_is_said(folder, capsys):
+    asked = ["regions", str(folder / "grasps.json"), "--cones", "64"]
+    assert main(asked) == Exit.NEGATIVE
+    assert "none proved" in capsys.readouterr().out
+
+
+def test_what_is_wrong_is_refused(folder, capsys):
+    grasps = str(folder / "grasps.json")
+    assert main(["regions", grasps, "--grasp", "none"]) == Exit.INPUT
+    assert "no grasp none" in capsys.readouterr().err
+    assert main(["regions", grasps, "--friction", "0.001"]) == Exit.INPUT
+    assert "not in force closure" in capsys.readouterr().err
+    assert main(["regions", grasps, "--cones", "1"]) == Exit.USAGE
