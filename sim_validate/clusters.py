@@ -6,6 +6,7 @@ engines. Ray without `address`, and Dask likewise, start workers on this machine
 
 import importlib
 import os
+import socket
 from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from contextlib import contextmanager
@@ -26,7 +27,7 @@ RAY_SETTINGS = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_Z
 ANY_PORT = "127.0.0.1:0"
 """Where a Dask scheduler started here shows its state: to this machine, at a port that is free."""
 ANSWER_S = 10.0
-"""How long a Dask scheduler may take to answer [s]."""
+"""How long a scheduler may take to answer [s]."""
 
 
 class RayCluster:
@@ -80,6 +81,8 @@ def ray_workers(workers: int, address: str | None) -> Generator[RayCluster]:
         "include_dashboard": False,
         "object_store_memory": OBJECT_STORE_BYTES,
     }
+    if address is not None:
+        _require_listener(address)
     try:
         ray.init(**quiet, **({"address": address} if address else here))
     except (ConnectionError, ValueError, RuntimeError, TimeoutError) as error:
@@ -88,6 +91,21 @@ def ray_workers(workers: int, address: str | None) -> Generator[RayCluster]:
         yield RayCluster(ray, int(ray.cluster_resources().get("CPU", workers)))
     finally:
         ray.shutdown()
+
+
+def _require_listener(address: str) -> None:
+    """Refuse a host and port where nothing listens: Ray itself asks again for minutes.
+
+    Raises:
+        InputError: Nothing does; `auto` and such are left to Ray.
+    """
+    host, colon, port = address.split("://")[-1].rpartition(":")
+    if not (colon and port.isdigit()):
+        return
+    try:
+        socket.create_connection((host, int(port)), timeout=ANSWER_S).close()
+    except (OSError, OverflowError) as error:
+        raise InputError(f"--address {address}: no Ray cluster answers there ({error})") from error
 
 
 @contextmanager
