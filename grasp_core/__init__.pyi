@@ -1,7 +1,7 @@
 from grasp_core.best_contacts import Improvement as Improvement
 from grasp_core.best_contacts import optimize_contacts as optimize_contacts
 from grasp_core.certified_regions import CertifiedRegions as CertifiedRegions
-from grasp_core.certified_regions import certified_regions as certified_regions
+from grasp_core.certified_regions import certify_regions as certify_regions
 from grasp_core.closure import ClosureCertificate as ClosureCertificate
 from grasp_core.closure import force_closure as force_closure
 from grasp_core.critical import critical_friction as critical_friction

@@ -62,7 +62,7 @@ class CertifiedRegions:
         return self.cover.verify(corners, self.normals, friction)
 
 
-def certified_regions(
+def certify_regions(
     body: Polyhedron, grasp: Grasp, friction: float, *, reserve: float = 0.0, cones: int = CONES
 ) -> CertifiedRegions | None:
     """Regions around the contacts of a grasp, as large as a proof is found for.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.certified_regions import CertifiedRegions, certified_regions
+from grasp_core.certified_regions import CertifiedRegions, certify_regions
 from grasp_core.errors import InputError
 from grasp_core.values import ContactRegion, Grasp, Polyhedron
 from grasp_core.versions import versions
@@ -70,7 +70,7 @@ def certify_file(command: cli.Regions, reporter: Reporter) -> int:
 
 
 def _certified(task: _Task) -> CertifiedRegions | None:
-    return certified_regions(
+    return certify_regions(
         task.body, task.grasp, task.friction, reserve=task.reserve, cones=task.cones
     )
 

@@ -19,7 +19,7 @@ from scipy.optimize import minimize
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.certified_regions import certified_regions
+from grasp_core.certified_regions import certify_regions
 from grasp_core.values import Contact
 from grasp_core.wrenches import contact_frames
 from sim_validate.engines import available_cores, each
@@ -108,7 +108,7 @@ def examine(given):
     body = scenes.example_object(task.name)
     grasp = gc.plan(body, FRICTION, families=(task.family,), limit=limit).grasps[task.place]
     begun = time.perf_counter()
-    proved = certified_regions(body, grasp, FRICTION, cones=task.cones)
+    proved = certify_regions(body, grasp, FRICTION, cones=task.cones)
     seconds = time.perf_counter() - begun
     if proved is None:
         return Answer(task.family, proved=False, seconds=seconds)

@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from grasp_core.certified_regions import certified_regions
+from grasp_core.certified_regions import certify_regions
 from grasp_core.on_faces import within
 from tests.grasp_core.curved import curved_body, inside
 from tests.judges import random_rotation
@@ -22,7 +22,7 @@ CASES = [
 def found(name, family, friction=0.5, cones=FEW, **more):
     body = scenes.example_object(name)
     grasp = gc.plan(body, friction, families=(family,), limit=1).grasps[0]
-    return body, grasp, certified_regions(body, grasp, friction, cones=cones, **more)
+    return body, grasp, certify_regions(body, grasp, friction, cones=cones, **more)
 
 
 @pytest.mark.parametrize(("name", "family"), CASES)
@@ -100,7 +100,7 @@ def test_regions_turn_and_grow_with_the_object():
         each for each in gc.plan(moved, 0.5, families=("pencil",)).grasps
         if np.allclose(each.positions, scale * grasp.positions @ rotation.T + shift, atol=1e-4)
     )  # fmt: skip
-    again = certified_regions(moved, same, 0.5, cones=FEW)
+    again = certify_regions(moved, same, 0.5, cones=FEW)
     assert again.radius == pytest.approx(scale * proved.radius, rel=0.15)
 
 
@@ -108,21 +108,21 @@ def test_what_cannot_be_is_refused():
     body = scenes.example_object("wedge")
     (grasp,) = gc.plan(body, 0.5, limit=1).grasps
     with pytest.raises(gc.InputError, match=r"not in force closure at friction 0\.01"):
-        certified_regions(body, grasp, 0.01)
+        certify_regions(body, grasp, 0.01)
     with pytest.raises(gc.InputError, match="reserve"):
-        certified_regions(body, grasp, 0.5, reserve=1.0)
+        certify_regions(body, grasp, 0.5, reserve=1.0)
     with pytest.raises(gc.InputError, match="friction"):
-        certified_regions(body, grasp, -0.5)
+        certify_regions(body, grasp, -0.5)
     curved = curved_body()
     (grasp,) = gc.plan(curved, 0.5, limit=1).grasps
     with pytest.raises(gc.InputError, match="curved"):
-        certified_regions(curved, grasp, 0.5)
+        certify_regions(curved, grasp, 0.5)
 
 
 def test_too_few_cones_prove_nothing():
     body = scenes.example_object("wedge")
     (grasp,) = gc.plan(body, 0.5, limit=1).grasps
-    assert certified_regions(body, grasp, 0.5, cones=64) is None
+    assert certify_regions(body, grasp, 0.5, cones=64) is None
 
 
 def test_without_compiled_loops_there_are_regions_too(monkeypatch):

@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from grasp_core.certified_regions import certified_regions
+from grasp_core.certified_regions import certify_regions
 from grasp_core.twist_covers import EDGES, LEAF, TwistCover, orthants
 
 SMALL = 20_000
@@ -17,7 +17,7 @@ SMALL = 20_000
 def proved():
     body = scenes.example_object("wedge")
     (grasp,) = gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps
-    return certified_regions(body, grasp, 0.5, cones=SMALL)
+    return certify_regions(body, grasp, 0.5, cones=SMALL)
 
 
 def random_tree(rng, cuts):
