@@ -23,7 +23,7 @@ from grasp_core.errors import InputError, SolverError
 from grasp_core.face_pieces import inscribed_disc_radius_of
 from grasp_core.on_faces import check_on_faces
 from grasp_core.polygons import clip, plane_frame
-from grasp_core.twist_covers import SLACK, TwistCover
+from grasp_core.twist_covers import SLACK, TwistCover, summed
 from grasp_core.values import ContactRegion, Grasp, Polyhedron, contact_frictions, four, stacked
 from grasp_core.wrenches import contact_frames
 
@@ -90,6 +90,7 @@ def certify_regions(
     positions, normals = stacked(grasp.contacts)
     if not force_closure(positions, normals, left).closed:
         raise InputError(f"grasp {grasp.id} is not in force closure at friction {left:.6g}")
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)  # files round them
     search = _Search(positions, normals, left, cones)
     found = search.largest(_reaches(body, grasp, search.scale))
     if found is None:
@@ -187,7 +188,7 @@ def _powerful_part(piece: Array, cover: TwistCover, finger: int, search: _Search
         twists, forces = rays[mine] @ cover.axes, cover.forces[where][mine][:, None, :]
         turned = np.cross(forces, twists[..., 3:])
         at = (forces * twists[..., :3]).sum(axis=2) + turned @ origin
-        lengths = np.linalg.norm(twists, axis=2) * np.linalg.norm(forces, axis=2)
+        lengths = summed(rays[mine], cover.axes) * np.linalg.norm(forces, axis=2)
         at -= MARGIN * SLACK * (2.0 + reach) * lengths
         falling = -turned @ frame
         sizes = np.linalg.norm(falling, axis=2)

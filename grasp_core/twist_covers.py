@@ -47,7 +47,7 @@ LEAF = 15
 """Code of a cone that is not cut; smaller ones number its edges (0, 1), (0, 2), ... (4, 5)."""
 EDGES = tuple((i, j) for i in range(TWIST) for j in range(i + 1, TWIST))
 SLACK = 1e-12
-"""Of a power, relative to the lengths of twist and wrench: thousands of roundings."""
+"""Of a power, relative to the lengths of wrench and `summed` twist: thousands of roundings."""
 LARGEST = 2.0**50
 """Entries of rays up to this are exact: they are sums of whole numbers."""
 
@@ -105,6 +105,11 @@ class TwistCover:
             normals: Inward normals, (k, 3).
             friction: (k,)
         """
+        k = len(regions)
+        if (len(normals), len(friction), len(self.axes)) != (k, k, TWIST):
+            return False
+        if self.contacts.max(initial=0) >= k or not _units(normals):
+            return False
         n = normals[self.contacts]
         along = np.einsum("mi,mi->m", self.forces, n)
         across = np.linalg.norm(self.forces - along[:, None] * n, axis=1)
@@ -137,12 +142,23 @@ class TwistCover:
             )
             powers = np.einsum("mri,mci->mrc", twists, wrenches)
             sizes = (
-                np.linalg.norm(twists, axis=2)[..., None]
-                * np.linalg.norm(wrenches, axis=2)[:, None]
+                summed(rays[mine], self.axes)[..., None] * np.linalg.norm(wrenches, axis=2)[:, None]
             )
             if not (powers > SLACK * sizes).all():
                 return False
         return True
+
+
+def _units(normals: Array) -> bool:
+    return bool((np.abs(np.linalg.norm(normals, axis=1) - 1.0) <= SLACK).all())
+
+
+def summed(rays: Array, axes: Array) -> Array:
+    """Lengths (m, 6) of the sums that twists are made of: what their rounding is relative to.
+
+    Where axes nearly cancel the twists themselves are shorter.
+    """
+    return np.linalg.norm(np.abs(rays) @ np.abs(axes), axis=2)
 
 
 def orthants() -> Array:

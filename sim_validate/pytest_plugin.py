@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 ENDING = ".grasps.toml"
 MARKER = (
-    "grasp(file=None, *, object=None, friction=0.5, limit=1, families, cones, seed, unit): run the "
+    "grasp([file], *, object=None, friction=0.5, limit=1, families, cones, seed, unit): run the "
     "test with each grasp of a grasps.json, or planned for an object, as its fixture `grasp_case`"
 )
 LINES = pytest.StashKey[list[dict[str, Any]]]()

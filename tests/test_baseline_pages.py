@@ -15,7 +15,7 @@ from sim_validate.baselines.suite import KINDS, suite_from_toml
 from sim_validate.baselines.values import Entry
 from sim_validate.cli import Exit, main
 from sim_validate.noise.draws import Noise
-from tests.sim_validate.test_pytest_plugin import pytest_in
+from tests.sim_validate.plugin.project import run_pytest
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "baselines.md").read_text()
@@ -42,10 +42,10 @@ def test_the_readme_in_a_project_of_somebody_else(project):
     assert (project / "results.xml").is_file()
     (project / "wedge.grasps.toml").write_text(block(README, "toml"))
     (project / "test_mine.py").write_text(block(README, "py"))
-    code, said = pytest_in(project, "--grasp-bless", "wedge.grasps.toml")
+    code, said = run_pytest(project, "--grasp-bless", "wedge.grasps.toml")
     assert code == 0, said
     assert (project / "wedge.baseline.json").is_file()
-    code, said = pytest_in(project, "--strict-markers", "-W", "error", "--grasp-report", "report")
+    code, said = run_pytest(project, "--strict-markers", "-W", "error", "--grasp-report", "report")
     assert code == 0, said
     assert "5 passed" in said
     assert "3 same, 2 stable" in (project / "report" / "index.html").read_text()
@@ -53,7 +53,7 @@ def test_the_readme_in_a_project_of_somebody_else(project):
 
 def test_the_tests_of_the_page_pass(project):
     (project / "test_page.py").write_text(block(PAGE, "python"))
-    code, said = pytest_in(project, "test_page.py", "--strict-markers", "-W", "error")
+    code, said = run_pytest(project, "test_page.py", "--strict-markers", "-W", "error")
     assert code == 0, said
     assert "5 passed" in said
 

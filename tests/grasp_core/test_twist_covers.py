@@ -114,6 +114,16 @@ def test_a_cover_that_was_tampered_with_is_refused(proved, changed):
     assert not tampered(proved, **changed).verify()
 
 
+def test_what_a_proof_does_not_speak_of_is_refused(proved):
+    corners = [(region.polygon - proved.center) / proved.scale for region in proved.regions]
+    friction = np.full(4, proved.friction)
+    assert proved.cover.verify(corners, proved.normals, friction)
+    assert not proved.cover.verify(corners[:3], proved.normals[:3], friction[:3])
+    assert not proved.cover.verify(corners, proved.normals, friction[:3])
+    assert not proved.cover.verify(corners, 2.0 * proved.normals, friction)
+    assert not proved.cover.verify([np.full((3, 3), np.nan)] * 4, proved.normals, friction)
+
+
 def test_a_cover_with_a_hole_is_refused(proved):
     cover = proved.cover
     cut = dataclasses.replace(cover, contacts=cover.contacts[:-1], forces=cover.forces[:-1],

@@ -1,0 +1,196 @@
+"""Files of grasps as tests of somebody else's: baselines, blessing, reports."""
+
+import json
+import shlex
+from xml.etree import ElementTree
+
+import pytest
+
+from sim_validate.baselines.comparing import Status
+from sim_validate.baselines.suite import suite_from_toml
+from sim_validate.cli import Exit, main
+from sim_validate.files import write_text
+from tests.sim_validate.plugin.project import CODE, copied, run_pytest
+
+
+def test_grasps_that_stay_as_they_were_pass(blessed, tmp_path):
+    code, said = run_pytest(blessed, "--junitxml", str(tmp_path / "j.xml"))
+    assert code == 0, said
+    assert "2 passed" in said
+    cases = ElementTree.parse(tmp_path / "j.xml").getroot().iter("testcase")  # noqa: S314 - ours
+    for case in cases:
+        kept = {each.get("name"): each.get("value") for each in case.iter("property")}
+        assert kept["status"] == "same"
+        assert kept["outcome"] == "held"
+
+
+@pytest.mark.slow
+def test_they_pass_on_several_workers_too(blessed):
+    code, said = run_pytest(blessed, "-n", "2")
+    assert code == 0, said
+    assert "2 passed" in said
+
+
+def test_a_regression_says_what_was_and_what_is(blessed, tmp_path):
+    copied(blessed, tmp_path)
+    baseline = tmp_path / "wedge.baseline.json"
+    record = json.loads(baseline.read_text())
+    record["grasps"][0].update(limit_n=1e3)
+    record["grasps"].append(record["grasps"][1] | {"id": "gone"})
+    baseline.write_text(json.dumps(record))
+    code, said = run_pytest(tmp_path)
+    assert code == 1
+    assert "2 failed, 1 passed" in said
+    name = record["grasps"][0]["id"]
+    assert f"{name}: regressed" in said
+    assert "limit_n: 1000 -> " in said
+    assert "predicted" in said
+    grasps = tmp_path / "grasps.json"
+    assert f"graspproof baseline check {baseline} --grasps {grasps}" in said
+    assert f"replay {baseline} --grasp {name} --grasps {grasps} --out replay" in said
+    assert "gone: missing" in said
+    assert "Traceback" not in said
+
+
+def test_a_grasp_that_slips_says_at_which_wrench_and_how_to_replay_it(blessed, tmp_path):
+    """A wrench in the baseline's settings that no finger can hold."""
+    copied(blessed, tmp_path)
+    baseline = tmp_path / "wedge.baseline.json"
+    record = json.loads(baseline.read_text())
+    record["settings"]["wrenches"] = {"far too much": [0.0, 0.0, 90.0, 0.0, 0.0, 0.0]}
+    baseline.write_text(json.dumps(record))
+    code, said = run_pytest(tmp_path)
+    assert code == 1
+    assert "held -> slipped at far too much" in said
+    assert "first wrench that was not held: far too much [0.0, 0.0, 90.0" in said
+    assert "predicted limit 0." in said
+    line = next(line for line in said.splitlines() if "graspproof replay" in line)
+    words = shlex.split(line.split("graspproof ", 1)[1])
+    assert "--wrench=far too much" in words
+    assert main([*words[:-1], str(tmp_path / "replay"), "-q"]) == Exit.NEGATIVE
+    assert (tmp_path / "replay" / "trace.csv").is_file()
+
+
+@pytest.mark.parametrize("workers", [(), ("-n", "2")], ids=["alone", "xdist"])
+def test_a_report_has_a_line_for_each_grasp(blessed, tmp_path, workers):
+    copied(blessed, tmp_path)
+    baseline = tmp_path / "wedge.baseline.json"
+    record = json.loads(baseline.read_text())
+    record["grasps"][0].update(limit_n=1e3)
+    baseline.write_text(json.dumps(record))
+    write_text(tmp_path / "test_mine.py", CODE)
+    code, said = run_pytest(tmp_path, "--grasp-report", "out/report", *workers)
+    assert code == 1, said
+    found = json.loads((tmp_path / "out" / "report" / "report.json").read_text())["grasps"]
+    assert sorted(line["status"] for line in found) == ["regressed", "same", "stable", "unstable"]
+    regressed = next(line for line in found if line["status"] == "regressed")
+    assert regressed["before"]["limit_n"] == 1e3
+    assert regressed["after"]["limit_n"] < 10.0
+    assert "graspproof replay" in regressed["why"]
+    page = (tmp_path / "out" / "report" / "index.html").read_text()
+    assert page.count("<tr") == 5
+    assert "was 1000" in page
+    assert "1 regressed, 1 same, 1 stable, 1 unstable" in page
+
+
+def test_without_a_baseline_it_is_said_how_to_make_one(blessed, tmp_path):
+    for name in ("grasps.json", "wedge.grasps.toml"):
+        (tmp_path / name).write_bytes((blessed / name).read_bytes())
+    code, said = run_pytest(tmp_path)
+    assert code == 1
+    assert "there is no baseline yet: pytest --grasp-bless" in said
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "grasps: expected the path"),
+        ("grasp = 1", "no such setting"),
+        ('grasps = "g.json"\nstrict = 1', "strict: expected bool"),
+        ('grasps = "nowhere.json"', "nowhere.json"),
+        ("grasps = ", "not TOML"),
+    ],
+)
+def test_a_bad_file_is_named(tmp_path, text, message):
+    write_text(tmp_path / "x.grasps.toml", text)
+    code, said = run_pytest(tmp_path)
+    assert code != 0
+    assert message in said
+
+
+def test_it_is_silent_where_it_is_not_used(tmp_path):
+    write_text(
+        tmp_path / "test_light.py",
+        """
+import sys
+
+def test_nothing_heavy_is_imported():
+    assert not {"numpy", "mujoco", "tyro"} & set(sys.modules)
+""",
+    )
+    code, said = run_pytest(tmp_path)
+    assert code == 0, said
+    assert "1 passed" in said
+
+
+def test_blessing_keeps_what_the_baseline_was_made_with(blessed, tmp_path):
+    copied(blessed, tmp_path)
+    task = {"wrenches": [{"name": "lift", "force_n": [0, 0, -0.1]}]}
+    write_text(tmp_path / "task.json", json.dumps(task))
+    grasps, baseline = (str(tmp_path / name) for name in ("grasps.json", "wedge.baseline.json"))
+    asked = ("--wrenches", str(tmp_path / "task.json"), "--trials", "2", "--seed", "7")
+    assert main(["baseline", "record", grasps, "-o", baseline, *asked, "-q"]) == Exit.GOOD
+    before = (tmp_path / "wedge.baseline.json").read_text()
+    code, said = run_pytest(tmp_path, "--grasp-bless")
+    assert code == 0, said
+    assert (tmp_path / "wedge.baseline.json").read_text() == before
+    assert '"lift"' in before
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ("trials = 3", "trials: 0 -> 3"),
+        ("seed = 5", "seed: 0 -> 5"),
+        ('wrenches = "task.json"', "wrenches.lift: None -> "),
+        ('setup = "setup.toml"', "setup.hold.hold_s: 0.4 -> 0.3"),
+    ],
+)
+def test_settings_that_the_baseline_was_not_made_with_are_not_compared(
+    blessed, tmp_path, line, reason
+):
+    copied(blessed, tmp_path)
+    task = {"wrenches": [{"name": "lift", "force_n": [0, 0, -0.1]}]}
+    write_text(tmp_path / "task.json", json.dumps(task))
+    write_text(tmp_path / "setup.toml", "[hold]\nhold_s = 0.3\n")
+    path = write_text(tmp_path / "wedge.grasps.toml", f'grasps = "grasps.json"\n{line}\n')
+    suite = suite_from_toml(path)
+    for name in suite.ids:
+        (finding,) = suite.tested(name).findings
+        assert finding.status is Status.NOT_COMPARABLE
+        assert finding.reasons[0].startswith(reason)
+    suite.bless()
+    suite = suite_from_toml(path)
+    for name in suite.ids:
+        (finding,) = suite.tested(name).findings
+        assert finding.status is Status.SAME
+
+
+def test_other_projects_see_nothing_of_it(tmp_path):
+    write_text(
+        tmp_path / "conftest.py",
+        """
+def pytest_runtest_logreport(report):
+    assert not any("grasp" in name for name in vars(report)), vars(report)
+""",
+    )
+    write_text(tmp_path / "test_plain.py", "def test_it(): pass\n")
+    code, said = run_pytest(tmp_path, "-W", "error")
+    assert code == 0, said
+    after = said.split("collected 1 item")[1]
+    assert "grasp" not in after
+    assert {path.name for path in tmp_path.iterdir()} <= {
+        "conftest.py",
+        "test_plain.py",
+        "__pycache__",
+    }

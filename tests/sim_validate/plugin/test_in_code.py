@@ -1,0 +1,178 @@
+"""The marker, `assert_stable` and what it can be asked for, in tests of somebody else's."""
+
+import json
+
+import pytest
+
+from grasp_core.records import grasps_from_json
+from sim_validate.files import write_text
+from tests.sim_validate.plugin.project import CODE, copied, run_pytest
+
+MARKED = """
+import pytest
+import scenes
+
+@pytest.mark.grasp("grasps.json")
+def test_of_a_file(grasp_case, assert_stable):
+    assert assert_stable(grasp_case).held
+
+@pytest.mark.grasp(object="wedge", friction=0.4, limit=1, families=("pencil",))
+def test_planned(grasp_case, assert_stable):
+    assert grasp_case.friction == 0.4
+    assert grasp_case.grasp.family == "pencil"
+
+@pytest.mark.grasp(object="box.obj", unit="mm")
+def test_a_mesh(grasp_case):
+    assert grasp_case.body.radius < 0.1
+
+def test_unmarked(grasp_case):
+    pass
+"""
+BOX = "\n".join(
+    [f"v {x} {y} {z}" for x in (0, 30) for y in (0, 20) for z in (0, 10)]
+    + ["f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"]
+)
+DEMANDS = """
+import pytest
+
+pytestmark = pytest.mark.grasp(object="wedge")
+
+def test_good_enough(grasp_case, assert_stable):
+    assert_stable(grasp_case, min_margin=0.3, trials=5, min_pass_rate=0.5)
+
+def test_close_to_slipping(grasp_case, assert_stable):
+    assert_stable(grasp_case, min_margin=0.49)
+
+def test_often_dropped(grasp_case, assert_stable):
+    from sim_validate.noise.draws import Noise
+    assert_stable(grasp_case, trials=20, noise=Noise(mass=0.5), min_pass_rate=0.99)
+"""
+
+
+def test_marked_tests_run_with_each_grasp(blessed, tmp_path):
+    copied(blessed, tmp_path)
+    write_text(tmp_path / "test_marked.py", MARKED)
+    write_text(tmp_path / "box.obj", BOX)
+    code, said = run_pytest(tmp_path, "-v", "--strict-markers", "test_marked.py")
+    assert code == 1, said
+    names = [grasp.id for grasp in grasps_from_json((tmp_path / "grasps.json").read_text()).grasps]
+    for name in names:
+        assert f"test_of_a_file[{name}] PASSED" in said
+    assert said.count("test_planned[p-") == 1
+    assert said.count("test_a_mesh[") == 1
+    assert "test_unmarked: grasp_case needs @pytest.mark.grasp" in said
+    assert f"{2 + len(names)} passed, 1 error" in said
+
+
+@pytest.mark.parametrize(
+    ("marker", "message"),
+    [
+        ("", "needs a grasps.json, or object="),
+        ("object='wedge', taste=1", "got 'taste'"),
+        ("'grasps.json', limit=1", "beside a file takes friction; got 'limit'"),
+        ("'a.json', 'b.json'", "takes one file of grasps"),
+        ("3", "takes one file of grasps"),
+        ("'nowhere.json'", "nowhere.json"),
+        ("object='wedg'", "did you mean wedge"),
+        ("object='wedge', friction='0.5'", "friction must be a number, got '0.5'"),
+        ("object='wedge', limit='2'", "a setting is of the wrong kind"),
+        ("object='box', cones='normal', families=('pencil',)", "there is no grasp of box"),
+    ],
+)
+def test_a_wrong_marker_is_named(tmp_path, marker, message):
+    write_text(
+        tmp_path / "test_it.py",
+        f"import pytest\n@pytest.mark.grasp({marker})\ndef test_it(grasp_case): pass\n",
+    )
+    code, said = run_pytest(tmp_path)
+    assert code == 2
+    assert message in said
+    assert "Traceback" not in said
+    assert "During handling" not in said
+
+
+def test_more_can_be_asked_for(tmp_path):
+    write_text(tmp_path / "test_demands.py", DEMANDS)
+    code, said = run_pytest(tmp_path)
+    assert code == 1, said
+    assert "2 failed, 1 passed" in said
+    assert "less than 0.49 above the predicted critical one" in said
+    assert "asked for are 0.99" in said
+    assert "of 20 held (" in said
+
+
+def test_assert_stable_in_code(tmp_path):
+    write_text(tmp_path / "test_mine.py", CODE)
+    code, said = run_pytest(tmp_path, "-v", "--junitxml", "j.xml")
+    assert code == 1
+    assert "1 failed, 1 passed" in said
+    assert "push [0.0, 0.0, 900.0" in said
+    assert "predicted limit" in said
+    assert ".critical_friction" in (tmp_path / "j.xml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        ("assert_stable(grasp_case, min_pass_rate=0.9)", "give trials, too"),
+        ("assert_stable(grasp_case, trials=2, min_pass_rate=80)", "from 0 to 1, got 80"),
+        ("assert_stable(grasp_case, min_margin=float('nan'))", "min_margin must be from 0"),
+        ("assert_stable(grasp_case, min_margin='0.2')", "min_margin must be from 0"),
+        ("assert_stable(grasp_case, trial=2)", "assert_stable takes wrenches, trials"),
+        ("assert_stable(grasp_case, wrenches=[[1, 2]])", "must be NamedWrench values"),
+        ("assert_stable(grasp_case.grasp)", "expected a grasp_case"),
+        ("assert_stable(grasp_case, friction=0.01)", "needs friction above"),
+    ],
+)
+def test_demands_that_are_none_are_refused(tmp_path, call, message):
+    write_text(
+        tmp_path / "test_it.py",
+        "import pytest\n@pytest.mark.grasp(object='wedge')\n"
+        f"def test_it(grasp_case, assert_stable):\n    {call}\n",
+    )
+    code, said = run_pytest(tmp_path)
+    assert code == 1
+    assert message in said
+
+
+def test_other_frictions_and_grasps_from_anywhere(tmp_path):
+    write_text(
+        tmp_path / "test_it.py",
+        """
+import pytest
+@pytest.mark.grasp(object='wedge')
+def test_it(grasp_case, assert_stable):
+    body, grasp = grasp_case.body, grasp_case.grasp
+    assert assert_stable(grasp_case, friction=0.3).friction == 0.3
+    assert assert_stable(body, grasp).friction == 0.5
+    assert assert_stable(body, grasp, 0.4).friction == 0.4
+    assert assert_stable(body, grasp, friction=0.4).friction == 0.4
+""",
+    )
+    code, said = run_pytest(tmp_path)
+    assert code == 0, said
+
+
+def test_what_fails_before_a_test_begins_is_in_the_report_once(tmp_path):
+    write_text(
+        tmp_path / "test_it.py",
+        """
+import pytest
+import grasp_core as gc
+import scenes
+from sim_validate import NamedWrench
+
+@pytest.fixture
+def held(assert_stable):
+    body = scenes.example_object("wedge")
+    grasp = gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps[0]
+    assert_stable(body, grasp, wrenches=[NamedWrench("push", [0, 0, 900, 0, 0, 0])])
+
+def test_it(held):
+    pass
+""",
+    )
+    code, said = run_pytest(tmp_path, "--grasp-report", "report")
+    assert code == 1, said
+    found = json.loads((tmp_path / "report" / "report.json").read_text())["grasps"]
+    assert [line["status"] for line in found] == ["unstable"]
