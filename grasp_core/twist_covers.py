@@ -9,29 +9,35 @@ object moves with v = a + b x x. As the choice of one contact does not bind the 
     all choices are closed  <=>  for every y != 0 there is an i such that
                                  min over x in K_i of max over f in C_i of f.(a + b x x) > 0.
 
-Cover. Fix i and f. The least power over K_i, h(y) = min over x of f.(a + b x x), is concave in y
-and h(t y) = t h(y) for t > 0, for it is the least of linear functions. So if h is positive on some
-rays of twists, it is so on the whole cone that they span. A *cover* is a list of cones, six rays
-each, with a contact and a force, whose cones fill all of R^6: if h > 0 on the rays of each, every
-choice of contacts is force-closed. The sixty-four orthants of six independent twists fill R^6. A
-cone is cut into two by a ray on one of its edges, the sum of its ends, in place of either end; so
-cones still fill R^6. Where f with unit normal part is n + g, a disc of radius r around p gives
+Cover. Choose forces F_i in the cones C_i, some perhaps zero. The least that their powers sum to,
 
-    h(y) = (n + g).(a + b x p) - r |b_t - b_n g|,
+    h(y) = sum over i of min over x in K_i of F_i.(a + b x x),
 
-b_t and b_n being the parts of b across and along the normal, and over a polygon the least is at a
-corner. A region that is thicker than its plane, as below a patch of a curved surface, loses the
-depth times |n.(g x b)| more.
+is concave in y, as a sum of least values of linear functions, and h(t y) = t h(y) for t > 0. So if
+h is positive on some rays of twists, it is so on the whole cone that they span; and where a sum of
+powers is positive one of them is. A *cover* is a list of cones, six rays each, with forces, whose
+cones fill all of R^6: if h > 0 on the rays of each, every choice of contacts is force-closed. The
+sixty-four orthants of six independent twists fill R^6. A cone is cut into two by a ray on one of
+its edges, the sum of its ends, in place of either end; so cones still fill R^6. For F_i with normal
+part n and tangential part g a disc of radius r around p gives, b_t and b_n being the parts of b
+across and along the normal,
+
+    min F_i.(a + b x x) = F_i.(a + b x p) - r |n b_t - b_n g|,
+
+and over a polygon the least is at a corner. A region that is thicker than its plane, as below a
+patch of a curved surface, is a prism, with corners on both sides.
 
 Completeness. If all choices are closed with something to spare, cutting the longest edges long
-enough ends with a cover; if a ray has no contact with h > 0 for any force, there is a choice that
-is not closed, as a best force and a worst point exist for each contact (h is concave in f and
-convex in x). Between the two only time decides.
+enough ends with a cover. If a twist has h <= 0 for any forces, there is a choice that is not
+closed, as each contact has a best force and a worst place (the power is linear in both). Between
+the two only time decides, and it takes little: were regions points, h would be linear, and a cone
+of twists in any half-space would be covered by one set of forces (force closure itself); what
+bends h is how the worst place moves from ray to ray.
 
-Source: with fixed forces the criterion is that of independent regions by primitive wrenches
-(Pollard, "Closure and quality equivalence for efficient synthesis of grasps from examples", 2004);
-covers by cones that are cut where needed are ours, as is their use for regions of reguli, for which
-Sudsang & Ponce (1995) have no method.
+Source: for single forces the criterion is that of independent regions by primitive wrenches
+(Pollard, "Closure and quality equivalence for efficient synthesis of grasps from examples", 2004).
+Covers by cones that are cut where needed, with forces that share the work, are ours, as is their
+use for regions of reguli, for which Sudsang & Ponce (1995) have no method.
 """
 
 from collections.abc import Iterator, Sequence
@@ -54,7 +60,7 @@ LARGEST = 2.0**50
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TwistCover:
-    """Cones of twists, on each of which one contact has a force with power.
+    """Cones of twists, on each of which forces of the contacts have power together.
 
     The rays of a cone are whole numbers in the coordinates of `axes`, so that cutting is exact.
     """
@@ -64,19 +70,16 @@ class TwistCover:
     codes: Indices
     """The tree, level by level from the sixty-four orthants: for each cone the number of the edge
     that is cut, or `LEAF`, (n,)."""
-    contacts: Indices
-    """For each cone that is not cut, in the same order, the contact with power there, (m,)."""
     forces: Array
-    """And the force on the object, with unit normal part, (m, 3)."""
+    """For each cone that is not cut, in the same order, forces on the object, (m, k, 3)."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axes", frozen(self.axes, (TWIST, TWIST), "axes"))
-        for name in ("codes", "contacts"):
-            object.__setattr__(self, name, frozen_indices(getattr(self, name), (None,), name))
+        object.__setattr__(self, "codes", frozen_indices(self.codes, (None,), "codes"))
         leaves = int(np.count_nonzero(self.codes == LEAF))
-        object.__setattr__(self, "forces", frozen(self.forces, (leaves, 3), "forces"))
-        if len(self.contacts) != leaves or self.codes.max(initial=0) > LEAF:
-            raise InputError(f"a cover of {leaves} cones needs as many contacts, and known codes")
+        object.__setattr__(self, "forces", frozen(self.forces, (leaves, None, 3), "forces"))
+        if self.codes.min(initial=0) < 0 or self.codes.max(initial=0) > LEAF:
+            raise InputError(f"codes of a cover are from 0 to {LEAF}")
 
     def leaves(self) -> Iterator[tuple[slice, Array]]:
         """The cones, level by level: where they are in the order of `contacts`, and rays (m, 6, 6).
@@ -106,14 +109,11 @@ class TwistCover:
             friction: (k,)
         """
         k = len(regions)
-        if (len(normals), len(friction), len(self.axes)) != (k, k, TWIST):
+        if (len(normals), len(friction), self.forces.shape[1]) != (k, k, k) or not _units(normals):
             return False
-        if self.contacts.max(initial=0) >= k or not _units(normals):
-            return False
-        n = normals[self.contacts]
-        along = np.einsum("mi,mi->m", self.forces, n)
-        across = np.linalg.norm(self.forces - along[:, None] * n, axis=1)
-        if not (across <= friction[self.contacts] * along).all() or not self._independent():
+        along = np.einsum("mki,ki->mk", self.forces, normals)
+        across = np.linalg.norm(self.forces - along[..., None] * normals, axis=2)
+        if not (across <= friction * along).all() or not self._independent():
             return False
         try:
             return all(self._powerful(where, rays, regions) for where, rays in self.leaves())
@@ -127,38 +127,43 @@ class TwistCover:
         return bool(np.linalg.svd(self.axes / lengths[:, None], compute_uv=False)[-1] > SLACK)
 
     def _powerful(self, where: slice, rays: Array, regions: Sequence[Array]) -> bool:
-        """Whether each cone's force has power on its rays wherever its contact is."""
-        if rays.max(initial=0.0) > LARGEST or -rays.min(initial=0.0) > LARGEST:
+        """Whether each cone's forces have power on its rays wherever the contacts are."""
+        if np.abs(rays).max(initial=0.0) > LARGEST:
             return False
-        contacts, forces = self.contacts[where], self.forces[where]
-        for contact, region in enumerate(regions):
-            mine = np.flatnonzero(contacts == contact)
-            if not mine.size:
-                continue
-            twists = rays[mine] @ self.axes
-            f = forces[mine][:, None, :]
-            wrenches = np.concatenate(
-                [np.broadcast_to(f, (len(mine), len(region), 3)), np.cross(region[None], f)], axis=2
-            )
-            powers = np.einsum("mri,mci->mrc", twists, wrenches)
-            sizes = (
-                summed(rays[mine], self.axes)[..., None] * np.linalg.norm(wrenches, axis=2)[:, None]
-            )
-            if not (powers > SLACK * sizes).all():
-                return False
-        return True
+        powers, sizes = np.zeros(rays.shape[:2]), np.zeros(rays.shape[:2])
+        twists, lengths = rays @ self.axes, summed(rays, self.axes)
+        for region, F in zip(regions, self.forces[where].swapaxes(0, 1), strict=True):
+            slopes, at_origin = power_of(F, twists)
+            powers += at_origin + (slopes @ region.T).min(axis=2)
+            sizes += lengths * slack_of(F, region)[:, None]
+        return bool((powers > sizes).all())
 
 
 def _units(normals: Array) -> bool:
     return bool((np.abs(np.linalg.norm(normals, axis=1) - 1.0) <= SLACK).all())
 
 
+def power_of(F: Array, twists: Array) -> tuple[Array, Array]:
+    """Power F.(a + b x x) of forces (m, 3) on twists (m, r, 6) as slopes in x and the rest.
+
+    Returns:
+        F x b, (m, r, 3), and F.a, (m, r).
+    """
+    return np.cross(F[:, None], twists[..., 3:]), np.einsum("mi,mri->mr", F, twists[..., :3])
+
+
 def summed(rays: Array, axes: Array) -> Array:
-    """Lengths (m, 6) of the sums that twists are made of: what their rounding is relative to.
+    """Lengths (m, r) of the sums that twists are made of: what their rounding is relative to.
 
     Where axes nearly cancel the twists themselves are shorter.
     """
     return np.linalg.norm(np.abs(rays) @ np.abs(axes), axis=2)
+
+
+def slack_of(F: Array, places: Array) -> Array:
+    """Rounding of powers of forces (m, 3) at places (c, 3), per length `summed`, (m,)."""
+    farthest = np.linalg.norm(places, axis=1).max()
+    return SLACK * np.linalg.norm(F, axis=1) * (1.0 + farthest)
 
 
 def orthants() -> Array:

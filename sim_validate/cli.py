@@ -32,6 +32,7 @@ from sim_validate.flags import (
     Edges,
     Fingers,
     Mesh,
+    NotNegative,
     Planning,
     Positive,
     Seed,
@@ -81,7 +82,7 @@ class Plan:
     """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
     planning: OmitArgPrefixes[Planning] = field(default_factory=Planning)
     jobs: Count = field(default_factory=available_cores)
-    """Largest number of processes for --optimize; results do not depend on it."""
+    """Largest number of processes for --optimize and --regions; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for grasps.json; nothing is written if not given."""
@@ -137,7 +138,13 @@ class Regions:
     """Coulomb coefficient; the one planned for if not given."""
     reserve: Annotated[float, at_least(0.0, up_to=0.99)] = 0.0
     """Share of the friction that is not counted on."""
-    cones: Annotated[int, at_least(64, up_to=10_000_000)] = 200_000
+    balance: Literal["radius", "area"] = "radius"
+    """Large discs for all fingers, or much area in total (some times slower)."""
+    recenter: bool = False
+    """Move the regions to where the discs can be largest; contacts may then be outside of them."""
+    edge_clearance_m: NotNegative = 0.0
+    """How far regions stay from the edges of their faces [m]."""
+    cones: Annotated[int, at_least(64, up_to=10_000_000)] = 10_000
     """Size of a proof at most: larger ones prove larger regions, and take longer."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes; results do not depend on it."""

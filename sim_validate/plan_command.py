@@ -16,6 +16,7 @@ from grasp_core.requests import methods_for
 from grasp_core.values import FaceQuadruple, PatchLimits, Polyhedron
 from scenes.objects import example_object
 from sim_validate import cli, flags
+from sim_validate.certifying import with_regions
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.files import write_text
 from sim_validate.improving import improved, show_gains
@@ -54,6 +55,10 @@ def plan_object(
     if planning.ceiling is not None and not planning.optimize:
         raise InputError("--ceiling bounds what --optimize may reach; give both or neither")
     _check_optimize(planning)
+    if planning.regions and planning.share_faces_m is not None:
+        raise InputError(
+            "--regions would let fingers that share a face meet; leave it or --share-faces-m out"
+        )
     body = load_object(name, planning.mesh)
     if planning.optimize and body.patches:
         raise InputError(
@@ -79,12 +84,16 @@ def plan_object(
             share_faces=planning.share_faces_m,
             progress=lambda done, total, grasps: steps.update(done, total, f"({grasps} grasps)"),
         )
-    if not (planning.optimize and found.grasps):
-        return body, found, ()
-    found, moves = improved(
-        body, found, finger_radius=planning.finger_radius_m, parts=planning.ceiling, jobs=jobs,
-        reporter=reporter,
-    )  # fmt: skip
+    moves: tuple[Moved, ...] = ()
+    if planning.optimize and found.grasps:
+        found, moves = improved(
+            body, found, finger_radius=planning.finger_radius_m, parts=planning.ceiling, jobs=jobs,
+            reporter=reporter,
+        )  # fmt: skip
+    if planning.regions and found.grasps:
+        found = with_regions(
+            body, found, clearance=planning.edge_clearance_m, jobs=jobs, reporter=reporter
+        )
     return body, found, moves
 
 

@@ -2,37 +2,25 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.certified_regions import CertifiedRegions, certify_regions
+from grasp_core.certified_regions import CertifiedRegions
 from grasp_core.errors import InputError
-from grasp_core.values import ContactRegion, Grasp, Polyhedron
+from grasp_core.values import ContactRegion, Grasp
 from grasp_core.versions import versions
 from sim_validate import cli
+from sim_validate.certifying import Asked, certified
 from sim_validate.console import TABLE_ROWS, Reporter
-from sim_validate.engines import each
 from sim_validate.files import write_arrays, write_text
 from sim_validate.grasps_file import read_grasps
 from sim_validate.plan_command import say_cut
 
-SCHEMA = 1
+SCHEMA = 2
 REGIONS, PROOFS = "regions.json", "proofs"
 MILLI = 1e3
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Task:
-    """One grasp, as it travels to a worker."""
-
-    body: Polyhedron
-    grasp: Grasp
-    friction: float
-    reserve: float
-    cones: int
 
 
 def certify_file(command: cli.Regions, reporter: Reporter) -> int:
@@ -41,23 +29,24 @@ def certify_file(command: cli.Regions, reporter: Reporter) -> int:
     chosen = [grasp for grasp in saved.grasps if command.grasp in (None, grasp.id)][: command.limit]
     if not chosen:
         raise InputError(f"{command.grasps}: no grasp {command.grasp or ''}")
-    friction = saved.friction if command.friction is None else command.friction
-    tasks = [_Task(saved.body, grasp, friction, command.reserve, command.cones) for grasp in chosen]
+    asked = Asked(
+        saved.friction if command.friction is None else command.friction,
+        command.reserve, command.balance, command.recenter, command.edge_clearance_m, command.cones,
+    )  # fmt: skip
     found = dict[str, CertifiedRegions | None]()
-    with reporter.progress("certifying") as steps:
-        answers = each(_certified, tasks, jobs=command.jobs)
-        for grasp, proved in zip(chosen, answers, strict=True):
-            found[grasp.id] = proved
-            if command.out is not None and proved is not None:
-                path = command.out / PROOFS / f"{grasp.id}.npz"
-                write_arrays(path, proof_arrays(proved))
-            steps.update(len(found), len(tasks))
+    for grasp, proved in certified(saved.body, chosen, asked, jobs=command.jobs, reporter=reporter):
+        found[grasp.id] = proved
+        if command.out is not None and proved is not None:
+            write_arrays(command.out / PROOFS / f"{grasp.id}.npz", proof_arrays(proved))
     document = {
         "schema": SCHEMA,
         "object": {"name": saved.body.name, "content_sha256": saved.body.content_sha256},
-        "friction": friction,
-        "reserve": command.reserve,
-        "cones": command.cones,
+        "friction": asked.friction,
+        "reserve": asked.reserve,
+        "balance": asked.balance,
+        "recenter": asked.recenter,
+        "edge_clearance_m": asked.clearance,
+        "cones": asked.cones,
         "versions": versions(),
         "grasps": [_record(grasp, found[grasp.id]) for grasp in chosen],
     }
@@ -69,12 +58,6 @@ def certify_file(command: cli.Regions, reporter: Reporter) -> int:
     return cli.Exit.GOOD if all(found.values()) else cli.Exit.NEGATIVE
 
 
-def _certified(task: _Task) -> CertifiedRegions | None:
-    return certify_regions(
-        task.body, task.grasp, task.friction, reserve=task.reserve, cones=task.cones
-    )
-
-
 def proof_arrays(proved: CertifiedRegions) -> dict[str, Array]:
     """Everything that `CertifiedRegions.verify` looks at, by name."""
     cover = proved.cover
@@ -82,11 +65,11 @@ def proof_arrays(proved: CertifiedRegions) -> dict[str, Array]:
     return {
         "axes": cover.axes,
         "codes": cover.codes.astype(np.uint8),
-        "contacts": cover.contacts.astype(np.uint8),
         "forces": cover.forces,
         "normals": proved.normals,
-        "friction": np.array(proved.friction),
-        "center_m": proved.center,
+        "friction": proved.friction,
+        "origin_m": proved.origin,
+        "depths_m": proved.depths,
         "scale_m": np.array(proved.scale),
         **regions,
     }  # pyright: ignore[reportReturnType] - whole numbers are kept as such
@@ -94,11 +77,17 @@ def proof_arrays(proved: CertifiedRegions) -> dict[str, Array]:
 
 def _record(grasp: Grasp, proved: CertifiedRegions | None) -> Mapping[str, Any]:
     if proved is None:
-        return {"id": grasp.id, "radius_m": None, "cones": None, "regions": None}
+        return {"id": grasp.id, "family": grasp.family, "radius_m": None, "regions": None}
+    open_choice = proved.open_choice
     return {
         "id": grasp.id,
+        "family": grasp.family,
         "radius_m": proved.radius,
-        "cones": len(proved.cover.contacts),
+        "centers_m": proved.centers.tolist(),
+        "friction": proved.friction.tolist(),
+        "limit_m": None if open_choice is None else proved.limit,
+        "open_choice_m": None if open_choice is None else open_choice.tolist(),
+        "cones": len(proved.cover.forces),
         "regions": [
             {
                 "kind": region.kind,
@@ -126,14 +115,15 @@ def _show(
         proved = found[grasp.id]
         planned = f"{MILLI * grasp.radius:.2f}"
         if proved is None:
-            rows.append((grasp.id, grasp.family, planned, "none proved", "", ""))
+            rows.append((grasp.id, grasp.family, planned, "none proved", "", "", ""))
             continue
         smallest = min(region.inscribed_radius for region in proved.regions)
         area = sum(map(area_of, proved.regions))
         rows.append(
             (grasp.id, grasp.family, planned, f"{MILLI * smallest:.2f}",
-             f"{MILLI**2 * area:.4g}", str(len(proved.cover.contacts)))
+             "" if proved.open_choice is None else f"{proved.radius / proved.limit:.2f}",
+             f"{MILLI**2 * area:.4g}", str(len(proved.cover.forces)))
         )  # fmt: skip
-    columns = ("grasp", "family", "planned mm", "certified mm", "area mm2", "cones of twists")
-    reporter.table("independent regions: smallest inscribed disc", columns, rows)
+    columns = ("grasp", "family", "planned mm", "certified mm", "of limit", "area mm2", "cones")
+    reporter.table("independent regions: their smallest inscribed disc", columns, rows)
     say_cut(len(grasps), reporter)

@@ -1,8 +1,8 @@
-"""A search for a cover of all twists by cones on each of which one contact force has power.
+"""A search for a cover of all twists by cones on each of which contact forces have power together.
 
 What is covered and why is derived in `grasp_core.twist_covers`, which checks every answer; here
 only cones are cut and forces chosen. Cones are cut level by level, the oldest first, so that the
-answer is a tree in levels: for each cone either the edge that is cut, or the contact and its force.
+answer is a tree in levels: for each cone either the edge that is cut, or the forces.
 """
 
 import math
@@ -12,38 +12,27 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.contact_sites import Sites
 
 RAYS = 6
-POWERS = 6
+MOTIONS = 6
 """Numbers that say how a twist of unit length moves a contact: along the normal and two tangents,
 turning about these two and about the normal."""
 LEAF = 15
 """Code of a cone that is not cut; smaller ones are edges, (0, 1), (0, 2) and so on."""
 COVERED, REFUTED, UNDECIDED = 1, -1, 0
-NARROWINGS = 7
-"""Halvings of the step in the search for a force."""
-WAYS = 4
+ROUNDS = 30
+"""Of the game between a ray, who wants little power, and forces, who want much."""
+ANSWERS = 3
+"""Forces that are tried as the best answer to weights of rays."""
+STEPS = 40
+"""Towards the place of a contact where a twist is resisted least."""
 AHEAD = 1e-9
 """Power per length of twist with which a force counts."""
-SHARE = 0.1
-"""Of the length of an edge in all that decides which one is cut; the rest is its contact's."""
+EVEN = 0.02
+"""Weight that each ray keeps in the choice of the edge that is cut."""
 TINY = 1e-12
 """Share of the friction that forces keep clear of, for rounding."""
-
-
-class Contacts(NamedTuple):
-    """What is to be covered."""
-
-    points: Array
-    """About any origin, (k, 3)."""
-    frames: Array
-    """Columns (inward normal, tangent, tangent), (k, 3, 3)."""
-    friction: Array
-    """(k,)"""
-    sizes: Array
-    """Radius and depth of each contact's region, (k, 2)."""
-    axes: Array
-    """Twists of the first rays as rows, (6, 6)."""
 
 
 class Tree(NamedTuple):
@@ -51,104 +40,214 @@ class Tree(NamedTuple):
 
     codes: Indices
     """(n,)"""
-    contacts: Indices
-    """Whose force covers it, (n,)."""
     forces: Array
-    """Tangential parts of that force, whose normal part is one, (n, 2)."""
+    """Along the frames, (n, k, 3)."""
+    shifts: Array
+    """Where contacts do not resist a twist, along the frames from the points, (k, 3)."""
 
 
 @njit(cache=True, error_model="numpy")
-def least_power(
-    ids: Indices, powers: Array, given: Contacts, i: int, force: tuple[float, float]
-) -> float:
-    """Least power of a force n + f t_1 + g t_2 of contact i on some rays, over its region."""
+def lowest(
+    motion: Array, sites: Sites, i: int, force: tuple[float, float]
+) -> tuple[float, float, float, float]:
+    """Least power of a force n + f t_1 + g t_2 over a contact's site, and where, (n, t_1, t_2)."""
     f, g = force
-    least, radius, depth = np.inf, given.sizes[i, 0], given.sizes[i, 1]
-    for place in range(len(ids)):
-        ray = ids[place]
-        across, along = powers[ray, i, 3], powers[ray, i, 4]
-        u, v = across - powers[ray, i, 5] * f, along - powers[ray, i, 5] * g
-        found = powers[ray, i, 0] + f * powers[ray, i, 1] + g * powers[ray, i, 2]
-        found -= radius * math.sqrt(u * u + v * v) + depth * abs(f * along - g * across)
-        least = min(least, found)
+    u, v, w = motion[3] - motion[5] * f, motion[4] - motion[5] * g, f * motion[4] - g * motion[3]
+    least, x, y = np.inf, 0.0, 0.0
+    for corner in range(sites.corners.shape[1]):
+        height = u * sites.corners[i, corner, 1] - v * sites.corners[i, corner, 0]
+        if height < least:
+            least, x, y = height, sites.corners[i, corner, 0], sites.corners[i, corner, 1]
+    length = math.sqrt(u * u + v * v)
+    if sites.radii[i] > 0.0 and length > 0.0:
+        least -= sites.radii[i] * length
+        x += sites.radii[i] * v / length
+        y -= sites.radii[i] * u / length
+    out = -sites.depths[i] if w > 0.0 else sites.depths[i]
+    return motion[0] + f * motion[1] + g * motion[2] + least + out * w, out, x, y
+
+
+@njit(cache=True, error_model="numpy")
+def velocity(motion: Array, place: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Of a contact that is off its point, along the frame."""
+    out, x, y = place
+    return (
+        motion[0] + motion[3] * y - motion[4] * x,
+        motion[1] - motion[5] * y + motion[4] * out,
+        motion[2] + motion[5] * x - motion[3] * out,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def longest(f: float, g: float, most: float) -> tuple[float, float]:
+    """The tangential part in a direction that friction allows."""
+    length = math.sqrt(f * f + g * g)
+    return (f * most / length, g * most / length) if length > 0.0 else (0.0, 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def resists(motion: Array, sites: Sites, i: int, shift: Array) -> bool:
+    """Whether a contact may resist a twist wherever it is; else a place, perhaps, where it cannot.
+
+    The most power that friction allows is convex in the place, and steps go to where it is least.
+    False, with a place that resists, where the steps do not suffice.
+    """
+    most = sites.friction[i] * (1.0 - TINY)
+    out, x, y = 0.0, 0.0, 0.0
+    for step in range(STEPS):
+        _, q, r = velocity(motion, (out, x, y))
+        least, out_ahead, x_ahead, y_ahead = lowest(motion, sites, i, longest(q, r, most))
+        if least > AHEAD:
+            return True
+        share = 2.0 / (step + 2.0)
+        out += share * (out_ahead - out)
+        x += share * (x_ahead - x)
+        y += share * (y_ahead - y)
+        p, q, r = velocity(motion, (out, x, y))
+        if p + sites.friction[i] * math.sqrt(q * q + r * r) <= 0.0:
+            break
+    shift[0], shift[1], shift[2] = out, x, y
+    return False
+
+
+@njit(cache=True, error_model="numpy")
+def is_open(motions: Array, sites: Sites, shifts: Array) -> bool:
+    """Whether no contact resists a twist at the places that are filled in."""
+    for i in range(len(sites.points)):
+        if resists(motions[i], sites, i, shifts[i]):
+            return False
+        p, q, r = velocity(motions[i], (shifts[i, 0], shifts[i, 1], shifts[i, 2]))
+        if p + sites.friction[i] * math.sqrt(q * q + r * r) > 0.0:
+            return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def pivot(ids: Indices, weights: Array, motions: Array, i: int, most: float) -> tuple[float, float]:
+    """The tangential part of a contact's force along the axis of the mean twist, if allowed.
+
+    It has the same power wherever the contact is.
+    """
+    f, g, along = 0.0, 0.0, 0.0
+    for place in range(RAYS):
+        f += weights[place] * motions[ids[place], i, 3]
+        g += weights[place] * motions[ids[place], i, 4]
+        along += weights[place] * motions[ids[place], i, 5]
+    if f * f + g * g < (most * along) ** 2:
+        return f / along, g / along
+    return longest(f * along, g * along, most)
+
+
+@njit(cache=True, error_model="numpy")
+def answer(
+    ids: Indices, weights: Array, motions: Array, sites: Sites, i: int
+) -> tuple[float, float, float]:
+    """The sum of a contact's least powers on weighted rays for a good force, and that force."""
+    most = sites.friction[i] * (1.0 - TINY)
+    best, best_f, best_g = -np.inf, 0.0, 0.0
+    f, g = pivot(ids, weights, motions, i, most)
+    mean_f, mean_g = 0.0, 0.0
+    for turn in range(ANSWERS):
+        total, slope_f, slope_g = 0.0, 0.0, 0.0
+        for place in range(RAYS):
+            if weights[place] > 0.0:
+                motion = motions[ids[place], i]
+                power, out, x, y = lowest(motion, sites, i, (f, g))
+                _, q, r = velocity(motion, (out, x, y))
+                total += weights[place] * power
+                slope_f += weights[place] * q
+                slope_g += weights[place] * r
+        if turn == 0 or total > best:
+            best, best_f, best_g = total, f, g
+        share = 1.0 / (turn + 1.0)
+        mean_f += share * (slope_f - mean_f)
+        mean_g += share * (slope_g - mean_g)
+        f, g = longest(mean_f, mean_g, most)
+    return best, best_f, best_g
+
+
+@njit(cache=True, error_model="numpy")
+def together(ids: Indices, motions: Array, sites: Sites, forces: Array) -> float:
+    """Least power of some forces together on the rays of a cone, over all sites."""
+    least = np.inf
+    for place in range(RAYS):
+        total = 0.0
+        for i in range(len(forces)):
+            along = forces[i, 0]
+            if along > 0.0:
+                force = (forces[i, 1] / along, forces[i, 2] / along)
+                total += along * lowest(motions[ids[place], i], sites, i, force)[0]
+        least = min(least, total)
     return least
 
 
 @njit(cache=True, error_model="numpy")
-def allowed(f: float, g: float, most: float) -> tuple[float, float]:
-    """A tangential part, made as short as friction demands."""
-    length = math.sqrt(f * f + g * g)
-    return (f * most / length, g * most / length) if length > most else (f, g)
+def reweigh(regrets: Array, powers: Array, weights: Array) -> None:
+    """Put weight on rays by how little power they would have cost so far, the last time twice."""
+    mean, total = weights @ powers, 0.0
+    for place in range(RAYS):
+        regrets[place] = max(0.0, regrets[place] + mean - powers[place])
+        weights[place] = max(0.0, regrets[place] + mean - powers[place])
+        total += weights[place]
+    if total <= 0.0:
+        weights[:] = 1.0 / RAYS
+    else:
+        weights /= total
 
 
 @njit(cache=True, error_model="numpy")
-def mean_motion(ids: Indices, powers: Array, i: int, most: float) -> tuple[bool, float, float]:
-    """Whether no ray is beyond the power of all forces, and a force along the mean motion."""
-    f, g = 0.0, 0.0
-    for place in range(len(ids)):
-        p, q, r = powers[ids[place], i, 0], powers[ids[place], i, 1], powers[ids[place], i, 2]
-        if p + most * math.sqrt(q * q + r * r) <= 0.0:
-            return False, 0.0, 0.0
-        f += q
-        g += r
-    length = math.sqrt(f * f + g * g)
-    scale = most / length if length > 0.0 else 0.0
-    return True, f * scale, g * scale
+def find_forces(ids: Indices, motions: Array, sites: Sites, forces: Array, weights: Array) -> bool:
+    """Fill in forces with power on all rays of a cone, if some are found; else a bad twist in it.
 
-
-@njit(cache=True, error_model="numpy")
-def best_force(ids: Indices, powers: Array, given: Contacts, i: int, force: Array) -> float:
-    """Fill in tangential parts of a force with much power on all of some rays; its least power.
-
-    The least power is concave in the force: steps along the axes from the mean direction of
-    motion, halved when none is better, until it counts.
+    A game: weights of the rays are chosen by what they regret not to have chosen, forces answer,
+    and the mean answer, late ones counting more, is what gets the power. No answer, no such forces.
     """
-    most = given.friction[i] * (1.0 - TINY)
-    possible, f, g = mean_motion(ids, powers, i, most)
-    if not possible:
-        return -np.inf
-    best, step = least_power(ids, powers, given, i, (f, g)), 0.5 * most
-    for turn in range(NARROWINGS * WAYS):
-        if best > AHEAD:
-            break
-        ahead = step if turn % WAYS < WAYS // 2 else -step
-        tried = allowed(f + ahead * (turn % 2), g + ahead * (1 - turn % 2), most)
-        found = least_power(ids, powers, given, i, tried)
-        if found > best:
-            best = found
-            f, g = tried
-        if turn % WAYS == WAYS - 1:
-            step *= 0.6
-    force[0], force[1] = f, g
-    return best
+    regrets, powers = np.zeros(RAYS), np.empty(RAYS)
+    weights[:] = 1.0 / RAYS
+    forces[:] = 0.0
+    for turn in range(ROUNDS):
+        best, contact, f, g = -np.inf, 0, 0.0, 0.0
+        for i in range(len(forces)):
+            found = answer(ids, weights, motions, sites, i)
+            if found[0] > best:
+                contact = i
+                best, f, g = found
+        if best <= AHEAD:
+            return False
+        for place in range(RAYS):
+            powers[place] = lowest(motions[ids[place], contact], sites, contact, (f, g))[0]
+        forces[contact, 0] += turn + 1.0
+        forces[contact, 1] += (turn + 1.0) * f
+        forces[contact, 2] += (turn + 1.0) * g
+        if together(ids, motions, sites, forces) > AHEAD:
+            return True
+        reweigh(regrets, powers, weights)
+    return False
 
 
 @njit(cache=True, error_model="numpy")
-def fill_powers(ray: int, rays: Array, given: Contacts, powers: Array) -> None:
+def fill_motions(ray: int, rays: Array, sites: Sites, axes: Array, motions: Array) -> None:
     """Fill in how the twist of a ray moves each contact, per length of twist."""
-    twist = rays[ray] @ given.axes
+    twist = rays[ray] @ axes
     length = math.sqrt(twist @ twist)
     for part in range(RAYS):
         twist[part] /= length
     a0, a1, a2, b0, b1, b2 = twist
-    for i in range(len(given.points)):
-        x, y, z = given.points[i]
+    for i in range(len(sites.points)):
+        x, y, z = sites.points[i]
         v0, v1, v2 = a0 + b1 * z - b2 * y, a1 + b2 * x - b0 * z, a2 + b0 * y - b1 * x
         for c in range(3):
-            column = given.frames[i, :, c]
-            powers[ray, i, c] = v0 * column[0] + v1 * column[1] + v2 * column[2]
+            column = sites.frames[i, :, c]
+            motions[ray, i, c] = v0 * column[0] + v1 * column[1] + v2 * column[2]
             turning = b0 * column[0] + b1 * column[1] + b2 * column[2]
-            powers[ray, i, 3 + (c + 2) % 3] = turning  # tangents first
+            motions[ray, i, 3 + (c + 2) % 3] = turning  # tangents first
 
 
 @njit(cache=True, error_model="numpy")
-def longest_edge(
-    ids: Indices, rays: Array, powers: Array, given: Contacts, contact: int
-) -> tuple[int, int, int]:
-    """Number and ends of the edge of a cone along which a contact's motion changes most."""
+def edge_to_cut(ids: Indices, rays: Array, weights: Array) -> tuple[int, int, int]:
+    """Number and ends of a long edge of a cone between rays that weigh much."""
     longest, chosen, number, first, last = -1.0, 0, 0, 0, 0
-    lengths, weights = np.empty(RAYS), np.ones(POWERS)
-    weights[1:3], weights[3:] = given.friction[contact], given.sizes[contact, 0]
+    lengths = np.empty(RAYS)
     for i in range(RAYS):
         lengths[i] = math.sqrt(rays[ids[i]] @ rays[ids[i]])
     for i in range(RAYS):
@@ -156,9 +255,8 @@ def longest_edge(
             length = 0.0
             for part in range(RAYS):
                 gap = rays[ids[i], part] / lengths[i] - rays[ids[j], part] / lengths[j]
-                length += SHARE * gap * gap
-                gap = powers[ids[i], contact, part] - powers[ids[j], contact, part]
-                length += (weights[part] * gap) ** 2
+                length += gap * gap
+            length *= (weights[i] + EVEN) * (weights[j] + EVEN)
             if length > longest:
                 longest, chosen, first, last = length, number, ids[i], ids[j]
             number += 1
@@ -166,36 +264,23 @@ def longest_edge(
 
 
 @njit(cache=True, error_model="numpy")
-def most_power(ids: Indices, powers: Array, given: Contacts, force: Array) -> tuple[int, float]:
-    """The contact whose best force, filled in, has most power on all of some rays; that power."""
-    closest, best, tried = 0, -np.inf, np.zeros(2)
-    for i in range(len(given.points)):
-        found = best_force(ids, powers, given, i, tried)
-        if found > best:
-            closest, best = i, found
-            force[:] = tried
-        if found > AHEAD:
-            break
-    return closest, best
-
-
-@njit(cache=True, error_model="numpy")
-def orthants(given: Contacts, rays: Array, powers: Array, cones: Indices) -> None:
+def orthants(rays: Array, sites: Sites, axes: Array, motions: Array, cones: Indices) -> None:
     """Fill in the first rays, the axes and their opposites, and the cones that they span."""
     for ray in range(2 * RAYS):
         rays[ray, ray // 2] = 1.0 - 2.0 * (ray % 2)
-        fill_powers(ray, rays, given, powers)
+        fill_motions(ray, rays, sites, axes, motions)
     for signs in range(1 << RAYS):
         for j in range(RAYS):
             cones[signs, j] = 2 * j + (signs >> j & 1)
 
 
 @njit(cache=True, error_model="numpy")
-def search(given: Contacts, most: int, tree: Tree) -> tuple[int, int]:
+def search(sites: Sites, axes: Array, most: int, tree: Tree) -> tuple[int, int]:
     """Cut cones until each is covered, one ray is refuted, or there are too many.
 
     Args:
-        given: What is to be covered.
+        sites: Where contacts may be.
+        axes: Twists of the first rays as rows, (6, 6).
         most: Cones.
         tree: Filled with what becomes of each.
 
@@ -203,22 +288,20 @@ def search(given: Contacts, most: int, tree: Tree) -> tuple[int, int]:
         How it ended, and the number of cones.
     """
     rays = np.zeros((2 * RAYS + most, RAYS))
-    powers = np.empty((2 * RAYS + most, len(given.points), POWERS))
-    cones, one = np.empty((most, RAYS), dtype=np.int64), np.empty(1, dtype=np.int64)
-    orthants(given, rays, powers, cones)
-    count, made, done, force = 1 << RAYS, 2 * RAYS, 0, np.zeros(2)
+    motions = np.empty((2 * RAYS + most, len(sites.points), MOTIONS))
+    cones, weights = np.empty((most, RAYS), dtype=np.int64), np.empty(RAYS)
+    orthants(rays, sites, axes, motions, cones)
+    count, made, done = 1 << RAYS, 2 * RAYS, 0
     while done < count:
-        contact, best = most_power(cones[done], powers, given, tree.forces[done])
-        tree.contacts[done], tree.codes[done] = contact, LEAF
-        if best <= AHEAD:
+        tree.codes[done] = LEAF
+        if not find_forces(cones[done], motions, sites, tree.forces[done], weights):
             if count + 2 > most:
                 return UNDECIDED, done
-            edge, a, b = longest_edge(cones[done], rays, powers, given, contact)
+            edge, a, b = edge_to_cut(cones[done], rays, weights)
             tree.codes[done] = edge
             rays[made] = rays[a] + rays[b]
-            fill_powers(made, rays, given, powers)
-            one[0] = made
-            if most_power(one, powers, given, force)[1] <= AHEAD:
+            fill_motions(made, rays, sites, axes, motions)
+            if is_open(motions[made], sites, tree.shifts):
                 return REFUTED, done
             for j in range(RAYS):
                 end = cones[done, j]
@@ -231,8 +314,11 @@ def search(given: Contacts, most: int, tree: Tree) -> tuple[int, int]:
 
 def try_out() -> None:
     """Compile for the types in use, on contacts on which nothing is covered."""
-    count = 1 << RAYS
-    tree = Tree(np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros((count, 2)))
-    frames = np.zeros((4, 3, 3)) + np.eye(3)
-    given = Contacts(np.zeros((4, 3)), frames, np.ones(4), np.zeros((4, 2)), np.eye(RAYS))
-    search(given, count, tree)
+    k, most = 4, 1 << RAYS
+    tree = Tree(np.zeros(most, np.int64), np.zeros((most, k, 3)), np.zeros((k, 3)))
+    frames = np.zeros((k, 3, 3)) + np.eye(3)
+    points, corners = np.zeros((k, 3)), np.zeros((k, 1, 2))
+    search(
+        Sites(points, frames, np.ones(k), corners, np.zeros(k), np.zeros(k)),
+        np.eye(RAYS), most, tree,
+    )  # fmt: skip

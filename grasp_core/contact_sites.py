@@ -1,0 +1,43 @@
+"""Where each contact of a set may be: a polygon widened by a disc, and a depth across its plane."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_core.arrays import Array
+
+
+class Sites(NamedTuple):
+    """Places of k contacts. Plain arrays, as compiled loops take them."""
+
+    points: Array
+    """About any origin, (k, 3)."""
+    frames: Array
+    """Columns (inward normal, tangent, tangent), right-handed, (k, 3, 3)."""
+    friction: Array
+    """(k,)"""
+    corners: Array
+    """Of convex polygons, along the tangents about the points, some perhaps twice, (k, c, 2)."""
+    radii: Array
+    """Of discs that widen the polygons, (k,)."""
+    depths: Array
+    """How far contacts may be off the planes, (k,)."""
+
+    def lowest(self, i: int, slopes: Array) -> Array:
+        """Least values over a contact's polygon and disc of linear functions, (...,).
+
+        Args:
+            i: The contact.
+            slopes: Along the tangents, (..., 2).
+        """
+        lengths = np.sqrt(np.einsum("...j,...j->...", slopes, slopes))
+        return (slopes @ self.corners[i].T).min(axis=-1) - self.radii[i] * lengths
+
+
+def stacked_corners(polygons: list[Array]) -> Array:
+    """Polygons (c, 2) of different numbers of corners as one array, last corners repeated."""
+    most = max(map(len, polygons))
+    return np.array([
+        np.vstack([polygon, np.repeat(polygon[-1:], most - len(polygon), axis=0)])
+        for polygon in polygons
+    ])  # fmt: skip
