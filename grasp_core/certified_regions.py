@@ -23,7 +23,7 @@ from grasp_core.face_pieces import FacePiece, inscribed_disc_radius_of, inset_pi
 from grasp_core.on_faces import check_on_faces
 from grasp_core.region_centers import better_centers
 from grasp_core.region_growth import BEGINNINGS, disc_polygons, most_area, shared_out, tidy
-from grasp_core.region_search import Grounds, Proved, largest_discs
+from grasp_core.region_search import WIDER, Grounds, Proved, largest_discs
 from grasp_core.twist_covers import TwistCover
 from grasp_core.values import ContactRegion, Grasp, Polyhedron, four, stacked
 
@@ -43,7 +43,7 @@ class CertifiedRegions:
     centers: Array
     """(4, 3) [m]"""
     limit: float
-    """A radius of such discs for which `open_choice` was found; infinite if none was [m]."""
+    """A larger radius for which `open_choice` was found; infinite if none was [m]."""
     open_choice: Array | None
     """Contacts in those discs that are not force-closed, (4, 3) [m]."""
     friction: Array
@@ -160,8 +160,7 @@ def _checked(  # noqa: PLR0913, PLR0917 - everything that regions are made of
     ]
     normals = np.array([piece.normal for piece in grounds.pieces])
     depths = np.array([piece.depth for piece in grounds.pieces])
-    choice = None if proved.choice is None else origin + scale * proved.choice
-    refuted = choice is not None and not depths.any() and not _closed(choice, normals, grounds)
+    choice = _open_choice(grounds, proved)
     found = CertifiedRegions(
         regions=four(
             ContactRegion("certified", polygon, inscribed_disc_radius_of(polygon, normal))
@@ -169,8 +168,8 @@ def _checked(  # noqa: PLR0913, PLR0917 - everything that regions are made of
         ),
         radius=scale * proved.radius,
         centers=origin + scale * grounds.points(proved.ys),
-        limit=scale * proved.limit if refuted else math.inf,
-        open_choice=choice if refuted else None,
+        limit=math.inf if choice is None else scale * proved.limit,
+        open_choice=None if choice is None else origin + scale * choice,
         friction=grounds.friction,
         origin=origin,
         normals=normals,
@@ -183,8 +182,14 @@ def _checked(  # noqa: PLR0913, PLR0917 - everything that regions are made of
     return found
 
 
-def _closed(positions: Array, normals: Array, grounds: Grounds) -> bool:
-    return force_closure(positions, normals, float(grounds.friction.min())).closed
+def _open_choice(grounds: Grounds, proved: Proved) -> Array | None:
+    """The choice that a search found open, if it is, by the exact test, and is where it says."""
+    if proved.choice is None or any(piece.depth for piece in grounds.pieces):
+        return None
+    away = np.linalg.norm(proved.choice - grounds.points(proved.ys), axis=1)
+    normals = np.array([piece.normal for piece in grounds.pieces])
+    closed = force_closure(proved.choice, normals, float(grounds.friction.min())).closed
+    return None if closed or (away > WIDER * proved.limit).any() else proved.choice
 
 
 def _piece(body: Polyhedron, grasp: Grasp, finger: int, origin: Array, scale: float) -> FacePiece:

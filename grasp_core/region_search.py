@@ -32,7 +32,9 @@ NEAR = 0.04
 FEWER = 4
 """Attempts to find one take so many times fewer cones."""
 SIDES = 16
-"""Of the polygon around a disc that a face's border cuts; it is larger by a fiftieth."""
+"""Of the polygon around a disc that a face's border cuts."""
+WIDER = 1.0 / math.cos(math.pi / SIDES)
+"""The polygon's corners are so many radii away."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -68,7 +68,9 @@ def lowest(
 
 
 @njit(cache=True, error_model="numpy")
-def velocity(motion: Array, place: tuple[float, float, float]) -> tuple[float, float, float]:
+def velocity(
+    motion: Array, place: Array | tuple[float, float, float]
+) -> tuple[float, float, float]:
     """Of a contact that is off its point, along the frame."""
     out, x, y = place
     return (
@@ -86,14 +88,34 @@ def longest(f: float, g: float, most: float) -> tuple[float, float]:
 
 
 @njit(cache=True, error_model="numpy")
+def holds(sites: Sites, i: int, x: float, y: float) -> bool:
+    """Whether a place in its plane is in a contact's polygon, or in its disc."""
+    if x * x + y * y <= sites.radii[i] ** 2:
+        return True
+    corners, sides = sites.corners[i], 0
+    for place in range(len(corners)):
+        here, there = corners[place - 1], corners[place]
+        sides += int(here[0] != there[0] or here[1] != there[1])
+        ahead = (there[0] - here[0]) * (y - here[1]) - (there[1] - here[1]) * (x - here[0])
+        if ahead < 0.0:
+            return False
+    return sides > 0
+
+
+@njit(cache=True, error_model="numpy")
 def resists(motion: Array, sites: Sites, i: int, shift: Array) -> bool:
     """Whether a contact may resist a twist wherever it is; else a place, perhaps, where it cannot.
 
-    The most power that friction allows is convex in the place, and steps go to where it is least.
-    False, with a place that resists, where the steps do not suffice.
+    Where a contact does not slide friction has no power, and otherwise the most that it allows is
+    convex in the place, and steps go to where it is least. False, with a place that resists, where
+    the steps do not suffice.
     """
     most = sites.friction[i] * (1.0 - TINY)
     out, x, y = 0.0, 0.0, 0.0
+    if motion[5] != 0.0:
+        shift[0], shift[1], shift[2] = 0.0, -motion[2] / motion[5], motion[1] / motion[5]
+        if holds(sites, i, shift[1], shift[2]) and velocity(motion, shift)[0] <= 0.0:
+            return False
     for step in range(STEPS):
         _, q, r = velocity(motion, (out, x, y))
         least, out_ahead, x_ahead, y_ahead = lowest(motion, sites, i, longest(q, r, most))
@@ -291,6 +313,7 @@ def search(sites: Sites, axes: Array, most: int, tree: Tree) -> tuple[int, int]:
     motions = np.empty((2 * RAYS + most, len(sites.points), MOTIONS))
     cones, weights = np.empty((most, RAYS), dtype=np.int64), np.empty(RAYS)
     orthants(rays, sites, axes, motions, cones)
+    bad = np.empty(motions.shape[1:])
     count, made, done = 1 << RAYS, 2 * RAYS, 0
     while done < count:
         tree.codes[done] = LEAF
@@ -301,7 +324,10 @@ def search(sites: Sites, axes: Array, most: int, tree: Tree) -> tuple[int, int]:
             tree.codes[done] = edge
             rays[made] = rays[a] + rays[b]
             fill_motions(made, rays, sites, axes, motions)
-            if is_open(motions[made], sites, tree.shifts):
+            bad[:] = 0.0
+            for place in range(RAYS):
+                bad += weights[place] * motions[cones[done, place]]
+            if is_open(motions[made], sites, tree.shifts) or is_open(bad, sites, tree.shifts):
                 return REFUTED, done
             for j in range(RAYS):
                 end = cones[done, j]

@@ -1,29 +1,32 @@
 """How large are certified regions, and are all choices of contacts in them closed?
 
-    python -m tests.benchmarks.regions [--grasps 500] [--choices 200] [--simulate 100] [--cones N]
+    python -m tests.benchmarks.regions [--grasps 500] [--choices 200] [--simulate 25] [--closely 40]
 
 Per family, on built-in and random objects: how many grasps got regions, the exact test on random
-choices of contacts in them (corners often), simulation of some with controls of none, and sizes
-beside the paper's own regions and beside the largest disc for which no choice was found open by
-descent. Some hours for everything; `--grasps 20 --simulate 5` for some minutes.
+choices of contacts in them (corners often), and sizes beside the paper's own regions. Of the first
+ones, simulation of twenty choices each, and of contacts that walk outwards together, from the
+centres through the border until they are not held. Of `--closely` many, other ways to certify, the
+predecessor's squares, and the largest disc for which no open choice was found by descent. An hour
+for everything; `--grasps 20 --simulate 2 --closely 2` for some minutes.
 """
 
 import argparse
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import minimize
 
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.certified_regions import certify_regions
+from grasp_core.certified_regions import CONES, certify_regions
+from grasp_core.region_search import WIDER
 from grasp_core.values import Contact
-from grasp_core.wrenches import contact_frames
 from sim_validate.engines import available_cores, each
 from sim_validate.regions_command import area_of
+from tests.benchmarks.open_choices import largest_possible, unit_pieces
+from tests.benchmarks.predecessor import largest_squares
 
 FRICTION = 0.5
 OBJECTS = (
@@ -32,7 +35,16 @@ OBJECTS = (
     "screwdriver", "mug",
 )  # fmt: skip
 FAMILIES = ("concurrent", "pencil", "regulus", "free")
-STARTS, FINE = 6, 0.02
+SLACK = 1e-7
+WALKS = np.concatenate([[0.95, 1.0], np.arange(1.02, 1.2, 0.02), np.arange(1.2, 4.01, 0.1)])
+"""How far contacts walk, relative to the border."""
+WAYS = {
+    "discs": {},
+    "fast": {"cones": CONES // 8},
+    "more cones": {"cones": 5 * CONES},
+    "recentered": {"recenter": True},
+    "area": {"balance": "area"},
+}
 
 
 @dataclass(frozen=True)
@@ -43,7 +55,7 @@ class Task:
     seed: int
     choices: int
     simulate: bool
-    cones: int
+    closely: bool
 
 
 @dataclass(frozen=True)
@@ -55,21 +67,20 @@ class Answer:
     tried: int = 0
     dropped: int = 0
     simulated: int = 0
-    seconds: float = 0.0
-    radius: float = 0.0
-    inscribed: float = 0.0
-    area: float = 0.0
-    planned: float = 0.0
-    planned_area: float = 0.0
-    possible: float = 0.0
+    walks: list = field(default_factory=list)
+    """How far contacts walked until they were not closed, and not held, in borders' distances."""
+    sizes: dict = field(default_factory=dict)
+    """By way: disc, least inscribed radius, total area in object radii, seconds."""
+    possible: float = float("nan")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--grasps", type=int, default=500)
     parser.add_argument("--choices", type=int, default=200)
-    parser.add_argument("--simulate", type=int, default=100)
-    parser.add_argument("--cones", type=int, default=200_000)
+    parser.add_argument("--simulate", type=int, default=25)
+    parser.add_argument("--closely", type=int, default=40)
+    parser.add_argument("--family", action="append", choices=FAMILIES)
     asked = parser.parse_args()
     tasks = list(tasks_of(asked))
     answers, begun = [], time.perf_counter()
@@ -80,53 +91,73 @@ def main():
                 f"{len(answers)} of {len(tasks)}, {time.perf_counter() - begun:.0f} s", flush=True
             )
     wrong = 0
-    for family in FAMILIES:
+    for family in asked.family or FAMILIES:
         wrong += show(family, [answer for answer in answers if answer.family == family])
     return int(wrong > 0)
 
 
 def tasks_of(asked):
     """Grasps of each family, the first of each object in turn, then the second, and so on."""
-    for family in FAMILIES:
+    for family in asked.family or FAMILIES:
         counts = {}
         names = [*OBJECTS, *(f"random-{n}-{s}" for n in (8, 10, 12, 14) for s in range(20))]
+        limit = -(-asked.grasps // len(OBJECTS))
         for name in names:
             body = scenes.example_object(name)
-            limit = -(-asked.grasps // len(OBJECTS))
             counts[name] = len(gc.plan(body, FRICTION, families=(family,), limit=limit).grasps)
             if sum(counts.values()) >= asked.grasps:
                 break
         chosen = sorted((place, name) for name, n in counts.items() for place in range(n))
         for number, (place, name) in enumerate(chosen[: asked.grasps]):
-            limit = counts[name]
-            yield (Task(name, family, place, number, asked.choices, number < asked.simulate,
-                        asked.cones), limit)  # fmt: skip
+            yield Task(name, family, place, number, asked.choices, number < asked.simulate,
+                       number < asked.closely), limit  # fmt: skip
 
 
 def examine(given):
     task, limit = given
     body = scenes.example_object(task.name)
     grasp = gc.plan(body, FRICTION, families=(task.family,), limit=limit).grasps[task.place]
-    begun = time.perf_counter()
-    proved = certify_regions(body, grasp, FRICTION, cones=task.cones)
-    seconds = time.perf_counter() - begun
+    sizes = {"paper": (grasp.radius / body.radius, grasp.radius / body.radius,
+                       sum(map(area_of, grasp.regions)) / body.radius**2, 0.0)}  # fmt: skip
+    proved = None
+    for way, settings in WAYS.items():
+        if way != "discs" and not task.closely:
+            continue
+        begun = time.perf_counter()
+        found = certify_regions(body, grasp, FRICTION, **settings)
+        if found is not None:
+            sizes[way] = (*size(found, body), time.perf_counter() - begun)
+        if way == "discs":
+            proved = found
+    if task.closely and task.family == "concurrent":
+        sizes["squares"] = squares(body, grasp)
     if proved is None:
-        return Answer(task.family, proved=False, seconds=seconds)
+        return Answer(task.family, proved=False, sizes=sizes)
     rng = np.random.default_rng(task.seed)
     opened = sum(not gc.force_closure(drawn(proved, rng), grasp.normals, FRICTION).closed
                  for _ in range(task.choices))  # fmt: skip
-    dropped = simulated = 0
-    for _ in range(20 if task.simulate else 0):
-        held = holds(body, grasp, drawn(proved, rng))
-        simulated += held is not None
-        dropped += held is False
-    size = body.radius
+    held = [holds(body, grasp, drawn(proved, rng)) for _ in range(20 if task.simulate else 0)]
     return Answer(
-        task.family, True, proved.verify(), opened, task.choices, dropped, simulated, seconds,
-        proved.radius / size, min(r.inscribed_radius for r in proved.regions) / size,
-        sum(map(area_of, proved.regions)) / size**2, grasp.radius / size,
-        sum(map(area_of, grasp.regions)) / size**2, possible(grasp, rng) / size,
+        task.family, True, proved.verify(), opened, task.choices,
+        sum(each is False for each in held), sum(each is not None for each in held),
+        walks(body, grasp, proved, rng) if task.simulate else [],
+        sizes, largest_possible(body, grasp, FRICTION, rng) / body.radius if task.closely else float("nan"),
     )  # fmt: skip
+
+
+def size(proved, body):
+    inscribed = min(region.inscribed_radius for region in proved.regions)
+    area = sum(map(area_of, proved.regions))
+    return proved.radius / body.radius, inscribed / body.radius, area / body.radius**2
+
+
+def squares(body, grasp):
+    """The predecessor's squares for the planner's force cones, on the pieces with the contacts."""
+    begun = time.perf_counter()
+    half = largest_squares(unit_pieces(body, grasp), grasp.force_cones)
+    if half is None:  # a focus behind some fingers
+        return (float("nan"),) * 4
+    return half, half, 4 * (2 * half) ** 2, time.perf_counter() - begun
 
 
 def drawn(proved, rng):
@@ -146,31 +177,51 @@ def holds(body, grasp, positions):
     return None if verdict.outcome is sv.Outcome.INVALID_START else verdict.held
 
 
-def possible(grasp, rng):
-    """A radius of discs for which a choice that is open was found by descent, just about."""
-    frames = contact_frames(grasp.normals)
+def walks(body, grasp, proved, rng):
+    """How far contacts walk, to random corners and to an open choice, by kind."""
+    found = []
+    for _ in range(3):
+        corners = np.array([
+            region.polygon[rng.integers(len(region.polygon))] for region in proved.regions
+        ])  # fmt: skip
+        middles = np.array([region.polygon.mean(axis=0) for region in proved.regions])
+        found.append(("random", *walked(body, grasp, middles, corners)))
+    if proved.open_choice is not None:
+        share = proved.radius / (WIDER * proved.limit)
+        borders = proved.centers + share * (proved.open_choice - proved.centers)
+        found.append(("adverse", *walked(body, grasp, proved.centers, borders)))
+    return found
 
-    def margin(angles, radius):
-        ways = np.cos(angles)[:, None] * frames[:, :, 1] + np.sin(angles)[:, None] * frames[:, :, 2]
-        try:
-            return gc.force_closure(grasp.positions + radius * ways, grasp.normals, FRICTION).margin
-        except gc.UndecidedError:
-            return 0.0
 
-    def opens(radius):
-        return any(
-            minimize(margin, rng.uniform(0.0, 2.0 * np.pi, 4), (radius,), "Nelder-Mead",
-                     options={"maxiter": 200, "xatol": 1e-3, "fatol": 1e-9}).fun <= 0.0
-            for _ in range(STARTS)
-        )  # fmt: skip
+def walked(body, grasp, middles, borders):
+    """How far contacts walk from their middles, the borders at one, till not closed and not held.
 
-    lower, upper = 0.0, 0.1 * np.linalg.norm(np.ptp(grasp.positions, axis=0))
-    while not opens(upper):
-        lower, upper = upper, 1.6 * upper
-    while upper - lower > FINE * upper:
-        middle = 0.5 * (lower + upper)
-        lower, upper = (lower, middle) if opens(middle) else (middle, upper)
-    return upper
+    Infinite where a contact leaves its face before that.
+    """
+    pieces = unit_pieces(body, grasp)
+    opened = dropped = float("inf")
+    for far in WALKS:
+        positions = middles + far * (borders - middles)
+        at = (positions - body.center_of_mass) / body.radius
+        outside = [(p.E @ p.frame.T @ (x - p.origin) - p.b).max()
+                   for p, x in zip(pieces, at, strict=True)]  # fmt: skip
+        if max(outside) > SLACK:
+            break
+        closed = gc.force_closure(positions, grasp.normals, FRICTION).closed
+        if not closed:
+            opened = min(opened, far)
+        if (not closed or far <= 1.0) and holds_or_not(body, grasp, positions) is False:
+            dropped = far
+            break
+    return opened, dropped
+
+
+def holds_or_not(body, grasp, positions):
+    """As `holds`; None also where there is no closure, so that no wrenches can be chosen."""
+    try:
+        return holds(body, grasp, positions)
+    except gc.GraspError:
+        return False
 
 
 def show(family, answers):
@@ -183,20 +234,43 @@ def show(family, answers):
         f"{sum(a.tried for a in done)} choices open, {dropped} of {sum(a.simulated for a in done)} "
         f"dropped in simulation, {unverified} proofs not verified"
     )
-    if done:
-        shares = [answer.radius / answer.possible for answer in done]
-        print(
-            f"  in object radii, medians: disc proved {median(done, 'radius'):.4f}, inscribed "
-            f"{median(done, 'inscribed'):.4f}, paper's {median(done, 'planned'):.4f}, descent "
-            f"{median(done, 'possible'):.4f}; proved of it: median {np.median(shares):.2f}, least "
-            f"{min(shares):.2f}; area {median(done, 'area'):.3f}, paper's "
-            f"{median(done, 'planned_area'):.3f}; {median(done, 'seconds'):.2f} s each"
-        )
-    return opened + dropped + unverified
+    early = 0
+    for kind in ("random", "adverse"):
+        far = np.array([walk[1:] for a in done for walk in a.walks if walk[0] == kind])
+        if len(far):
+            ended = far[np.isfinite(far[:, 1])]
+            too_early = int((far[:, 1] < far[:, 0]).sum() + (far.min(axis=1) <= 1.0).sum())
+            early += too_early
+            print(f"  {len(far)} {kind} walks, {len(ended)} end on the faces: {told(ended[:, 0])} "
+                  f"not closed, {told(ended[:, 1])} not held; {too_early} too early")  # fmt: skip
+    table(done)
+    close = [a for a in done if np.isfinite(a.possible)]
+    for way in WAYS:
+        shares = [a.sizes[way][0] / a.possible for a in close if way in a.sizes]
+        if shares and way not in {"recentered", "area"}:
+            print(f"  {way}: {np.median(shares):.2f} of the largest disc possible (median of "
+                  f"{len(shares)}; least {min(shares):.2f})")  # fmt: skip
+    return opened + dropped + unverified + early
 
 
-def median(answers, name):
-    return float(np.median([getattr(answer, name) for answer in answers]))
+def told(far):
+    """Distances in those of the borders."""
+    if not len(far):
+        return "-"
+    return f"from {far.min():.2f} (median {np.median(far):.2f})"
+
+
+def table(done):
+    """Medians of sizes, of all and of those that were looked at closely."""
+    closely = [answer for answer in done if "area" in answer.sizes]
+    for whose, answers in ((f"all {len(done)}", done), (f"{len(closely)} closely", closely)):
+        print(f"  {whose}, medians in object radii: disc, least inscribed, total area, seconds")
+        for way in ("paper", *WAYS, "squares"):
+            rows = [a.sizes[way] for a in answers if way in a.sizes]
+            rows = [row for row in rows if np.isfinite(row).all()]
+            if len(rows) > len(answers) // 2:
+                figures = "  ".join(f"{figure:8.4f}" for figure in np.median(rows, axis=0))
+                print(f"    {way:<11} {figures}  ({len(rows)})")
 
 
 if __name__ == "__main__":
