@@ -137,11 +137,12 @@ def examine(given):
     opened = sum(not gc.force_closure(drawn(proved, rng), grasp.normals, FRICTION).closed
                  for _ in range(task.choices))  # fmt: skip
     held = [holds(body, grasp, drawn(proved, rng)) for _ in range(20 if task.simulate else 0)]
+    largest = largest_possible(body, grasp, FRICTION, rng) if task.closely else float("nan")
     return Answer(
         task.family, True, proved.verify(), opened, task.choices,
         sum(each is False for each in held), sum(each is not None for each in held),
         walks(body, grasp, proved, rng) if task.simulate else [],
-        sizes, largest_possible(body, grasp, FRICTION, rng) / body.radius if task.closely else float("nan"),
+        sizes, largest / body.radius,
     )  # fmt: skip
 
 

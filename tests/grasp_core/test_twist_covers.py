@@ -1,6 +1,7 @@
 """Covers of all twists: they leave nothing out, and nothing false passes their check."""
 
 import dataclasses
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -77,6 +78,40 @@ def test_where_a_cover_says_so_its_forces_have_power(proved):
             assert powers.sum() > 0.0
             tried += 1
     assert tried > 300
+
+
+def test_a_cover_holds_in_rational_arithmetic():
+    """Every number as the fraction that it is: nothing is rounded, nothing allowed for."""
+    body = scenes.example_object("wedge")
+    (grasp,) = gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps
+    small = certify_regions(body, grasp, 0.5, cones=300)
+    cover, mu = small.cover, [Fraction(each) for each in small.friction]
+    axes, normals = fractions(cover.axes), fractions(small.normals)
+    corners = [fractions((r.polygon - small.origin) / small.scale) for r in small.regions]
+    checked = 0
+    for where, rays in cover.leaves():
+        for F, cone in zip(fractions(cover.forces[where]), rays.astype(int), strict=True):
+            for f, n, friction in zip(F, normals, mu, strict=True):
+                along = f @ n
+                across = f - along * n / (n @ n)
+                assert along >= 0
+                assert (across @ across) * (n @ n) <= (friction * along) ** 2
+            for twist in cone.astype(object) @ axes:
+                a, b = twist[:3], twist[3:]
+                power = sum(min(f @ a + (x * turned(f, b)).sum() for x in places)
+                            for f, places in zip(F, corners, strict=True))  # fmt: skip
+                assert power > 0
+                checked += 1
+    assert checked == 6 * len(cover.forces) > 300
+
+
+def fractions(array):
+    return np.vectorize(Fraction, otypes=[object])(array)
+
+
+def turned(f, b):
+    return np.array([f[1] * b[2] - f[2] * b[1], f[2] * b[0] - f[0] * b[2],
+                     f[0] * b[1] - f[1] * b[0]])  # fmt: skip
 
 
 def tampered(proved, **changed):

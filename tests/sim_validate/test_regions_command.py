@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from grasp_core.records import grasps_from_json
 from grasp_core.twist_covers import TwistCover
 from sim_validate.cli import Exit, main
 
@@ -87,3 +88,52 @@ def test_what_is_wrong_is_refused(folder, capsys):
     assert main(["regions", grasps, "--friction", "0.001"]) == Exit.INPUT
     assert "not in force closure" in capsys.readouterr().err
     assert main(["regions", grasps, "--cones", "1"]) == Exit.USAGE
+
+
+def test_plans_may_come_with_certified_regions(tmp_path, folder):
+    asked = ["plan", "wedge", "--limit", "3", "--regions", "--out", str(tmp_path), "-q"]
+    assert main(asked) == Exit.GOOD
+    plain = json.loads((folder / "grasps.json").read_text())["grasps"]
+    found = json.loads((tmp_path / "grasps.json").read_text())["grasps"]
+    widened = 0
+    for new, old in zip(found, plain, strict=True):
+        assert new["contacts"] == old["contacts"]
+        assert new["radius_m"] >= old["radius_m"]
+        widened += new["regions"][0]["kind"] == "certified"
+        if new["regions"][0]["kind"] == "certified":
+            radii = [region["inscribed_radius_m"] for region in new["regions"]]
+            assert new["radius_m"] == min(radii) > old["radius_m"]
+    assert widened >= 2
+
+
+def test_regions_of_plans_stay_clear_of_edges(tmp_path):
+    asked = ["plan", "octahedron", "--limit", "1", "--family", "regulus", "--regions"]
+    for clear in ("0", "0.002"):
+        out = tmp_path / clear
+        assert main([*asked, "--edge-clearance-m", clear, "--out", str(out), "-q"]) == Exit.GOOD
+    text = (tmp_path / "0.002" / "grasps.json").read_text()
+    saved = grasps_from_json(text)
+    (grasp,) = saved.grasps
+    for region, index in zip(grasp.regions, grasp.faces, strict=True):
+        face = saved.body.faces[index]
+        border = face.polygon
+        edges = np.roll(border, -1, axis=0) - border
+        inward = np.cross(face.normal, edges) / np.linalg.norm(edges, axis=1, keepdims=True)
+        inside = np.einsum("ki,cki->ck", inward, region.polygon[:, None] - border)
+        assert inside.min() > 0.002 - 1e-9
+
+
+def test_fingers_on_one_face_and_certified_regions_do_not_go_together(capsys):
+    asked = ["plan", "wedge", "--regions", "--share-faces-m", "0.01"]
+    assert main(asked) == Exit.INPUT
+    assert "leave it or --share-faces-m out" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("flags", [["--balance", "area"], ["--recenter"]])
+def test_other_balances_are_said_in_the_file(folder, flags, capsys):
+    asked = ["regions", str(folder / "grasps.json"), "--limit", "1", "--cones", "500", "--json"]
+    assert main([*asked, *flags]) == Exit.GOOD
+    found = json.loads(capsys.readouterr().out)
+    assert (found["balance"], found["recenter"]) == (
+        ("area", False) if "area" in flags else ("radius", True)
+    )
