@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from grasp_core.arrays import Array
 from grasp_core.certified_regions import CertifiedRegions
 from grasp_core.errors import InputError
 from grasp_core.values import ContactRegion, Grasp
@@ -58,7 +58,7 @@ def certify_file(command: cli.Regions, reporter: Reporter) -> int:
     return cli.Exit.GOOD if all(found.values()) else cli.Exit.NEGATIVE
 
 
-def proof_arrays(proved: CertifiedRegions) -> dict[str, Array]:
+def proof_arrays(proved: CertifiedRegions) -> dict[str, NDArray[Any]]:
     """Everything that `CertifiedRegions.verify` looks at, by name."""
     cover = proved.cover
     regions = {f"region{i}_m": region.polygon for i, region in enumerate(proved.regions)}
@@ -72,7 +72,7 @@ def proof_arrays(proved: CertifiedRegions) -> dict[str, Array]:
         "depths_m": proved.depths,
         "scale_m": np.array(proved.scale),
         **regions,
-    }  # pyright: ignore[reportReturnType] - whole numbers are kept as such
+    }
 
 
 def _record(grasp: Grasp, proved: CertifiedRegions | None) -> Mapping[str, Any]:
