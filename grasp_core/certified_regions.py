@@ -12,6 +12,7 @@ loses the angle by which the surface leans, so that normals are counted as the p
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -19,16 +20,19 @@ import numpy as np
 from grasp_core.arrays import Array, positive
 from grasp_core.closure import force_closure
 from grasp_core.errors import InputError, SolverError
-from grasp_core.face_pieces import FacePiece, inscribed_disc_radius_of, inset_piece, piece_of
+from grasp_core.face_pieces import FacePiece, inscribed_disc_radius_of, piece_of
 from grasp_core.on_faces import check_on_faces
+from grasp_core.polygons import clip, nearest_point, tidy, with_fewer_corners
 from grasp_core.region_centers import better_centers
-from grasp_core.region_growth import BEGINNINGS, disc_polygons, most_area, shared_out, tidy
+from grasp_core.region_growth import BEGINNINGS, disc_polygons, most_area, shared_out
 from grasp_core.region_search import WIDER, Grounds, Proved, largest_discs
 from grasp_core.twist_covers import TwistCover
 from grasp_core.values import ContactRegion, Grasp, Polyhedron, four, stacked
 
 Balance: TypeAlias = Literal["radius", "area"]
 """What regions are grown for: the smallest inscribed disc, or the total area."""
+FEWEST = 64
+"""Cones that the search begins with."""
 CONES = 10_000
 """Cones of one cover at most, unless told otherwise: half a second's work."""
 
@@ -60,7 +64,11 @@ class CertifiedRegions:
     """[m]"""
 
     def verify(self) -> bool:
-        """Re-check in plain arithmetic that every choice of contacts is force-closed."""
+        """Re-check in plain arithmetic that every choice of contacts is force-closed.
+
+        This is about `regions`, on planes with `normals`, `depths` and `friction`; the radii are
+        not looked at.
+        """
         prisms = [
             (np.vstack([r.polygon - depth * n, r.polygon + depth * n]) - self.origin) / self.scale
             for r, n, depth in zip(self.regions, self.normals, self.depths, strict=True)
@@ -86,12 +94,14 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
         grasp: On its faces.
         friction: Coulomb coefficient at every contact.
         reserve: Share of the friction that is not counted on.
-        balance: Seek large discs for all fingers, or much area in total (some ten times slower).
+        balance: Seek large discs for all fingers, or much area in total, with smaller discs
+            perhaps, and several times slower.
         recenter: Move the regions' centres to where the discs can be largest; the contacts may
             then be outside of their regions.
-        clearance: How far regions stay from the edges of their faces, up to half the radius of the
-            largest disc there [m].
-        cones: Of one proof, at most. The radius grows with it, and the time in proportion.
+        clearance: How far regions stay from the edges of their faces [m]. Where a contact does not,
+            the middle of its region is the nearest place that does.
+        cones: Of one attempt at a proof, at least `FEWEST`. With more, radii grow by some
+            hundredths, or not at all where they are as large as can be.
 
     Returns:
         The regions; None if no radius could be proved.
@@ -101,39 +111,94 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
             number or a choice is out of its range.
     """
     check_on_faces(body, grasp)
-    if not 0.0 <= reserve < 1.0:
-        raise InputError(f"reserve must be from 0 to below 1, got {reserve}")
-    if not (math.isfinite(clearance) and clearance >= 0.0):
-        raise InputError(f"clearance must be at least 0, got {clearance}")
-    if balance not in {"radius", "area"}:
-        raise InputError(f"balance must be 'radius' or 'area', got {balance!r}")
+    _check_settings(reserve, balance, clearance, cones)
     left = positive(friction, "friction") * (1.0 - reserve)
     positions, normals = stacked(grasp.contacts)
     if not force_closure(positions, normals, left).closed:
         raise InputError(f"grasp {grasp.id} is not in force closure at friction {left:.6g}")
-    origin = positions.mean(axis=0)
-    scale = float(np.linalg.norm(positions - origin, axis=1).max())
-    pieces = tuple(
-        inset_piece(_piece(body, grasp, finger, origin, scale), clearance / scale)
-        for finger in range(len(positions))
-    )
-    steepest = math.atan(left) - np.array([piece.spread for piece in pieces])
-    if steepest.min() <= 0.0:
+    unit = _Unit.of(positions)
+    pieces = _pieces(body, grasp, unit, clearance)
+    least = math.atan(left) - max(body.faces[face].spread for face in grasp.faces)
+    if pieces is None or least <= 0.0:
         return None
-    grounds = Grounds(pieces, np.tan(steepest), cones)
-    arms = (positions - origin) / scale
-    ys = np.array(
-        [piece.frame.T @ (x - piece.origin) for piece, x in zip(pieces, arms, strict=True)]
-    )
+    leaning = [math.tan(math.atan(left) - p.spread) if p.spread else left for p in pieces]
+    grounds = Grounds(pieces, np.array(leaning), cones)
+    ys = np.array([
+        nearest_point(piece.corners, piece.frame.T @ (x - piece.origin))
+        for piece, x in zip(pieces, unit.at(positions), strict=True)
+    ])  # fmt: skip
     proved = largest_discs(grounds, better_centers(grounds, ys) if recenter else ys)
     if proved is None:
         return None
-    polygons, cover = _polygons(grounds, proved, balance, grasp, origin, scale)
-    return _checked(grasp, grounds, proved, polygons, cover, origin, scale)
+    polygons, cover = _polygons(grounds, proved, balance, grasp, unit)
+    found = _placed(grounds, proved, polygons, cover, unit)
+    if not found.verify():
+        raise SolverError(f"grasp {grasp.id}: the proof of its regions fails its check")
+    return found
+
+
+def _check_settings(reserve: float, balance: str, clearance: float, cones: int) -> None:
+    if not 0.0 <= reserve < 1.0:
+        raise InputError(f"reserve must be from 0 to below 1, got {reserve}")
+    if balance not in {"radius", "area"}:
+        raise InputError(f"balance must be 'radius' or 'area', got {balance!r}")
+    if not (math.isfinite(clearance) and clearance >= 0.0):
+        raise InputError(f"clearance must be at least 0, got {clearance}")
+    if cones < FEWEST:
+        raise InputError(f"cones must be at least {FEWEST}, got {cones}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Unit:
+    """The unit of length, and the origin, in which the contacts' largest lever is one."""
+
+    origin: Array
+    scale: float
+
+    @classmethod
+    def of(cls, positions: Array) -> "_Unit":
+        origin = positions.mean(axis=0)
+        return cls(origin, float(np.linalg.norm(positions - origin, axis=1).max()))
+
+    def at(self, points: Array) -> Array:
+        """Points in this unit, (..., 3)."""
+        return (points - self.origin) / self.scale
+
+    def back(self, points: Array) -> Array:
+        """Points in the object's frame [m]."""
+        return self.origin + self.scale * points
+
+
+def _pieces(
+    body: Polyhedron, grasp: Grasp, unit: _Unit, clearance: float
+) -> tuple[FacePiece, ...] | None:
+    """The convex pieces that contacts lie on, clear of edges; None if one has no room.
+
+    Of several pieces of a face it is the one that the contact is deepest in.
+    """
+    found = list[FacePiece]()
+    for index, contact in zip(grasp.faces, grasp.contacts, strict=True):
+        face = body.faces[index]
+        normal = face.normal / np.linalg.norm(face.normal)  # files round them
+        whole = max(
+            (piece_of(index, normal, unit.at(corners)) for corners in face.pieces),
+            key=partial(_room, unit.at(contact.position)),
+        )
+        corners = tidy(clip(whole.corners, whole.E, whole.b - clearance / unit.scale))
+        if len(corners) < 3:  # noqa: PLR2004 - not a polygon
+            return None
+        clear = piece_of(index, normal, whole.origin + corners @ whole.frame.T)
+        found.append(replace(clear, spread=face.spread, depth=face.depth / unit.scale))
+    return tuple(found)
+
+
+def _room(point: Array, piece: FacePiece) -> float:
+    """How far inside of a piece a point is."""
+    return float((piece.b - piece.E @ (piece.frame.T @ (point - piece.origin))).min())
 
 
 def _polygons(
-    grounds: Grounds, proved: Proved, balance: Balance, grasp: Grasp, origin: Array, scale: float
+    grounds: Grounds, proved: Proved, balance: Balance, grasp: Grasp, unit: _Unit
 ) -> tuple[list[Array], TwistCover]:
     """Polygons in plane coordinates, and their proof."""
     if balance == "radius":
@@ -141,7 +206,7 @@ def _polygons(
         return shared_out(grounds, proved.ys, discs, proved.cover), proved.cover
     beginnings = [disc_polygons(grounds, proved.ys, b * proved.radius) for b in BEGINNINGS]
     planned = [
-        tidy(((region.polygon - origin) / scale - piece.origin) @ piece.frame)
+        tidy(clip((unit.at(region.polygon) - piece.origin) @ piece.frame, piece.E, piece.b))
         for region, piece in zip(grasp.regions, grounds.pieces, strict=True)
     ]
     if min(map(len, planned)) > 2:  # noqa: PLR2004 - polygons, not points
@@ -149,37 +214,32 @@ def _polygons(
     return most_area(grounds, proved, beginnings)
 
 
-def _checked(  # noqa: PLR0913, PLR0917 - everything that regions are made of
-    grasp: Grasp, grounds: Grounds, proved: Proved, polygons: list[Array], cover: TwistCover,
-    origin: Array, scale: float,
-) -> CertifiedRegions:  # fmt: skip
-    """Regions in the object's frame, with their proof, checked."""
+def _placed(
+    grounds: Grounds, proved: Proved, polygons: list[Array], cover: TwistCover, unit: _Unit
+) -> CertifiedRegions:
+    """Regions in the object's frame, with their proof."""
+    normals = np.array([piece.normal for piece in grounds.pieces])
+    choice = _open_choice(grounds, proved)
     placed = [
-        origin + scale * (piece.origin + polygon @ piece.frame.T)
+        unit.back(piece.origin + with_fewer_corners(polygon) @ piece.frame.T)
         for piece, polygon in zip(grounds.pieces, polygons, strict=True)
     ]
-    normals = np.array([piece.normal for piece in grounds.pieces])
-    depths = np.array([piece.depth for piece in grounds.pieces])
-    choice = _open_choice(grounds, proved)
-    found = CertifiedRegions(
+    return CertifiedRegions(
         regions=four(
             ContactRegion("certified", polygon, inscribed_disc_radius_of(polygon, normal))
             for polygon, normal in zip(placed, normals, strict=True)
         ),
-        radius=scale * proved.radius,
-        centers=origin + scale * grounds.points(proved.ys),
-        limit=math.inf if choice is None else scale * proved.limit,
-        open_choice=None if choice is None else origin + scale * choice,
+        radius=unit.scale * proved.radius,
+        centers=unit.back(grounds.points(proved.ys)),
+        limit=math.inf if choice is None else unit.scale * proved.limit,
+        open_choice=None if choice is None else unit.back(choice),
         friction=grounds.friction,
-        origin=origin,
+        origin=unit.origin,
         normals=normals,
-        depths=scale * depths,
+        depths=unit.scale * np.array([piece.depth for piece in grounds.pieces]),
         cover=cover,
-        scale=scale,
+        scale=unit.scale,
     )
-    if not found.verify():
-        raise SolverError(f"grasp {grasp.id}: the proof of its regions fails its check")
-    return found
 
 
 def _open_choice(grounds: Grounds, proved: Proved) -> Array | None:
@@ -190,18 +250,3 @@ def _open_choice(grounds: Grounds, proved: Proved) -> Array | None:
     normals = np.array([piece.normal for piece in grounds.pieces])
     closed = force_closure(proved.choice, normals, float(grounds.friction.min())).closed
     return None if closed or (away > WIDER * proved.limit).any() else proved.choice
-
-
-def _piece(body: Polyhedron, grasp: Grasp, finger: int, origin: Array, scale: float) -> FacePiece:
-    """The convex piece of a face that a contact lies on, the one it is deepest in, at unit size."""
-    index, point = grasp.faces[finger], grasp.contacts[finger].position
-    face = body.faces[index]
-    normal = face.normal / np.linalg.norm(face.normal)  # files round them
-    pieces = [piece_of(index, normal, (corners - origin) / scale) for corners in face.pieces]
-    at = (point - origin) / scale
-
-    def depth(piece: FacePiece) -> float:
-        return float((piece.b - piece.E @ (piece.frame.T @ (at - piece.origin))).min())
-
-    found = max(pieces, key=depth)
-    return replace(found, spread=face.spread, depth=face.depth / scale)

@@ -17,6 +17,11 @@ CONVEX_SLACK = 1e-9
 """How far a corner may turn inwards and still count as straight, relative to the two edge
 lengths' product: well above the rounding of coordinates, well below a visible notch."""
 
+SAME_CORNER = 1e-9
+"""Corners closer than this are one, at unit size."""
+TRIMMED = 1e-3
+"""Share of a polygon's area that fewer corners may cost."""
+
 Row: TypeAlias = tuple[float, float, float]
 
 
@@ -82,6 +87,39 @@ def clip(polygon: Array, rows: Array, limits: Array) -> Array:
                 kept.append(polygon[here] + share * (polygon[after] - polygon[here]))
         polygon = np.array(kept).reshape(-1, 2)
     return polygon
+
+
+def tidy(polygon: Array) -> Array:
+    """A polygon (k, 2) at unit size without corners that coincide with the one before."""
+    return polygon[np.linalg.norm(polygon - np.roll(polygon, 1, axis=0), axis=1) > SAME_CORNER]
+
+
+def with_fewer_corners(polygon: Array) -> Array:
+    """A convex polygon inside of a convex one (k, 2), without corners that cut hardly any area."""
+    left = TRIMMED * signed_area(polygon)
+    while len(polygon) > 3:  # noqa: PLR2004 - a triangle has no corner to spare
+        before, after = (
+            np.roll(polygon, 1, axis=0) - polygon,
+            np.roll(polygon, -1, axis=0) - polygon,
+        )
+        areas = 0.5 * np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
+        least = int(areas.argmin())
+        left -= areas[least]
+        if left < 0.0:
+            break
+        polygon = np.delete(polygon, least, axis=0)
+    return polygon
+
+
+def nearest_point(polygon: Array, point: Array) -> Array:
+    """The point of a convex counter-clockwise polygon (k, 2) that is nearest to a point (2,)."""
+    E, b = edge_rows(polygon)
+    if (E @ point <= b).all():
+        return point
+    along = np.roll(polygon, -1, axis=0) - polygon
+    shares = ((point - polygon) * along).sum(axis=1) / (along**2).sum(axis=1)
+    feet = polygon + np.clip(shares, 0.0, 1.0)[:, None] * along
+    return feet[int(np.linalg.norm(feet - point, axis=1).argmin())]
 
 
 def convex_hull(points: Array) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.contact_sites import Sites
 from grasp_core.cover_search import search_cover
-from grasp_core.polygons import clip, edge_rows, signed_area
+from grasp_core.polygons import SAME_CORNER, clip, edge_rows, signed_area, tidy
 from grasp_core.region_search import Grounds, Proved, part_of_disc
 from grasp_core.twist_covers import TwistCover, power_of, slack_of, summed
 
@@ -30,8 +30,6 @@ BEGINNINGS = (1.0, 0.6)
 """Radii of discs from which areas grow, relative to the largest that were proved."""
 FEWER = 4
 """Each attempt to grow takes so many times fewer cones."""
-SAME = 1e-9
-"""Corners closer than this are one."""
 
 
 def shared_out(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) -> list[Array]:
@@ -93,11 +91,6 @@ def _inside(polygon: Array, rows: Array, limits: Array) -> Array:
     return polygon
 
 
-def tidy(polygon: Array) -> Array:
-    """A polygon (c, 2) without corners that coincide with the one before."""
-    return polygon[np.linalg.norm(polygon - np.roll(polygon, 1, axis=0), axis=1) > SAME]
-
-
 def disc_polygons(grounds: Grounds, ys: Array, radius: float) -> list[Array]:
     """What the pieces have of polygons around discs, in plane coordinates, (c, 2) each."""
     return [
@@ -139,7 +132,7 @@ def _grown(
                 continue
             tried = list(polygons)
             tried[i] = _offset(piece.corners, polygons[i], steps[i])
-            full = signed_area(tried[i]) <= signed_area(polygons[i]) * (1.0 + SAME)
+            full = signed_area(tried[i]) <= signed_area(polygons[i]) * (1.0 + SAME_CORNER)
             found = None if full else _cover(grounds, proved.ys, tried, axes)
             if found is None:
                 steps[i] = 0.0 if full else 0.5 * steps[i]

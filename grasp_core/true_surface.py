@@ -17,14 +17,11 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.face_pieces import FacePiece, FaceShape, piece_of
 from grasp_core.placements import Placement, balanced_forces
-from grasp_core.polygons import clip, edge_rows
+from grasp_core.polygons import clip, edge_rows, tidy
 from grasp_core.values import ContactRegion, ForceCone
 
 LEAST_FACET = 1e-5
 """Parts of triangles without room for a disc of this radius (object size one) are left."""
-
-SAME_CORNER = 1e-9
-"""Corners closer than this are one."""
 
 OnFacets = Callable[[tuple[FacePiece, ...]], Placement | None]
 
@@ -111,8 +108,7 @@ def _facet(
     E, b = edge_rows(claimed) if len(claimed) > 1 else (piece.E, piece.b)
     rows = E @ piece.frame.T
     inside = clip(facet.corners, rows @ facet.frame, b - rows @ (facet.origin - piece.origin))
-    apart = np.linalg.norm(inside - np.roll(inside, 1, axis=0), axis=1) > SAME_CORNER
-    inside = inside[apart]
+    inside = tidy(inside)
     if len(inside) < 3:  # noqa: PLR2004 - not a polygon
         return None
     part = piece_of(piece.face, facet.normal, facet.origin + inside @ facet.frame.T)

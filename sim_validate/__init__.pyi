@@ -2,6 +2,7 @@ from sim_validate.datasets.loading import load_dataset as load_dataset
 from sim_validate.grasp_verdict import Verdict as Verdict
 from sim_validate.noise.draws import Noise as Noise
 from sim_validate.protocol import HoldProtocol as HoldProtocol
+from sim_validate.region_files import read_regions as read_regions
 from sim_validate.setup import Agenda as Agenda
 from sim_validate.setup import NamedWrench as NamedWrench
 from sim_validate.setup import Setup as Setup

@@ -3,8 +3,12 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from grasp_core.arrays import Array
 from grasp_core.certified_regions import CONES, Balance, CertifiedRegions, certify_regions
-from grasp_core.plans import Plan
+from grasp_core.closure import force_closure
+from grasp_core.errors import UndecidedError
 from grasp_core.values import Grasp, Polyhedron
 from sim_validate.console import Reporter
 from sim_validate.engines import each
@@ -46,29 +50,39 @@ def certified(
 
 def _certify(task: _Task) -> CertifiedRegions | None:
     asked = task.asked
+    if not _closed(task.grasp, asked.friction * (1.0 - asked.reserve)):
+        return None
     return certify_regions(
         task.body, task.grasp, asked.friction, reserve=asked.reserve, balance=asked.balance,
         recenter=asked.recenter, clearance=asked.clearance, cones=asked.cones,
     )  # fmt: skip
 
 
-def with_regions(
-    body: Polyhedron, found: Plan, *, clearance: float, jobs: int, reporter: Reporter
-) -> Plan:
-    """The plan with certified regions where their smallest disc is larger than the planned one."""
-    asked = Asked(found.friction, clearance=clearance)
-    grasps = [
-        _wider(grasp, proved)
-        for grasp, proved in certified(body, found.grasps, asked, jobs=jobs, reporter=reporter)
-    ]
-    widened = sum(new is not old for new, old in zip(grasps, found.grasps, strict=True))
-    reporter.say(f"{widened} of {len(grasps)} grasps got larger regions with proofs of their own")
-    return replace(found, grasps=tuple(grasps))
+def _closed(grasp: Grasp, friction: float) -> bool:
+    try:
+        return force_closure(grasp.positions, grasp.normals, friction).closed
+    except UndecidedError:
+        return False
 
 
-def _wider(grasp: Grasp, proved: CertifiedRegions | None) -> Grasp:
+def wider(grasp: Grasp, proved: CertifiedRegions | None) -> Grasp:
+    """A grasp with certified regions where their discs around its contacts are larger."""
     if proved is None:
         return grasp
-    radius = min(region.inscribed_radius for region in proved.regions)
-    planned = min(region.inscribed_radius for region in grasp.regions)
-    return grasp if radius <= planned else replace(grasp, regions=proved.regions, radius=radius)
+    radius = min(
+        _room(region.polygon, contact.position, normal)
+        for region, contact, normal in zip(
+            proved.regions, grasp.contacts, proved.normals, strict=True
+        )
+    )
+    if radius <= grasp.radius and grasp.regions[0].kind != "point":
+        return grasp
+    return replace(grasp, regions=proved.regions, radius=max(radius, 0.0))
+
+
+def _room(polygon: Array, point: Array, normal: Array) -> float:
+    """How far a point is inside of a convex polygon (c, 3), across its plane or not [m]."""
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    inward = np.cross(normal, edges)
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    return float(np.einsum("ci,ci->c", inward, point - polygon).min())

@@ -139,13 +139,16 @@ class Regions:
     reserve: Annotated[float, at_least(0.0, up_to=0.99)] = 0.0
     """Share of the friction that is not counted on."""
     balance: Literal["radius", "area"] = "radius"
-    """Large discs for all fingers, or much area in total (some times slower)."""
+    """Large discs for all fingers, or much area in total, with smaller discs perhaps, and several
+    times slower."""
     recenter: bool = False
-    """Move the regions to where the discs can be largest; contacts may then be outside of them."""
+    """Move the regions to where discs inside the faces can be largest; contacts may then be outside
+    of them."""
     edge_clearance_m: NotNegative = 0.0
     """How far regions stay from the edges of their faces [m]."""
     cones: Annotated[int, at_least(64, up_to=10_000_000)] = 10_000
-    """Size of a proof at most: larger ones prove larger regions, and take longer."""
+    """Effort: cones that an attempt at a proof may have. With more, radii grow by some hundredths,
+    or not at all where they are as large as can be."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)

@@ -97,7 +97,8 @@ class Planning:
     """Move the contacts of each grasp on their faces to raise its Ferrari-Canny quality."""
     regions: bool = False
     """Certify regions around the contacts of each grasp by proofs of their own, as the command
-    `regions` does; they replace those of its construction where their smallest disc is larger."""
+    `regions` does, after the grasps are chosen; they replace those of its construction where the
+    discs in them around all contacts are larger."""
     finger_radius_m: Positive | None = None
     """Radius of the fingertips that --approach-m lets come [m], and with --optimize how far moved
     contacts stay from edges, or half the radius of the largest disc in a face if that is less. If

@@ -3,8 +3,11 @@
 import math
 import re
 from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
+from grasp_core.certified_regions import CertifiedRegions
 from grasp_core.errors import InputError
 from grasp_core.mesh import FORMATS
 from grasp_core.planner import plan
@@ -13,13 +16,14 @@ from grasp_core.polyhedra import load_polyhedron
 from grasp_core.reach import Finger
 from grasp_core.records import Moved, plan_to_json
 from grasp_core.requests import methods_for
-from grasp_core.values import FaceQuadruple, PatchLimits, Polyhedron
+from grasp_core.values import FaceQuadruple, Grasp, PatchLimits, Polyhedron
 from scenes.objects import example_object
 from sim_validate import cli, flags
-from sim_validate.certifying import with_regions
+from sim_validate.certifying import Asked, certified, wider
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.files import write_text
 from sim_validate.improving import improved, show_gains
+from sim_validate.region_files import write_regions
 
 
 def load_object(name: str, mesh: flags.Mesh) -> Polyhedron:
@@ -90,11 +94,28 @@ def plan_object(
             body, found, finger_radius=planning.finger_radius_m, parts=planning.ceiling, jobs=jobs,
             reporter=reporter,
         )  # fmt: skip
-    if planning.regions and found.grasps:
-        found = with_regions(
-            body, found, clearance=planning.edge_clearance_m, jobs=jobs, reporter=reporter
-        )
     return body, found, moves
+
+
+def with_regions(
+    body: Polyhedron, found: Plan, planning: flags.Planning, folder: Path | None, jobs: int,
+    reporter: Reporter,
+) -> Plan:  # fmt: skip
+    """The plan with certified regions, where that is asked for; proofs go to the folder."""
+    if not (planning.regions and found.grasps):
+        return found
+    asked = Asked(found.friction, clearance=planning.edge_clearance_m)
+    grasps = list[Grasp]()
+
+    def kept() -> Iterator[tuple[Grasp, CertifiedRegions | None]]:
+        for grasp, proved in certified(body, found.grasps, asked, jobs=jobs, reporter=reporter):
+            grasps.append(wider(grasp, proved))
+            yield grasp, proved
+
+    write_regions(folder, body, asked, kept())
+    widened = sum(new is not old for new, old in zip(grasps, found.grasps, strict=True))
+    reporter.say(f"{widened} of {len(grasps)} grasps got regions with proofs of their own")
+    return replace(found, grasps=tuple(grasps))
 
 
 def _check_optimize(planning: flags.Planning) -> None:
@@ -123,6 +144,7 @@ def asked_finger(planning: flags.Planning) -> Finger | None:
 def plan_file(command: cli.Plan, reporter: Reporter) -> int:
     """Plan, write the grasps, and show the best."""
     body, found, moves = plan_object(command.object, command.planning, command.jobs, reporter)
+    found = with_regions(body, found, command.planning, command.out, command.jobs, reporter)
     text = plan_to_json(body, found, moves)
     if command.out:
         path = write_text(command.out / "grasps.json", text)

@@ -1,25 +1,16 @@
 """The command that certifies independent regions for grasps of a file."""
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from grasp_core.certified_regions import CertifiedRegions
 from grasp_core.errors import InputError
-from grasp_core.values import ContactRegion, Grasp
-from grasp_core.versions import versions
 from sim_validate import cli
 from sim_validate.certifying import Asked, certified
 from sim_validate.console import TABLE_ROWS, Reporter
-from sim_validate.files import write_arrays, write_text
 from sim_validate.grasps_file import read_grasps
 from sim_validate.plan_command import say_cut
+from sim_validate.region_files import REGIONS, write_regions
 
-SCHEMA = 2
-REGIONS, PROOFS = "regions.json", "proofs"
 MILLI = 1e3
 
 
@@ -33,97 +24,50 @@ def certify_file(command: cli.Regions, reporter: Reporter) -> int:
         saved.friction if command.friction is None else command.friction,
         command.reserve, command.balance, command.recenter, command.edge_clearance_m, command.cones,
     )  # fmt: skip
-    found = dict[str, CertifiedRegions | None]()
-    for grasp, proved in certified(saved.body, chosen, asked, jobs=command.jobs, reporter=reporter):
-        found[grasp.id] = proved
-        if command.out is not None and proved is not None:
-            write_arrays(command.out / PROOFS / f"{grasp.id}.npz", proof_arrays(proved))
-    document = {
-        "schema": SCHEMA,
-        "object": {"name": saved.body.name, "content_sha256": saved.body.content_sha256},
-        "friction": asked.friction,
-        "reserve": asked.reserve,
-        "balance": asked.balance,
-        "recenter": asked.recenter,
-        "edge_clearance_m": asked.clearance,
-        "cones": asked.cones,
-        "versions": versions(),
-        "grasps": [_record(grasp, found[grasp.id]) for grasp in chosen],
-    }
-    _show(chosen, found, reporter)
+    found = certified(saved.body, chosen, asked, jobs=command.jobs, reporter=reporter)
+    document = write_regions(command.out, saved.body, asked, found)
+    _show(document, reporter)
     if command.out is not None:
-        text = json.dumps(document, allow_nan=False, indent=1) + "\n"
-        reporter.say(f"wrote {write_text(command.out / REGIONS, text)}")
+        reporter.say(f"wrote {command.out / REGIONS}")
     reporter.document(document)
-    return cli.Exit.GOOD if all(found.values()) else cli.Exit.NEGATIVE
+    proved = all(grasp["regions"] for grasp in document["grasps"])
+    return cli.Exit.GOOD if proved else cli.Exit.NEGATIVE
 
 
-def proof_arrays(proved: CertifiedRegions) -> dict[str, NDArray[Any]]:
-    """Everything that `CertifiedRegions.verify` looks at, by name."""
-    cover = proved.cover
-    regions = {f"region{i}_m": region.polygon for i, region in enumerate(proved.regions)}
-    return {
-        "axes": cover.axes,
-        "codes": cover.codes.astype(np.uint8),
-        "forces": cover.forces,
-        "normals": proved.normals,
-        "friction": proved.friction,
-        "origin_m": proved.origin,
-        "depths_m": proved.depths,
-        "scale_m": np.array(proved.scale),
-        **regions,
-    }
-
-
-def _record(grasp: Grasp, proved: CertifiedRegions | None) -> Mapping[str, Any]:
-    if proved is None:
-        return {"id": grasp.id, "family": grasp.family, "radius_m": None, "regions": None}
-    open_choice = proved.open_choice
-    return {
-        "id": grasp.id,
-        "family": grasp.family,
-        "radius_m": proved.radius,
-        "centers_m": proved.centers.tolist(),
-        "friction": proved.friction.tolist(),
-        "limit_m": None if open_choice is None else proved.limit,
-        "open_choice_m": None if open_choice is None else open_choice.tolist(),
-        "cones": len(proved.cover.forces),
-        "regions": [
-            {
-                "kind": region.kind,
-                "polygon_m": region.polygon.tolist(),
-                "inscribed_radius_m": region.inscribed_radius,
-                "area_m2": area_of(region),
-            }
-            for region in proved.regions
-        ],
-    }
-
-
-def area_of(region: ContactRegion) -> float:
-    """Area of a convex region [m^2]."""
-    sides = region.polygon[1:] - region.polygon[0]
-    crossed = np.cross(sides[:-1], sides[1:])
-    return 0.5 * float(np.linalg.norm(crossed.sum(axis=0)))
-
-
-def _show(
-    grasps: list[Grasp], found: Mapping[str, CertifiedRegions | None], reporter: Reporter
-) -> None:
-    rows: list[tuple[str, ...]] = []
-    for grasp in grasps[:TABLE_ROWS]:
-        proved = found[grasp.id]
-        planned = f"{MILLI * grasp.radius:.2f}"
-        if proved is None:
-            rows.append((grasp.id, grasp.family, planned, "none proved", "", "", ""))
-            continue
-        smallest = min(region.inscribed_radius for region in proved.regions)
-        area = sum(map(area_of, proved.regions))
-        rows.append(
-            (grasp.id, grasp.family, planned, f"{MILLI * smallest:.2f}",
-             "" if proved.open_choice is None else f"{proved.radius / proved.limit:.2f}",
-             f"{MILLI**2 * area:.4g}", str(len(proved.cover.forces)))
-        )  # fmt: skip
-    columns = ("grasp", "family", "planned mm", "certified mm", "of limit", "area mm2", "cones")
-    reporter.table("independent regions: their smallest inscribed disc", columns, rows)
+def _show(document: Mapping[str, Any], reporter: Reporter) -> None:
+    grasps = document["grasps"]
+    columns = ("grasp", "family", "planned mm", "disc mm", "open mm", "inner mm", "mm2", "cones")
+    reporter.table("independent regions", columns, [_row(grasp) for grasp in grasps[:TABLE_ROWS]])
     say_cut(len(grasps), reporter)
+    reporter.say(
+        "disc: radius proved around contacts or middles, cut with the faces; open: a radius with "
+        "a choice that is not closed; inner: smallest disc in the polygons; mm2: their area"
+    )
+    unproved = sum(grasp["regions"] is None for grasp in grasps)
+    if unproved:
+        reporter.say(f"{unproved} of {len(grasps)} grasps: no regions proved")
+    counted = [mu for grasp in grasps if grasp["regions"] for mu in grasp["friction"]]
+    left = document["friction"] * (1.0 - document["reserve"])
+    if counted and min(counted) < left:
+        reporter.say(
+            f"friction counted on: {min(counted):.4g}, as the surface leans from its plane"
+        )
+
+
+def _row(grasp: Mapping[str, Any]) -> tuple[str, ...]:
+    named = (grasp["id"], grasp["family"], _millimetres(grasp["planned_radius_m"] or None))
+    if grasp["regions"] is None:
+        return (*named, "none", "", "", "", "")
+    regions = grasp["regions"]
+    return (
+        *named,
+        _millimetres(grasp["disc_radius_m"]),
+        _millimetres(grasp["open_radius_m"]),
+        _millimetres(min(region["inscribed_radius_m"] for region in regions)),
+        f"{MILLI**2 * sum(region['area_m2'] for region in regions):.4g}",
+        str(grasp["cones"]),
+    )
+
+
+def _millimetres(length: float | None) -> str:
+    return "-" if length is None else f"{MILLI * length:.3g}"

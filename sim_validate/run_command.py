@@ -9,7 +9,7 @@ from sim_validate.console import Reporter
 from sim_validate.files import remove_results, write_text
 from sim_validate.gate import require_faithful
 from sim_validate.improving import show_gains
-from sim_validate.plan_command import asked_finger, plan_object, say_counts
+from sim_validate.plan_command import asked_finger, plan_object, say_counts, with_regions
 from sim_validate.validate_command import prepared, simulate_grasps, with_planned_fingers
 
 RESULTS = Path("graspproof-out")
@@ -23,6 +23,7 @@ def run_object(command: cli.Run, reporter: Reporter) -> int:
     setup, _ = prepared(testing, planning.seed, command.out or RESULTS)
     body, found, moves = plan_object(command.object, planning, testing.jobs, reporter)
     folder = command.out or RESULTS / _folder_name(body.name)
+    found = with_regions(body, found, planning, folder, testing.jobs, reporter)
     require_faithful(setup, found.friction, body.radius)
     remove_results(folder)
     write_text(folder / "grasps.json", plan_to_json(body, found, moves))

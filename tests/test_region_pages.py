@@ -13,7 +13,7 @@ import pytest
 
 from grasp_core.certified_regions import CONES, CertifiedRegions
 from sim_validate import cli
-from sim_validate.regions_command import SCHEMA
+from sim_validate.region_files import SCHEMA
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "regions.md").read_text()

@@ -24,7 +24,7 @@ from grasp_core.certified_regions import CONES, certify_regions
 from grasp_core.region_search import WIDER
 from grasp_core.values import Contact
 from sim_validate.engines import available_cores, each
-from sim_validate.regions_command import area_of
+from sim_validate.region_files import area_of
 from tests.benchmarks.open_choices import largest_possible, unit_pieces
 from tests.benchmarks.predecessor import largest_squares
 

@@ -10,7 +10,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.certified_regions import certify_regions
 from grasp_core.on_faces import within
-from sim_validate.regions_command import area_of
+from sim_validate.region_files import area_of
 from tests.grasp_core.curved import curved_body, inside, met
 from tests.judges import random_rotation
 

@@ -1,10 +1,15 @@
 """`graspproof regions`: regions and proofs that a stranger can re-check from the files alone."""
 
+import hashlib
 import json
 
 import numpy as np
 import pytest
 
+import grasp_core as gc
+import sim_validate as sv
+from grasp_core.on_faces import within
+from grasp_core.polygons import plane_frame
 from grasp_core.records import grasps_from_json
 from grasp_core.twist_covers import TwistCover
 from sim_validate.cli import Exit, main
@@ -27,7 +32,7 @@ def test_every_grasp_has_regions_of_its_own(folder):
     assert found["object"]["content_sha256"] == planned["object"]["content_sha256"]
     assert [each["id"] for each in found["grasps"]] == [each["id"] for each in planned["grasps"]]
     for grasp in found["grasps"]:
-        assert grasp["radius_m"] > 0.0
+        assert grasp["disc_radius_m"] > 0.0
         for region in grasp["regions"]:
             assert region["kind"] == "certified"
             assert region["area_m2"] >= np.pi * region["inscribed_radius_m"] ** 2
@@ -68,7 +73,7 @@ def test_one_grasp_with_a_reserve(folder, capsys):
     assert (grasp["id"], found["reserve"]) == (name, 0.4)
     assert main(asked) == Exit.GOOD
     (without,) = json.loads(capsys.readouterr().out)["grasps"]
-    assert grasp["radius_m"] < without["radius_m"]
+    assert grasp["disc_radius_m"] < without["disc_radius_m"]
 
 
 def test_where_nothing_can_be_proved_it_is_said(folder, capsys):
@@ -78,49 +83,118 @@ def test_where_nothing_can_be_proved_it_is_said(folder, capsys):
     asked = ["regions", str(folder / "grasps.json"), "--cones", "64"]
     asked += ["--grasp", grasp["id"], "--friction", barely]
     assert main(asked) == Exit.NEGATIVE
-    assert "none proved" in capsys.readouterr().out
+    assert "1 of 1 grasps: no regions proved" in " ".join(capsys.readouterr().out.split())
 
 
 def test_what_is_wrong_is_refused(folder, capsys):
     grasps = str(folder / "grasps.json")
     assert main(["regions", grasps, "--grasp", "none"]) == Exit.INPUT
     assert "no grasp none" in capsys.readouterr().err
-    assert main(["regions", grasps, "--friction", "0.001"]) == Exit.INPUT
-    assert "not in force closure" in capsys.readouterr().err
     assert main(["regions", grasps, "--cones", "1"]) == Exit.USAGE
+
+
+def test_grasps_that_are_not_closed_do_not_stop_the_others(folder, tmp_path, capsys):
+    grasps = json.loads((folder / "grasps.json").read_text())["grasps"]
+    frictions = sorted(grasp["critical_friction"] for grasp in grasps)
+    asked = ["regions", str(folder / "grasps.json"), "--cones", "300", "--out", str(tmp_path)]
+    between = str(0.5 * (frictions[1] + frictions[2]))
+    assert main([*asked, "--friction", between]) == Exit.NEGATIVE
+    assert "1 of 3 grasps: no regions proved" in capsys.readouterr().out
+    found = json.loads((tmp_path / "regions.json").read_text())["grasps"]
+    assert [grasp["regions"] is None for grasp in found].count(True) == 1
+    assert len(list((tmp_path / "proofs").iterdir())) == 2
+    for grasp in found:
+        kept = tmp_path / "proofs" / f"{grasp['id']}.npz"
+        assert kept.exists() == (grasp["regions"] is not None)
+        if grasp["regions"]:
+            assert grasp["proof"]["sha256"] == hashlib.sha256(kept.read_bytes()).hexdigest()
+
+
+def test_a_proof_of_before_does_not_stay(folder, tmp_path):
+    name = json.loads((folder / "grasps.json").read_text())["grasps"][0]["id"]
+    asked = ["regions", str(folder / "grasps.json"), "--grasp", name, "--out", str(tmp_path), "-q"]
+    kept = tmp_path / "proofs" / f"{name}.npz"
+    assert main([*asked, "--cones", "300"]) == Exit.GOOD
+    assert kept.exists()
+    assert main([*asked, "--friction", "0.001"]) == Exit.NEGATIVE
+    assert not kept.exists()
+
+
+def test_files_give_back_the_regions_and_their_proof(folder):
+    document = json.loads((folder / "regions.json").read_text())
+    for grasp in document["grasps"]:
+        found = sv.read_regions(folder / grasp["proof"]["file"])
+        assert found.verify()
+        assert found.radius == grasp["disc_radius_m"]
+        for region, told in zip(found.regions, grasp["regions"], strict=True):
+            np.testing.assert_array_equal(region.polygon, told["polygon_m"])
+            assert region.inscribed_radius == told["inscribed_radius_m"]
+
+
+@pytest.mark.parametrize("text", [b"", b"not a proof", b"PK\x03\x04"])
+def test_files_that_are_no_proofs_are_refused(tmp_path, text):
+    path = tmp_path / "proof.npz"
+    path.write_bytes(text)
+    with pytest.raises(gc.InputError, match="not the proof"):
+        sv.read_regions(path)
 
 
 def test_plans_may_come_with_certified_regions(tmp_path, folder):
     asked = ["plan", "wedge", "--limit", "3", "--regions", "--out", str(tmp_path), "-q"]
     assert main(asked) == Exit.GOOD
     plain = json.loads((folder / "grasps.json").read_text())["grasps"]
-    found = json.loads((tmp_path / "grasps.json").read_text())["grasps"]
+    found = grasps_from_json((tmp_path / "grasps.json").read_text()).grasps
     widened = 0
     for new, old in zip(found, plain, strict=True):
-        assert new["contacts"] == old["contacts"]
-        assert new["radius_m"] >= old["radius_m"]
-        widened += new["regions"][0]["kind"] == "certified"
-        if new["regions"][0]["kind"] == "certified":
-            radii = [region["inscribed_radius_m"] for region in new["regions"]]
-            assert new["radius_m"] == min(radii) > old["radius_m"]
+        assert new.id == old["id"]
+        assert sv.read_regions(tmp_path / "proofs" / f"{new.id}.npz").verify()
+        if new.regions[0].kind != "certified":
+            assert new.radius == old["radius_m"]
+            continue
+        assert new.radius > old["radius_m"]
+        widened += 1
+        for region, contact in zip(new.regions, new.contacts, strict=True):
+            ring = ring_around(contact, 0.999 * new.radius)
+            assert all(within(point, region.polygon, contact.normal, 0.0) for point in ring)
     assert widened >= 2
+
+
+def ring_around(contact, radius):
+    frame = plane_frame(contact.normal)
+    turns = np.linspace(0.0, 2.0 * np.pi, 60)
+    return contact.position + radius * np.column_stack([np.cos(turns), np.sin(turns)]) @ frame.T
 
 
 def test_regions_of_plans_stay_clear_of_edges(tmp_path):
     asked = ["plan", "octahedron", "--limit", "1", "--family", "regulus", "--regions"]
-    for clear in ("0", "0.002"):
-        out = tmp_path / clear
-        assert main([*asked, "--edge-clearance-m", clear, "--out", str(out), "-q"]) == Exit.GOOD
-    text = (tmp_path / "0.002" / "grasps.json").read_text()
-    saved = grasps_from_json(text)
-    (grasp,) = saved.grasps
-    for region, index in zip(grasp.regions, grasp.faces, strict=True):
-        face = saved.body.faces[index]
-        border = face.polygon
-        edges = np.roll(border, -1, axis=0) - border
+    assert main([*asked, "--edge-clearance-m", "0.002", "--out", str(tmp_path), "-q"]) == Exit.GOOD
+    saved = grasps_from_json((tmp_path / "grasps.json").read_text())
+    assert clearance_of(saved.body, saved.grasps[0], saved.grasps[0].regions) > 0.002 - 1e-9
+
+
+def test_regions_stay_clear_of_edges_that_contacts_are_near_to(folder, tmp_path):
+    saved = grasps_from_json((folder / "grasps.json").read_text())
+    asked = ["regions", str(folder / "grasps.json"), "--cones", "1000", "--out", str(tmp_path)]
+    assert main([*asked, "--edge-clearance-m", "0.006", "-q"]) == Exit.GOOD
+    near = 0
+    for grasp in saved.grasps:
+        found = sv.read_regions(tmp_path / "proofs" / f"{grasp.id}.npz")
+        assert clearance_of(saved.body, grasp, found.regions) > 0.006 - 1e-9
+        near += float(np.linalg.norm(found.centers - grasp.positions, axis=1).max()) > 1e-6
+    assert near > 0
+    assert main([*asked, "--edge-clearance-m", "1", "-q"]) == Exit.NEGATIVE
+
+
+def clearance_of(body, grasp, regions):
+    """How far regions are from the edges of their faces."""
+    least = np.inf
+    for region, index in zip(regions, grasp.faces, strict=True):
+        face = body.faces[index]
+        edges = np.roll(face.polygon, -1, axis=0) - face.polygon
         inward = np.cross(face.normal, edges) / np.linalg.norm(edges, axis=1, keepdims=True)
-        inside = np.einsum("ki,cki->ck", inward, region.polygon[:, None] - border)
-        assert inside.min() > 0.002 - 1e-9
+        inside = np.einsum("ki,cki->ck", inward, region.polygon[:, None] - face.polygon)
+        least = min(least, inside.min())
+    return least
 
 
 def test_fingers_on_one_face_and_certified_regions_do_not_go_together(capsys):

@@ -1,0 +1,157 @@
+"""Certified regions in files: a proof per grasp, and one document for all."""
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.certified_regions import CertifiedRegions
+from grasp_core.errors import InputError
+from grasp_core.face_pieces import inscribed_disc_radius_of
+from grasp_core.twist_covers import TwistCover
+from grasp_core.values import ContactRegion, Grasp, Polyhedron, four
+from grasp_core.versions import versions
+from sim_validate.certifying import Asked
+from sim_validate.files import write_arrays, write_text
+
+SCHEMA = 2
+REGIONS, PROOFS = "regions.json", "proofs"
+
+
+def write_regions(
+    folder: Path | None,
+    body: Polyhedron,
+    asked: Asked,
+    found: Iterable[tuple[Grasp, CertifiedRegions | None]],
+) -> Mapping[str, Any]:
+    """Write proofs as they come, and then what was found; nothing where there is no folder.
+
+    Args:
+        folder: For regions.json and the proofs.
+        body: The object.
+        asked: How regions were certified.
+        found: Each grasp with its regions.
+
+    Returns:
+        What is in regions.json.
+    """
+    records = [_record(grasp, proved, body, folder) for grasp, proved in found]
+    document = {
+        "schema": SCHEMA,
+        "object": {"name": body.name, "content_sha256": body.content_sha256},
+        "friction": asked.friction,
+        "reserve": asked.reserve,
+        "balance": asked.balance,
+        "recenter": asked.recenter,
+        "edge_clearance_m": asked.clearance,
+        "cones": asked.cones,
+        "versions": versions(),
+        "grasps": records,
+    }
+    if folder is not None:
+        write_text(folder / REGIONS, json.dumps(document, allow_nan=False, indent=1) + "\n")
+    return document
+
+
+def _record(
+    grasp: Grasp, proved: CertifiedRegions | None, body: Polyhedron, folder: Path | None
+) -> Mapping[str, Any]:
+    """What is told of a grasp; its proof is written, or one of before is removed."""
+    named = {"id": grasp.id, "family": grasp.family, "planned_radius_m": grasp.radius}
+    name = f"{PROOFS}/{grasp.id}.npz"
+    if proved is None:
+        if folder is not None:
+            (folder / name).unlink(missing_ok=True)
+        return {**named, "disc_radius_m": None, "regions": None}
+    proof = None
+    if folder is not None:
+        path = write_arrays(folder / name, proof_arrays(proved, grasp, body))
+        proof = {"file": name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+    return {
+        **named,
+        "disc_radius_m": proved.radius,
+        "centers_m": proved.centers.tolist(),
+        "friction": proved.friction.tolist(),
+        "open_radius_m": proved.limit if proved.open_choice is not None else None,
+        "open_choice_m": None if proved.open_choice is None else proved.open_choice.tolist(),
+        "cones": len(proved.cover.forces),
+        "proof": proof,
+        "regions": [
+            {
+                "kind": region.kind,
+                "polygon_m": region.polygon.tolist(),
+                "inscribed_radius_m": region.inscribed_radius,
+                "area_m2": area_of(region),
+            }
+            for region in proved.regions
+        ],
+    }
+
+
+def area_of(region: ContactRegion) -> float:
+    """Area of a convex region [m^2]."""
+    sides = region.polygon[1:] - region.polygon[0]
+    crossed = np.cross(sides[:-1], sides[1:])
+    return 0.5 * float(np.linalg.norm(crossed.sum(axis=0)))
+
+
+def proof_arrays(
+    proved: CertifiedRegions, grasp: Grasp, body: Polyhedron
+) -> dict[str, NDArray[Any]]:
+    """Regions and their proof as arrays by name."""
+    cover, choice = proved.cover, proved.open_choice
+    regions = {f"region{i}_m": region.polygon for i, region in enumerate(proved.regions)}
+    return {
+        "grasp": np.array(grasp.id),
+        "object_sha256": np.array(body.content_sha256),
+        "axes": cover.axes,
+        "codes": cover.codes.astype(np.uint8),
+        "forces": cover.forces,
+        "normals": proved.normals,
+        "friction": proved.friction,
+        "origin_m": proved.origin,
+        "depths_m": proved.depths,
+        "scale_m": np.array(proved.scale),
+        "centers_m": proved.centers,
+        "disc_radius_m": np.array(proved.radius),
+        "open_radius_m": np.array(proved.limit),
+        "open_choice_m": np.zeros((0, 3)) if choice is None else choice,
+        **regions,
+    }
+
+
+def read_regions(path: Path) -> CertifiedRegions:
+    """Regions and their proof from a file that `graspproof regions` has written; not yet verified.
+
+    Raises:
+        InputError: The file is not such a one.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as held:
+            kept = {name: held[name] for name in held.files}
+        polygons = [kept[f"region{i}_m"] for i in range(4)]
+        choice = kept["open_choice_m"]
+        return CertifiedRegions(
+            regions=four(
+                ContactRegion("certified", polygon, inscribed_disc_radius_of(polygon, normal))
+                for polygon, normal in zip(polygons, kept["normals"], strict=True)
+            ),
+            radius=float(kept["disc_radius_m"]),
+            centers=kept["centers_m"],
+            limit=float(kept["open_radius_m"]),
+            open_choice=choice if len(choice) else None,
+            friction=kept["friction"],
+            origin=kept["origin_m"],
+            normals=kept["normals"],
+            depths=kept["depths_m"],
+            cover=TwistCover(kept["axes"], kept["codes"], kept["forces"]),
+            scale=float(kept["scale_m"]),
+        )
+    except InputError:
+        raise
+    except Exception as error:  # whatever a foreign file makes numpy raise
+        raise InputError(f"{path}: not the proof of a grasp's regions ({error})") from error
