@@ -17,17 +17,31 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array, positive
+from grasp_core.arrays import Array, frozen, positive
 from grasp_core.closure import force_closure
-from grasp_core.errors import InputError, SolverError
-from grasp_core.face_pieces import FacePiece, inscribed_disc_radius_of, piece_of
+from grasp_core.errors import InputError, SolverError, UndecidedError
+from grasp_core.face_pieces import FacePiece, inscribed_radius, piece_of
 from grasp_core.on_faces import check_on_faces
-from grasp_core.polygons import clip, nearest_point, tidy, with_fewer_corners
-from grasp_core.region_centers import better_centers
+from grasp_core.polygons import (
+    SAME_CORNER,
+    clip,
+    edge_rows,
+    nearest_point,
+    tidy,
+    with_fewer_corners,
+)
+from grasp_core.region_centers import better_centers, larger_inside
 from grasp_core.region_growth import BEGINNINGS, disc_polygons, most_area, shared_out
-from grasp_core.region_search import WIDER, Grounds, Proved, largest_discs
+from grasp_core.region_search import Grounds, Proved, largest_discs
 from grasp_core.twist_covers import TwistCover
-from grasp_core.values import ContactRegion, Grasp, Polyhedron, four, stacked
+from grasp_core.values import (
+    ContactRegion,
+    Grasp,
+    Polyhedron,
+    contact_frictions,
+    four,
+    stacked,
+)
 
 Balance: TypeAlias = Literal["radius", "area"]
 """What regions are grown for: the smallest inscribed disc, or the total area."""
@@ -43,13 +57,14 @@ class CertifiedRegions:
 
     regions: tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
     radius: float
-    """Of discs around `centers` whose parts on the faces were proved first [m]."""
+    """Of discs around `centers`: what the faces have of them was proved first, and the polygons
+    hold it but for a thousandth of their area [m]."""
     centers: Array
     """(4, 3) [m]"""
     limit: float
-    """A larger radius for which `open_choice` was found; infinite if none was [m]."""
+    """Of discs that hold `open_choice`, a little larger; infinite if none was found [m]."""
     open_choice: Array | None
-    """Contacts in those discs that are not force-closed, (4, 3) [m]."""
+    """Contacts on the faces, in those discs, that are not force-closed, (4, 3) [m]."""
     friction: Array
     """For which all choices are force-closed, (4,)."""
     origin: Array
@@ -62,6 +77,19 @@ class CertifiedRegions:
     """The proof; lengths relative to `scale`."""
     scale: float
     """[m]"""
+
+    def __post_init__(self) -> None:
+        for name in ("centers", "normals"):
+            object.__setattr__(self, name, frozen(getattr(self, name), (4, 3), name))
+        object.__setattr__(self, "friction", contact_frictions(self.friction, 4))
+        object.__setattr__(self, "origin", frozen(self.origin, (3,), "origin"))
+        object.__setattr__(self, "depths", frozen(self.depths, (4,), "depths"))
+        if self.open_choice is not None:
+            choice = frozen(self.open_choice, (4, 3), "open_choice")
+            object.__setattr__(self, "open_choice", choice)
+        positive(self.scale, "scale")
+        if (self.depths < 0.0).any():
+            raise InputError(f"depths must not be negative, got {float(self.depths.min()):.6g}")
 
     def verify(self) -> bool:
         """Re-check in plain arithmetic that every choice of contacts is force-closed.
@@ -109,6 +137,8 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     Raises:
         InputError: The contacts are not on the faces, or not closed with what friction is left; a
             number or a choice is out of its range.
+        UndecidedError: Whether the contacts are closed is too close to call.
+        SolverError: A proof failed its check.
     """
     check_on_faces(body, grasp)
     _check_settings(reserve, balance, clearance, cones)
@@ -122,15 +152,20 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     if pieces is None or least <= 0.0:
         return None
     leaning = [math.tan(math.atan(left) - p.spread) if p.spread else left for p in pieces]
-    grounds = Grounds(pieces, np.array(leaning), cones)
+    grounds = Grounds(pieces, np.array(leaning), int(cones))
     ys = np.array([
         nearest_point(piece.corners, piece.frame.T @ (x - piece.origin))
         for piece, x in zip(pieces, unit.at(positions), strict=True)
     ])  # fmt: skip
-    proved = largest_discs(grounds, better_centers(grounds, ys) if recenter else ys)
+    proved = largest_discs(grounds, ys)
+    if recenter:
+        moved = largest_discs(grounds, better_centers(grounds, ys))
+        proved = larger_inside(grounds, moved, proved)
     if proved is None:
         return None
     polygons, cover = _polygons(grounds, proved, balance, grasp, unit)
+    if min(map(len, polygons)) < 3:  # noqa: PLR2004 - not polygons
+        return None
     found = _placed(grounds, proved, polygons, cover, unit)
     if not found.verify():
         raise SolverError(f"grasp {grasp.id}: the proof of its regions fails its check")
@@ -144,8 +179,8 @@ def _check_settings(reserve: float, balance: str, clearance: float, cones: int) 
         raise InputError(f"balance must be 'radius' or 'area', got {balance!r}")
     if not (math.isfinite(clearance) and clearance >= 0.0):
         raise InputError(f"clearance must be at least 0, got {clearance}")
-    if cones < FEWEST:
-        raise InputError(f"cones must be at least {FEWEST}, got {cones}")
+    if not (float(cones).is_integer() and cones >= FEWEST):
+        raise InputError(f"cones must be a whole number from {FEWEST} on, got {cones}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -219,20 +254,21 @@ def _placed(
 ) -> CertifiedRegions:
     """Regions in the object's frame, with their proof."""
     normals = np.array([piece.normal for piece in grounds.pieces])
-    choice = _open_choice(grounds, proved)
-    placed = [
-        unit.back(piece.origin + with_fewer_corners(polygon) @ piece.frame.T)
-        for piece, polygon in zip(grounds.pieces, polygons, strict=True)
-    ]
+    found = _open_choice(grounds, proved)
+    trimmed = [_trimmed(polygon, y) for polygon, y in zip(polygons, proved.ys, strict=True)]
     return CertifiedRegions(
         regions=four(
-            ContactRegion("certified", polygon, inscribed_disc_radius_of(polygon, normal))
-            for polygon, normal in zip(placed, normals, strict=True)
+            ContactRegion(
+                "certified",
+                unit.back(piece.origin + polygon @ piece.frame.T),
+                unit.scale * inscribed_radius(*edge_rows(polygon)),
+            )
+            for piece, polygon in zip(grounds.pieces, trimmed, strict=True)
         ),
         radius=unit.scale * proved.radius,
         centers=unit.back(grounds.points(proved.ys)),
-        limit=math.inf if choice is None else unit.scale * proved.limit,
-        open_choice=None if choice is None else unit.back(choice),
+        limit=math.inf if found is None else unit.scale * found[0],
+        open_choice=None if found is None else unit.back(found[1]),
         friction=grounds.friction,
         origin=unit.origin,
         normals=normals,
@@ -242,11 +278,31 @@ def _placed(
     )
 
 
-def _open_choice(grounds: Grounds, proved: Proved) -> Array | None:
-    """The choice that a search found open, if it is, by the exact test, and is where it says."""
-    if proved.choice is None or any(piece.depth for piece in grounds.pieces):
+def _trimmed(polygon: Array, y: Array) -> Array:
+    """A polygon with fewer corners that still holds its centre."""
+    fewer = with_fewer_corners(polygon)
+    E, b = edge_rows(fewer)
+    return fewer if (E @ y <= b).all() else polygon
+
+
+def _open_choice(grounds: Grounds, proved: Proved) -> tuple[float, Array] | None:
+    """The radius of discs that hold the choice that a search found open, and the choice.
+
+    None unless it is open by the exact test, and on the pieces. Patches of curved surfaces are
+    not planes, so nothing is said of them.
+    """
+    if proved.choice is None or any(piece.depth or piece.spread for piece in grounds.pieces):
+        return None
+    on_pieces = all(
+        _room(x, piece) >= -SAME_CORNER
+        for piece, x in zip(grounds.pieces, proved.choice, strict=True)
+    )
+    normals = np.array([piece.normal for piece in grounds.pieces])
+    try:
+        closed = force_closure(proved.choice, normals, grounds.friction).closed
+    except UndecidedError:
+        return None
+    if closed or not on_pieces:
         return None
     away = np.linalg.norm(proved.choice - grounds.points(proved.ys), axis=1)
-    normals = np.array([piece.normal for piece in grounds.pieces])
-    closed = force_closure(proved.choice, normals, float(grounds.friction.min())).closed
-    return None if closed or (away > WIDER * proved.limit).any() else proved.choice
+    return float(away.max()), proved.choice

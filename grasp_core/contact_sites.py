@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.errors import InputError
 
 
 class Sites(NamedTuple):
@@ -35,7 +36,13 @@ class Sites(NamedTuple):
 
 
 def stacked_corners(polygons: list[Array]) -> Array:
-    """Polygons (c, 2) of different numbers of corners as one array, last corners repeated."""
+    """Polygons (c, 2) of different numbers of corners as one array, last corners repeated.
+
+    Raises:
+        InputError: One has no corners: nothing would be asked of its contact.
+    """
+    if min(map(len, polygons)) == 0:
+        raise InputError("a contact's site has no corners")
     most = max(map(len, polygons))
     return np.array([
         np.vstack([polygon, np.repeat(polygon[-1:], most - len(polygon), axis=0)])

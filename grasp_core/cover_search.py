@@ -1,8 +1,9 @@
 """Covers of all twists, found in compiled code or, without it, level by level in NumPy.
 
 Both cut cones until forces have power together on all rays of each (`twist_covers`, which checks
-the answer), and stop at a twist that contacts at some places do not resist. Forces are found by a
-game: weights of the rays are moved to where power lacks, forces answer, and the mean answer counts.
+the answer). Forces are found by a game: weights of the rays are moved to where power lacks, forces
+answer, and the mean answer counts. The compiled way also stops at a twist that contacts at some
+places do not resist; the plain one does not look for such.
 """
 
 from dataclasses import dataclass
@@ -12,23 +13,16 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.contact_sites import Sites
+from grasp_core.cover_game import AHEAD, ANSWERS, EVEN, ROUNDS, TINY
 from grasp_core.kernels import compiled
 from grasp_core.twist_covers import EDGES, LEAF, TWIST, TwistCover, halves, orthants
 
 KERNEL = "twist_cover"
-ROUNDS, ANSWERS = 30, 3
-"""Of the game, and forces that are tried in each as the best answer."""
-AHEAD = 1e-9
-"""Power per length of twist with which a force counts."""
-EVEN = 0.02
-"""Weight that each ray keeps in the choice of the edge that is cut."""
-TINY = 1e-12
-"""Share of the friction that forces keep clear of, for rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Searched:
-    """How a search ended: with a cover, with an open choice, or with neither in time."""
+    """How a search ended: with a cover, an open choice, or neither within the cones granted."""
 
     cover: TwistCover | None = None
     choice: Array | None = None
@@ -41,11 +35,11 @@ def search_cover(sites: Sites, axes: Array, cones: int) -> Searched:
     Args:
         sites: Where contacts may be.
         axes: Twists to begin with, as rows, (6, 6).
-        cones: At most.
+        cones: At most; the orthants are always tried.
     """
     kernel = compiled(KERNEL)
     if kernel is None:
-        plainly = _by_levels(sites, axes, cones)
+        plainly = _by_levels(sites, axes, max(cones, 1 << TWIST))
         return Searched() if plainly is None else Searched(_cover(sites, axes, *plainly))
     k, most = len(sites.points), max(cones, 1 << TWIST)
     tree = kernel.Tree(np.zeros(most, np.int64), np.zeros((most, k, 3)), np.zeros((k, 3)))

@@ -94,7 +94,7 @@ def shape_of(pieces: Sequence[FacePiece]) -> FaceShape:
     points = np.vstack([piece.origin + piece.corners @ piece.frame.T for piece in pieces])
     corners = convex_hull((points - first.origin) @ first.frame)
     E, b = edge_rows(corners)
-    inradius = _inscribed_radius(E, b)
+    inradius = inscribed_radius(E, b)
     hull = replace(first, corners=corners, E=E, b=b, inradius=inradius)
     return FaceShape(tuple(pieces), hull)
 
@@ -172,21 +172,21 @@ def piece_of(face: int, normal: Array, polygon: Array) -> FacePiece:
         corners=corners,
         E=E,
         b=b,
-        inradius=_inscribed_radius(E, b),
+        inradius=inscribed_radius(E, b),
     )
 
 
 def inscribed_disc_radius(polygon: Array, piece: FacePiece) -> float:
     """Radius of the largest disc in a convex polygon (k, 3) that lies on a piece."""
-    return _inscribed_radius(*edge_rows((polygon - piece.origin) @ piece.frame))
+    return inscribed_radius(*edge_rows((polygon - piece.origin) @ piece.frame))
 
 
 def inscribed_disc_radius_of(polygon: Array, normal: Array) -> float:
     """Radius of the largest disc in a convex polygon (k, 3), counter-clockwise about a normal."""
-    return _inscribed_radius(*edge_rows((polygon - polygon[0]) @ plane_frame(normal)))
+    return inscribed_radius(*edge_rows((polygon - polygon[0]) @ plane_frame(normal)))
 
 
-def _inscribed_radius(E: Array, b: Array) -> float:
+def inscribed_radius(E: Array, b: Array) -> float:
     """Radius of the largest disc in {y : E y <= b}."""
     rows = np.column_stack([E, np.ones(len(E))])
     best = maximize(LinearProgram(np.array([0.0, 0.0, 1.0]), rows, b))

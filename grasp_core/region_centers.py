@@ -13,17 +13,18 @@ grows: the paper's own program for concurrent grasps is of this kind, with one f
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, to_digits
 from grasp_core.errors import SolverError
 from grasp_core.lp import LinearProgram, Optimum, maximize
 from grasp_core.region_search import Grounds, Proved, largest_discs
 from grasp_core.twist_covers import power_of
 
 MOVES = 12
-FEWER = 8
+MOVING = 8
 """Covers of moves take so many times fewer cones."""
 WORTH = 1.005
 """A move ends the search unless the radius grows by this factor."""
@@ -35,18 +36,29 @@ NEAR = 3.0
 
 def better_centers(grounds: Grounds, ys: Array) -> Array:
     """Centres (k, 2) of discs inside the faces that are larger than around given ones, if found."""
-    coarse = replace(grounds, cones=grounds.cones // FEWER)
+    coarse = replace(grounds, cones=grounds.cones // MOVING)
     best = largest_discs(coarse, ys)
     for _ in range(MOVES):
         moved = None if best is None else _best_for_forces(coarse, best)
         found = None if moved is None or best is None else largest_discs(coarse, moved, best.radius)
-        if best is None or found is None or _inside(coarse, found) < WORTH * _inside(coarse, best):
+        if (
+            best is None
+            or found is None
+            or inside_faces(coarse, found) < WORTH * inside_faces(coarse, best)
+        ):
             break
         best = found
     return ys if best is None else best.ys
 
 
-def _inside(grounds: Grounds, proved: Proved) -> float:
+def larger_inside(grounds: Grounds, one: Proved | None, other: Proved | None) -> Proved | None:
+    """Those of two sets of discs of which larger ones are inside the faces."""
+    if one is None or other is None:
+        return other if one is None else one
+    return max(one, other, key=partial(inside_faces, grounds))
+
+
+def inside_faces(grounds: Grounds, proved: Proved) -> float:
     """The radius of discs that are proved and inside the faces."""
     depths = [(p.b - p.E @ y).min() for p, y in zip(grounds.pieces, proved.ys, strict=True)]
     return min(proved.radius, *map(float, depths))
@@ -87,7 +99,7 @@ def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
         best = maximize(LinearProgram(c, np.vstack(rows), np.concatenate(limits)))
     except SolverError:
         return None
-    return proved.ys + best.x[:-1].reshape(k, 2) if isinstance(best, Optimum) else None
+    return proved.ys + to_digits(best.x[:-1].reshape(k, 2)) if isinstance(best, Optimum) else None
 
 
 def _sizes(forces: Array) -> Array:

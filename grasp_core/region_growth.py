@@ -28,7 +28,7 @@ FIRST_STEP, LAST_STEP = 0.4, 0.03
 """By which polygons are moved outwards, relative to the radius of the discs."""
 BEGINNINGS = (1.0, 0.6)
 """Radii of discs from which areas grow, relative to the largest that were proved."""
-FEWER = 4
+GROWING = 4
 """Each attempt to grow takes so many times fewer cones."""
 
 
@@ -80,7 +80,7 @@ def _given_away(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) ->
 
 def _inside(polygon: Array, rows: Array, limits: Array) -> Array:
     """The part of a convex polygon (c, 2) in half-planes rows @ y <= limits, most idle."""
-    while len(rows):
+    while len(rows) and len(polygon):
         beyond = (rows @ polygon.T).max(axis=1) - limits
         worst = int(beyond.argmax())
         if beyond[worst] <= 0.0:
@@ -143,7 +143,7 @@ def _grown(
 
 def _cover(grounds: Grounds, ys: Array, polygons: list[Array], axes: Array) -> TwistCover | None:
     sites = grounds.around(ys, polygons, np.zeros(len(ys)))
-    return search_cover(sites, axes, grounds.cones // FEWER).cover
+    return search_cover(sites, axes, grounds.cones // GROWING).cover
 
 
 def _offset(piece: Array, polygon: Array, distance: float) -> Array:

@@ -12,12 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, to_digits
 from grasp_core.contact_sites import Sites, stacked_corners
+from grasp_core.cover_game import TINY
 from grasp_core.cover_search import search_cover
 from grasp_core.face_pieces import FacePiece
 from grasp_core.polygons import clip
-from grasp_core.twist_covers import SLACK, TwistCover
+from grasp_core.twist_covers import TwistCover
 
 FINENESS = 0.02
 """The radius is found to this, relative to it."""
@@ -29,12 +30,10 @@ FAST, SLOW = 2.0, 1.1
 """Steps of the radius, of the first attempts and of the others."""
 NEAR = 0.04
 """So near to what is proved an open choice is sought, relative to it."""
-FEWER = 4
+REFUTING = 4
 """Attempts to find one take so many times fewer cones."""
 SIDES = 16
 """Of the polygon around a disc that a face's border cuts."""
-WIDER = 1.0 / math.cos(math.pi / SIDES)
-"""The polygon's corners are so many radii away."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,8 +94,9 @@ class Grounds:
             weights = np.array([1.0, mu, mu])
             motions.append(weights[:, None] * (F.T @ np.hstack([np.eye(3), turning])))
         J = np.vstack(motions)
-        values, vectors = np.linalg.eigh(J.T @ J)
-        return (vectors / np.sqrt(np.maximum(values, SLACK * values[-1]))).T
+        # a triangular factor is the same on all machines, unlike eigenvectors of symmetric contacts
+        factor = np.linalg.cholesky(J.T @ J + TINY * np.eye(J.shape[1]))
+        return to_digits(np.asarray(np.linalg.inv(factor), dtype=np.float64))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,7 +141,7 @@ def largest_discs(grounds: Grounds, ys: Array, first: float = FIRST_RADIUS) -> P
     search.widen(grounds.cones, SLOW * search.lower or first, SLOW, FINENESS)
     if search.cover is None:
         return None
-    search.refute(grounds.cones // FEWER)
+    search.refute(grounds.cones // REFUTING)
     return Proved(ys, search.lower, search.cover, search.limit, search.choice)
 
 
@@ -158,7 +158,7 @@ class _Search:
 
     def widen(self, cones: int, radius: float, growth: float, fineness: float) -> None:
         """Try a radius, others larger by a factor each, and then those between."""
-        upper = self.limit
+        upper, radius = self.limit, min(radius, 0.5 * (self.lower + self.limit))
         while radius >= LEAST_RADIUS and upper - self.lower > fineness * self.lower:
             radius = min(radius, self.reach)
             if radius <= self.lower:

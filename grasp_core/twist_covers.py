@@ -27,12 +27,12 @@ across and along the normal,
 and over a polygon the least is at a corner. A region that is thicker than its plane, as below a
 patch of a curved surface, is a prism, with corners on both sides.
 
-Completeness. If all choices are closed with something to spare, cutting the longest edges long
-enough ends with a cover. If a twist has h <= 0 for any forces, there is a choice that is not
-closed, as each contact has a best force and a worst place (the power is linear in both). Between
-the two only time decides, and it takes little: were regions points, h would be linear, and a cone
-of twists in any half-space would be covered by one set of forces (force closure itself); what
-bends h is how the worst place moves from ray to ray.
+Completeness. If all choices are closed with something to spare, cutting long edges long enough ends
+with a cover; edges are preferred where power lacks, but all are cut in the end. If a twist has
+h <= 0 for any forces, there is a choice that is not closed, as each contact has a best force and a
+worst place (the power is linear in both). Between the two only time decides, and it takes little:
+were regions points, h would be linear, and a cone of twists in a half-space would be covered by one
+set of forces (force closure itself); what bends h is how the worst place moves from ray to ray.
 
 Source: for single forces the criterion is that of independent regions by primitive wrenches
 (Pollard, "Closure and quality equivalence for efficient synthesis of grasps from examples", 2004).
@@ -55,7 +55,8 @@ EDGES = tuple((i, j) for i in range(TWIST) for j in range(i + 1, TWIST))
 SLACK = 1e-12
 """Of a power, relative to the lengths of wrench and `summed` twist: thousands of roundings."""
 LARGEST = 2.0**50
-"""Entries of rays up to this are exact: they are sums of whole numbers."""
+"""Entries of rays up to this are exact: they are sums of whole numbers. Lengths of axes are
+between its inverse and it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,28 +112,36 @@ class TwistCover:
         k = len(regions)
         if (len(normals), len(friction), self.forces.shape[1]) != (k, k, k) or not _units(normals):
             return False
-        along = np.einsum("mki,ki->mk", self.forces, normals)
-        across = np.linalg.norm(self.forces - along[..., None] * normals, axis=2)
-        if not (across <= friction * along).all() or not self._independent():
+        if min(map(len, regions)) == 0 or not ((friction >= 0.0) & np.isfinite(friction)).all():
+            return False
+        largest = np.abs(self.forces).max(axis=(1, 2), initial=0.0)
+        if not (largest > 0.0).all() or not self._independent():
+            return False
+        forces = self.forces / largest[:, None, None]  # else squares of tiny ones are zero
+        along = np.einsum("mki,ki->mk", forces, normals)
+        across = np.linalg.norm(forces - along[..., None] * normals, axis=2)
+        if not ((along >= 0.0) & (across <= friction * along)).all():
             return False
         try:
-            return all(self._powerful(where, rays, regions) for where, rays in self.leaves())
+            return all(
+                self._powerful(forces[where], rays, regions) for where, rays in self.leaves()
+            )
         except InputError:
             return False
 
     def _independent(self) -> bool:
         lengths = np.linalg.norm(self.axes, axis=1)
-        if not (lengths > 0.0).all():
+        if not ((lengths > 1.0 / LARGEST) & (lengths < LARGEST)).all():
             return False
         return bool(np.linalg.svd(self.axes / lengths[:, None], compute_uv=False)[-1] > SLACK)
 
-    def _powerful(self, where: slice, rays: Array, regions: Sequence[Array]) -> bool:
+    def _powerful(self, forces: Array, rays: Array, regions: Sequence[Array]) -> bool:
         """Whether each cone's forces have power on its rays wherever the contacts are."""
         if np.abs(rays).max(initial=0.0) > LARGEST:
             return False
         powers, sizes = np.zeros(rays.shape[:2]), np.zeros(rays.shape[:2])
         twists, lengths = rays @ self.axes, summed(rays, self.axes)
-        for region, F in zip(regions, self.forces[where].swapaxes(0, 1), strict=True):
+        for region, F in zip(regions, forces.swapaxes(0, 1), strict=True):
             slopes, at_origin = power_of(F, twists)
             powers += at_origin + (slopes @ region.T).min(axis=2)
             sizes += lengths * slack_of(F, region)[:, None]

@@ -2,16 +2,20 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.certified_regions import CONES, Balance, CertifiedRegions, certify_regions
 from grasp_core.closure import force_closure
-from grasp_core.errors import UndecidedError
+from grasp_core.errors import SolverError, UndecidedError
 from grasp_core.values import Grasp, Polyhedron
 from sim_validate.console import Reporter
 from sim_validate.engines import each
+
+Found: TypeAlias = tuple[Grasp, CertifiedRegions | str]
+"""A grasp with its regions, or why it has none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,37 +41,33 @@ class _Task:
 
 def certified(
     body: Polyhedron, grasps: Sequence[Grasp], asked: Asked, *, jobs: int, reporter: Reporter
-) -> Iterator[tuple[Grasp, CertifiedRegions | None]]:
-    """Each grasp with its regions, in order."""
+) -> Iterator[Found]:
+    """Each grasp with its regions, or why there are none, in order."""
     tasks = [_Task(body, grasp, asked) for grasp in grasps]
     with reporter.progress("certifying") as steps:
-        for done, (grasp, proved) in enumerate(
-            zip(grasps, each(_certify, tasks, jobs=jobs), strict=True)
-        ):
+        for done, found in enumerate(zip(grasps, each(_certify, tasks, jobs=jobs), strict=True)):
             steps.update(done + 1, len(tasks))
-            yield grasp, proved
+            yield found
 
 
-def _certify(task: _Task) -> CertifiedRegions | None:
-    asked = task.asked
-    if not _closed(task.grasp, asked.friction * (1.0 - asked.reserve)):
-        return None
-    return certify_regions(
-        task.body, task.grasp, asked.friction, reserve=asked.reserve, balance=asked.balance,
-        recenter=asked.recenter, clearance=asked.clearance, cones=asked.cones,
-    )  # fmt: skip
-
-
-def _closed(grasp: Grasp, friction: float) -> bool:
+def _certify(task: _Task) -> CertifiedRegions | str:
+    asked, grasp = task.asked, task.grasp
+    left = asked.friction * (1.0 - asked.reserve)
     try:
-        return force_closure(grasp.positions, grasp.normals, friction).closed
-    except UndecidedError:
-        return False
+        if not force_closure(grasp.positions, grasp.normals, left).closed:
+            return f"not in force closure at friction {left:.6g}"
+        proved = certify_regions(
+            task.body, grasp, asked.friction, reserve=asked.reserve, balance=asked.balance,
+            recenter=asked.recenter, clearance=asked.clearance, cones=asked.cones,
+        )  # fmt: skip
+    except (UndecidedError, SolverError) as error:
+        return str(error)
+    return "no radius could be proved" if proved is None else proved
 
 
-def wider(grasp: Grasp, proved: CertifiedRegions | None) -> Grasp:
+def wider(grasp: Grasp, proved: CertifiedRegions | str) -> Grasp:
     """A grasp with certified regions where their discs around its contacts are larger."""
-    if proved is None:
+    if isinstance(proved, str):
         return grasp
     radius = min(
         _room(region.polygon, contact.position, normal)

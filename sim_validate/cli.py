@@ -146,7 +146,7 @@ class Regions:
     of them."""
     edge_clearance_m: NotNegative = 0.0
     """How far regions stay from the edges of their faces [m]."""
-    cones: Annotated[int, at_least(64, up_to=10_000_000)] = 10_000
+    cones: Annotated[int, at_least(64, up_to=1_000_000)] = 10_000
     """Effort: cones that an attempt at a proof may have. With more, radii grow by some hundredths,
     or not at all where they are as large as can be."""
     jobs: Count = field(default_factory=available_cores)

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from grasp_core.certified_regions import CertifiedRegions
 from grasp_core.errors import InputError
 from grasp_core.mesh import FORMATS
 from grasp_core.planner import plan
@@ -19,7 +18,7 @@ from grasp_core.requests import methods_for
 from grasp_core.values import FaceQuadruple, Grasp, PatchLimits, Polyhedron
 from scenes.objects import example_object
 from sim_validate import cli, flags
-from sim_validate.certifying import Asked, certified, wider
+from sim_validate.certifying import Asked, Found, certified, wider
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.files import write_text
 from sim_validate.improving import improved, show_gains
@@ -107,7 +106,7 @@ def with_regions(
     asked = Asked(found.friction, clearance=planning.edge_clearance_m)
     grasps = list[Grasp]()
 
-    def kept() -> Iterator[tuple[Grasp, CertifiedRegions | None]]:
+    def kept() -> Iterator[Found]:
         for grasp, proved in certified(body, found.grasps, asked, jobs=jobs, reporter=reporter):
             grasps.append(wider(grasp, proved))
             yield grasp, proved

@@ -9,16 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from grasp_core.arrays import Array
 from grasp_core.certified_regions import CertifiedRegions
 from grasp_core.errors import InputError
 from grasp_core.face_pieces import inscribed_disc_radius_of
 from grasp_core.twist_covers import TwistCover
 from grasp_core.values import ContactRegion, Grasp, Polyhedron, four
 from grasp_core.versions import versions
-from sim_validate.certifying import Asked
+from sim_validate.certifying import Asked, Found
 from sim_validate.files import write_arrays, write_text
 
-SCHEMA = 2
+SCHEMA = 3
 REGIONS, PROOFS = "regions.json", "proofs"
 
 
@@ -26,7 +27,7 @@ def write_regions(
     folder: Path | None,
     body: Polyhedron,
     asked: Asked,
-    found: Iterable[tuple[Grasp, CertifiedRegions | None]],
+    found: Iterable[Found],
 ) -> Mapping[str, Any]:
     """Write proofs as they come, and then what was found; nothing where there is no folder.
 
@@ -58,15 +59,15 @@ def write_regions(
 
 
 def _record(
-    grasp: Grasp, proved: CertifiedRegions | None, body: Polyhedron, folder: Path | None
+    grasp: Grasp, proved: CertifiedRegions | str, body: Polyhedron, folder: Path | None
 ) -> Mapping[str, Any]:
     """What is told of a grasp; its proof is written, or one of before is removed."""
     named = {"id": grasp.id, "family": grasp.family, "planned_radius_m": grasp.radius}
     name = f"{PROOFS}/{grasp.id}.npz"
-    if proved is None:
+    if isinstance(proved, str):
         if folder is not None:
             (folder / name).unlink(missing_ok=True)
-        return {**named, "disc_radius_m": None, "regions": None}
+        return {**named, "disc_radius_m": None, "regions": None, "reason": proved}
     proof = None
     if folder is not None:
         path = write_arrays(folder / name, proof_arrays(proved, grasp, body))
@@ -131,13 +132,13 @@ def read_regions(path: Path) -> CertifiedRegions:
         InputError: The file is not such a one.
     """
     try:
-        with np.load(path, allow_pickle=False) as held:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as held:
             kept = {name: held[name] for name in held.files}
         polygons = [kept[f"region{i}_m"] for i in range(4)]
-        choice = kept["open_choice_m"]
+        choice, scale = kept["open_choice_m"], float(kept["scale_m"])
         return CertifiedRegions(
             regions=four(
-                ContactRegion("certified", polygon, inscribed_disc_radius_of(polygon, normal))
+                ContactRegion("certified", polygon, _inscribed(polygon, normal, scale))
                 for polygon, normal in zip(polygons, kept["normals"], strict=True)
             ),
             radius=float(kept["disc_radius_m"]),
@@ -149,9 +150,13 @@ def read_regions(path: Path) -> CertifiedRegions:
             normals=kept["normals"],
             depths=kept["depths_m"],
             cover=TwistCover(kept["axes"], kept["codes"], kept["forces"]),
-            scale=float(kept["scale_m"]),
+            scale=scale,
         )
     except InputError:
         raise
     except Exception as error:  # whatever a foreign file makes numpy raise
         raise InputError(f"{path}: not the proof of a grasp's regions ({error})") from error
+
+
+def _inscribed(polygon: Array, normal: Array, scale: float) -> float:
+    return scale * inscribed_disc_radius_of(polygon / scale, normal)

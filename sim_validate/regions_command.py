@@ -1,5 +1,6 @@
 """The command that certifies independent regions for grasps of a file."""
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
@@ -30,7 +31,7 @@ def certify_file(command: cli.Regions, reporter: Reporter) -> int:
     if command.out is not None:
         reporter.say(f"wrote {command.out / REGIONS}")
     reporter.document(document)
-    proved = all(grasp["regions"] for grasp in document["grasps"])
+    proved = all(grasp["regions"] is not None for grasp in document["grasps"])
     return cli.Exit.GOOD if proved else cli.Exit.NEGATIVE
 
 
@@ -43,9 +44,9 @@ def _show(document: Mapping[str, Any], reporter: Reporter) -> None:
         "disc: radius proved around contacts or middles, cut with the faces; open: a radius with "
         "a choice that is not closed; inner: smallest disc in the polygons; mm2: their area"
     )
-    unproved = sum(grasp["regions"] is None for grasp in grasps)
-    if unproved:
-        reporter.say(f"{unproved} of {len(grasps)} grasps: no regions proved")
+    reasons = Counter(grasp["reason"] for grasp in grasps if grasp["regions"] is None)
+    for reason, count in reasons.most_common():
+        reporter.say(f"no regions for {count} of {len(grasps)} grasps: {reason}")
     counted = [mu for grasp in grasps if grasp["regions"] for mu in grasp["friction"]]
     left = document["friction"] * (1.0 - document["reserve"])
     if counted and min(counted) < left:

@@ -13,26 +13,12 @@ from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissi
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.contact_sites import Sites
+from grasp_core.cover_game import AHEAD, ANSWERS, EVEN, ROUNDS, TINY
+from grasp_core.kernels.contact_motions import MOTIONS, is_open, longest, lowest, velocity
+from grasp_core.twist_covers import LEAF, TWIST
 
-RAYS = 6
-MOTIONS = 6
-"""Numbers that say how a twist of unit length moves a contact: along the normal and two tangents,
-turning about these two and about the normal."""
-LEAF = 15
-"""Code of a cone that is not cut; smaller ones are edges, (0, 1), (0, 2) and so on."""
+RAYS = TWIST
 COVERED, REFUTED, UNDECIDED = 1, -1, 0
-ROUNDS = 30
-"""Of the game between a ray, who wants little power, and forces, who want much."""
-ANSWERS = 3
-"""Forces that are tried as the best answer to weights of rays."""
-STEPS = 40
-"""Towards the place of a contact where a twist is resisted least."""
-AHEAD = 1e-9
-"""Power per length of twist with which a force counts."""
-EVEN = 0.02
-"""Weight that each ray keeps in the choice of the edge that is cut."""
-TINY = 1e-12
-"""Share of the friction that forces keep clear of, for rounding."""
 
 
 class Tree(NamedTuple):
@@ -44,104 +30,6 @@ class Tree(NamedTuple):
     """Along the frames, (n, k, 3)."""
     shifts: Array
     """Where contacts do not resist a twist, along the frames from the points, (k, 3)."""
-
-
-@njit(cache=True, error_model="numpy")
-def lowest(
-    motion: Array, sites: Sites, i: int, force: tuple[float, float]
-) -> tuple[float, float, float, float]:
-    """Least power of a force n + f t_1 + g t_2 over a contact's site, and where, (n, t_1, t_2)."""
-    f, g = force
-    u, v, w = motion[3] - motion[5] * f, motion[4] - motion[5] * g, f * motion[4] - g * motion[3]
-    least, x, y = np.inf, 0.0, 0.0
-    for corner in range(sites.corners.shape[1]):
-        height = u * sites.corners[i, corner, 1] - v * sites.corners[i, corner, 0]
-        if height < least:
-            least, x, y = height, sites.corners[i, corner, 0], sites.corners[i, corner, 1]
-    length = math.sqrt(u * u + v * v)
-    if sites.radii[i] > 0.0 and length > 0.0:
-        least -= sites.radii[i] * length
-        x += sites.radii[i] * v / length
-        y -= sites.radii[i] * u / length
-    out = -sites.depths[i] if w > 0.0 else sites.depths[i]
-    return motion[0] + f * motion[1] + g * motion[2] + least + out * w, out, x, y
-
-
-@njit(cache=True, error_model="numpy")
-def velocity(
-    motion: Array, place: Array | tuple[float, float, float]
-) -> tuple[float, float, float]:
-    """Of a contact that is off its point, along the frame."""
-    out, x, y = place
-    return (
-        motion[0] + motion[3] * y - motion[4] * x,
-        motion[1] - motion[5] * y + motion[4] * out,
-        motion[2] + motion[5] * x - motion[3] * out,
-    )
-
-
-@njit(cache=True, error_model="numpy")
-def longest(f: float, g: float, most: float) -> tuple[float, float]:
-    """The tangential part in a direction that friction allows."""
-    length = math.sqrt(f * f + g * g)
-    return (f * most / length, g * most / length) if length > 0.0 else (0.0, 0.0)
-
-
-@njit(cache=True, error_model="numpy")
-def holds(sites: Sites, i: int, x: float, y: float) -> bool:
-    """Whether a place in its plane is in a contact's polygon, or in its disc."""
-    if x * x + y * y <= sites.radii[i] ** 2:
-        return True
-    corners, sides = sites.corners[i], 0
-    for place in range(len(corners)):
-        here, there = corners[place - 1], corners[place]
-        sides += int(here[0] != there[0] or here[1] != there[1])
-        ahead = (there[0] - here[0]) * (y - here[1]) - (there[1] - here[1]) * (x - here[0])
-        if ahead < 0.0:
-            return False
-    return sides > 0
-
-
-@njit(cache=True, error_model="numpy")
-def resists(motion: Array, sites: Sites, i: int, shift: Array) -> bool:
-    """Whether a contact may resist a twist wherever it is; else a place, perhaps, where it cannot.
-
-    Where a contact does not slide friction has no power, and otherwise the most that it allows is
-    convex in the place, and steps go to where it is least. False, with a place that resists, where
-    the steps do not suffice.
-    """
-    most = sites.friction[i] * (1.0 - TINY)
-    out, x, y = 0.0, 0.0, 0.0
-    if motion[5] != 0.0:
-        shift[0], shift[1], shift[2] = 0.0, -motion[2] / motion[5], motion[1] / motion[5]
-        if holds(sites, i, shift[1], shift[2]) and velocity(motion, shift)[0] <= 0.0:
-            return False
-    for step in range(STEPS):
-        _, q, r = velocity(motion, (out, x, y))
-        least, out_ahead, x_ahead, y_ahead = lowest(motion, sites, i, longest(q, r, most))
-        if least > AHEAD:
-            return True
-        share = 2.0 / (step + 2.0)
-        out += share * (out_ahead - out)
-        x += share * (x_ahead - x)
-        y += share * (y_ahead - y)
-        p, q, r = velocity(motion, (out, x, y))
-        if p + sites.friction[i] * math.sqrt(q * q + r * r) <= 0.0:
-            break
-    shift[0], shift[1], shift[2] = out, x, y
-    return False
-
-
-@njit(cache=True, error_model="numpy")
-def is_open(motions: Array, sites: Sites, shifts: Array) -> bool:
-    """Whether no contact resists a twist at the places that are filled in."""
-    for i in range(len(sites.points)):
-        if resists(motions[i], sites, i, shifts[i]):
-            return False
-        p, q, r = velocity(motions[i], (shifts[i, 0], shifts[i, 1], shifts[i, 2]))
-        if p + sites.friction[i] * math.sqrt(q * q + r * r) > 0.0:
-            return False
-    return True
 
 
 @njit(cache=True, error_model="numpy")
@@ -221,8 +109,7 @@ def reweigh(regrets: Array, powers: Array, weights: Array) -> None:
 def find_forces(ids: Indices, motions: Array, sites: Sites, forces: Array, weights: Array) -> bool:
     """Fill in forces with power on all rays of a cone, if some are found; else a bad twist in it.
 
-    A game: weights of the rays are chosen by what they regret not to have chosen, forces answer,
-    and the mean answer, late ones counting more, is what gets the power. No answer, no such forces.
+    The game of `grasp_core.cover_game`, which ends at once where no answer has power.
     """
     regrets, powers = np.zeros(RAYS), np.empty(RAYS)
     weights[:] = 1.0 / RAYS

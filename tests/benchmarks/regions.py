@@ -1,13 +1,13 @@
 """How large are certified regions, and are all choices of contacts in them closed?
 
-    python -m tests.benchmarks.regions [--grasps 500] [--choices 200] [--simulate 25] [--closely 40]
+    python -m tests.benchmarks.regions [--grasps 500] [--cones N] [--simulate 25] [--closely 20]
 
 Per family, on built-in and random objects: how many grasps got regions, the exact test on random
 choices of contacts in them (corners often), and sizes beside the paper's own regions. Of the first
 ones, simulation of twenty choices each, and of contacts that walk outwards together, from the
 centres through the border until they are not held. Of `--closely` many, other ways to certify, the
 predecessor's squares, and the largest disc for which no open choice was found by descent. An hour
-for everything; `--grasps 20 --simulate 2 --closely 2` for some minutes.
+for everything, half with `--cones 1250`; `--grasps 20 --simulate 2 --closely 2` for some minutes.
 """
 
 import argparse
@@ -21,7 +21,6 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.certified_regions import CONES, certify_regions
-from grasp_core.region_search import WIDER
 from grasp_core.values import Contact
 from sim_validate.engines import available_cores, each
 from sim_validate.region_files import area_of
@@ -56,6 +55,7 @@ class Task:
     choices: int
     simulate: bool
     closely: bool
+    cones: int
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,8 @@ def main():
     parser.add_argument("--grasps", type=int, default=500)
     parser.add_argument("--choices", type=int, default=200)
     parser.add_argument("--simulate", type=int, default=25)
-    parser.add_argument("--closely", type=int, default=40)
+    parser.add_argument("--closely", type=int, default=20)
+    parser.add_argument("--cones", type=int, default=CONES, help="for all but the close looks")
     parser.add_argument("--family", action="append", choices=FAMILIES)
     asked = parser.parse_args()
     tasks = list(tasks_of(asked))
@@ -110,7 +111,7 @@ def tasks_of(asked):
         chosen = sorted((place, name) for name, n in counts.items() for place in range(n))
         for number, (place, name) in enumerate(chosen[: asked.grasps]):
             yield Task(name, family, place, number, asked.choices, number < asked.simulate,
-                       number < asked.closely), limit  # fmt: skip
+                       number < asked.closely, asked.cones), limit  # fmt: skip
 
 
 def examine(given):
@@ -124,7 +125,8 @@ def examine(given):
         if way != "discs" and not task.closely:
             continue
         begun = time.perf_counter()
-        found = certify_regions(body, grasp, FRICTION, **settings)
+        cones = {} if task.closely else {"cones": task.cones}
+        found = certify_regions(body, grasp, FRICTION, **cones | settings)
         if found is not None:
             sizes[way] = (*size(found, body), time.perf_counter() - begun)
         if way == "discs":
@@ -188,7 +190,7 @@ def walks(body, grasp, proved, rng):
         middles = np.array([region.polygon.mean(axis=0) for region in proved.regions])
         found.append(("random", *walked(body, grasp, middles, corners)))
     if proved.open_choice is not None:
-        share = proved.radius / (WIDER * proved.limit)
+        share = proved.radius / proved.limit
         borders = proved.centers + share * (proved.open_choice - proved.centers)
         found.append(("adverse", *walked(body, grasp, proved.centers, borders)))
     return found

@@ -1,6 +1,7 @@
 """Covers of all twists: they leave nothing out, and nothing false passes their check."""
 
 import dataclasses
+from collections import deque
 from fractions import Fraction
 
 import numpy as np
@@ -85,23 +86,31 @@ def test_a_cover_holds_in_rational_arithmetic():
     body = scenes.example_object("wedge")
     (grasp,) = gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps
     small = certify_regions(body, grasp, 0.5, cones=300)
-    cover, mu = small.cover, [Fraction(each) for each in small.friction]
+    cover, mu = small.cover, fractions(small.friction)
     axes, normals = fractions(cover.axes), fractions(small.normals)
-    corners = [fractions((r.polygon - small.origin) / small.scale) for r in small.regions]
-    checked = 0
-    for where, rays in cover.leaves():
-        for F, cone in zip(fractions(cover.forces[where]), rays.astype(int), strict=True):
-            for f, n, friction in zip(F, normals, mu, strict=True):
-                along = f @ n
-                across = f - along * n / (n @ n)
-                assert along >= 0
-                assert (across @ across) * (n @ n) <= (friction * along) ** 2
-            for twist in cone.astype(object) @ axes:
-                a, b = twist[:3], twist[3:]
-                power = sum(min(f @ a + (x * turned(f, b)).sum() for x in places)
-                            for f, places in zip(F, corners, strict=True))  # fmt: skip
-                assert power > 0
-                checked += 1
+    origin, scale = fractions(small.origin), Fraction(small.scale)
+    corners = [(fractions(region.polygon) - origin) / scale for region in small.regions]
+    codes, forces, checked = iter(cover.codes), iter(fractions(cover.forces)), 0
+    cones = deque(np.diag([1 - 2 * (s >> j & 1) for j in range(6)]).astype(object)
+                  for s in range(64))  # fmt: skip
+    while cones:
+        cone, code = cones.popleft(), next(codes)
+        if code < LEAF:
+            for end in EDGES[code]:
+                cones.append(cone.copy())
+                cones[-1][end] = cone[EDGES[code][0]] + cone[EDGES[code][1]]
+            continue
+        F = next(forces)
+        for f, n, friction in zip(F, normals, mu, strict=True):
+            across = f - (f @ n) * n / (n @ n)
+            assert f @ n >= 0
+            assert (across @ across) * (n @ n) <= (friction * (f @ n)) ** 2
+        for twist in cone @ axes:
+            power = sum(f @ twist[:3] + min((x * turned(f, twist[3:])).sum() for x in places)
+                        for f, places in zip(F, corners, strict=True))  # fmt: skip
+            assert power > 0
+            checked += 1
+    assert next(codes, None) is next(forces, None) is None
     assert checked == 6 * len(cover.forces) > 300
 
 
@@ -162,6 +171,22 @@ def test_what_a_proof_does_not_speak_of_is_refused(proved):
     assert not proved.cover.verify(corners, proved.normals, proved.friction[:3])
     assert not proved.cover.verify(corners, 2.0 * proved.normals, proved.friction)
     assert not proved.cover.verify([np.full((3, 3), np.nan)] * 4, proved.normals, proved.friction)
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e-100, 1e100])
+def test_the_size_of_forces_proves_nothing(proved, size):
+    """Squares of tiny numbers are zero: a friction cone could not be told from a line."""
+    corners = [(region.polygon - proved.origin) / proved.scale for region in proved.regions]
+    scaled = dataclasses.replace(proved.cover, forces=size * proved.cover.forces)
+    assert scaled.verify(corners, proved.normals, proved.friction)
+    assert not scaled.verify(corners, proved.normals, np.full(4, 0.01))
+
+
+def test_pulling_contacts_are_not_taken_for_pushing_ones(proved):
+    corners = [(region.polygon - proved.origin) / proved.scale for region in proved.regions]
+    assert not proved.cover.verify(corners, -proved.normals, -proved.friction)
+    assert not proved.cover.verify(corners, -proved.normals, proved.friction)
+    assert not proved.cover.verify([np.zeros((0, 3))] * 4, proved.normals, proved.friction)
 
 
 def test_a_cover_with_a_hole_is_refused(proved):

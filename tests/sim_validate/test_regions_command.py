@@ -83,7 +83,7 @@ def test_where_nothing_can_be_proved_it_is_said(folder, capsys):
     asked = ["regions", str(folder / "grasps.json"), "--cones", "64"]
     asked += ["--grasp", grasp["id"], "--friction", barely]
     assert main(asked) == Exit.NEGATIVE
-    assert "1 of 1 grasps: no regions proved" in " ".join(capsys.readouterr().out.split())
+    assert "no regions for 1 of 1 grasps: " in capsys.readouterr().out
 
 
 def test_what_is_wrong_is_refused(folder, capsys):
@@ -97,9 +97,9 @@ def test_grasps_that_are_not_closed_do_not_stop_the_others(folder, tmp_path, cap
     grasps = json.loads((folder / "grasps.json").read_text())["grasps"]
     frictions = sorted(grasp["critical_friction"] for grasp in grasps)
     asked = ["regions", str(folder / "grasps.json"), "--cones", "300", "--out", str(tmp_path)]
-    between = str(0.5 * (frictions[1] + frictions[2]))
+    between = str(0.99 * frictions[2])
     assert main([*asked, "--friction", between]) == Exit.NEGATIVE
-    assert "1 of 3 grasps: no regions proved" in capsys.readouterr().out
+    assert "no regions for 1 of 3 grasps: not in force closure" in capsys.readouterr().out
     found = json.loads((tmp_path / "regions.json").read_text())["grasps"]
     assert [grasp["regions"] is None for grasp in found].count(True) == 1
     assert len(list((tmp_path / "proofs").iterdir())) == 2
@@ -128,7 +128,7 @@ def test_files_give_back_the_regions_and_their_proof(folder):
         assert found.radius == grasp["disc_radius_m"]
         for region, told in zip(found.regions, grasp["regions"], strict=True):
             np.testing.assert_array_equal(region.polygon, told["polygon_m"])
-            assert region.inscribed_radius == told["inscribed_radius_m"]
+            assert region.inscribed_radius == pytest.approx(told["inscribed_radius_m"])
 
 
 @pytest.mark.parametrize("text", [b"", b"not a proof", b"PK\x03\x04"])
