@@ -118,8 +118,9 @@ def _write(path: Path, parts: Iterable[bytes]) -> Path:
 
 
 def remove_results(folder: Path) -> None:
-    """Remove the verdicts and scenes of an earlier run, which would contradict the new grasps."""
-    old = [folder / "verdicts.json", *folder.glob("scenes/[cprf]-*-*-*-*.xml"),
-           *folder.glob("traces/[cprf]-*-*-*-*.npz")]  # fmt: skip
+    """Remove what an earlier run has told of its grasps, which would contradict the new ones."""
+    old = [folder / "verdicts.json", folder / "regions.json",
+           *folder.glob("scenes/[cprf]-*-*-*-*.xml"), *folder.glob("traces/[cprf]-*-*-*-*.npz"),
+           *folder.glob("proofs/[cprf]-*-*-*-*.npz")]  # fmt: skip
     for path in old:
         path.unlink(missing_ok=True)

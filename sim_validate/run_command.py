@@ -23,9 +23,9 @@ def run_object(command: cli.Run, reporter: Reporter) -> int:
     setup, _ = prepared(testing, planning.seed, command.out or RESULTS)
     body, found, moves = plan_object(command.object, planning, testing.jobs, reporter)
     folder = command.out or RESULTS / _folder_name(body.name)
-    found = with_regions(body, found, planning, folder, testing.jobs, reporter)
     require_faithful(setup, found.friction, body.radius)
     remove_results(folder)
+    found = with_regions(body, found, planning, folder, testing.jobs, reporter)
     write_text(folder / "grasps.json", plan_to_json(body, found, moves))
     say_counts(body, found, reporter)
     if found.absence:

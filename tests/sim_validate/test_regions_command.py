@@ -165,6 +165,17 @@ def ring_around(contact, radius):
     return contact.position + radius * np.column_stack([np.cos(turns), np.sin(turns)]) @ frame.T
 
 
+def test_a_run_keeps_regions_and_proofs_and_the_next_removes_them(tmp_path):
+    asked = ["run", "tetrahedron", "--limit", "1", "--family", "concurrent", "--out", str(tmp_path)]
+    assert main([*asked, "--regions", "-q"]) == Exit.GOOD
+    (grasp,) = json.loads((tmp_path / "grasps.json").read_text())["grasps"]
+    assert grasp["regions"][0]["kind"] == "certified"
+    assert sv.read_regions(tmp_path / "proofs" / f"{grasp['id']}.npz").verify()
+    assert main([*asked, "-q"]) == Exit.GOOD
+    assert not (tmp_path / "regions.json").exists()
+    assert not list((tmp_path / "proofs").iterdir())
+
+
 def test_regions_of_plans_stay_clear_of_edges(tmp_path):
     asked = ["plan", "octahedron", "--limit", "1", "--family", "regulus", "--regions"]
     assert main([*asked, "--edge-clearance-m", "0.002", "--out", str(tmp_path), "-q"]) == Exit.GOOD
