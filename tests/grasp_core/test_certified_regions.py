@@ -126,6 +126,7 @@ def test_better_centres_have_larger_discs_inside_their_faces():
             assert gc.force_closure(positions, grasp.normals, 0.5).closed
 
 
+@pytest.mark.slow
 def test_area_can_be_sought_instead_of_radius():
     wide, large = (
         found("wedge", "pencil", balance=balance, cones=10_000)[2] for balance in ("radius", "area")
@@ -269,8 +270,8 @@ def test_moving_centres_never_makes_discs_smaller():
 
 
 def test_without_compiled_loops_there_are_regions_too(monkeypatch):
-    compiled = found("wedge", "pencil")[2]
+    compiled = found("wedge", "pencil", cones=500)[2]
     monkeypatch.setattr("grasp_core.cover_search.compiled", lambda _: None)
-    plain = found("wedge", "pencil")[2]
+    plain = found("wedge", "pencil", cones=500)[2]
     assert plain.verify()
     assert plain.radius == pytest.approx(compiled.radius, rel=0.02)
