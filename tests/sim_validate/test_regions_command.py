@@ -96,7 +96,7 @@ def test_what_is_wrong_is_refused(folder, capsys):
 def test_grasps_that_are_not_closed_do_not_stop_the_others(folder, tmp_path, capsys):
     grasps = json.loads((folder / "grasps.json").read_text())["grasps"]
     frictions = sorted(grasp["critical_friction"] for grasp in grasps)
-    asked = ["regions", str(folder / "grasps.json"), "--cones", "300", "--out", str(tmp_path)]
+    asked = ["regions", str(folder / "grasps.json"), "--cones", "8000", "--out", str(tmp_path)]
     between = str(0.99 * frictions[2])
     assert main([*asked, "--friction", between]) == Exit.NEGATIVE
     assert "no regions for 1 of 3 grasps: not in force closure" in capsys.readouterr().out
