@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from sim_validate.region_files import area_of
 from tests.grasp_core.curved import curved_body, inside, met
 from tests.judges import random_rotation
 
-FEW = 2_000
+FEW = 1_000
 CASES = [
     ("tetrahedron", "concurrent"), ("wedge", "pencil"), ("mug", "regulus"), ("box", "concurrent"),
     ("chamfered-box", "regulus"), ("hex-nut", "pencil"), ("cross", "free"),
@@ -28,9 +29,14 @@ needs_kernels = pytest.mark.skipif(
 )
 
 
-def found(name, family, friction=0.5, cones=FEW, **more):
+@cache
+def planned(name, family, friction):
     body = scenes.example_object(name)
-    grasp = gc.plan(body, friction, families=(family,), limit=1).grasps[0]
+    return body, gc.plan(body, friction, families=(family,), limit=1).grasps[0]
+
+
+def found(name, family, friction=0.5, cones=FEW, **more):
+    body, grasp = planned(name, family, friction)
     return body, grasp, certify_regions(body, grasp, friction, cones=cones, **more)
 
 
@@ -46,8 +52,8 @@ def test_all_choices_in_the_regions_are_closed(name, family):
         assert within(contact.position, region.polygon, normal, 1e-9)
         for corner in region.polygon:
             assert any(within(corner, piece, normal, 1e-9) for piece in body.faces[face].pieces)
-    drawn = np.array([inside(region.polygon, rng, 60) for region in proved.regions])
-    corners = [region.polygon[rng.integers(len(region.polygon), size=60)]
+    drawn = np.array([inside(region.polygon, rng, 30) for region in proved.regions])
+    corners = [region.polygon[rng.integers(len(region.polygon), size=30)]
                for region in proved.regions]  # fmt: skip
     for positions in (*drawn.transpose(1, 0, 2), *np.transpose(corners, (1, 0, 2))):
         assert gc.force_closure(positions, grasp.normals, 0.5).closed
@@ -87,7 +93,7 @@ def test_reguli_get_regions_at_all():
 
 def test_more_cones_give_larger_regions():
     radii = [found("tetrahedron", "concurrent", cones=cones)[2].radius
-             for cones in (64, 1_000, 20_000)]  # fmt: skip
+             for cones in (64, 1_000, 8_000)]  # fmt: skip
     assert radii[0] < radii[1] < radii[2]
 
 
@@ -95,7 +101,7 @@ def test_more_cones_give_larger_regions():
 @pytest.mark.parametrize(("name", "family"), [CASES[0], CASES[2], CASES[3]])
 def test_not_much_larger_discs_have_an_open_choice(name, family):
     """The other side of the proof, by contacts that the exact test refutes."""
-    body, grasp, proved = found(name, family, cones=20_000)
+    body, grasp, proved = found(name, family, cones=8_000)
     assert proved.radius < proved.limit < 1.25 * proved.radius
     away = np.linalg.norm(proved.open_choice - proved.centers, axis=1)
     assert away.max() == pytest.approx(proved.limit, rel=1e-9)
