@@ -38,17 +38,15 @@ def better_centers(grounds: Grounds, ys: Array) -> Array:
     """Centres (k, 2) of discs inside the faces that are larger than around given ones, if found."""
     coarse = replace(grounds, cones=grounds.cones // MOVING)
     best = largest_discs(coarse, ys)
+    if best is None:
+        return ys
     for _ in range(MOVES):
-        moved = None if best is None else _best_for_forces(coarse, best)
-        found = None if moved is None or best is None else largest_discs(coarse, moved, best.radius)
-        if (
-            best is None
-            or found is None
-            or inside_faces(coarse, found) < WORTH * inside_faces(coarse, best)
-        ):
+        moved = _best_for_forces(coarse, best)
+        found = None if moved is None else largest_discs(coarse, moved, best.radius)
+        if found is None or inside_faces(coarse, found) < WORTH * inside_faces(coarse, best):
             break
         best = found
-    return ys if best is None else best.ys
+    return best.ys
 
 
 def larger_inside(grounds: Grounds, one: Proved | None, other: Proved | None) -> Proved | None:

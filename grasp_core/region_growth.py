@@ -44,6 +44,8 @@ def shared_out(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) -> 
     polygons = list[Array]()
     for _ in range(SHARINGS):
         polygons = _given_away(grounds, ys, sites, cover)
+        if min(map(len, polygons)) == 0:
+            break  # thinner than the slack of the check
         sites = grounds.around(ys, polygons, np.zeros(len(ys)))
     return polygons
 

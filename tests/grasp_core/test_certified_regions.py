@@ -124,7 +124,8 @@ def test_better_centres_have_larger_discs_inside_their_faces():
     for name, family in (("hex-nut", "pencil"), ("wedge", "pencil")):
         _, grasp, fixed = found(name, family)
         _, _, moved = found(name, family, recenter=True)
-        assert least_inscribed(moved) > 1.04 * least_inscribed(fixed)
+        # gains were from 1.10 to 1.24 with 1,000 to 20,000 cones; radii are found to 2 %
+        assert least_inscribed(moved) > 1.05 * least_inscribed(fixed)
         assert moved.verify()
         rng = np.random.default_rng(3)
         drawn = np.array([inside(region.polygon, rng, 40) for region in moved.regions])
