@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
+from scenes.layout import Layout
 from sim_validate import schedules
 from sim_validate.schedules import Load, Schedule
 from sim_validate.setup import Setup
@@ -21,6 +22,12 @@ class Watched:
     """As in `Motion`, (n, 7 + 3k)."""
     trace: Trace
     """From the moment friction was lowered."""
+    times_s: Array
+    """Of the samples before and after that moment, which is at zero, (n,)."""
+    pushes_n: Array
+    """What each fingertip's servos push with, along the axes of its contact, (n, k, 3)."""
+    friction: Array
+    """In each sample, (n,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +62,15 @@ class Rig:
         (motion,) = self.bench.run([schedule], self.closed and self.closed.state)
         (found,) = self._traced([schedule], [motion])
         before = [] if self.closed is None else [self.closed.joints[-1:]]
-        return Watched(np.concatenate([*before, motion.joints]), found)
+        count = len(motion.joints)
+        sample_s = self.bench.clock.sample_s
+        return Watched(
+            joints=np.concatenate([*before, motion.joints]),
+            trace=found,
+            times_s=sample_s * (np.arange(1, count + 1) - schedule.watched),
+            pushes_n=pushes(schedule.forces[:count], motion.joints, self.bench.scene.layout),
+            friction=schedule.friction[:count],
+        )
 
     def _holds(
         self, loads: Sequence[Load], settling_frictions: Sequence[float] | None
@@ -98,6 +113,23 @@ class Rig:
             trace(motion.after(self.closed) if self.closed else motion, layout, trial.watched)
             for motion, trial in zip(motions, trials, strict=True)
         )
+
+
+def pushes(planned: Array, joints: Array, layout: Layout) -> Array:
+    """What the servos push fingertips with: the planned forces, less what their springs gave way.
+
+    Args:
+        planned: Forces that the fingers are told to apply, (n, k, 3) [N], world axes.
+        joints: As in `Motion`, (n, 7 + 3k) [m].
+        layout: Of the scene, with fingertips on slides.
+
+    Returns:
+        Along the axes of the contacts, (n, k, 3) [N]. At rest, the contact forces.
+    """
+    local = np.einsum("kij,nki->nkj", layout.frames, planned)
+    forces = local - layout.drive.stiffness_n_per_m * joints[:, 7:].reshape(local.shape)
+    forces[..., 0] = np.clip(forces[..., 0], 0.0, layout.drive.max_normal_force_n)
+    return forces
 
 
 def squeezed(

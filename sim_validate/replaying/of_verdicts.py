@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError
+from grasp_core.records import SavedGrasps
 from sim_validate.noise.draws import Noise
 from sim_validate.replaying.of_grasps import (
     chosen_grasp,
@@ -42,13 +43,31 @@ def from_verdicts(path: Path, record: Mapping[str, Any], wanted: Wanted) -> Reco
         grasp = chosen_grasp(path, saved, wanted)
         if grasp.id not in verdicts:
             raise InputError(f"{path}: no verdict on {grasp.id}; there is {some(verdicts)}")
-        verdict = verdicts[grasp.id]
-        require_contacts(path, grasp, verdict["contacts_sha256"])
-        setup, agenda = _asked(path, verdict)
-        found = of_grasp(path, saved, setup, agenda, replace(wanted, grasp=grasp.id))
-        return _with_outcomes(path, found, verdict, wanted)
+        return of_verdict(path, saved, verdicts[grasp.id], replace(wanted, grasp=grasp.id))
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: is not what `graspproof validate` writes ({error!r})") from error
+
+
+def of_verdict(
+    path: Path, saved: SavedGrasps, verdict: Mapping[str, Any], wanted: Wanted
+) -> Recorded:
+    """What one verdict says.
+
+    Args:
+        path: Of its file, for messages.
+        saved: The grasps that it is among.
+        verdict: An entry of the file.
+        wanted: Which contact set, with the grasp's id.
+
+    Raises:
+        InputError: It is about other contacts, or does not hold what is wanted.
+        KeyError: It is not what `validate` writes.
+    """
+    grasp = chosen_grasp(path, saved, wanted)
+    require_contacts(path, grasp, verdict["contacts_sha256"])
+    setup, agenda = _asked(path, verdict)
+    found = of_grasp(path, saved, setup, agenda, wanted)
+    return _with_outcomes(path, found, verdict, wanted)
 
 
 def _asked(path: Path, verdict: Mapping[str, Any]) -> tuple[Setup, Agenda]:

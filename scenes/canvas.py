@@ -1,0 +1,125 @@
+"""The door to matplotlib: figures, their files, and polygons in them.
+
+Figures are made without `pyplot`, so that none outlives its use and no display is looked for.
+"""
+
+# pyright: basic
+# matplotlib's types at their door.
+
+import importlib
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.errors import InputError
+from scenes.palette import INK
+
+FORMATS = ("png", "svg", "pdf", "webp", "jpg")
+LETTERS = 9.0
+"""Of text in figures [points]."""
+STYLE = {
+    "font.size": LETTERS, "font.family": "DejaVu Sans", "axes.spines.top": False,
+    "axes.spines.right": False, "axes.edgecolor": INK, "axes.labelcolor": INK, "text.color": INK,
+    "xtick.color": INK, "ytick.color": INK, "axes.titlesize": LETTERS, "legend.frameon": False,
+    "legend.fontsize": LETTERS - 1.0, "svg.hashsalt": "graspproof", "svg.fonttype": "path",
+    "path.simplify": True, "lines.linewidth": 1.4,
+}  # fmt: skip
+DOTS_PER_INCH = 100.0
+QUALITY = 82
+"""Of pictures whose format loses some."""
+
+
+@dataclass(frozen=True, slots=True)
+class Around:
+    """Room around the panels of a figure, as shares of it, and between them, of a panel."""
+
+    left: float = 0.075
+    right: float = 0.01
+    below: float = 0.17
+    above: float = 0.09
+    between: float = 0.3
+
+
+def new_figure(width_in: float, height_in: float) -> Any:
+    """An empty figure of a size in inches, in the style of all figures here."""
+    matplotlib: Any = importlib.import_module("matplotlib")
+    figure: Any = importlib.import_module("matplotlib.figure")
+    with matplotlib.rc_context(STYLE):
+        return figure.Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout=None)
+
+
+def panels(
+    figure: Any, count: int, *, around: Around = Around(), projection: str | None = None
+) -> list[Any]:
+    """Axes side by side, where a figure says: to find room for labels would take as long again."""
+    matplotlib: Any = importlib.import_module("matplotlib")
+    room = {"left": around.left, "right": 1.0 - around.right, "bottom": around.below,
+            "top": 1.0 - around.above, "wspace": around.between}  # fmt: skip
+    with matplotlib.rc_context(STYLE):
+        found = figure.subplots(
+            1, count, squeeze=False, subplot_kw={"projection": projection}, gridspec_kw=room
+        )
+    return list(found[0])
+
+
+def add_polygons(
+    axes: Any, polygons: Sequence[Array], colours: Sequence[tuple[float, ...]],
+    smooth: Sequence[bool],
+) -> None:  # fmt: skip
+    """Filled polygons, in the order given."""
+    collections: Any = importlib.import_module("matplotlib.collections")
+    axes.add_collection(
+        collections.PolyCollection(
+            polygons, facecolors=colours, linewidths=0.0, antialiaseds=np.array(smooth)
+        ),
+        autolim=False,
+    )
+
+
+def legend_patch(colour: str, label: str, opacity: float = 1.0) -> Any:
+    """A coloured box for a legend."""
+    patches: Any = importlib.import_module("matplotlib.patches")
+    return patches.Patch(facecolor=colour, alpha=opacity, edgecolor="none", label=label)
+
+
+def legend_line(colour: str, label: str, *, style: str = "-", marker: str = "") -> Any:
+    """A line or a marker for a legend."""
+    lines: Any = importlib.import_module("matplotlib.lines")
+    return lines.Line2D([], [], color=colour, linestyle=style, marker=marker, label=label)
+
+
+def encoded(figure: Any, form: str) -> bytes:
+    """A figure as the bytes of a file, the same for the same figure.
+
+    Args:
+        figure: From `new_figure`.
+        form: One of `FORMATS`.
+    """
+    matplotlib: Any = importlib.import_module("matplotlib")
+    stream = io.BytesIO()
+    undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    lossy = {"pil_kwargs": {"quality": QUALITY}} if form in {"webp", "jpg"} else {}
+    with matplotlib.rc_context(STYLE):
+        figure.savefig(
+            stream, format=form, metadata=undated.get(form), facecolor="white", **lossy
+        )
+    return stream.getvalue()
+
+
+def write_figure(figure: Any, path: Path) -> Path:
+    """Write a figure to a file whose ending says the format.
+
+    Raises:
+        InputError: The ending is none of the known ones.
+    """
+    form = path.suffix.lower().removeprefix(".").replace("jpeg", "jpg")
+    if form not in FORMATS:
+        raise InputError(f"{path}: pictures end in {', '.join('.' + name for name in FORMATS)}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(encoded(figure, form))
+    return path

@@ -1,0 +1,147 @@
+"""What is drawn of a grasp, after the figures of the paper.
+
+The object is glass. On its outside fingers are long bars; on its inside, at each contact, is the
+friction cone and in it the cone of forces that the construction used. Lines of force run through the
+focus points; a pencil also shows the plane of each pair, a regulus the surface its lines lie on.
+Pictures and turnable pages draw what is listed here.
+"""
+
+import math
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.values import Grasp, Polyhedron
+from scenes.ruled_surfaces import between, rulings
+from scenes.shapes import Shape, closed, cone_rim, cone_sides, tube
+
+BAR_LENGTH, BAR_RADIUS = 0.75, 0.05
+"""Of a finger, in object radii."""
+CONE_LENGTH = 0.42
+"""Of a cone's sides, in object radii."""
+BEYOND = 0.2
+"""How far lines go on behind the points that they are drawn for, in object radii."""
+REACH = 0.95
+"""How far from the object's centre the surface of a regulus is drawn, in object radii."""
+POLYGON = 3
+"""Corners of the smallest region that can be shaded."""
+MOST_TRIANGLES = 2500
+"""Of the glass: finer surfaces are drawn coarser."""
+
+
+def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, ...]:
+    """Everything that is drawn of a grasp.
+
+    Args:
+        body: The object.
+        grasp: On it.
+        friction: Coulomb coefficient of the friction cones.
+
+    Returns:
+        Shapes in the object's frame.
+    """
+    shapes = [*glass(body)]
+    for finger in range(len(grasp.contacts)):
+        shapes += _finger(body, grasp, finger, math.atan(friction))
+    shapes += _family(body, grasp)
+    return (*shapes, Shape("contact", points=grasp.positions))
+
+
+def glass(body: Polyhedron) -> tuple[Shape, ...]:
+    """The object: its surface, and the borders of its faces."""
+    loops = [loop for face in body.faces for loop in (face.polygon, *face.holes)]
+    return (
+        Shape("object", polygons=_panes(body)),
+        Shape("edge", lines=tuple(closed(loop) for loop in loops)),
+    )
+
+
+def _panes(body: Polyhedron) -> tuple[Array, ...]:
+    """Pieces of planar faces, or the triangles of a curved surface."""
+    if body.patches is None:
+        return tuple(piece for face in body.faces for piece in face.pieces)
+    fine = len(body.triangles) > MOST_TRIANGLES
+    return tuple(_coarse(body) if fine else body.vertices[body.triangles])
+
+
+def _coarse(body: Polyhedron) -> Array:
+    """Triangles between the middles of cells of a grid, (t, 3, 3) [m]: what they join stays joined.
+
+    Each vertex moves to the middle of those in its cell; triangles inside one cell or along two
+    are gone.
+    """
+    cells = math.sqrt(MOST_TRIANGLES) / 2.0
+    low = body.vertices.min(axis=0)
+    size = float((body.vertices.max(axis=0) - low).max()) / cells
+    places = np.floor((body.vertices - low) / size).astype(np.int64)
+    _, owners = np.unique(places, axis=0, return_inverse=True)
+    owners = owners.reshape(-1)
+    counts = np.bincount(owners)
+    middles = np.stack([np.bincount(owners, axis) / counts for axis in body.vertices.T], axis=1)
+    joined = owners[body.triangles]
+    a, b, c = joined.T
+    joined = joined[(a != b) & (b != c) & (c != a)]
+    _, first = np.unique(np.sort(joined, axis=1), axis=0, return_index=True)
+    return middles[joined[np.sort(first)]]
+
+
+def _finger(body: Polyhedron, grasp: Grasp, finger: int, half_angle: float) -> list[Shape]:
+    contact, cone = grasp.contacts[finger], grasp.force_cones[finger]
+    tip, length = contact.position, CONE_LENGTH * body.radius
+    ways = grasp.approach_directions
+    inward = contact.normal if ways is None else ways[finger]
+    bar = tube(tip, tip - BAR_LENGTH * body.radius * inward, BAR_RADIUS * body.radius)
+    rim = cone_rim(tip, contact.normal, half_angle, length)
+    spokes = [np.array([tip, corner]) for corner in rim[::5]]
+    shapes = [
+        Shape("finger", finger, polygons=bar),
+        Shape("friction cone", finger, lines=(closed(rim), *spokes)),
+        Shape("force cone", finger,
+              polygons=cone_sides(tip, cone.axis, cone.half_angle, length)),
+    ]  # fmt: skip
+    region = grasp.regions[finger].polygon
+    if len(region) >= POLYGON:
+        shapes.append(Shape("region", finger, polygons=(region,)))
+    return shapes
+
+
+def _family(body: Polyhedron, grasp: Grasp) -> list[Shape]:
+    """Lines of force, and what shows that they are of the grasp's family."""
+    if grasp.family == "regulus":
+        return _regulus(body, grasp)
+    beyond = BEYOND * body.radius
+    foci = np.repeat(grasp.focus_points, len(grasp.contacts) // len(grasp.focus_points), axis=0)
+    shapes = [Shape("focus", points=grasp.focus_points)]
+    for finger, (start, focus) in enumerate(zip(grasp.positions, foci, strict=True)):
+        far = focus + beyond * _unit(focus - start)
+        shapes.append(Shape("line of force", finger, lines=(np.array([start, far]),)))
+    if grasp.family == "pencil":
+        shapes += _planes(grasp, beyond)
+    return shapes
+
+
+def _regulus(body: Polyhedron, grasp: Grasp) -> list[Shape]:
+    """Lines along the witness forces, and the surface that they rule."""
+    reach, beyond = REACH * body.radius, BEYOND * body.radius
+    ways = grasp.witness.directions
+    ruled = rulings(grasp.positions, ways, body.center_of_mass, reach)
+    shapes = [Shape("ruled surface", polygons=between(ruled), lines=ruled)]
+    for finger, (start, way) in enumerate(zip(grasp.positions, ways, strict=True)):
+        ahead = max(float((body.center_of_mass - start) @ way), 0.0)
+        line = np.array([start, start + (2.0 * ahead + beyond) * way])
+        shapes.append(Shape("line of force", finger, lines=(line,)))
+    return shapes
+
+
+def _planes(grasp: Grasp, beyond: float) -> list[Shape]:
+    """The plane of each pair of a pencil; both hold the line through the foci."""
+    one, two = grasp.focus_points
+    along = beyond * _unit(two - one)
+    ends = np.array([one - along, two + along])
+    x = grasp.positions
+    quads = [np.array([x[first], ends[0], x[first + 1], ends[1]]) for first in (0, 2)]
+    return [Shape("plane", polygons=tuple(quads), lines=(ends,))]
+
+
+def _unit(vector: Array) -> Array:
+    return vector / max(float(np.linalg.norm(vector)), np.finfo(np.float64).tiny)

@@ -1,0 +1,135 @@
+"""A grasp -> its picture in the style of the paper, as a figure or a file."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.values import Grasp, Polyhedron
+from scenes.canvas import (
+    Around,
+    add_polygons,
+    legend_line,
+    legend_patch,
+    new_figure,
+    panels,
+    write_figure,
+)
+from scenes.drawings import BAR_LENGTH, drawing_of
+from scenes.painting import painted
+from scenes.palette import FINGERS, INK, LOOKS, NEUTRAL, colour_of
+from scenes.shapes import Role, Shape, extent_of
+from scenes.views import View, best_view
+
+SIDE_IN = 5.0
+"""Width of a picture, and its height without the legend [inches]."""
+LEGEND_IN = 0.5
+"""Height of the legend [inches]."""
+MARGIN = 0.04
+"""Around what is drawn, as a share of the picture."""
+FARTHEST = 2.0
+"""Points farther from the centre than so many object radii may be cut off."""
+NUMBER_BEYOND = 0.12
+"""How far a finger's number is from the end of its bar, in object radii."""
+EXPLAINED: tuple[Role, ...] = (
+    "finger", "friction cone", "force cone", "region", "line of force", "focus", "plane",
+    "ruled surface",
+)  # fmt: skip
+
+
+def write_picture(
+    body: Polyhedron,
+    grasp: Grasp,
+    path: str | Path,
+    friction: float = 0.5,
+    *,
+    view: View | None = None,
+) -> Path:
+    """Draw a grasp as in the paper, and write the picture.
+
+    Args:
+        body: The object.
+        grasp: On it.
+        path: Of the picture; its ending (png, svg, pdf, webp, jpg) says the format.
+        friction: Coulomb coefficient, of the friction cones.
+        view: From where it is seen; from where it is seen best if None.
+
+    Raises:
+        InputError: The ending is none of the known ones.
+    """
+    figure = grasp_figure(body, grasp, friction, view=view)
+    return write_figure(figure, Path(path))
+
+
+def grasp_figure(
+    body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
+    legend: bool = True,
+) -> Any:  # fmt: skip
+    """The picture of a grasp: a matplotlib figure."""
+    shapes = drawing_of(body, grasp, friction)
+    view = view or best_view(body, grasp)
+    figure = new_figure(SIDE_IN, SIDE_IN + (LEGEND_IN if legend else 0.0))
+    below = LEGEND_IN / (SIDE_IN + LEGEND_IN) if legend else 0.0
+    (axes,) = panels(figure, 1, around=Around(0.0, 0.0, below, 0.0))
+    numbers = _number_places(body, grasp)
+    low, high = _frame(shapes, numbers, body, view)
+    patches = painted(shapes, view, float(high[0] - low[0]))
+    add_polygons(
+        axes,
+        [patch.polygon for patch in patches],
+        [patch.colour for patch in patches],
+        [patch.smooth for patch in patches],
+    )
+    for finger, (x, y) in enumerate(view.seen(numbers)[0]):
+        axes.text(x, y, str(finger), ha="center", va="center", weight="bold", color=INK,
+                  bbox={"boxstyle": "circle,pad=0.18", "fc": "white", "ec": FINGERS[finger]},
+                  zorder=10)  # fmt: skip
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    if legend:
+        figure.legend(
+            handles=_legend(shapes), loc="lower center", ncols=4, frameon=False,
+            fontsize=8.0, handlelength=1.4, columnspacing=1.2,
+        )  # fmt: skip
+    return figure
+
+
+def _number_places(body: Polyhedron, grasp: Grasp) -> Array:
+    """Where the fingers' numbers are: behind the ends of their bars, (4, 3) [m]."""
+    ways = grasp.normals if grasp.approach_directions is None else grasp.approach_directions
+    return grasp.positions - (BAR_LENGTH + NUMBER_BEYOND) * body.radius * ways
+
+
+def _frame(
+    shapes: Sequence[Shape], numbers: Array, body: Polyhedron, view: View
+) -> tuple[Array, Array]:
+    """Corners of a square around what is to be seen, (2,) each [m]."""
+    points = np.vstack([extent_of(shapes), numbers])
+    near = np.linalg.norm(points - body.center_of_mass, axis=1) <= FARTHEST * body.radius
+    flat, _ = view.seen(points[near])
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    half = 0.5 * (1.0 + 2.0 * MARGIN) * float((high - low).max())
+    middle = 0.5 * (low + high)
+    return middle - half, middle + half
+
+
+def _legend(shapes: Sequence[Shape]) -> list[Any]:
+    """What the roles look like that occur."""
+    found = {shape.role: shape for shape in reversed(shapes)}
+    handles = list[Any]()
+    for role in EXPLAINED:
+        if role not in found:
+            continue
+        look, shape = LOOKS[role], found[role]
+        colour = NEUTRAL if shape.finger is not None else colour_of(shape)
+        if look.dot:
+            handles.append(legend_line(colour, role, style="", marker="o"))
+        elif look.fill:
+            handles.append(legend_patch(colour, role, max(look.fill, 0.3)))
+        else:
+            handles.append(legend_line(colour, role, style="--" if look.dashed else "-"))
+    return handles

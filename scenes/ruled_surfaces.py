@@ -1,0 +1,60 @@
+"""The surface on which the lines of force of a regulus lie.
+
+Three pairwise skew lines are met by one line through each point of the first: the intersection of
+the planes that this point spans with the other two. These transversals sweep a hyperboloid of one
+sheet, and every line that depends on the three, such as the fourth line of force, meets all of them
+and so lies on it, too (Sudsang & Ponce 1995, section 2.2).
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from grasp_core.arrays import Array
+
+RULINGS = 40
+PARALLEL = 1e-9
+"""Shortest way of a transversal whose direction is known."""
+
+
+def rulings(points: Array, directions: Array, center: Array, reach: float) -> tuple[Array, ...]:
+    """Segments of the transversals of three lines, inside a ball.
+
+    Args:
+        points: One on each line, (k, 3) [m]; the first three lines count.
+        directions: Unit vectors along them, (k, 3).
+        center: Of the ball, (3,) [m].
+        reach: Its radius [m].
+
+    Returns:
+        Ends of each segment, (2, 3) [m], neighbours next to each other.
+    """
+    segments = list[Array]()
+    for along in np.linspace(-reach, reach, RULINGS):
+        start = points[0] + along * directions[0]
+        planes = np.cross(points[1:3] - start, directions[1:3])
+        way = np.cross(planes[0], planes[1])
+        length = float(np.linalg.norm(way))
+        if length > PARALLEL * reach**2:
+            segments += _inside(start, way / length, center, reach)
+    return tuple(segments)
+
+
+def _inside(start: Array, way: Array, center: Array, reach: float) -> list[Array]:
+    """The part of a line inside a ball, if any."""
+    middle = float((center - start) @ way)
+    room = reach**2 - float(np.linalg.norm(center - start - middle * way)) ** 2
+    if room <= 0.0:
+        return []
+    half = math.sqrt(room)
+    return [np.array([start + (middle - half) * way, start + (middle + half) * way])]
+
+
+def between(segments: Sequence[Array]) -> tuple[Array, ...]:
+    """Quadrilaterals between neighbouring segments, each (4, 3)."""
+    quads = list[Array]()
+    for one, two in zip(segments, segments[1:], strict=False):
+        turned = two if (one[1] - one[0]) @ (two[1] - two[0]) > 0.0 else two[::-1]
+        quads.append(np.array([one[0], one[1], turned[1], turned[0]]))
+    return tuple(quads)

@@ -1,0 +1,162 @@
+"""One grasp -> the pictures and charts of its page, in files; work for any process.
+
+Charts of motion need a trial: the first that was not held, or else the weakest, is simulated again,
+which gives bit for bit what was judged.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from grasp_core.closure import force_closure
+from grasp_core.records import SavedGrasps
+from grasp_core.values import ContactRegion, Grasp, four
+from scenes.canvas import write_figure
+from scenes.clips import GraphicsError, magnified, write_clip
+from scenes.pictures import grasp_figure
+from scenes.views import best_view
+from sim_validate.replaying.bench import Replayed, replayed
+from sim_validate.replaying.of_verdicts import of_verdict
+from sim_validate.replaying.values import Wanted
+from sim_validate.reports.motion_charts import motion_figure
+from sim_validate.reports.run_folder import Record, RunFolder
+from sim_validate.reports.wrench_charts import margin_figure, wrench_figure
+
+PICTURES, CHARTS, CLIPS = "pictures", "charts", "clips"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """A grasp to draw, as it travels to a worker."""
+
+    saved: SavedGrasps
+    """The grasp alone, with its object."""
+    friction: float
+    verdict: Record | None
+    regions: Record | None
+    """Certified ones."""
+    source: Path
+    """Of the verdict, for messages."""
+    folder: Path
+    """Of the report."""
+    name: str
+    """Of the files."""
+    clip: bool
+    """Whether to draw a clip of the trial, too."""
+
+    @property
+    def grasp(self) -> Grasp:
+        """With its certified regions, where there are any."""
+        return certified(self.saved.grasps[0], self.regions)
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """Files of a grasp, relative to the report's folder, and what they show."""
+
+    picture: str
+    wrenches: str | None
+    """None for contacts that are not in force closure at this friction."""
+    margins: str | None
+    motion: str | None = None
+    """None where nothing was simulated."""
+    clip: str | None = None
+    trial: str = ""
+    """Name of the wrench of the trial."""
+    outcome: str = ""
+    no_clip: str = ""
+    """Why a clip could not be drawn."""
+
+
+def tasks_of(run: RunFolder, folder: Path, prefix: str, clips: int) -> list[Task]:
+    """What there is to draw of a run: clips of so many grasps, those that were not held first."""
+    grasps = run.saved.grasps
+    held = {grasp.id: bool(run.verdicts.get(grasp.id, {}).get("held", True)) for grasp in grasps}
+    filmed = [grasp.id for grasp in sorted(grasps, key=lambda grasp: held[grasp.id])][:clips]
+    return [
+        Task(
+            saved=replace(run.saved, grasps=(grasp,), friction=run.friction),
+            friction=run.friction,
+            verdict=run.verdicts.get(grasp.id),
+            regions=run.regions.get(grasp.id),
+            source=run.verdicts_path,
+            folder=folder,
+            name=f"{prefix}{grasp.id}",
+            clip=grasp.id in filmed,
+        )
+        for grasp in grasps
+    ]
+
+
+def certified(grasp: Grasp, record: Record | None) -> Grasp:
+    """The grasp with the regions of a record, if it has any."""
+    if record is None or record["regions"] is None:
+        return grasp
+    regions = [
+        ContactRegion("certified", np.array(each["polygon_m"]), each["inscribed_radius_m"])
+        for each in record["regions"]
+    ]
+    return replace(grasp, regions=four(regions))
+
+
+def draw(task: Task) -> Drawn:
+    """Write the files of one grasp.
+
+    Raises:
+        InputError: Its verdict is about other contacts.
+    """
+    body, grasp = task.saved.body, task.grasp
+    view = best_view(body, grasp)
+    picture = _written(
+        task, PICTURES, "", grasp_figure(body, grasp, task.friction, view=view, legend=False)
+    )
+    drawn = Drawn(picture, None, None)
+    if force_closure(grasp, friction=task.friction).closed:
+        largest = _largest_push(task.verdict)
+        wrenches = wrench_figure(body, grasp, task.friction, view=view)
+        margins = margin_figure(body, grasp, task.friction, max_normal_force_n=largest)
+        drawn = replace(
+            drawn,
+            wrenches=_written(task, CHARTS, "-wrenches", wrenches),
+            margins=_written(task, CHARTS, "-margins", margins),
+        )
+    return drawn if task.verdict is None else _with_motion(task, task.verdict, drawn)
+
+
+def _with_motion(task: Task, verdict: Record, drawn: Drawn) -> Drawn:
+    recorded = of_verdict(task.source, task.saved, verdict, Wanted(task.saved.grasps[0].id))
+    found = replayed(recorded)
+    size = found.scene.layout.grasp_size_m
+    figure = motion_figure(found, recorded.setup.hold.hold_threshold * size)
+    drawn = replace(
+        drawn,
+        motion=_written(task, CHARTS, "-motion", figure),
+        trial=found.name,
+        outcome=found.hold.outcome.value,
+    )
+    return _with_clip(task, found, drawn) if task.clip else drawn
+
+
+def _with_clip(task: Task, found: Replayed, drawn: Drawn) -> Drawn:
+    path = task.folder / CLIPS / f"{task.name}.webp"
+    known = np.isfinite(found.watched.joints).all(axis=1)
+    joints, factor = magnified(found.watched.joints[known], found.scene)
+    caption = f"{found.name}: {found.hold.outcome.value}, motion {factor:g} times as large"
+    try:
+        write_clip(found.scene, joints, path, caption)
+    except GraphicsError as error:
+        return replace(drawn, no_clip=str(error))
+    return replace(drawn, clip=f"{CLIPS}/{path.name}")
+
+
+def _written(task: Task, kind: str, ending: str, figure: Any) -> str:
+    path = task.folder / kind / f"{task.name}{ending}.webp"
+    write_figure(figure, path)
+    return f"{kind}/{path.name}"
+
+
+def _largest_push(verdict: Record | None) -> float:
+    """Of each finger [N]."""
+    return 10.0 if verdict is None else float(verdict["settings"]["fingers"]["max_normal_force_n"])

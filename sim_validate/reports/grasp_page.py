@@ -1,0 +1,183 @@
+"""A grasp, what was found about it, and its pictures -> its page."""
+
+import math
+import shlex
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.values import Grasp
+from sim_validate.reports.drawn_grasps import Drawn, certified
+from sim_validate.reports.pages import NOTHING, number, page
+from sim_validate.reports.run_folder import GRASPS, Record, RunFolder
+from sim_validate.reports.turntable import as_text, grasp_data
+from sim_validate.verdict import LET_GO, Outcome
+
+MILLI, MICRO = 1e3, 1e6
+HELD = Outcome.HELD.value
+GONE = tuple(outcome.value for outcome in LET_GO)
+GOOD, BAD, QUIET = "good", "bad", "quiet"
+"""Classes of what is said."""
+LESS = 1e-3
+"""Parts of a vector below this share of its length are said to be zero."""
+
+
+@dataclass(frozen=True, slots=True)
+class Neighbours:
+    """Pages before and after one, where there are any."""
+
+    before: str | None = None
+    after: str | None = None
+
+
+def grasp_page(
+    run: RunFolder, grasp: Grasp, drawn: Drawn, object_script: str, neighbours: Neighbours
+) -> str:
+    """The text of a page."""
+    verdict, regions = run.verdicts.get(grasp.id), run.regions.get(grasp.id)
+    shown = certified(grasp, regions)
+    said, tone = said_of(verdict)
+    return page(
+        "grasp.html",
+        grasp=grasp,
+        object=run.saved.body.name,
+        friction=run.friction,
+        verdict=verdict,
+        verdict_text=said,
+        tone=tone,
+        before=neighbours.before,
+        after=neighbours.after,
+        picture=drawn.picture,
+        charts=drawn if drawn.wrenches else None,
+        shown=drawn.trial,
+        shown_outcome=drawn.outcome,
+        clip=drawn.clip,
+        object_script=object_script,
+        facts=list(_facts(grasp, verdict)),
+        contacts=list(_contacts(shown)),
+        certified=_certified(regions),
+        trials=[] if verdict is None else [_trial(each) for each in verdict["wrenches"]],
+        controls=[] if verdict is None else _controls(verdict["controls"]),
+        commands=list(_commands(grasp, verdict)),
+        drawing=as_text(grasp_data(run.saved.body, shown, run.friction)),
+    )
+
+
+def said_of(verdict: Record | None) -> tuple[str, str]:
+    """What became of a grasp, in a word or two, and whether that is good."""
+    if verdict is None:
+        return "not simulated", QUIET
+    if verdict["mismatches"]:
+        return "contradicts the analysis", BAD
+    if any(control["held"] for control in verdict["controls"].values()):
+        return "a control held", BAD
+    outcome = str(verdict["outcome"]).replace("_", " ")
+    return outcome, GOOD if verdict["held"] else BAD
+
+
+def _facts(grasp: Grasp, verdict: Record | None) -> Iterable[tuple[str, str]]:
+    """Names of figures and what they are."""
+    lower, upper = grasp.ferrari_canny
+    yield "Family", grasp.family
+    yield "Faces", ", ".join(map(str, grasp.faces))
+    yield "Smallest independent disc", f"{number(MILLI * grasp.radius)} mm"
+    simulated = None if verdict is None else verdict["critical_friction"]["simulated"]
+    in_simulation = "" if simulated is None else f", in simulation {number(simulated)}"
+    yield "Critical friction", f"{number(grasp.critical_friction)}{in_simulation}"
+    yield "Margin of closure", number(grasp.closure_margin)
+    yield "Ferrari-Canny quality", f"{number(lower, 5)} to {number(upper, 5)} N"
+    yield "Normals span up to", f"{number(math.degrees(grasp.span_angle), 3)} deg"
+    for place, focus in enumerate(grasp.focus_points):
+        yield f"Focus {place}", f"{vector(MILLI * focus)} mm"
+    if verdict is not None:
+        moved = [trial["displacement_m"] for trial in verdict["wrenches"]]
+        known = [MICRO * each for each in moved if each is not None]
+        yield "Moved at most", f"{number(max(known, default=None), 2)} um"
+        if (repeats := verdict.get("robustness")) is not None:
+            low, high = repeats["pass_rate_interval"]
+            yield "With noise", (
+                f"held {repeats['held']} of {repeats['trials']} times; "
+                f"95 % interval {low:.2f} to {high:.2f}"
+            )
+
+
+def _contacts(grasp: Grasp) -> Iterable[Record]:
+    for face, contact, cone, region in zip(
+        grasp.faces, grasp.contacts, grasp.force_cones, grasp.regions, strict=True
+    ):
+        lean = math.degrees(math.acos(min(float(cone.axis @ contact.normal), 1.0)))
+        half = math.degrees(cone.half_angle)
+        yield {
+            "face": face,
+            "position": vector(MILLI * contact.position),
+            "normal": vector(contact.normal),
+            "cone": f"{half:.1f} deg, leans {lean:.1f} deg",
+            "region": region.kind,
+            "disc": NOTHING if region.kind == "point" else number(MILLI * region.inscribed_radius),
+        }
+
+
+def _certified(record: Record | None) -> str:
+    if record is None:
+        return ""
+    if record["regions"] is None:
+        return f"No certified regions: {record['reason']}."
+    proof = record.get("proof")
+    where = f" Proof: {proof['file']}." if proof else ""
+    return f"Regions are certified: discs of {number(MILLI * record['disc_radius_m'])} mm.{where}"
+
+
+def _trial(trial: Record) -> Record:
+    limit, simulated = trial["predicted_limit"], trial["simulated_limit"]
+    resisted = limit is not None and limit >= 1.0
+    as_predicted = trial["outcome"] == HELD if resisted else trial["outcome"] in GONE
+    moved = trial["displacement_m"]
+    return {
+        "name": trial["name"],
+        "wrench": ", ".join(f"{part:.3g}" for part in trial["wrench"]),
+        "limit": number(limit),
+        "simulated": number(simulated),
+        "friction": number(trial["required_friction"], 3),
+        "outcome": str(trial["outcome"]).replace("_", " "),
+        "tone": GOOD if as_predicted else BAD,
+        "moved": NOTHING if moved is None else number(MICRO * moved, 2),
+    }
+
+
+def _controls(controls: Record) -> Sequence[Record]:
+    return [
+        {
+            "name": name.replace("_", " "),
+            "friction": number(control["friction"]),
+            "outcomes": ", ".join(
+                f"{trial['name']}: {str(trial['outcome']).replace('_', ' ')}"
+                for trial in control["wrenches"]
+            ),
+            "tone": GOOD if let_go(control) else BAD,
+            "said": "let go" if let_go(control) else "held" if control["held"] else "undecided",
+        }
+        for name, control in controls.items()
+    ]
+
+
+def let_go(control: Record) -> bool:
+    """Whether each of a control's loads moved it, as the analysis says."""
+    return all(trial["outcome"] in GONE for trial in control["wrenches"])
+
+
+def _commands(grasp: Grasp, verdict: Record | None) -> Iterable[str]:
+    """What shows, and simulates, the grasp again."""
+    asked = f"--grasp {shlex.quote(grasp.id)}"
+    yield f"graspproof view {GRASPS} {asked}"
+    if verdict is not None:
+        yield f"graspproof replay . {asked} --out replay"
+        for name in verdict["controls"]:
+            yield f"graspproof replay . {asked} --control {shlex.quote(name)} --out replay"
+
+
+def vector(parts: Array) -> str:
+    """Its parts for people; what is next to nothing is zero."""
+    small = LESS * float(np.linalg.norm(parts))
+    return ", ".join(f"{0.0 if abs(part) < small else part:.4g}" for part in parts)

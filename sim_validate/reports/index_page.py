@@ -1,0 +1,132 @@
+"""Runs and the pictures of their grasps -> the page that shows them all."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from grasp_core.values import Grasp
+from grasp_core.versions import versions
+from sim_validate.reports.fidelity_charts import Agreement, frictions_in, limits_in, quadrants_in
+from sim_validate.reports.grasp_page import MILLI, let_go, said_of
+from sim_validate.reports.pages import page
+from sim_validate.reports.run_folder import Record, RunFolder
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A grasp in the gallery."""
+
+    run: RunFolder
+    grasp: Grasp
+    page: str
+    picture: str
+
+
+def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown]) -> str:
+    """The text of the page."""
+    verdicts = all_verdicts(runs)
+    cards = [_card(each) for each in shown]
+    found = agreements(verdicts)
+    return page(
+        "index.html",
+        names=", ".join(dict.fromkeys(run.saved.body.name for run in runs)),
+        runs=[_described(run) for run in runs],
+        cards=cards,
+        choices={
+            name: sorted({str(card[name]) for card in cards})
+            for name in ("object", "family", "verdict")
+        },
+        tried=bool(verdicts),
+        quadrants=quadrants_in(verdicts),
+        agreements=found,
+        limits=any(each.pairs for each in found[1:]),
+        mismatches=[f"{each['id']}: {line}" for each in verdicts for line in each["mismatches"]],
+        controls=_controls(verdicts),
+        gate=[check for run in runs for check in run.summary.get("gate", {}).get("checks", ())],
+    )
+
+
+def all_verdicts(runs: Iterable[RunFolder]) -> list[Record]:
+    """Verdicts of several runs, in order."""
+    return [verdict for run in runs for verdict in run.verdicts.values()]
+
+
+def agreements(verdicts: Sequence[Record]) -> list[Agreement]:
+    """Critical frictions and, where they were simulated, limits."""
+    frictions, limits = frictions_in(verdicts), limits_in(verdicts)
+    return [frictions, limits] if limits.pairs else [frictions]
+
+
+def _card(shown: Shown) -> dict[str, Any]:
+    grasp, verdict = shown.grasp, shown.run.verdicts.get(shown.grasp.id)
+    said, tone = said_of(verdict)
+    return {
+        "id": grasp.id,
+        "object": shown.run.saved.body.name,
+        "family": grasp.family,
+        "page": shown.page,
+        "picture": shown.picture,
+        "verdict": said,
+        "tone": tone,
+        "radius_mm": round(MILLI * grasp.radius, 6),
+        "quality": grasp.ferrari_canny[0],
+        "critical_friction": grasp.critical_friction,
+        "weakest": None if verdict is None else _weakest(verdict),
+    }
+
+
+def _weakest(verdict: Record) -> float | None:
+    """The least of the limits [N], torques over the grasp's size."""
+    lever = verdict["settings"]["grasp_size_m"]
+    found = list[float]()
+    for trial in verdict["wrenches"]:
+        if trial["predicted_limit"] is not None:
+            force, torque = np.reshape(trial["wrench"], (2, 3))
+            found.append(trial["predicted_limit"] * math.hypot(*force, *(torque / lever)))
+    return min(found, default=None)
+
+
+def _described(run: RunFolder) -> dict[str, Any]:
+    counts = run.summary.get("summary")
+    said = f"{len(run.saved.grasps)} grasps at friction {run.friction:g}"
+    if counts:
+        said += (
+            f"; {counts['grasps_held']} of {counts['grasps']} held, "
+            f"{counts['controls_let_go']} of {counts['controls']} negative controls were let go, "
+            f"{counts['mismatches']} figures contradict the analysis"
+        )
+        said += "" if run.summary.get("complete", True) else "; the run was interrupted"
+    return {"name": run.saved.body.name, "summary": said + ".", "about": list(_about(run))}
+
+
+def _about(run: RunFolder) -> Iterable[tuple[str, str]]:
+    body = run.saved.body
+    yield "object", f"{len(body.faces)} faces, radius {MILLI * body.radius:.4g} mm"
+    yield "content_sha256", body.content_sha256
+    yield "friction", f"{run.friction:g}"
+    yield "seed", str(run.saved.seed)
+    first = next(iter(run.verdicts.values()), None)
+    settings: Record = {} if first is None else first["settings"]
+    for table, values in settings.items():
+        entries = values.items() if isinstance(values, dict) else [("", values)]
+        for name, value in entries:
+            yield f"{table}.{name}".removesuffix("."), str(value)
+    for name, version in (versions() if first is None else first["versions"]).items():
+        yield f"version of {name}", str(version)
+
+
+def _controls(verdicts: Sequence[Record]) -> list[dict[str, Any]]:
+    """How many of each kind were let go, and how many held."""
+    kinds = dict[str, dict[str, Any]]()
+    for verdict in verdicts:
+        for name, control in verdict["controls"].items():
+            plain = name.rstrip("0123456789").rstrip("_").replace("_", " ")
+            kind = kinds.setdefault(
+                plain, {"name": plain, "let_go": 0, "held": 0, "undecided": 0}
+            )
+            gone = let_go(control)
+            kind["let_go" if gone else "held" if control["held"] else "undecided"] += 1
+    return list(kinds.values())

@@ -1,0 +1,73 @@
+"""One trial over time, drawn: how far things moved, how hard fingers pushed, how near to slipping."""
+
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from scenes.canvas import LETTERS, new_figure, panels
+from scenes.palette import BAD, FINGERS, INK, NEUTRAL
+from sim_validate.replaying.bench import Replayed
+
+MICRO = 1e6
+LEAST_UM = 1e-4
+"""Displacements below this are drawn as none."""
+LEAST_PUSH = 1e-3
+"""Share of a finger's largest push below which its friction says nothing."""
+
+
+def motion_figure(found: Replayed, threshold_m: float) -> Any:
+    """Displacement, normal forces, and friction used, over the time of one trial.
+
+    Args:
+        found: The trial.
+        threshold_m: Displacement that counts as motion.
+
+    Returns:
+        A matplotlib figure. Friction is lowered to the one under test at time zero.
+    """
+    figure = new_figure(9.0, 2.8)
+    moved, pushed, used = panels(figure, 3)
+    watched, trace = found.watched, found.watched.trace
+    times = trace.times_s
+    moved.plot(times, MICRO * trace.displacements_m, color=INK, label="object")
+    for finger, colour in enumerate(FINGERS[: trace.slips_m.shape[1]]):
+        moved.plot(times, MICRO * trace.slips_m[:, finger], color=colour, linewidth=1.0,
+                   label=f"finger {finger} slid")  # fmt: skip
+    moved.axhline(MICRO * threshold_m, color=BAD, linestyle="--", label="counts as moved")
+    moved.set_yscale("log")
+    moved.set_ylim(LEAST_UM, 100.0 * max(1e6 * threshold_m, *MICRO * trace.displacements_m))
+    _label(moved, "displacement [um]")
+    moved.legend(fontsize=7.0, frameon=False, loc="upper left", ncols=2)
+    _forces(pushed, watched.times_s, watched.pushes_n[..., 0])
+    _label(pushed, "normal force [N]")
+    _forces(used, watched.times_s, friction_used(watched.pushes_n, watched.friction))
+    used.axhline(1.0, color=BAD, linestyle="--", label="slips")
+    used.set_ylim(0.0, 1.15)
+    _label(used, "share of friction used")
+    return figure
+
+
+def friction_used(pushes: Array, friction: Array) -> Array:
+    """Tangential over normal force over friction, (n, k); NaN where fingers hardly push.
+
+    Args:
+        pushes: Forces along (normal, tangent, tangent), (n, k, 3) [N].
+        friction: Coulomb coefficients, (n,).
+    """
+    normal = pushes[..., 0]
+    tangential = np.hypot(pushes[..., 1], pushes[..., 2])
+    pushing = normal > LEAST_PUSH * max(float(normal.max(initial=0.0)), 1e-12)
+    safe = np.where(pushing, normal, 1.0) * friction[:, None]
+    return np.where(pushing, tangential / safe, np.nan)
+
+
+def _forces(axes: Any, times: Array, values: Array) -> None:
+    for finger, colour in enumerate(FINGERS[: values.shape[1]]):
+        axes.plot(times, values[:, finger], color=colour, label=f"finger {finger}")
+    axes.axvline(0.0, color=NEUTRAL, linewidth=0.8, linestyle=":")
+
+
+def _label(axes: Any, title: str) -> None:
+    axes.set_title(title, fontsize=LETTERS)
+    axes.set_xlabel("time since friction was lowered [s]")

@@ -1,0 +1,118 @@
+"""The folder of a run -> a folder of pages that opens from disk and asks no network for anything."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+
+from scenes.canvas import write_figure
+from sim_validate.engines import available_cores, each
+from sim_validate.files import write_text
+from sim_validate.reports.drawn_grasps import CHARTS, CLIPS, PICTURES, Drawn, draw, tasks_of
+from sim_validate.reports.fidelity_charts import fidelity_figure
+from sim_validate.reports.grasp_page import Neighbours, grasp_page
+from sim_validate.reports.index_page import Shown, agreements, all_verdicts, index_page
+from sim_validate.reports.pages import asset
+from sim_validate.reports.run_folder import RunFolder, runs_in
+from sim_validate.reports.turntable import as_text, object_data
+
+REPORT, INDEX, GRASPS = "report", "index.html", "grasps"
+STATIC = ("style.css", "gallery.js", "turntable.js")
+FIDELITY = "fidelity.svg"
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A report that was written."""
+
+    index: Path
+    """Its first page."""
+    grasps: int
+    no_clip: str
+    """Why clips that were asked for are missing; empty if none is."""
+
+
+def write_report(
+    folder: str | Path,
+    out: str | Path | None = None,
+    *,
+    jobs: int | None = None,
+    clips: int = 0,
+    progress: Callable[[int, int], None] = lambda _done, _total: None,
+) -> Report:
+    """Write what a run has found as pages to look at.
+
+    Args:
+        folder: Of a run, with its grasps.json; or of several runs, in folders.
+        out: Where to write; `report` in the folder if None.
+        jobs: Largest number of processes; all cores if None.
+        clips: Also film the trials of so many grasps per run, those that were not held first, where
+            there are graphics.
+        progress: Told how many grasps are drawn, of how many.
+
+    Returns:
+        Where the report is.
+
+    Raises:
+        InputError: The folder holds no run, or a file in it is not what it should be.
+    """
+    folder = Path(folder)
+    out = folder / REPORT if out is None else Path(out)
+    runs = runs_in(folder)
+    remove_report(out)
+    return _written(runs, out, jobs or available_cores(), clips, progress)
+
+
+def remove_report(folder: Path) -> None:
+    """Remove the pages of an earlier report, and nothing else."""
+    old = chain(
+        (folder / name for name in (INDEX, FIDELITY, *STATIC)),
+        folder.glob("object-*.js"),
+        folder.glob(f"{GRASPS}/*.html"),
+        *(folder.glob(f"{kind}/*.webp") for kind in (PICTURES, CHARTS, CLIPS)),
+    )
+    for path in old:
+        path.unlink(missing_ok=True)
+
+
+def _written(
+    runs: tuple[RunFolder, ...], out: Path, jobs: int, clips: int,
+    progress: Callable[[int, int], None],
+) -> Report:  # fmt: skip
+    prefixes = [f"{place}-" if len(runs) > 1 else "" for place in range(len(runs))]
+    tasks = [
+        task for run, prefix in zip(runs, prefixes, strict=True)
+        for task in tasks_of(run, out, prefix, clips)
+    ]  # fmt: skip
+    drawn = list[Drawn]()
+    for found in each(draw, tasks, jobs=jobs):
+        drawn.append(found)
+        progress(len(drawn), len(tasks))
+    pages = [f"{task.name}.html" for task in tasks]
+    shown = list(_grasp_pages(runs, out, drawn, pages))
+    for name in STATIC:
+        write_text(out / name, asset(name))
+    if verdicts := all_verdicts(runs):
+        write_figure(fidelity_figure(agreements(verdicts)), out / FIDELITY)
+    index = write_text(out / INDEX, index_page(runs, shown))
+    return Report(index, len(tasks), next((each.no_clip for each in drawn if each.no_clip), ""))
+
+
+def _grasp_pages(
+    runs: tuple[RunFolder, ...], out: Path, drawn: list[Drawn], pages: list[str]
+) -> Iterator[Shown]:
+    """Write a page for each grasp, and what is drawn of each object."""
+    place = 0
+    for number, run in enumerate(runs):
+        script = f"object-{number}.js"
+        data = as_text(object_data(run.saved.body))
+        write_text(out / script, f"window.graspproofObject = {data};\n")
+        for grasp in run.saved.grasps:
+            around = Neighbours(
+                pages[place - 1] if place else None,
+                pages[place + 1] if place + 1 < len(pages) else None,
+            )
+            text = grasp_page(run, grasp, drawn[place], script, around)
+            path = write_text(out / GRASPS / pages[place], text)
+            yield Shown(run, grasp, f"{GRASPS}/{path.name}", drawn[place].picture)
+            place += 1

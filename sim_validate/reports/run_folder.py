@@ -1,0 +1,88 @@
+"""The files of a run -> what a report is made of."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from grasp_core.errors import InputError
+from grasp_core.records import SavedGrasps
+from sim_validate.files import read_text
+from sim_validate.grasps_file import read_grasps
+from sim_validate.region_files import REGIONS
+from sim_validate.reports.files_schema import RegionsFile, VerdictsFile
+
+GRASPS, VERDICTS = "grasps.json", "verdicts.json"
+Record = Mapping[str, Any]
+"""An object of a JSON file."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunFolder:
+    """What `plan`, `validate` and `regions` have written into one folder."""
+
+    path: Path
+    saved: SavedGrasps
+    friction: float
+    """At which the grasps were tried; where they were not, at which they were planned."""
+    verdicts: Mapping[str, Record]
+    """By the grasps' ids; empty if none was tried."""
+    summary: Record
+    """All of `verdicts.json` but the verdicts; empty if there is none."""
+    regions: Mapping[str, Record]
+    """Certified ones, by the grasps' ids; empty if there are none."""
+
+    @property
+    def verdicts_path(self) -> Path:
+        """Of the file, for messages."""
+        return self.path / VERDICTS
+
+
+def runs_in(folder: Path) -> tuple[RunFolder, ...]:
+    """The run in a folder, or those in the folders in it.
+
+    Raises:
+        InputError: There is none, or a file is not what it should be.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: not a folder; give one that `graspproof run` has written")
+    inside = [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]
+    found = [path for path in inside if (path / GRASPS).is_file()]
+    if not found:
+        raise InputError(
+            f"{folder}: has no {GRASPS}, nor has a folder in it; "
+            f"`graspproof run OBJECT --out {folder}` writes one"
+        )
+    own = found[0] == folder
+    return tuple(_run(path) for path in (found[:1] if own else found))
+
+
+def _run(path: Path) -> RunFolder:
+    saved = read_grasps(path / GRASPS)
+    tried = _read(path / VERDICTS, VerdictsFile, saved)
+    certified = _read(path / REGIONS, RegionsFile, saved)
+    return RunFolder(
+        path=path,
+        saved=saved,
+        friction=saved.friction if tried is None else tried["friction"],
+        verdicts={} if tried is None else {each["id"]: each for each in tried["verdicts"]},
+        summary={} if tried is None else {key: tried[key] for key in tried if key != "verdicts"},
+        regions={} if certified is None else {each["id"]: each for each in certified["grasps"]},
+    )
+
+
+def _read(path: Path, kind: type[BaseModel], saved: SavedGrasps) -> Record | None:
+    """What a file about the same object holds; None where there is no file."""
+    if not path.is_file():
+        return None
+    try:
+        found = kind.model_validate_json(read_text(path)).model_dump()
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "the document"
+        raise InputError(f"{path}: {where}: {first['msg']}") from error
+    if found["object"]["content_sha256"] != saved.body.content_sha256:
+        raise InputError(f"{path}: is about another object than {GRASPS} beside it")
+    return found

@@ -1,0 +1,65 @@
+"""A drawing -> the numbers of a page on which it can be turned.
+
+Lengths are whole thousandths of the object's radius from its centre of mass: finer than a screen,
+and a tenth of the text of full numbers.
+"""
+
+import json
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.values import Grasp, Polyhedron
+from scenes.drawings import drawing_of, glass
+from scenes.palette import LOOKS, colour_of
+from scenes.shapes import Shape
+from scenes.views import best_view
+
+UNITS = 1000.0
+"""Of length, in one object radius."""
+
+
+def object_data(body: Polyhedron) -> list[dict[str, Any]]:
+    """What is drawn of an object, for all of its grasps."""
+    return _data(glass(body), body)
+
+
+def grasp_data(body: Polyhedron, grasp: Grasp, friction: float) -> dict[str, Any]:
+    """What is drawn of a grasp besides the object, and from where it is seen first."""
+    beyond = drawing_of(body, grasp, friction)[len(glass(body)) :]
+    return {"shapes": _data(beyond, body), "axes": np.round(best_view(body, grasp).axes, 4).tolist()}
+
+
+def as_text(data: object) -> str:
+    """JSON that can stand inside a page: no tag begins in it."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _data(shapes: Iterable[Shape], body: Polyhedron) -> list[dict[str, Any]]:
+    return [_shape(shape, body) for shape in shapes]
+
+
+def _shape(shape: Shape, body: Polyhedron) -> dict[str, Any]:
+    look = LOOKS[shape.role]
+    points = np.empty((0, 3)) if shape.points is None else shape.points
+    return {
+        "role": shape.role,
+        "finger": shape.finger,
+        "colour": colour_of(shape),
+        "fill": look.fill,
+        "line": look.line,
+        "dot": look.dot,
+        "opacity": look.opacity,
+        "shaded": look.shaded,
+        "dashed": look.dashed,
+        "polygons": [_whole(polygon, body) for polygon in shape.polygons] if look.fill else [],
+        "lines": [_whole(line, body) for line in shape.lines] if look.line else [],
+        "points": _whole(points, body),
+    }
+
+
+def _whole(points: Array, body: Polyhedron) -> list[list[int]]:
+    return np.rint(UNITS / body.radius * (points - body.center_of_mass)).astype(int).tolist()
