@@ -8,7 +8,7 @@ Figures are made without `pyplot`, so that none outlives its use and no display 
 
 import importlib
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,8 +30,11 @@ STYLE = {
     "path.simplify": True, "lines.linewidth": 1.4,
 }  # fmt: skip
 DOTS_PER_INCH = 100.0
-QUALITY = 82
-"""Of pictures whose format loses some."""
+OPTIONS: dict[str, dict[str, Any]] = {
+    "webp": {"quality": 70, "method": 3},
+    "jpg": {"quality": 90},
+}
+"""How pictures are packed: lines keep their colours, files stay small."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +68,11 @@ def panels(
             1, count, squeeze=False, subplot_kw={"projection": projection}, gridspec_kw=room
         )
     return list(found[0])
+
+
+def entitle(axes: Any, title: str) -> None:
+    """Give axes a title, at a fixed place: to look for a free one takes as long as all the rest."""
+    axes.set_title(title, fontsize=LETTERS, y=1.0)
 
 
 def add_polygons(
@@ -103,12 +111,34 @@ def encoded(figure: Any, form: str) -> bytes:
     matplotlib: Any = importlib.import_module("matplotlib")
     stream = io.BytesIO()
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-    lossy = {"pil_kwargs": {"quality": QUALITY}} if form in {"webp", "jpg"} else {}
+    options = {"pil_kwargs": OPTIONS[form]} if form in OPTIONS else {}
     with matplotlib.rc_context(STYLE):
         figure.savefig(
-            stream, format=form, metadata=undated.get(form), facecolor="white", **lossy
+            stream, format=form, metadata=undated.get(form), facecolor="white", **options
         )
     return stream.getvalue()
+
+
+def write_frames(
+    figure: Any, draw: Callable[[int], None], count: int, rate: float, path: Path
+) -> Path:
+    """Write an animated picture.
+
+    Args:
+        figure: From `new_figure`.
+        draw: Draws one frame into the figure.
+        count: How many frames there are.
+        rate: Frames per second.
+        path: Of the file, gif or webp.
+    """
+    animation: Any = importlib.import_module("matplotlib.animation")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    writer = animation.PillowWriter(fps=rate)
+    with writer.saving(figure, str(path), dpi=DOTS_PER_INCH):
+        for frame in range(count):
+            draw(frame)
+            writer.grab_frame(facecolor="white")
+    return path
 
 
 def write_figure(figure: Any, path: Path) -> Path:

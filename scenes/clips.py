@@ -16,11 +16,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
-from grasp_core.errors import GraspError
+from grasp_core.errors import GraspError, InputError
 from scenes.mjcf import Scene
 
+FORMATS = (".gif", ".webp")
+ANGLES_DEG = (-50.0, 25.0)
+"""Where the camera is, if not told otherwise: azimuth and elevation."""
 SIZE = (480, 360)
 """Of the picture [pixels]."""
 RATE = 25.0
@@ -36,25 +40,31 @@ class GraphicsError(GraspError):
     """Nothing can be drawn on this machine."""
 
 
-def write_clip(scene: Scene, joints: Array, path: Path, caption: str) -> Path:
+def write_clip(
+    scene: Scene, joints: Array, path: Path, caption: str, *, angles_deg: ArrayLike = ANGLES_DEG
+) -> Path:
     """Draw what moved in a scene, a frame for each sample.
 
     Args:
         scene: What was simulated.
         joints: Position and quaternion of the object's frame, then the slides of the fingertips
             along the axes of their contacts, (n, 7 + 3k) [m].
-        path: Of the GIF file to write.
+        path: Of the file to write, gif or webp.
         caption: Written into the picture.
+        angles_deg: Azimuth and elevation of the camera as seen from the object, (2,) or for each
+            frame, (n, 2).
 
     Raises:
+        InputError: The file's name ends otherwise.
         GraphicsError: No graphics library draws here; the message has its words.
     """
+    require_clip(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
-        job, out = Path(folder) / "job.npz", Path(folder) / "clip.gif"
+        job, out = Path(folder) / "job.npz", Path(folder) / f"clip{path.suffix.lower()}"
         np.savez(
             job, xml=scene.xml, joints=joints, size=SIZE, radius=scene.layout.radius_m, rate=RATE,
-            caption=caption,
+            caption=caption, angles=np.broadcast_to(angles_deg, (len(joints), 2)),
         )  # fmt: skip
         said = ""
         for graphics in _graphics():
@@ -63,6 +73,31 @@ def write_clip(scene: Scene, joints: Array, path: Path, caption: str) -> Path:
                 path.write_bytes(out.read_bytes())
                 return path
     raise GraphicsError(f"no graphics: {said}; with a display or libEGL there would be a clip")
+
+
+def require_clip(path: Path) -> None:
+    """That a file is to be a clip.
+
+    Raises:
+        InputError: Its name ends otherwise.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise InputError(f"{path}: clips end in {' or '.join(FORMATS)}")
+
+
+def available_graphics() -> str:
+    """What MuJoCo's renderer can draw with here.
+
+    Raises:
+        GraphicsError: Nothing; the message says what was tried.
+    """
+    said = list[str]()
+    for graphics in _graphics():
+        trouble = _run_frames(graphics, [])
+        if not trouble:
+            return graphics
+        said.append(trouble)
+    raise GraphicsError("; ".join(said))
 
 
 def _graphics() -> Iterator[str]:
@@ -78,8 +113,14 @@ def _graphics() -> Iterator[str]:
 
 def _drawn(job: Path, out: Path, graphics: str) -> str:
     """Draw in another process; what went wrong, empty if nothing."""
+    trouble = _run_frames(graphics, [str(job), str(out)])
+    return trouble or ("" if out.is_file() else f"{graphics}: nothing was drawn")
+
+
+def _run_frames(graphics: str, arguments: list[str]) -> str:
+    """Run the program that draws, or without arguments sees whether it could; what went wrong."""
     program = str(Path(__file__).with_name("frames.py"))
-    command = [sys.executable, "-P", program, str(job), str(out)]
+    command = [sys.executable, "-P", program, *arguments]
     settings = {**os.environ, "MUJOCO_GL": graphics}
     try:
         ran = subprocess.run(  # noqa: S603 - our own program
@@ -87,7 +128,7 @@ def _drawn(job: Path, out: Path, graphics: str) -> str:
         )
     except subprocess.TimeoutExpired:
         return f"{graphics} took more than {PATIENCE_S:g} s"
-    if ran.returncode == 0 and out.is_file():
+    if ran.returncode == 0:
         return ""
     words = ran.stderr.decode(errors="replace").strip().splitlines()
     return f"{graphics}: {words[-1] if words else f'ended with {ran.returncode}'}"

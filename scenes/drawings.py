@@ -1,8 +1,8 @@
 """What is drawn of a grasp, after the figures of the paper.
 
 The object is glass. On its outside fingers are long bars; on its inside, at each contact, is the
-friction cone and in it the cone of forces that the construction used. Lines of force run through the
-focus points; a pencil also shows the plane of each pair, a regulus the surface its lines lie on.
+friction cone and in it the cone of forces that the construction used. Lines of force run through
+the focus points; a pencil also shows the plane of each pair, a regulus the surface of its lines.
 Pictures and turnable pages draw what is listed here.
 """
 

@@ -1,7 +1,8 @@
 """A scene and what moved in it -> an animated picture; a program of its own.
 
-Run as `python -P frames.py JOB.npz OUT.gif`, by `scenes.clips` only: which graphics MuJoCo uses
-is chosen when it is first imported, and a driver that is broken may end the whole process.
+Run as `python -P frames.py JOB.npz OUT`, by `scenes.clips` only: which graphics MuJoCo uses
+is chosen when it is first imported, and a driver that is broken may end the whole process. Without
+arguments it draws an empty scene, to see whether it can.
 """
 
 # pyright: basic, reportAttributeAccessIssue=false
@@ -16,8 +17,6 @@ from PIL import Image, ImageDraw, ImageFont  # noqa: TID251
 
 DISTANCE = 3.2
 """Of the camera, in object radii."""
-AZIMUTH, ELEVATION = 130.0, -25.0
-"""Of its direction of view [deg]."""
 SKY, AMBIENT, DIFFUSE = (0.93, 0.95, 0.97), 0.45, 0.45
 """Colour of the background, and of the light from the camera."""
 INK, LETTERS = (30, 30, 40), 18
@@ -34,10 +33,10 @@ def main(job: str, out: str) -> None:
     camera = mujoco.MjvCamera()
     camera.lookat[:] = 0.0
     camera.distance = DISTANCE * float(given["radius"])
-    camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
     frames = []
     with mujoco.Renderer(model, height, width) as renderer:
-        for joints in given["joints"]:
+        for joints, (azimuth, elevation) in zip(given["joints"], given["angles"], strict=True):
+            camera.azimuth, camera.elevation = azimuth + 180.0, -elevation  # of its line of sight
             data.qpos[:] = joints
             mujoco.mj_kinematics(model, data)
             renderer.update_scene(data, camera)
@@ -49,6 +48,16 @@ def main(job: str, out: str) -> None:
         duration=round(1000.0 / float(given["rate"])),
         loop=0,
     )
+
+
+def try_out() -> None:
+    """Draw an empty scene."""
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    with mujoco.Renderer(model, 8, 8) as renderer:
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        renderer.update_scene(data)
+        renderer.render()
 
 
 def _lit(xml: str) -> mujoco.MjModel:
@@ -76,4 +85,4 @@ def _captioned(pixels: np.ndarray, caption: str) -> Image.Image:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main(*sys.argv[1:]) if sys.argv[1:] else try_out()

@@ -20,6 +20,8 @@ DARKEST = 0.55
 """Of a shaded side, as a share of its colour."""
 DASHES = 24
 """Parts, every other one drawn, of a line as long as the picture is wide."""
+SEAMS = 0.5
+"""Opacity of polygons up to which smooth borders of neighbours would show as lines."""
 PIECES = 12
 """Parts of a whole line of that length, each with its own depth."""
 
@@ -60,13 +62,11 @@ def _patches(shape: Shape, view: View, width: float) -> Iterator[Patch]:
         yield Patch(place + around, float(near) + 0.02 * width, solid, smooth=True)
 
 
-def _filled(
-    polygon: Array, look: Look, colour: tuple[float, float, float], view: View
-) -> Patch:
+def _filled(polygon: Array, look: Look, colour: tuple[float, float, float], view: View) -> Patch:
     flat, near = view.seen(polygon)
     shade = _brightness(polygon, view) if look.shaded else 1.0
     red, green, blue = (shade * part for part in colour)
-    return Patch(flat, float(near.mean()), (red, green, blue, look.fill), smooth=look.fill > 0.5)
+    return Patch(flat, float(near.mean()), (red, green, blue, look.fill), smooth=look.fill > SEAMS)
 
 
 def _brightness(polygon: Array, view: View) -> float:

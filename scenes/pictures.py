@@ -68,13 +68,43 @@ def grasp_figure(
     legend: bool = True,
 ) -> Any:  # fmt: skip
     """The picture of a grasp: a matplotlib figure."""
-    shapes = drawing_of(body, grasp, friction)
-    view = view or best_view(body, grasp)
+    figure, axes = empty_picture(legend=legend)
+    shapes = draw_grasp(axes, body, grasp, friction, view or best_view(body, grasp))
+    if legend:
+        figure.legend(
+            handles=_legend(shapes), loc="lower center", ncols=4, frameon=False,
+            fontsize=8.0, handlelength=1.4, columnspacing=1.2,
+        )  # fmt: skip
+    return figure
+
+
+def empty_picture(*, legend: bool = False) -> tuple[Any, Any]:
+    """A figure for a grasp and perhaps a legend, and its axes."""
     figure = new_figure(SIDE_IN, SIDE_IN + (LEGEND_IN if legend else 0.0))
     below = LEGEND_IN / (SIDE_IN + LEGEND_IN) if legend else 0.0
     (axes,) = panels(figure, 1, around=Around(0.0, 0.0, below, 0.0))
+    return figure, axes
+
+
+def draw_grasp(
+    axes: Any, body: Polyhedron, grasp: Grasp, friction: float, view: View, *, steady: bool = False
+) -> tuple[Shape, ...]:  # fmt: skip
+    """Draw a grasp into square axes.
+
+    Args:
+        axes: Of matplotlib.
+        body: The object.
+        grasp: On it.
+        friction: Coulomb coefficient, of the friction cones.
+        view: From where it is seen.
+        steady: Whether the scale is the same for all views.
+
+    Returns:
+        What was drawn.
+    """
+    shapes = drawing_of(body, grasp, friction)
     numbers = _number_places(body, grasp)
-    low, high = _frame(shapes, numbers, body, view)
+    low, high = _frame(shapes, numbers, body, None if steady else view)
     patches = painted(shapes, view, float(high[0] - low[0]))
     add_polygons(
         axes,
@@ -90,12 +120,7 @@ def grasp_figure(
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
     axes.set_axis_off()
-    if legend:
-        figure.legend(
-            handles=_legend(shapes), loc="lower center", ncols=4, frameon=False,
-            fontsize=8.0, handlelength=1.4, columnspacing=1.2,
-        )  # fmt: skip
-    return figure
+    return shapes
 
 
 def _number_places(body: Polyhedron, grasp: Grasp) -> Array:
@@ -105,11 +130,15 @@ def _number_places(body: Polyhedron, grasp: Grasp) -> Array:
 
 
 def _frame(
-    shapes: Sequence[Shape], numbers: Array, body: Polyhedron, view: View
+    shapes: Sequence[Shape], numbers: Array, body: Polyhedron, view: View | None
 ) -> tuple[Array, Array]:
-    """Corners of a square around what is to be seen, (2,) each [m]."""
+    """Corners of a square around what is to be seen from one view, or any, (2,) each [m]."""
     points = np.vstack([extent_of(shapes), numbers])
-    near = np.linalg.norm(points - body.center_of_mass, axis=1) <= FARTHEST * body.radius
+    distances = np.linalg.norm(points - body.center_of_mass, axis=1)
+    near = distances <= FARTHEST * body.radius
+    if view is None:
+        half = (1.0 + 2.0 * MARGIN) * float(distances[near].max())
+        return np.full(2, -half), np.full(2, half)
     flat, _ = view.seen(points[near])
     low, high = flat.min(axis=0), flat.max(axis=0)
     half = 0.5 * (1.0 + 2.0 * MARGIN) * float((high - low).max())

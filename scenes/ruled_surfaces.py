@@ -8,6 +8,7 @@ and so lies on it, too (Sudsang & Ponce 1995, section 2.2).
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -54,7 +55,7 @@ def _inside(start: Array, way: Array, center: Array, reach: float) -> list[Array
 def between(segments: Sequence[Array]) -> tuple[Array, ...]:
     """Quadrilaterals between neighbouring segments, each (4, 3)."""
     quads = list[Array]()
-    for one, two in zip(segments, segments[1:], strict=False):
+    for one, two in pairwise(segments):
         turned = two if (one[1] - one[0]) @ (two[1] - two[0]) > 0.0 else two[::-1]
         quads.append(np.array([one[0], one[1], turned[1], turned[0]]))
     return tuple(quads)

@@ -40,6 +40,7 @@ from sim_validate.flags import (
     Testing,
     Wrench,
 )
+from sim_validate.showing_flags import Report, View
 
 RUN_LIMIT = 100
 """How many grasps `run` tests unless told otherwise: some ten seconds."""
@@ -72,6 +73,8 @@ class Run:
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for the results; graspproof-out/OBJECT if not given."""
+    no_report: bool = False
+    """Do without the pages; `graspproof report` writes them later."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,6 +232,8 @@ Command = (
     | Plan
     | Validate
     | Scene
+    | View
+    | Report
     | Regions
     | Replay
     | Analyze

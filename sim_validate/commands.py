@@ -3,7 +3,7 @@
 from pkgutil import resolve_name
 from typing import Any
 
-from sim_validate import baseline_flags, cli, dataset_flags
+from sim_validate import baseline_flags, cli, dataset_flags, showing_flags
 from sim_validate.console import Reporter
 
 ACTIONS: dict[type[Any], str] = {
@@ -11,6 +11,8 @@ ACTIONS: dict[type[Any], str] = {
     cli.Plan: "plan_command:plan_file",
     cli.Validate: "validate_command:validate_file",
     cli.Scene: "scene_command:write_scenes",
+    showing_flags.View: "view_command:view_grasp",
+    showing_flags.Report: "report_command:report_folder",
     cli.Regions: "regions_command:certify_file",
     cli.Replay: "replay_command:replay_trial",
     cli.Analyze: "analyze_command:analyze_file",

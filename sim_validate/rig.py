@@ -63,11 +63,11 @@ class Rig:
         (found,) = self._traced([schedule], [motion])
         before = [] if self.closed is None else [self.closed.joints[-1:]]
         count = len(motion.joints)
-        sample_s = self.bench.clock.sample_s
         return Watched(
             joints=np.concatenate([*before, motion.joints]),
             trace=found,
-            times_s=sample_s * (np.arange(1, count + 1) - schedule.watched),
+            times_s=self.bench.clock.sample_s
+            * np.arange(1.0 - schedule.watched, count + 1.0 - schedule.watched),
             pushes_n=pushes(schedule.forces[:count], motion.joints, self.bench.scene.layout),
             friction=schedule.friction[:count],
         )

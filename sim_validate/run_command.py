@@ -10,6 +10,8 @@ from sim_validate.files import remove_results, write_text
 from sim_validate.gate import require_faithful
 from sim_validate.improving import show_gains
 from sim_validate.plan_command import asked_finger, plan_object, say_counts, with_regions
+from sim_validate.report_command import shown_report
+from sim_validate.showing_flags import Report
 from sim_validate.validate_command import prepared, simulate_grasps, with_planned_fingers
 
 RESULTS = Path("graspproof-out")
@@ -40,6 +42,8 @@ def run_object(command: cli.Run, reporter: Reporter) -> int:
     saved = SavedGrasps(body, found.friction, found.seed, found.grasps, found.finger)
     code = simulate_grasps(saved, testing, folder, reporter)
     reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
+    if not command.no_report:
+        shown_report(Report(folder, jobs=testing.jobs), reporter)
     return code
 
 

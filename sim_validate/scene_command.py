@@ -3,19 +3,18 @@
 from grasp_core.errors import InputError
 from scenes.mjcf import build_scene
 from sim_validate import cli
+from sim_validate.asked_fingers import finger_settings, planned_fingers
 from sim_validate.console import Reporter
 from sim_validate.files import write_text
-from sim_validate.grasps_file import read_grasps
-from sim_validate.validate_command import finger_settings, planned_fingers
+from sim_validate.grasps_file import grasp_with_id, read_grasps
 
 
 def write_scenes(command: cli.Scene, reporter: Reporter) -> int:
     """Write the scenes of a file's grasps, or print a single one."""
     saved = read_grasps(command.grasps)
-    chosen = [grasp for grasp in saved.grasps if command.grasp in (None, grasp.id)]
-    if not chosen:
-        ids = ", ".join(grasp.id for grasp in saved.grasps[:5])
-        raise InputError(f"{command.grasps}: no grasp {command.grasp!r}; there is {ids or 'none'}")
+    chosen = saved.grasps
+    if command.grasp is not None:
+        chosen = (grasp_with_id(command.grasps, saved, command.grasp),)
     if command.out is None and len(chosen) > 1:
         raise InputError("several scenes need --out DIR; or choose one with --grasp ID")
     friction = saved.friction if command.friction is None else command.friction

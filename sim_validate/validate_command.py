@@ -10,8 +10,8 @@ from grasp_core.errors import InputError
 from grasp_core.reach import Finger
 from grasp_core.records import SavedGrasps
 from grasp_core.values import Grasp
-from scenes.fingertips import FingerSettings
 from sim_validate import cli, flags
+from sim_validate.asked_fingers import finger_settings, planned_fingers
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.files import write_arrays, write_text
 from sim_validate.gate import require_faithful
@@ -51,24 +51,6 @@ def validate_file(command: cli.Validate, reporter: Reporter) -> int:
 def with_planned_fingers(testing: flags.Testing, planned: Finger | None) -> flags.Testing:
     """Trials with fingertips of the radius that was planned for, unless another is asked for."""
     return replace(testing, fingers=planned_fingers(testing.fingers, planned))
-
-
-def planned_fingers(given: flags.Fingers, planned: Finger | None) -> flags.Fingers:
-    """Fingertips of the radius that was planned for, unless another is asked for."""
-    if planned is None or given.fingertip_radius_m is not None:
-        return given
-    return replace(given, fingertip_radius_m=planned.radius_m)
-
-
-def finger_settings(given: flags.Fingers) -> FingerSettings:
-    """What the flags say about fingertips."""
-    return FingerSettings(
-        max_normal_force_n=given.max_normal_force,
-        radius_m=given.fingertip_radius_m,
-        mass_kg=given.fingertip_mass_kg,
-        stiffness_n_per_m=given.stiffness_n_per_m,
-        approach=given.approach,
-    )
 
 
 def noise_of(given: flags.Repeats) -> Noise:

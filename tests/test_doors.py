@@ -25,6 +25,8 @@ DOORS = {
     "scipy.optimize": "grasp_core/least_distance.py",
     "mujoco": ("sim_validate/simulate.py", "scenes/frames.py"),
     "PIL": "scenes/frames.py",
+    "matplotlib": "scenes/canvas.py",
+    "jinja2": "sim_validate/reports/pages.py",
     "scipy.stats": "sim_validate/noise/proportions.py",
     "pebble": "sim_validate/engines.py",
     "ray": "sim_validate/clusters.py",

@@ -11,11 +11,11 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from grasp_core.errors import InputError
 from grasp_core.records import SavedGrasps
 from scenes.mjcf import Surface
+from sim_validate.asked_fingers import finger_settings, planned_fingers
 from sim_validate.flags import Fingers
 from sim_validate.noise.draws import Noise
 from sim_validate.setup import Agenda, LimitSearch, NamedWrench, Setup
 from sim_validate.setup_file import setup_from_file, setup_from_tables, tables_of
-from sim_validate.validate_command import finger_settings, planned_fingers
 
 
 class _Settings(BaseModel):

@@ -9,7 +9,7 @@ from grasp_core.values import Contact
 from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.rows import GIVEN, NOT_TRIED
 from sim_validate.datasets.selection import Selection, select
-from sim_validate.replaying.of_grasps import NAMED, some
+from sim_validate.grasps_file import NAMED, some
 from sim_validate.replaying.values import Recorded, Wanted
 from sim_validate.setup import Agenda, Setup
 

@@ -1,6 +1,5 @@
 """Grasps of a `grasps.json` as contact sets to replay: a grasp, or a control made from it."""
 
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,12 +9,9 @@ from grasp_core.errors import InputError
 from grasp_core.records import SavedGrasps
 from grasp_core.values import Grasp
 from sim_validate.controls import negative_controls
-from sim_validate.grasps_file import read_grasps
+from sim_validate.grasps_file import grasp_with_id, read_grasps, some
 from sim_validate.replaying.values import Recorded, Wanted
 from sim_validate.setup import Agenda, Setup
-
-NAMED = 5
-"""Names that a message lists."""
 
 
 def grasps_behind(path: Path, content_sha256: str, friction: float) -> SavedGrasps:
@@ -32,26 +28,11 @@ def grasps_behind(path: Path, content_sha256: str, friction: float) -> SavedGras
     return SavedGrasps(saved.body, friction, saved.seed, saved.grasps, saved.finger)
 
 
-def chosen_grasp(path: Path, saved: SavedGrasps, wanted: Wanted) -> Grasp:
-    """The grasp that is wanted.
-
-    Raises:
-        InputError: It is not there; the message, which begins with the path, lists some that are.
-    """
-    if wanted.grasp is None and len(saved.grasps) == 1:
-        return saved.grasps[0]
-    found = next((grasp for grasp in saved.grasps if grasp.id == wanted.grasp), None)
-    if found is None:
-        asked = "give --grasp ID" if wanted.grasp is None else f"no grasp {wanted.grasp}"
-        raise InputError(f"{path}: {asked}; there is {some(grasp.id for grasp in saved.grasps)}")
-    return found
-
-
 def of_grasp(
     path: Path, saved: SavedGrasps, setup: Setup, agenda: Agenda, wanted: Wanted
 ) -> Recorded:
     """A grasp of a file, or a control made from it."""
-    grasp = chosen_grasp(path, saved, wanted)
+    grasp = grasp_with_id(path, saved, wanted.grasp)
     found = Recorded(
         grasp.id, saved.body, grasp.contacts, saved.friction, setup, agenda,
         grasp=grasp, trial=wanted.trial,
@@ -99,10 +80,3 @@ def require_repeat(path: Path, trial: int, trials: int) -> None:
     if trial >= trials:
         said = f"they are 0 to {trials - 1}" if trials else "there were none (--trials)"
         raise InputError(f"{path}: there is no repeat {trial} with noise; {said}")
-
-
-def some(names: Iterable[str]) -> str:
-    """The first of many names, for a message."""
-    listed = list(names)
-    more = f" and {len(listed) - NAMED} more" if len(listed) > NAMED else ""
-    return (", ".join(listed[:NAMED]) or "none") + more

@@ -7,14 +7,13 @@ from typing import Any
 
 from grasp_core.errors import InputError
 from grasp_core.records import SavedGrasps
+from sim_validate.grasps_file import grasp_with_id, some
 from sim_validate.noise.draws import Noise
 from sim_validate.replaying.of_grasps import (
-    chosen_grasp,
     grasps_behind,
     of_grasp,
     require_contacts,
     require_repeat,
-    some,
 )
 from sim_validate.replaying.values import Recorded, Wanted
 from sim_validate.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, NamedWrench, Setup
@@ -40,7 +39,7 @@ def from_verdicts(path: Path, record: Mapping[str, Any], wanted: Wanted) -> Reco
         content, friction = record["object"]["content_sha256"], record["friction"]
         saved = grasps_behind(grasps, str(content), float(friction))
         verdicts = {str(each["id"]): each for each in record["verdicts"]}
-        grasp = chosen_grasp(path, saved, wanted)
+        grasp = grasp_with_id(path, saved, wanted.grasp)
         if grasp.id not in verdicts:
             raise InputError(f"{path}: no verdict on {grasp.id}; there is {some(verdicts)}")
         return of_verdict(path, saved, verdicts[grasp.id], replace(wanted, grasp=grasp.id))
@@ -63,7 +62,7 @@ def of_verdict(
         InputError: It is about other contacts, or does not hold what is wanted.
         KeyError: It is not what `validate` writes.
     """
-    grasp = chosen_grasp(path, saved, wanted)
+    grasp = grasp_with_id(path, saved, wanted.grasp)
     require_contacts(path, grasp, verdict["contacts_sha256"])
     setup, agenda = _asked(path, verdict)
     found = of_grasp(path, saved, setup, agenda, wanted)

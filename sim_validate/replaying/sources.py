@@ -14,15 +14,13 @@ from sim_validate.baselines.baseline_file import read_baseline
 from sim_validate.baselines.settings import of_settings, setup_for
 from sim_validate.datasets.manifest import MANIFEST
 from sim_validate.files import read_text
-from sim_validate.grasps_file import read_grasps
+from sim_validate.grasps_file import grasp_with_id, read_grasps, some
 from sim_validate.replaying.of_dataset import from_dataset
 from sim_validate.replaying.of_grasps import (
-    chosen_grasp,
     grasps_behind,
     of_grasp,
     require_contacts,
     require_repeat,
-    some,
 )
 from sim_validate.replaying.of_verdicts import from_verdicts
 from sim_validate.replaying.values import Recorded, Wanted
@@ -79,7 +77,7 @@ def _from_baseline(path: Path, wanted: Wanted) -> Recorded:
     saved = grasps_behind(grasps, baseline.content_sha256, baseline.friction)
     setup, agenda = of_settings(baseline.settings, str(path))
     found = of_grasp(path, saved, setup, agenda, wanted)
-    grasp = chosen_grasp(path, saved, wanted)
+    grasp = grasp_with_id(path, saved, wanted.grasp)
     entry = next((each for each in baseline.entries if each.id == grasp.id), None)
     if entry is None:
         there = some(each.id for each in baseline.entries)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from scenes.canvas import LETTERS, Around, new_figure, panels
+from scenes.canvas import Around, entitle, new_figure, panels
 from scenes.palette import BAD, GOOD, NEUTRAL
 
 TOLERANCE = 0.02
@@ -86,7 +86,9 @@ def quadrants_in(verdicts: Sequence[Mapping[str, Any]]) -> Quadrants:
     for verdict in verdicts:
         for trial in verdict["wrenches"]:
             limit = trial["predicted_limit"]
-            counts[_place(resisted=limit is not None and limit >= 1.0, outcome=trial["outcome"])] += 1
+            counts[
+                _place(resisted=limit is not None and limit >= 1.0, outcome=trial["outcome"])
+            ] += 1
         for control in verdict["controls"].values():
             for trial in control["wrenches"]:
                 counts[_place(resisted=False, outcome=trial["outcome"])] += 1
@@ -96,7 +98,9 @@ def quadrants_in(verdicts: Sequence[Mapping[str, Any]]) -> Quadrants:
 def _place(*, resisted: bool, outcome: str) -> str:
     if outcome not in {"held", "slipped", "lost_contact"}:
         return "neither"
-    return ("resisted_" if resisted else "not_resisted_") + ("held" if outcome == "held" else "let_go")
+    return ("resisted_" if resisted else "not_resisted_") + (
+        "held" if outcome == "held" else "let_go"
+    )
 
 
 def fidelity_figure(agreements: Sequence[Agreement]) -> Any:
@@ -110,7 +114,9 @@ def fidelity_figure(agreements: Sequence[Agreement]) -> Any:
     """
     figure = new_figure(4.2 * max(len(agreements), 1), 3.7)
     around = Around(left=0.2 / max(len(agreements), 1), below=0.14, between=0.3)
-    for axes, agreement in zip(panels(figure, max(len(agreements), 1), around=around), agreements, strict=False):
+    for axes, agreement in zip(
+        panels(figure, max(len(agreements), 1), around=around), agreements, strict=False
+    ):
         _panel(axes, agreement)
     return figure
 
@@ -137,7 +143,7 @@ def _panel(axes: Any, agreement: Agreement) -> None:
     axes.set_aspect("equal")
     axes.set_xlabel("predicted")
     axes.set_ylabel("simulated")
-    axes.set_title(agreement.quantity, fontsize=LETTERS)
+    entitle(axes, agreement.quantity)
     axes.legend(fontsize=8.0, frameon=False, loc="upper left")
 
 

@@ -97,9 +97,12 @@ def _facts(grasp: Grasp, verdict: Record | None) -> Iterable[tuple[str, str]]:
         yield "Moved at most", f"{number(max(known, default=None), 2)} um"
         if (repeats := verdict.get("robustness")) is not None:
             low, high = repeats["pass_rate_interval"]
-            yield "With noise", (
-                f"held {repeats['held']} of {repeats['trials']} times; "
-                f"95 % interval {low:.2f} to {high:.2f}"
+            yield (
+                "With noise",
+                (
+                    f"held {repeats['held']} of {repeats['trials']} times; "
+                    f"95 % interval {low:.2f} to {high:.2f}"
+                ),
             )
 
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -111,9 +111,11 @@ def _about(run: RunFolder) -> Iterable[tuple[str, str]]:
     first = next(iter(run.verdicts.values()), None)
     settings: Record = {} if first is None else first["settings"]
     for table, values in settings.items():
-        entries = values.items() if isinstance(values, dict) else [("", values)]
-        for name, value in entries:
-            yield f"{table}.{name}".removesuffix("."), str(value)
+        if isinstance(values, dict):
+            for name, value in cast("Record", values).items():
+                yield f"{table}.{name}", str(value)
+        else:
+            yield table, str(values)
     for name, version in (versions() if first is None else first["versions"]).items():
         yield f"version of {name}", str(version)
 
@@ -124,9 +126,7 @@ def _controls(verdicts: Sequence[Record]) -> list[dict[str, Any]]:
     for verdict in verdicts:
         for name, control in verdict["controls"].items():
             plain = name.rstrip("0123456789").rstrip("_").replace("_", " ")
-            kind = kinds.setdefault(
-                plain, {"name": plain, "let_go": 0, "held": 0, "undecided": 0}
-            )
+            kind = kinds.setdefault(plain, {"name": plain, "let_go": 0, "held": 0, "undecided": 0})
             gone = let_go(control)
             kind["let_go" if gone else "held" if control["held"] else "undecided"] += 1
     return list(kinds.values())

@@ -1,11 +1,11 @@
-"""One trial over time, drawn: how far things moved, how hard fingers pushed, how near to slipping."""
+"""One trial over time, drawn: how far things moved, how hard fingers pushed, what friction bore."""
 
 from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.canvas import LETTERS, new_figure, panels
+from scenes.canvas import entitle, new_figure, panels
 from scenes.palette import BAD, FINGERS, INK, NEUTRAL
 from sim_validate.replaying.bench import Replayed
 
@@ -36,6 +36,7 @@ def motion_figure(found: Replayed, threshold_m: float) -> Any:
                    label=f"finger {finger} slid")  # fmt: skip
     moved.axhline(MICRO * threshold_m, color=BAD, linestyle="--", label="counts as moved")
     moved.set_yscale("log")
+    moved.minorticks_off()
     moved.set_ylim(LEAST_UM, 100.0 * max(1e6 * threshold_m, *MICRO * trace.displacements_m))
     _label(moved, "displacement [um]")
     moved.legend(fontsize=7.0, frameon=False, loc="upper left", ncols=2)
@@ -69,5 +70,5 @@ def _forces(axes: Any, times: Array, values: Array) -> None:
 
 
 def _label(axes: Any, title: str) -> None:
-    axes.set_title(title, fontsize=LETTERS)
+    entitle(axes, title)
     axes.set_xlabel("time since friction was lowered [s]")

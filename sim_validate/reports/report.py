@@ -1,4 +1,4 @@
-"""The folder of a run -> a folder of pages that opens from disk and asks no network for anything."""
+"""The folder of a run -> a folder of pages that opens from disk and asks no network."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

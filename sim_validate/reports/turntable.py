@@ -16,6 +16,7 @@ from scenes.drawings import drawing_of, glass
 from scenes.palette import LOOKS, colour_of
 from scenes.shapes import Shape
 from scenes.views import best_view
+from sim_validate.reports.pages import asset, page
 
 UNITS = 1000.0
 """Of length, in one object radius."""
@@ -29,7 +30,25 @@ def object_data(body: Polyhedron) -> list[dict[str, Any]]:
 def grasp_data(body: Polyhedron, grasp: Grasp, friction: float) -> dict[str, Any]:
     """What is drawn of a grasp besides the object, and from where it is seen first."""
     beyond = drawing_of(body, grasp, friction)[len(glass(body)) :]
-    return {"shapes": _data(beyond, body), "axes": np.round(best_view(body, grasp).axes, 4).tolist()}
+    return {
+        "shapes": _data(beyond, body),
+        "axes": np.round(best_view(body, grasp).axes, 4).tolist(),
+    }
+
+
+def turntable_page(body: Polyhedron, grasp: Grasp, friction: float) -> str:
+    """A page by itself on which a grasp can be turned."""
+    return page(
+        "turntable.html",
+        id=grasp.id,
+        object=body.name,
+        family=grasp.family,
+        friction=friction,
+        style=asset("style.css"),
+        script=asset("turntable.js"),
+        object_drawing=as_text(object_data(body)),
+        drawing=as_text(grasp_data(body, grasp, friction)),
+    )
 
 
 def as_text(data: object) -> str:

@@ -2,9 +2,9 @@
 
 The set W of wrenches that contact forces with normal parts of sum 1 N can apply is convex, with a
 known support, so that its shadow on any plane is drawn exactly: the point of W farthest along each
-direction of the plane. The largest ball in W around zero, whose radius is the Ferrari-Canny quality,
-casts a disc. It touches W where its support is least; in a plane that holds this direction, the
-limiting facet is a line that touches disc and shadow.
+direction of the plane. The largest ball in W around zero, whose radius is the Ferrari-Canny
+quality, casts a disc. It touches W where its support is least; in a plane that holds this
+direction, the limiting facet is a line that touches disc and shadow.
 """
 
 from typing import Any
@@ -16,7 +16,7 @@ from grasp_core.quality import ferrari_canny
 from grasp_core.resisted_wrenches import wrench_limits
 from grasp_core.values import Grasp, Polyhedron
 from grasp_core.wrench_sets import WrenchSet
-from scenes.canvas import LETTERS, Around, new_figure, panels
+from scenes.canvas import Around, entitle, new_figure, panels
 from scenes.palette import BAD, GOOD, INK, NEUTRAL
 from scenes.views import View, best_view
 
@@ -111,7 +111,7 @@ def _shadow(axes: Any, wrenches: WrenchSet, plane: Array, radius: float) -> None
 
 
 def _label(axes: Any, title: str, across: str, up: str) -> None:
-    axes.set_title(title, fontsize=LETTERS)
+    entitle(axes, title)
     axes.set_xlabel(across)
     axes.set_ylabel(up)
 
@@ -179,10 +179,11 @@ def _map(figure: Any, axes: Any, values: Array, title: str) -> None:
     for name, x, y in (("+x", 0.0, 0.0), ("+y", 0.5 * np.pi, 0.0), ("-y", -0.5 * np.pi, 0.0),
                        ("+z", 0.0, 0.45 * np.pi), ("-z", 0.0, -0.45 * np.pi)):  # fmt: skip
         axes.text(x, y, name, ha="center", va="center", fontsize=8.0, color="white",
-                  bbox={"boxstyle": "round,pad=0.15", "fc": INK, "ec": "none", "alpha": 0.6})  # fmt: skip
+                  bbox={"boxstyle": "round,pad=0.15", "fc": INK, "ec": "none", "alpha": 0.6}
+        )  # fmt: skip
     axes.set_xticks([])
     axes.set_yticks([])
     axes.grid(visible=False)
-    axes.set_title(f"{title}: least {values.min():.3g} (circle)", fontsize=LETTERS)
+    entitle(axes, f"{title}: least {values.min():.3g} (circle)")
     bar = figure.colorbar(drawn, ax=axes, shrink=0.75, pad=0.02)
     bar.outline.set_edgecolor(NEUTRAL)

@@ -12,7 +12,9 @@
   const drawing = read("drawing");
   const shapes = [...(window.graspproofObject || read("object")), ...drawing.shapes];
   let axes = drawing.axes;
-  let zoom = 0.29; // of the canvas' width, an object radius
+  const reach = Math.max(...shapes.flatMap((shape) => shape.role === "finger" || shape.role === "object"
+    ? shape.polygons.flat().map((point) => Math.hypot(...point)) : []), 1);
+  let zoom = 460 / reach; // of the canvas' width, an object radius
   const off = new Set();
 
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

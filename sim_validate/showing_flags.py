@@ -1,0 +1,64 @@
+"""Flags of the commands that show what there is: pictures of grasps, reports of runs.
+
+Nothing heavy is imported here, so that help and usage errors answer at once.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import OmitArgPrefixes, Positional
+
+from sim_validate.bounds import at_least
+from sim_validate.engines import available_cores
+from sim_validate.flags import Count, Positive, Speech
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """Look at a grasp: in MuJoCo's viewer where there is a display, or in a file.
+
+    For example:
+
+    graspproof view DIR/grasps.json --grasp c-0-1-2-7
+
+    graspproof view DIR/grasps.json --picture grasp.png --page grasp.html --clip grasp.webp
+    """
+
+    grasps: Positional[Path]
+    """A grasps.json."""
+    grasp: str | None = None
+    """Id of the grasp; the first one if not given."""
+    friction: Positive | None = None
+    """Coulomb coefficient; the one planned for if not given."""
+    picture: Path | None = None
+    """Write the picture as in the paper (png, svg, pdf, webp, jpg)."""
+    page: Path | None = None
+    """Write a page on which the grasp can be turned (html)."""
+    clip: Path | None = None
+    """Write a clip (webp, gif): fingers closing, rendered by MuJoCo; without graphics, the picture
+    turning."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Write what a run has found as pages that open in a browser, without any network.
+
+    For example:
+
+    graspproof report graspproof-out/wedge
+
+    graspproof report graspproof-out --out all-objects
+    """
+
+    folder: Positional[Path]
+    """Of a run, with its grasps.json; or of several, in folders."""
+    clips: Annotated[int, at_least(0)] = 0
+    """Also film a trial of so many grasps per run, those that were not held first, where graphics
+    are available."""
+    jobs: Count = field(default_factory=available_cores)
+    """Largest number of processes."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+    out: Path | None = None
+    """Folder for the pages; `report` in the run's folder if not given."""
