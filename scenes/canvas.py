@@ -29,6 +29,8 @@ STYLE = {
     "legend.fontsize": LETTERS - 1.0, "svg.hashsalt": "graspproof", "svg.fonttype": "path",
     "path.simplify": True, "lines.linewidth": 1.4,
 }  # fmt: skip
+INTERVALS = 4
+"""Between ticks of an axis; ticks are what takes longest to draw."""
 DOTS_PER_INCH = 100.0
 OPTIONS: dict[str, dict[str, Any]] = {
     "webp": {"quality": 70, "method": 3},
@@ -56,18 +58,16 @@ def new_figure(width_in: float, height_in: float) -> Any:
         return figure.Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout=None)
 
 
-def panels(
-    figure: Any, count: int, *, around: Around = Around(), projection: str | None = None
-) -> list[Any]:
+def panels(figure: Any, count: int, *, around: Around = Around()) -> list[Any]:
     """Axes side by side, where a figure says: to find room for labels would take as long again."""
     matplotlib: Any = importlib.import_module("matplotlib")
     room = {"left": around.left, "right": 1.0 - around.right, "bottom": around.below,
             "top": 1.0 - around.above, "wspace": around.between}  # fmt: skip
     with matplotlib.rc_context(STYLE):
-        found = figure.subplots(
-            1, count, squeeze=False, subplot_kw={"projection": projection}, gridspec_kw=room
-        )
-    return list(found[0])
+        found = list(figure.subplots(1, count, squeeze=False, gridspec_kw=room)[0])
+        for axes in found:
+            axes.locator_params(nbins=INTERVALS)
+    return found
 
 
 def entitle(axes: Any, title: str) -> None:

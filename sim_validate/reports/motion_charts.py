@@ -1,5 +1,6 @@
 """One trial over time, drawn: how far things moved, how hard fingers pushed, what friction bore."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,10 @@ def motion_figure(found: Replayed, threshold_m: float) -> Any:
     moved.axhline(MICRO * threshold_m, color=BAD, linestyle="--", label="counts as moved")
     moved.set_yscale("log")
     moved.minorticks_off()
-    moved.set_ylim(LEAST_UM, 100.0 * max(1e6 * threshold_m, *MICRO * trace.displacements_m))
+    highest = max(MICRO * threshold_m, float(np.nanmax(MICRO * trace.displacements_m, initial=0.0)))
+    moved.set_ylim(LEAST_UM, 100.0 * highest)
+    moved.yaxis.set_ticks(10.0 ** np.arange(-4, math.log10(100.0 * highest), 2))
+    moved.yaxis.set_major_formatter("{x:g}")
     _label(moved, "displacement [um]")
     moved.legend(fontsize=7.0, frameon=False, loc="upper left", ncols=2)
     _forces(pushed, watched.times_s, watched.pushes_n[..., 0])
