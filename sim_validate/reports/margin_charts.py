@@ -1,0 +1,106 @@
+"""How much a grasp resists in every direction: forces and torques on maps of the sphere.
+
+The maps are Hammer's projection: equal areas are equal, the middle is +x, the rim -x.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.resisted_wrenches import wrench_limits
+from grasp_core.values import Grasp, Polyhedron
+from scenes.canvas import Around, entitle, new_figure, panels
+from scenes.palette import BAD, INK, NEUTRAL
+
+LONGITUDES, LATITUDES = 21, 11
+"""Nodes of a map: around, the first also the last, and from pole to pole."""
+COLOURS = "cividis"
+"""From small to large; differs in brightness, too."""
+MILLI = 1e3
+SAME = 12
+"""Decimals in which equal directions are equal."""
+NAMED = {
+    "+x": (0.0, 0.0), "+y": (90.0, 0.0), "-y": (-90.0, 0.0), "+z": (0.0, 80.0), "-z": (0.0, -80.0),
+}  # fmt: skip
+"""Longitudes and latitudes at which directions are written [deg], those of z a little below."""
+
+
+def margin_figure(
+    body: Polyhedron, grasp: Grasp, friction: float, *, max_normal_force_n: float = 10.0
+) -> Any:
+    """Largest force and largest torque resisted, by direction.
+
+    Args:
+        body: The object.
+        grasp: On it, in force closure.
+        friction: Coulomb coefficient.
+        max_normal_force_n: Limit of each finger's push.
+
+    Returns:
+        A matplotlib figure.
+    """
+    figure = new_figure(9.0, 2.5)
+    around = Around(left=0.01, right=0.02, below=0.02, above=0.12, between=0.05)
+    forces, torques = panels(figure, 2, around=around)
+    ways = np.zeros((LATITUDES * LONGITUDES, 6))
+    ways[:, :3] = directions_of_map().reshape(-1, 3)
+    limits = _limits(body, grasp, friction, max_normal_force_n, ways)
+    _map(figure, forces, limits, "largest force resisted [N]")
+    ways = np.roll(ways, 3, axis=1) * body.radius
+    limits = MILLI * body.radius * _limits(body, grasp, friction, max_normal_force_n, ways)
+    _map(figure, torques, limits, "largest torque resisted [mN m]")
+    return figure
+
+
+def _limits(
+    body: Polyhedron, grasp: Grasp, friction: float, largest: float, wrenches: Array
+) -> Array:
+    """Largest multiples of a map's wrenches, (LATITUDES, LONGITUDES); each is found once."""
+    different, same = np.unique(np.round(wrenches, SAME), axis=0, return_inverse=True)
+    found = wrench_limits(
+        grasp, None, friction, different, max_normal_force=largest, center=body.center_of_mass
+    )
+    limits = np.array([each.limit for each in found])
+    return limits[same.reshape(-1)].reshape(LATITUDES, LONGITUDES)
+
+
+def _nodes() -> tuple[Array, Array]:
+    """Longitudes and latitudes of a map, (LATITUDES, LONGITUDES) each [rad]."""
+    around = np.linspace(-np.pi, np.pi, LONGITUDES)
+    longitudes, latitudes = np.meshgrid(around, np.linspace(-0.5 * np.pi, 0.5 * np.pi, LATITUDES))
+    return longitudes, latitudes
+
+
+def directions_of_map() -> Array:
+    """Unit vectors of a map's nodes, (LATITUDES, LONGITUDES, 3)."""
+    longitudes, latitudes = _nodes()
+    flat = np.cos(latitudes)
+    return np.stack(
+        [flat * np.cos(longitudes), flat * np.sin(longitudes), np.sin(latitudes)], axis=2
+    )
+
+
+def on_map(longitudes: Array, latitudes: Array) -> tuple[Array, Array]:
+    """Where directions [rad] are on a map: at most 2 aside, 1 up."""
+    scale = np.sqrt(1.0 + np.cos(latitudes) * np.cos(0.5 * longitudes))
+    return 2.0 * np.cos(latitudes) * np.sin(0.5 * longitudes) / scale, np.sin(latitudes) / scale
+
+
+def _map(figure: Any, axes: Any, values: Array, title: str) -> None:
+    x, y = on_map(*_nodes())
+    drawn = axes.pcolormesh(x, y, values, cmap=COLOURS, shading="gouraud", vmin=0.0)
+    least = int(values.argmin())
+    axes.plot(x.flat[least], y.flat[least], "o", mfc="none", mec=BAD, ms=9, mew=2, clip_on=False)
+    for name, angles in NAMED.items():
+        place = on_map(*(np.array(math.radians(angle)) for angle in angles))
+        axes.text(*map(float, place), name, ha="center", va="center", fontsize=8.0, color="white",
+                  bbox={"boxstyle": "round,pad=0.15", "fc": INK, "ec": "none", "alpha": 0.6}
+        )  # fmt: skip
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    entitle(axes, f"{title}: least {values.min():.3g} (circle)")
+    bar = figure.colorbar(drawn, ax=axes, shrink=0.85, pad=0.02)
+    bar.ax.locator_params(nbins=4)
+    bar.outline.set_edgecolor(NEUTRAL)
