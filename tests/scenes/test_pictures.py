@@ -141,9 +141,19 @@ def pixels_of(figure):
 
 
 def assert_inside(figure):
-    """That every text of a figure is whole."""
-    texts = [text for text in figure.findobj(match=lambda each: hasattr(each, "get_text"))
-             if text.get_text().strip() and text.get_visible()]  # fmt: skip
+    """That every text of a figure is whole, and no label of a tick is on another."""
+    of_ticks = set()
+    for axis in [axis for axes in figure.axes if axes.axison for axis in (axes.xaxis, axes.yaxis)]:
+        low, high = sorted(axis.get_view_interval())
+        shown = [tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
+        of_ticks |= {tick.label1 for tick in shown} | {tick.label2 for tick in shown}
+        boxes = [tick.label1.get_window_extent() for tick in shown if tick.label1.get_visible()]
+        assert not any(one.overlaps(two) for one, two in itertools.combinations(boxes, 2))
+    every = set(figure.findobj(match=lambda each: hasattr(each, "get_text")))
+    hidden = {text for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)
+              for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks())
+              for text in (tick.label1, tick.label2)} - of_ticks  # fmt: skip
+    texts = [text for text in every - hidden if text.get_text().strip() and text.get_visible()]
     assert texts
     width, height = figure.canvas.get_width_height()
     for text in texts:

@@ -1,0 +1,231 @@
+"""Reports work in a browser, on a desk and on a phone, by day and by night."""
+
+import json
+import shutil
+
+import pytest
+
+from sim_validate.cli import Exit, main
+from sim_validate.reports.report import write_report
+from tests.sim_validate.reports.test_report import EVIL, changed
+
+BROWSER, DRIVER = (shutil.which(name) for name in ("chromium", "chromedriver"))
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not (BROWSER and DRIVER), reason="there is no chromium with its driver"),
+]
+READABLE = 4.5
+"""Contrast of text that anyone can read, after WCAG 2.1."""
+CONTRASTS = """
+const light = (text) => {
+  const parts = text.match(/[\\d.]+/g).slice(0, 3).map((part) => part / 255)
+    .map((part) => (part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4));
+  return 0.2126 * parts[0] + 0.7152 * parts[1] + 0.0722 * parts[2];
+};
+const ground = (node) => {
+  for (; node; node = node.parentElement) {
+    const colour = getComputedStyle(node).backgroundColor;
+    if (colour !== "rgba(0, 0, 0, 0)") return colour;
+  }
+  throw new Error("no background");
+};
+return [...document.querySelectorAll("h1, h2, p, a, th, td, label, summary, .verdict, figcaption")]
+  .filter((node) => node.textContent.trim() && node.getClientRects().length)
+  .map((node) => {
+    const [one, two] = [getComputedStyle(node).color, ground(node)].map(light);
+    return [(Math.max(one, two) + 0.05) / (Math.min(one, two) + 0.05), node.textContent.trim()];
+  });
+"""
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    """A headless one that tells of every request and of every message of its console."""
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = BROWSER
+    flags = ("headless", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run",
+             "disable-background-networking", "disable-component-update", "disable-sync",
+             "disable-dev-shm-usage",
+             f"user-data-dir={tmp_path_factory.mktemp('profile')}")  # fmt: skip
+    for flag in flags:
+        options.add_argument(f"--{flag}")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    driver = webdriver.Chrome(options=options, service=Service(DRIVER))
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture(scope="module")
+def evil_report(small_run, tmp_path_factory):
+    """A report whose object has a name that would run as a script."""
+    folder = shutil.copytree(small_run, tmp_path_factory.mktemp("evil") / "run")
+    changed(folder / "grasps.json", lambda each: each["object"].update(name=EVIL))
+    return write_report(folder, jobs=1).index.parent
+
+
+def opened(browser, path, *, width=1200, dark=False, touch=False):
+    """Open a file; what was asked for, and said on the console, since."""
+    for log in ("browser", "performance"):
+        browser.get_log(log)
+    scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [scheme]})
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": touch}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    browser.get(path.as_uri())
+
+
+def errors_of(browser):
+    """Without warnings, such as that this test reads pixels often."""
+    return [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
+
+
+def requests_of(browser):
+    messages = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
+    return [each["params"]["request"]["url"] for each in messages
+            if each["method"] == "Network.requestWillBeSent"]  # fmt: skip
+
+
+def pages_of(report):
+    return [report / "index.html", *sorted((report / "grasps").iterdir())]
+
+
+def test_pages_open_without_errors_and_ask_nothing_of_a_network(browser, small_report):
+    for path in pages_of(small_report):
+        opened(browser, path)
+        browser.execute_script("window.scrollTo(0, document.body.scrollHeight)")
+        broken = browser.execute_async_script("""
+            const done = arguments[0];
+            const images = [...document.images];
+            images.forEach((image) => { image.loading = "eager"; });
+            Promise.allSettled(images.map((image) => image.decode())).then((ends) => done(
+              images.filter((image, i) => ends[i].status !== "fulfilled").map((image) => image.src)));
+        """)
+        assert broken == []
+        assert browser.get_log("browser") == []
+        asked = requests_of(browser)
+        assert len(asked) >= 4
+        own = ("file://", "data:", "chrome://")  # the last are the browser's first page
+        assert [url for url in asked if not url.startswith(own)] == []
+
+
+def test_the_policy_of_the_pages_stops_what_would_leave_them(browser, small_report):
+    """A negative control: a request is tried, and seen to be stopped."""
+    opened(browser, small_report / "index.html")
+    browser.execute_script(
+        "document.body.append(Object.assign(new Image(), {src: 'http://127.0.0.1:9/a.png'}))"
+    )
+    said = [entry["message"] for entry in browser.get_log("browser")]
+    assert any("Content Security Policy" in line for line in said)
+
+
+def test_a_name_is_no_script(browser, evil_report):
+    for path in pages_of(evil_report):
+        opened(browser, path)
+        assert browser.title != "taken"
+        assert "<script>document.title" in browser.execute_script("return document.body.innerText")
+        assert browser.get_log("browser") == []
+
+
+def cards(browser):
+    return browser.execute_script(
+        "return [...document.querySelectorAll('.card')].filter((card) => !card.hidden && "
+        "card.getClientRects().length).map((card) => card.querySelector('.id').textContent)"
+    )
+
+
+def ask(browser, name, value):
+    browser.execute_script(
+        "const part = document.forms[0].elements[arguments[0]]; part.value = arguments[1];"
+        "part.dispatchEvent(new Event('input', {bubbles: true}))", name, value,
+    )  # fmt: skip
+
+
+def test_filters_and_orders_work(browser, small_report, small_run):
+    grasps = json.loads((small_run / "grasps.json").read_text())["grasps"]
+    ids = [grasp["id"] for grasp in grasps]
+    opened(browser, small_report / "index.html")
+    assert cards(browser) == ids
+    for family in ("concurrent", "pencil"):
+        ask(browser, "family", family)
+        wanted = [grasp["id"] for grasp in grasps if grasp["family"] == family]
+        assert 0 < len(wanted) < len(ids)
+        assert cards(browser) == wanted
+        said = browser.execute_script("return document.querySelector('output').value")
+        assert said == f"{len(wanted)} of {len(ids)} grasps"
+    ask(browser, "family", "")
+    ask(browser, "find", ids[1].upper())
+    assert cards(browser) == [ids[1]]
+    ask(browser, "find", "")
+    for order, key in (("friction", lambda each: each["critical_friction"]),
+                       ("-quality", lambda each: -each["ferrari_canny"][0]),
+                       ("-radius", lambda each: -round(1e3 * each["radius_m"], 6))):  # fmt: skip
+        ask(browser, "order", order)
+        assert cards(browser) == [grasp["id"] for grasp in sorted(grasps, key=key)]
+
+
+PIXELS = """
+const canvas = document.querySelector("canvas");
+const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+let sum = 0, drawn = 0;
+for (let at = 0; at < data.length; at += 4) {
+  sum = (sum * 31 + data[at] + 7 * data[at + 1] + 13 * data[at + 3]) % 1000003;
+  drawn += data[at + 3] > 0;
+}
+return [sum, drawn / (data.length / 4)];
+"""
+
+
+def test_the_grasp_turns_zooms_and_hides_its_parts(browser, small_report):
+    from selenium.webdriver import ActionChains, Keys
+    from selenium.webdriver.common.by import By
+
+    opened(browser, pages_of(small_report)[1])
+    canvas = browser.find_element(By.TAG_NAME, "canvas")
+    pictures = [browser.execute_script(PIXELS)]
+    assert pictures[0][1] > 0.1
+    ActionChains(browser).drag_and_drop_by_offset(canvas, 60, 30).perform()
+    pictures.append(browser.execute_script(PIXELS))
+    for keys in (Keys.ARROW_LEFT, Keys.ARROW_UP, "+"):
+        canvas.send_keys(keys)
+        pictures.append(browser.execute_script(PIXELS))
+    browser.find_element(By.CSS_SELECTOR, ".stage input").click()
+    pictures.append(browser.execute_script(PIXELS))
+    assert len({picture[0] for picture in pictures}) == len(pictures)
+    assert pictures[-1][1] < pictures[-2][1]
+    assert errors_of(browser) == []
+
+
+def test_a_page_by_itself_turns(browser, small_run, tmp_path):
+    asked = ["view", str(small_run / "grasps.json"), "--page", str(tmp_path / "a.html"), "-q"]
+    assert main(asked) == Exit.GOOD
+    opened(browser, tmp_path / "a.html")
+    assert browser.get_log("browser") == []
+    assert browser.execute_script(PIXELS)[1] > 0.1
+    assert requests_of(browser)[0].endswith("a.html")
+
+
+@pytest.mark.parametrize("width", [360, 1200])
+def test_pages_are_as_wide_as_the_screen(browser, small_report, width):
+    for path in pages_of(small_report)[:2]:
+        opened(browser, path, width=width, touch=width < 500)
+        wide = browser.execute_script("return document.documentElement.scrollWidth")
+        assert wide <= width
+        small = browser.execute_script(
+            "return [...document.querySelectorAll('p, td, label')].map((node) => "
+            "parseFloat(getComputedStyle(node).fontSize))"
+        )
+        assert min(small) >= 12.0
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_text_can_be_read_by_day_and_by_night(browser, small_report, dark):
+    for path in pages_of(small_report)[:2]:
+        opened(browser, path, dark=dark)
+        found = browser.execute_script(CONTRASTS)
+        assert len(found) > 40
+        assert [text for contrast, text in found if contrast < READABLE] == []
+    light = browser.execute_script("return getComputedStyle(document.body).backgroundColor")
+    assert (light == "rgb(255, 255, 255)") != dark

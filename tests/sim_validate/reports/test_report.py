@@ -1,0 +1,250 @@
+"""Reports hold what the files of a run say, whatever these are called."""
+
+import json
+import re
+import shlex
+import shutil
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from grasp_core.errors import InputError
+from sim_validate import commands
+from sim_validate.cli import Exit, main
+from sim_validate.grasps_file import read_grasps
+from sim_validate.reports.report import write_report
+from sim_validate.reports.turntable import UNITS
+
+EVIL = '<script>document.title="taken"</script>"\'&\x1b[31m'
+
+
+class Page(HTMLParser):
+    """Tags, links and text of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.links, self.said, self.data = [], [], [], {}
+        self.inside = None
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        known = dict(attrs)
+        self.tags.append((tag, known))
+        self.links += [known[name] for name in ("href", "src") if name in known]
+        self.inside = known.get("id") if tag == "script" else None
+
+    def handle_endtag(self, tag):
+        self.inside = None
+
+    def handle_data(self, data):
+        if self.inside:
+            self.data[self.inside] = self.data.get(self.inside, "") + data
+        self.said.append(data)
+
+
+def pages_of(report):
+    return {path: Page(path.read_text()) for path in report.rglob("*.html")}
+
+
+def test_every_grasp_has_a_card_and_a_page(small_run, small_report):
+    ids = [grasp.id for grasp in read_grasps(small_run / "grasps.json").grasps]
+    assert len(ids) == 3
+    index = Page((small_report / "index.html").read_text())
+    cards = [known for tag, known in index.tags if tag == "li" and known.get("class") == "card"]
+    assert [card["data-find"].split()[0] for card in cards] == ids
+    assert {card["data-verdict"] for card in cards} == {"held"}
+    assert sorted(path.stem for path in (small_report / "grasps").iterdir()) == sorted(ids)
+
+
+def test_every_link_leads_to_a_file_of_the_report(small_report):
+    count = 0
+    for path, page in pages_of(small_report).items():
+        for link in page.links:
+            if not link.startswith(("#", "data:")):
+                assert (path.parent / link).resolve().is_relative_to(small_report.resolve())
+                assert (path.parent / link).is_file()
+                count += 1
+    assert count > 30
+
+
+def test_nothing_is_asked_of_a_network(small_report):
+    for path in small_report.rglob("*"):
+        if path.suffix in {".html", ".css", ".js"}:
+            assert not re.search(r"https?:|//[a-z]|@import|url\(", path.read_text())
+    assert all("Content-Security-Policy" in path.read_text()
+               for path in small_report.rglob("*.html"))  # fmt: skip
+
+
+def test_a_page_says_what_the_files_say(small_run, small_report):
+    document = json.loads((small_run / "verdicts.json").read_text())
+    regions = json.loads((small_run / "regions.json").read_text())
+    for verdict, certified in zip(document["verdicts"], regions["grasps"], strict=True):
+        page = Page((small_report / "grasps" / f"{verdict['id']}.html").read_text())
+        said = " ".join(page.said)
+        for trial in verdict["wrenches"]:
+            assert trial["name"] in said
+            assert f"{trial['simulated_limit']:.4g}" in said
+        assert f"{verdict['critical_friction']['simulated']:.4g}" in said
+        for name in verdict["controls"]:
+            assert name.replace("_", " ") in said
+        assert f"{1e3 * certified['disc_radius_m']:.4g} mm" in said
+        assert certified["proof"]["file"] in said
+        assert "held 2 of 2 times" in said
+
+
+def test_the_first_page_counts(small_run, small_report):
+    summary = json.loads((small_run / "verdicts.json").read_text())["summary"]
+    said = " ".join(Page((small_report / "index.html").read_text()).said)
+    controls = summary["controls"]
+    assert f"3 of 3 held, {controls} of {controls} negative controls were let go" in said
+    assert "critical friction: 3 pairs" in said
+    assert "largest wrench [N], torques over grasp size: 39 pairs" in said
+    assert (small_report / "fidelity.svg").stat().st_size > 5000
+
+
+def test_the_drawing_is_that_of_the_grasp(small_run, small_report):
+    saved = read_grasps(small_run / "grasps.json")
+    body = saved.body
+    for grasp in saved.grasps:
+        page = Page((small_report / "grasps" / f"{grasp.id}.html").read_text())
+        shapes = json.loads(page.data["drawing"])["shapes"]
+        (contacts,) = (shape["points"] for shape in shapes if shape["role"] == "contact")
+        points = body.center_of_mass + np.array(contacts) * body.radius / UNITS
+        np.testing.assert_allclose(points, grasp.positions, atol=body.radius / UNITS)
+        assert sum(shape["role"] == "region" for shape in shapes) == 4
+    text = (small_report / "object-0.js").read_text()
+    drawn = json.loads(text.partition("= ")[2].rstrip(";\n"))
+    assert [shape["role"] for shape in drawn] == ["object", "edge"]
+
+
+def test_its_commands_are_commands(small_run, small_report, monkeypatch):
+    monkeypatch.chdir(small_run)
+    asked = []
+    monkeypatch.setattr(commands, "execute", lambda command: asked.append(command) or Exit.GOOD)
+    text = next((small_report / "grasps").iterdir()).read_text()
+    (block,) = re.findall(r"<pre>(.*?)</pre>", text, re.DOTALL)
+    lines = [line for line in block.splitlines() if line]
+    assert len(lines) >= 5
+    for line in lines:
+        assert main(shlex.split(line)[1:]) == Exit.GOOD
+    assert {type(command).__name__ for command in asked} == {"View", "Replay"}
+
+
+@pytest.fixture
+def copy(small_run, tmp_path):
+    """Another run to spoil."""
+    return shutil.copytree(small_run, tmp_path / "copy")
+
+
+def changed(path, change):
+    document = json.loads(path.read_text())
+    change(document)
+    path.write_text(json.dumps(document))
+
+
+def spoiled(document):
+    document["verdicts"][0]["mismatches"] = [EVIL]
+    controls = document["verdicts"][0]["controls"]
+    document["verdicts"][0]["controls"] = {EVIL: next(iter(controls.values()))}
+    document["gate"]["checks"][0]["name"] = EVIL
+
+
+def test_names_are_escaped(copy, tmp_path):
+    changed(copy / "grasps.json", lambda each: each["object"].update(name=EVIL))
+    changed(copy / "verdicts.json", spoiled)
+    changed(copy / "regions.json", lambda each: each["grasps"][0].update(regions=None, reason=EVIL))
+    index = write_report(copy, tmp_path / "out", jobs=1).index
+    pages = pages_of(index.parent)
+    assert len(pages) == 4
+    for path, page in pages.items():
+        assert "<script>document" not in path.read_text()
+        assert "\x1b" not in path.read_text()
+        assert EVIL.replace("\x1b", " ") in "".join(page.said)
+        assert {known.get("src") for tag, known in page.tags if tag == "script"} <= {
+            None, "gallery.js", "../turntable.js", "../object-0.js",
+        }  # fmt: skip
+    assert "contradicts the analysis" in pages[index].said
+
+
+def test_without_verdicts_grasps_are_shown(copy, tmp_path):
+    (copy / "verdicts.json").unlink()
+    (copy / "regions.json").unlink()
+    report = write_report(copy, tmp_path / "out", jobs=1)
+    index = Page(report.index.read_text())
+    assert report.grasps == 3
+    assert index.said.count("not simulated") == 4  # three cards, and the choice
+    assert not (tmp_path / "out" / "fidelity.svg").exists()
+
+
+def test_an_interrupted_run_is_called_that(copy, tmp_path):
+    def interrupted(document):
+        document["complete"] = False
+        del document["verdicts"][1:]
+
+    changed(copy / "verdicts.json", interrupted)
+    said = " ".join(Page(write_report(copy, tmp_path / "out", jobs=1).index.read_text()).said)
+    assert "the run was interrupted" in said
+    assert "not simulated" in said
+
+
+def test_several_runs_make_one_report(copy, tmp_path):
+    both = tmp_path / "both"
+    shutil.copytree(copy, both / "b")
+    shutil.copytree(copy, both / "a")
+    changed(both / "b" / "grasps.json", lambda each: each["object"].update(name="other"))
+    (both / "empty").mkdir()
+    report = write_report(both, jobs=1)
+    assert report.grasps == 6
+    assert report.index == both / "report" / "index.html"
+    index = Page(report.index.read_text())
+    shown = [known["data-object"] for tag, known in index.tags if known.get("class") == "card"]
+    assert shown == ["wedge"] * 3 + ["other"] * 3
+    assert len(pages_of(both / "report")) == 7
+
+
+def test_pages_of_an_earlier_report_are_removed_and_nothing_else(copy):
+    old = copy / "report" / "grasps" / "c-9-9-9-9.html"
+    own = copy / "report" / "notes.txt"
+    for path in (old, own):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("old")
+    write_report(copy, jobs=1)
+    assert not old.exists()
+    assert own.read_text() == "old"
+
+
+@pytest.mark.parametrize(
+    ("file", "change", "says"),
+    [
+        ("verdicts.json", lambda each: each.pop("gate"), r"verdicts\.json: gate: Field required"),
+        ("verdicts.json", lambda each: each["verdicts"][0].update(wrenches=3), "wrenches"),
+        ("verdicts.json", lambda each: each["verdicts"][0]["wrenches"][0].update(wrench=[1]),
+         r"verdicts\.0\.wrenches\.0\.wrench"),
+        ("verdicts.json", lambda each: each["object"].update(content_sha256="0"), "another object"),
+        ("verdicts.json", lambda each: each["verdicts"][0].update(contacts_sha256="0"), "contacts"),
+        ("regions.json", lambda each: each["grasps"][0]["regions"].pop(), "at least 4 items"),
+        ("regions.json", lambda each: each["grasps"].append(3), r"regions\.json: grasps\.3"),
+    ],
+)  # fmt: skip
+def test_files_that_are_not_ours_are_refused(copy, file, change, says):
+    changed(copy / file, change)
+    with pytest.raises(InputError, match=says):
+        write_report(copy, jobs=1)
+    assert not (copy / "report" / "index.html").exists()
+
+
+def test_a_folder_without_a_run_is_refused(tmp_path, capsys):
+    assert main(["report", str(tmp_path)]) == Exit.INPUT
+    assert "has no grasps.json" in capsys.readouterr().err
+    assert main(["report", str(tmp_path / "none")]) == Exit.INPUT
+    assert "not a folder" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_says_where_the_report_is(copy, tmp_path, capsys):
+    asked = ["report", str(copy), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    assert main([*asked, "--json"]) == Exit.GOOD
+    shown = capsys.readouterr()
+    assert json.loads(shown.out) == {"report": str(tmp_path / "out" / "index.html"), "grasps": 3}
+    assert "open" in shown.err
