@@ -282,14 +282,15 @@ def _dispatch(command: Command) -> int:
     except KeyboardInterrupt:
         return _complain("interrupted", Exit.INTERRUPTED)
     except (GraspError, OSError) as error:
-        return _complain(_reason(error), _code(error))
+        return _complain(reason_of(error), _code(error))
     except Exception as error:
         if command.speech.verbose:
             traceback.print_exc()
         return _complain(f"internal error: {error!r}; -v shows where", Exit.INTERNAL)
 
 
-def _reason(error: GraspError | OSError) -> str:
+def reason_of(error: GraspError | OSError) -> str:
+    """What an error says to people, with the file it is about."""
     if isinstance(error, OSError):
         return f"{error.filename or 'output'}: {error.strerror}"
     return str(error)

@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+from grasp_core.errors import GraspError
 from grasp_core.records import SavedGrasps, plan_to_json
 from sim_validate import cli
 from sim_validate.console import Reporter
@@ -11,6 +12,7 @@ from sim_validate.gate import require_faithful
 from sim_validate.improving import show_gains
 from sim_validate.plan_command import asked_finger, plan_object, say_counts, with_regions
 from sim_validate.report_command import shown_report
+from sim_validate.reports.report import REPORT, remove_report
 from sim_validate.showing_flags import Report
 from sim_validate.validate_command import prepared, simulate_grasps, with_planned_fingers
 
@@ -27,6 +29,7 @@ def run_object(command: cli.Run, reporter: Reporter) -> int:
     folder = command.out or RESULTS / _folder_name(body.name)
     require_faithful(setup, found.friction, body.radius)
     remove_results(folder)
+    remove_report(folder / REPORT)
     found = with_regions(body, found, planning, folder, testing.jobs, reporter)
     write_text(folder / "grasps.json", plan_to_json(body, found, moves))
     say_counts(body, found, reporter)
@@ -43,8 +46,16 @@ def run_object(command: cli.Run, reporter: Reporter) -> int:
     code = simulate_grasps(saved, testing, folder, reporter)
     reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
     if not command.no_report:
-        shown_report(Report(folder, jobs=testing.jobs), reporter)
+        _report(folder, testing.jobs, reporter)
     return code
+
+
+def _report(folder: Path, jobs: int, reporter: Reporter) -> None:
+    """Show the results as pages; what has been found stands without them, too."""
+    try:
+        shown_report(Report(folder, jobs=jobs), reporter)
+    except (GraspError, OSError) as error:
+        reporter.warn(f"no report: {cli.reason_of(error)}")
 
 
 def _folder_name(name: str) -> str:

@@ -25,10 +25,12 @@ def here(tmp_path, monkeypatch):
 def test_run_writes_grasps_verdicts_and_scenes_and_tells(here, capsys):
     assert main(["run", "tetrahedron", "--family", "concurrent", "--out", "results"]) == Exit.GOOD
     assert sorted(p.name for p in here.iterdir()) == ["results"]
-    names = sorted(p.name for p in (here / "results").rglob("*") if p.is_file())
-    assert names == ["c-0-1-2-3.xml", "grasps.json", "verdicts.json"]
+    names = sorted(p.name for p in (here / "results").iterdir())
+    assert names == ["grasps.json", "report", "scenes", "verdicts.json"]
+    assert [p.name for p in (here / "results" / "scenes").iterdir()] == ["c-0-1-2-3.xml"]
+    assert (here / "results" / "report" / "grasps" / "c-0-1-2-3.html").is_file()
     shown = capsys.readouterr().out
-    for word in ("concurrent", "in sim", "mu*", "held", "um moved", "results"):
+    for word in ("concurrent", "in sim", "mu*", "held", "um moved", "results/report/index.html"):
         assert word in shown
     verdicts = json.loads((here / "results" / "verdicts.json").read_text())
     assert verdicts["complete"] is True
@@ -47,8 +49,18 @@ def test_a_second_run_leaves_nothing_of_the_first_behind(here):
     assert names == ["grasps.json", "mine.xml"]
 
 
+@pytest.mark.usefixtures("here")
+def test_a_report_that_fails_leaves_the_run_as_it_is(monkeypatch, capsys):
+    def broken(*_, **__):
+        raise OSError(28, "No space left on device", "a.webp")
+
+    monkeypatch.setattr("sim_validate.report_command.write_report", broken)
+    assert main(["run", "tetrahedron", "--limit", "1", "-q"]) == Exit.GOOD
+    assert "no report: a.webp: No space left on device" in capsys.readouterr().err
+
+
 def test_a_verdict_has_the_fields_that_users_rely_on(here, capsys):
-    assert main(["run", "wedge", "--limit", "1", "--json"]) == Exit.GOOD
+    assert main(["run", "wedge", "--limit", "1", "--no-report", "--json"]) == Exit.GOOD
     document = json.loads(capsys.readouterr().out)
     (verdict,) = document["verdicts"]
     assert {
@@ -98,7 +110,8 @@ def test_one_and_two_processes_give_the_same_verdicts(here):
 @pytest.mark.usefixtures("here")
 def test_json_output_is_one_document_and_the_rest_goes_elsewhere(capsys):
     commands = {
-        "plan wedge --out p": 0, "inspect box": 0, "objects": 0, "run tetrahedron": 0, "doctor": 0,
+        "plan wedge --out p": 0, "inspect box": 0, "objects": 0, "run tetrahedron --no-report": 0,
+        "doctor": 0, "report graspproof-out/tetrahedron": 0,
         "run box --family pencil --cones normal": 5,
         "plan box --family pencil --cones normal --out b": 5, "validate b/grasps.json": 5,
         "scene p/grasps.json --out s": 0,
@@ -176,14 +189,14 @@ def test_a_config_file_sets_flags_and_flags_override_it(here, capsys):
 @pytest.mark.usefixtures("here")
 def test_a_control_that_holds_makes_the_run_fail(monkeypatch, capsys):
     monkeypatch.setattr("sim_validate.control_trials.judge", _always_held)
-    assert main(["run", "wedge", "--limit", "1", "--jobs", "1"]) == Exit.NEGATIVE
+    assert main(["run", "wedge", "--limit", "1", "--jobs", "1", "--no-report"]) == Exit.NEGATIVE
     assert "negative controls were let go (all should)" in capsys.readouterr().out
 
 
 @pytest.mark.usefixtures("here")
 def test_a_run_without_controls_says_so(monkeypatch, capsys):
     monkeypatch.setattr("sim_validate.validation.negative_controls", lambda *_: ())
-    assert main(["run", "tetrahedron", "--jobs", "1"]) == Exit.GOOD
+    assert main(["run", "tetrahedron", "--jobs", "1", "--no-report"]) == Exit.GOOD
     assert "no negative controls" in capsys.readouterr().err
 
 

@@ -141,9 +141,12 @@ def test_flags_that_make_no_sense_are_refused_before_anything_runs(capsys, flags
 @pytest.mark.parametrize("flags", [["--down", "0", "0", "-1"], ["--setup", "pyramids.toml"]])
 def test_a_run_that_is_refused_leaves_earlier_results(planned, flags):
     (planned / "pyramids.toml").write_text('[physics]\ncone = "pyramidal"\n')
-    assert main(["run", "tetrahedron", "--out", "r", "-q"]) == Exit.GOOD
+    assert main(["run", "tetrahedron", "--out", "r", "-q", "--no-report"]) == Exit.GOOD
     before = (planned / "r" / "verdicts.json").read_text()
-    assert main(["run", "tetrahedron", "--out", "r", "-q", *flags]) in {Exit.INPUT, Exit.INTERNAL}
+    assert main(["run", "tetrahedron", "--out", "r", "-q", "--no-report", *flags]) in {
+        Exit.INPUT,
+        Exit.INTERNAL,
+    }
     assert (planned / "r" / "verdicts.json").read_text() == before
 
 
@@ -151,7 +154,7 @@ def test_the_scenes_of_a_run_are_those_that_were_simulated(planned):
     (planned / "setup.toml").write_text(
         "[physics]\ntimestep = 0.001\n[fingers]\nradius_m = 0.004\n"
     )
-    command = ["run", "tetrahedron", "--out", "r", "-q", "--setup", "setup.toml"]
+    command = ["run", "tetrahedron", "--out", "r", "-q", "--no-report", "--setup", "setup.toml"]
     assert main(command) == Exit.GOOD
     for path in (planned / "r" / "scenes").iterdir():
         text = path.read_text()

@@ -34,7 +34,7 @@ class Page(HTMLParser):
         self.links += [known[name] for name in ("href", "src") if name in known]
         self.inside = known.get("id") if tag == "script" else None
 
-    def handle_endtag(self, tag):
+    def handle_endtag(self, _):
         self.inside = None
 
     def handle_data(self, data):
