@@ -100,6 +100,13 @@ def available_graphics() -> str:
     raise GraphicsError("; ".join(said))
 
 
+def has_display() -> bool:
+    """Whether MuJoCo's viewer has a display to open on."""
+    if sys.platform != "linux":
+        return True
+    return any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+
+
 def _graphics() -> Iterator[str]:
     """What MuJoCo may draw with, in the order to try."""
     chosen = os.environ.get("MUJOCO_GL")

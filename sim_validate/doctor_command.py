@@ -1,18 +1,31 @@
-"""The command that checks an installation."""
+"""The command that checks an installation, and says what to do about what it lacks."""
 
 import math
+import os
+import sys
+from collections.abc import Mapping
 
 from grasp_core.closure import force_closure
 from grasp_core.concurrent_grasps import PYRAMID_SIDES
 from grasp_core.critical import critical_friction
+from grasp_core.kernels import SWITCH, compiled
 from grasp_core.planner import plan
+from grasp_core.values import Grasp, Polyhedron
 from grasp_core.versions import versions
+from scenes.clips import GraphicsError, available_graphics, has_display
 from scenes.objects import example_object
 from sim_validate import cli
 from sim_validate.console import Reporter
-from sim_validate.gate import measured_gate
+from sim_validate.engines import available_cores
+from sim_validate.gate import Gate, measured_gate
 from sim_validate.setup import Setup
 from sim_validate.validation import validate
+from sim_validate.verdict_records import finite, gate_record
+
+USUAL_KERNEL = "simplex"
+"""If this can be compiled, all can."""
+GATE = "gate: "
+"""What the names of its checks begin with."""
 
 
 def check_installation(_: cli.Doctor, reporter: Reporter) -> int:
@@ -20,21 +33,83 @@ def check_installation(_: cli.Doctor, reporter: Reporter) -> int:
     body = example_object("tetrahedron")
     grasp = plan(body).grasps[0]
     gate = measured_gate(Setup())
+    checks = _checks(body, grasp, gate)
+    machine, found = _machine(), versions()
+    record = {"versions": found, "machine": machine, "gate": gate_record(gate), "checks": checks}
+    reporter.document(finite(record))
+    reporter.table("versions", ("what", "version"), list(found.items()))
+    rows = [
+        (_state(check.passed), f"{check.value:.5g}", f"{check.least:.5g} to {check.largest:.5g}",
+         check.name)
+        for check in gate.checks
+    ]  # fmt: skip
+    columns = ("gate", "measured", "must be", "known case, in simulation")
+    reporter.table("is the simulator faithful?", columns, rows)
+    own = {name: passed for name, passed in checks.items() if not name.startswith(GATE)}
+    reporter.table("checks", ("state", "what"), [(_state(ok), name) for name, ok in own.items()])
+    for name, state in machine.items():
+        reporter.say(f"{name}: {state}")
+    return _concluded(checks, reporter)
+
+
+def _checks(body: Polyhedron, grasp: Grasp, gate: Gate) -> Mapping[str, bool]:
+    """What must be so, and whether it is."""
     verdict = validate(body, grasp) if gate.passed else None
     cone = math.tan(grasp.force_cones[0].half_angle) * math.cos(math.pi / PYRAMID_SIDES)
-    checks = {
+    return {
         "linear programs": math.isclose(3.0 * grasp.radius / body.radius, cone, rel_tol=1e-6),
         "conic programs": force_closure(grasp).verify(),
         "critical friction": critical_friction(grasp) == 0.0,
-        **{f"gate: {check.name}": check.passed for check in gate.checks},
+        **{f"{GATE}{check.name}": check.passed for check in gate.checks},
         "simulated grasp holds": verdict is not None and verdict.held,
         "simulated controls do not": (
             verdict is not None and verdict.controls_failed and bool(verdict.controls)
         ),
     }
-    found = versions()
-    reporter.document({"versions": found, "checks": checks})
-    rows = [(name, value) for name, value in found.items()]
-    rows += [(name, "ok" if passed else "FAILED") for name, passed in checks.items()]
-    reporter.table("graspproof doctor", ("what", "state"), rows)
-    return cli.Exit.GOOD if all(checks.values()) else cli.Exit.INTERNAL
+
+
+def _state(passed: bool) -> str:
+    return "ok" if passed else "FAILED"
+
+
+def _machine() -> Mapping[str, str]:
+    """What this machine offers, and what to do about what it does not."""
+    try:
+        graphics = f"MuJoCo draws with {available_graphics() or 'its default'}"
+    except GraphicsError as error:
+        graphics = (
+            f"none ({error}); pictures and reports need none, clips of `replay` do: "
+            "install libegl1 or libosmesa6, or choose with MUJOCO_GL"
+        )
+    loops = "yes"
+    if compiled(USUAL_KERNEL) is None:
+        loops = f"no, {SWITCH} says so" if os.environ.get(SWITCH) == "off" else (
+            "no, numba cannot compile, or keep, them here; planning takes ten times as long: "
+            "make its packages' __pycache__ or NUMBA_CACHE_DIR writable"
+        )  # fmt: skip
+    viewer = (
+        "yes" if has_display() else "no; use `graspproof view` with --picture, --page or --clip"
+    )
+    return {
+        "Python": sys.executable,
+        "cores": f"{available_cores()} to use (--jobs), of {os.cpu_count()}",
+        "compiled loops": loops,
+        "graphics": graphics,
+        "display for the viewer": viewer,
+    }
+
+
+def _concluded(checks: Mapping[str, bool], reporter: Reporter) -> int:
+    """Say what the checks amount to."""
+    failed = [name for name, passed in checks.items() if not passed]
+    if not failed:
+        reporter.say("all checks passed: plans and verdicts of this installation can be relied on")
+        return cli.Exit.GOOD
+    if any(name.startswith(GATE) for name in failed):
+        reporter.warn(
+            "the gate failed: this MuJoCo does not give the answers of statics, and `validate` "
+            "will refuse to certify anything; install the versions of .ci/constraints.txt"
+        )
+    else:
+        reporter.warn("solvers or simulation give wrong answers: install the package anew")
+    return cli.Exit.INTERNAL

@@ -14,14 +14,20 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-import mujoco  # noqa: TID251 - this is the door
 import numpy as np
-from mujoco import batch as mujoco_batch  # noqa: TID251
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from scenes.mjcf import Scene
 from sim_validate.schedules import Clock, Schedule
+
+try:
+    import mujoco  # noqa: TID251 - this is the door
+    from mujoco import batch as mujoco_batch  # noqa: TID251
+except RuntimeError as error:  # it looks for its graphics when it is imported
+    raise InputError(
+        f"MuJoCo cannot be imported: {error}; MUJOCO_GL may be egl, osmesa, glfw, or not set"
+    ) from error
 
 CHUNK = 5
 """Steps between changes of load and samples of motion."""

@@ -1,6 +1,5 @@
 """The command that shows one grasp: in MuJoCo's viewer, or in files."""
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -13,7 +12,7 @@ from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.records import SavedGrasps
 from grasp_core.values import Grasp
-from scenes.clips import GraphicsError, require_clip, write_clip
+from scenes.clips import GraphicsError, has_display, require_clip, write_clip
 from scenes.mjcf import Scene, build_scene
 from scenes.pictures import write_picture
 from scenes.turning_clips import write_turning_clip
@@ -58,7 +57,7 @@ def _in_viewer(scene: Scene, grasp: Grasp, reporter: Reporter) -> None:
     Raises:
         InputError: There is no display.
     """
-    if sys.platform == "linux" and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
+    if not has_display():
         raise InputError(
             "there is no display for MuJoCo's viewer (neither DISPLAY nor WAYLAND_DISPLAY is set): "
             "give --picture FILE.png, --page FILE.html or --clip FILE.webp"
