@@ -6,3 +6,5 @@ from scenes.mjcf import write_scene as write_scene
 from scenes.objects import example_names as example_names
 from scenes.objects import example_object as example_object
 from scenes.physics import PhysicsSettings as PhysicsSettings
+from scenes.pictures import grasp_figure as grasp_figure
+from scenes.pictures import write_picture as write_picture

@@ -3,6 +3,9 @@ from sim_validate.grasp_verdict import Verdict as Verdict
 from sim_validate.noise.draws import Noise as Noise
 from sim_validate.protocol import HoldProtocol as HoldProtocol
 from sim_validate.region_files import read_regions as read_regions
+from sim_validate.reports.margin_charts import margin_figure as margin_figure
+from sim_validate.reports.report import write_report as write_report
+from sim_validate.reports.wrench_charts import wrench_figure as wrench_figure
 from sim_validate.setup import Agenda as Agenda
 from sim_validate.setup import NamedWrench as NamedWrench
 from sim_validate.setup import Setup as Setup

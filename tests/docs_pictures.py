@@ -1,0 +1,106 @@
+"""The pictures of the README and of docs/: `python -m tests.docs_pictures` makes them again."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import grasp_core as gc
+import scenes
+from scenes.canvas import Around, entitle, new_figure, panels, write_figure
+from scenes.pictures import draw_grasp, grasp_figure
+from scenes.views import best_view
+from sim_validate.replaying.bench import replayed
+from sim_validate.replaying.values import Recorded
+from sim_validate.reports.drawn_grasps import certified
+from sim_validate.reports.fidelity_charts import Agreement, fidelity_figure
+from sim_validate.reports.margin_charts import margin_figure
+from sim_validate.reports.motion_charts import motion_figure
+from sim_validate.reports.wrench_charts import wrench_figure
+from sim_validate.setup import Agenda, Setup
+
+FOLDER = Path(__file__).parent.parent / "docs" / "pictures"
+TEN_DEGREES = math.tan(math.radians(10.0))
+FAMILIES = (
+    ("dodecahedron", "concurrent", TEN_DEGREES, "normal"),
+    ("double-wedge-bar", "pencil", TEN_DEGREES, "normal"),
+    ("icosahedron", "regulus", 0.3, "tilted"),
+)
+FRICTION = 0.5
+
+
+def best(name, family, friction, cones="tilted"):
+    body = scenes.example_object(name)
+    plan = gc.plan(body, friction, families=(family,), cones=cones, limit=1)
+    return body, plan.grasps[0]
+
+
+def families():
+    """A grasp of each of the paper's families, side by side."""
+    figure = new_figure(12.0, 4.3)
+    around = Around(left=0.0, right=0.0, below=0.0, above=0.07, between=0.02)
+    for axes, case in zip(panels(figure, 3, around=around), FAMILIES, strict=True):
+        body, grasp = best(*case)
+        draw_grasp(axes, body, grasp, case[2], best_view(body, grasp))
+        entitle(axes, case[1])
+    return figure
+
+
+def grasp():
+    """One grasp, with all that its picture explains."""
+    return grasp_figure(*best("wedge", "pencil", FRICTION), FRICTION)
+
+
+def regions():
+    """Certified regions of a regulus, for which the paper has none."""
+    body, grasp = best("octahedron", "regulus", FRICTION)
+    found = gc.certify_regions(body, grasp, FRICTION, cones=1250)
+    record = {"regions": [{"polygon_m": region.polygon,
+                           "inscribed_radius_m": region.inscribed_radius}
+                          for region in found.regions]}  # fmt: skip
+    return grasp_figure(body, certified(grasp, record), FRICTION)
+
+
+def wrenches():
+    return wrench_figure(*best("wedge", "pencil", FRICTION), FRICTION)
+
+
+def margins():
+    return margin_figure(*best("wedge", "pencil", FRICTION), FRICTION)
+
+
+def motion():
+    body, grasp = best("wedge", "pencil", FRICTION)
+    setup = Setup()
+    found = replayed(
+        Recorded(grasp.id, body, grasp.contacts, FRICTION, setup, Agenda(), grasp=grasp)
+    )
+    threshold = setup.hold.hold_threshold * found.scene.layout.grasp_size_m
+    return motion_figure(found, threshold)
+
+
+def fidelity():
+    """Critical friction of grasps of four objects, as predicted and as found in simulation."""
+    import sim_validate as sv
+
+    pairs = []
+    for name in ("wedge", "dodecahedron", "double-wedge-bar", "box"):
+        body = scenes.example_object(name)
+        for grasp in gc.plan(body, FRICTION, limit=8).grasps:
+            found = sv.simulated_critical_friction(body, grasp)
+            if grasp.critical_friction > 1e-3:
+                pairs.append((grasp.critical_friction, found))
+    return fidelity_figure([Agreement("critical friction", tuple(pairs))])
+
+
+PICTURES: dict[str, Callable[[], object]] = {
+    make.__name__: make for make in (families, grasp, regions, wrenches, margins, motion, fidelity)
+}
+
+
+def main() -> None:
+    for name, make in PICTURES.items():
+        print(write_figure(make(), FOLDER / f"{name}.webp"))
+
+
+if __name__ == "__main__":
+    main()
