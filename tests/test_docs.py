@@ -1,20 +1,31 @@
-"""What the pages in docs/ show can be done."""
+"""What the README and the pages in docs/ show can be done, and is all there is."""
 
 import json
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+import grasp_core as gc
+from grasp_core import errors
 from sim_validate import cli, commands
 from sim_validate.cli import Exit, main
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
 from sim_validate.datasets.given import read_given
+from sim_validate.setup import Setup
+from sim_validate.setup_file import setup_from_file
+from sim_validate.verdict import Outcome
+from sim_validate.wrench_file import wrenches_from_file
+from tests import api_reference
 from tests.sim_validate.datasets.small import build_small
 
-DOCS = sorted((Path(__file__).parent.parent / "docs").glob("*.md"))
-DATASETS = (Path(__file__).parent.parent / "docs" / "datasets.md").read_text()
+ROOT = Path(__file__).parent.parent
+DOCS = sorted((ROOT / "docs").glob("*.md"))
+PAGES = {page.stem: page.read_text() for page in DOCS}
+DATASETS = PAGES["datasets"]
 
 
 def blocks(text, language):
@@ -32,15 +43,142 @@ def shell_lines():
 
 
 def test_there_are_commands_to_try():
-    assert len(shell_lines()) >= 7
+    assert len(shell_lines()) >= 18
 
 
 @pytest.mark.parametrize("line", shell_lines())
 def test_every_command_is_one(line, monkeypatch):
     asked = []
     monkeypatch.setattr(commands, "execute", lambda command: asked.append(command) or Exit.GOOD)
-    assert main(shlex.split(line)[1:]) == Exit.GOOD
-    assert isinstance(asked[0], cli.Command)
+    words, _, code = line.partition("# exit code")
+    wanted = Exit.USAGE if code.strip() == "2" else Exit.GOOD
+    assert main(shlex.split(words)[1:]) == wanted
+    assert wanted == Exit.USAGE or isinstance(asked[0], cli.Command)
+
+
+@pytest.mark.parametrize("page", [pytest.param("pictures", marks=pytest.mark.slow), "errors"])
+def test_commands_end_as_the_page_says(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    lines = [line for block in blocks(PAGES[page], "sh") for line in block.splitlines()]
+    assert len(lines) >= 4
+    for line in lines:
+        words, _, code = line.partition("# exit code")
+        assert main(shlex.split(words)[1:]) == int(code or 0), line
+
+
+EXAMPLES = [
+    pytest.param(code, said, id=f"{page}-{place}")
+    for page, text in PAGES.items() if page not in {"datasets", "regions", "baselines"}
+    for place, (code, said) in enumerate(
+        re.findall(r"```python\n(.*?)```\n\nprints\n\n```text\n(.*?)```", text, re.DOTALL)
+    )
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("code", "said"), EXAMPLES)
+def test_the_examples_print_what_they_say(code, said, tmp_path):
+    answer = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stdout == said
+
+
+def test_every_block_of_code_is_one_that_a_test_runs():
+    kinds = {"sh": 0, "python": 0, "text": 0, "json": 0, "toml": 0, "py": 0}
+    for text in PAGES.values():
+        for language in re.findall(r"^```(\w+)$", text, re.MULTILINE):
+            kinds[language] += 1
+    own = [text for page, text in PAGES.items() if page not in {"datasets", "regions", "baselines"}]
+    assert sum(len(blocks(text, "python")) for text in own) == len(EXAMPLES) >= 6
+    assert not any(blocks(text, "py") for text in own)
+    for name in ("json", "toml"):
+        assert [page for page, text in PAGES.items() if blocks(text, name)] in (
+            ["baselines", "datasets", "files"], ["datasets", "files"], ["files"],
+        )  # fmt: skip
+
+
+def test_links_lead_somewhere_and_every_page_is_linked():
+    linked = set()
+    for path in (ROOT / "README.md", *DOCS):
+        for link in re.findall(r"\]\(([^)]+)\)", path.read_text()):
+            assert not link.startswith("http")
+            target = (path.parent / link.partition("#")[0]).resolve()
+            assert target.is_file(), link
+            linked.add(target)
+    assert {page.resolve() for page in DOCS} <= linked
+    assert {path.resolve() for path in (ROOT / "docs" / "pictures").iterdir()} <= linked
+
+
+def test_the_python_reference_is_that_of_the_docstrings():
+    text = PAGES["api"]
+    assert text == api_reference.page()
+    for package in api_reference.PACKAGES:
+        for name in __import__(package).__all__:
+            assert re.search(rf"^### (class )?`\w+\.{name}\b", text, re.MULTILINE)
+
+
+def listed(page, heading):
+    """Names in the first column of the table below a heading."""
+    part = PAGES[page].partition(heading)[2]
+    rows = re.search(r"((?:^\|.*\n)+)", part, re.MULTILINE)[1].splitlines()[2:]
+    return [name for row in rows for name in re.findall(r"`([\w-]+)`", row.split("|")[1])]
+
+
+@pytest.fixture(scope="module")
+def run_files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    asked = ["run", "wedge", "--limit", "1", "--no-report", "--out", str(folder), "-q"]
+    assert main(asked) == Exit.GOOD
+    return tuple(
+        json.loads((folder / f"{name}.json").read_text()) for name in ("grasps", "verdicts")
+    )
+
+
+def test_the_fields_of_files_are_those_of_the_page(run_files):
+    grasps, verdicts = run_files
+    assert set(listed("files", "## grasps.json")) | {"schema"} == set(grasps)
+    assert set(listed("files", "Each grasp:")) == set(grasps["grasps"][0])
+    assert set(listed("files", "## verdicts.json")) | {"schema"} == set(verdicts)
+    verdict = verdicts["verdicts"][0]
+    assert set(listed("files", "Each verdict:")) == set(verdict)
+    part = PAGES["files"].partition("Each verdict:")[2]
+    control = next(iter(verdict["controls"].values()))
+    for name in (*verdict["wrenches"][0], *control, *verdict["critical_friction"]):
+        assert f"`{name}`" in part
+    grasp = grasps["grasps"][0]
+    for part in (grasps["object"], grasps["object"]["mesh"], grasp["witness"], grasp["regions"][0],
+                 verdicts["summary"], verdicts["gate"]):  # fmt: skip
+        assert all(f"`{name}`" in PAGES["files"] for name in part)
+
+
+def test_the_files_that_the_page_shows_are_accepted(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    contacts, wrenches = blocks(PAGES["files"], "json")
+    setup, config = blocks(PAGES["files"], "toml")
+    for name, text in (("contacts.json", contacts), ("wrenches.json", wrenches),
+                       ("setup.toml", setup), ("config.toml", config)):  # fmt: skip
+        Path(name).write_text(text)
+    assert main(["analyze", "contacts.json", "-q"]) in {Exit.GOOD, Exit.NEGATIVE}
+    assert [each.name for each in wrenches_from_file(Path("wrenches.json"))] == ["lift"]
+    changed = setup_from_file(Path("setup.toml"), Setup())
+    assert changed.fingers.max_normal_force_n == 20.0
+    assert (changed.hold.load_share, changed.hold.hold_s) == (0.9, 1.0)
+    assert main(["plan", "wedge", "--config", "config.toml", "--out", "p", "-q"]) == Exit.GOOD
+    planned = json.loads(Path("p/grasps.json").read_text())
+    assert planned["friction"] == 0.3
+    assert {grasp["family"] for grasp in planned["grasps"]} == {"concurrent", "pencil"}
+
+
+def test_the_page_of_errors_lists_all_there_are():
+    codes = re.findall(r"^\| (\d+) \|", PAGES["errors"], re.MULTILINE)
+    assert sorted(map(int, codes)) == sorted(int(code) for code in Exit)
+    assert listed("errors", "## Meshes") == re.findall(r"`(GP-MESH-[\w-]+)`", PAGES["errors"])
+    assert set(listed("errors", "## Meshes")) == {reason.value for reason in gc.MeshRefusal}
+    known = {name for name in vars(errors) if name.endswith("Error")} - {"GraspError"}
+    assert set(listed("errors", "## In Python")) == known
+    for outcome in Outcome:
+        assert f"`{outcome.value}`" in PAGES["physics"]
 
 
 def test_the_settings_of_a_dataset_are_all_shown(tmp_path):

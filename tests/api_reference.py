@@ -1,0 +1,129 @@
+"""The page docs/api.md from docstrings: `python -m tests.api_reference` writes it again."""
+
+import ast
+import importlib
+import inspect
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from docstring_parser import DocstringStyle, parse
+
+PAGE = Path(__file__).parent.parent / "docs" / "api.md"
+PACKAGES = {"grasp_core": "gc", "scenes": "scenes", "sim_validate": "sv"}
+INTRODUCTION = """\
+# Python reference
+
+Made from the docstrings by `python -m tests.api_reference`. Conventions are in
+[reference.md](reference.md): SI units, the object's frame, normals into the object. Wherever
+`positions` and `normals` are arguments, a grasp may stand in the place of `positions`; `normals` is
+then `None`, or left out where it has a default.
+"""
+
+
+def page() -> str:
+    """The text of the page."""
+    parts = [INTRODUCTION]
+    for name, short in PACKAGES.items():
+        package = importlib.import_module(name)
+        summary = first_line(package)
+        heading = f"import {name}" + (f" as {short}" if short != name else "")
+        parts.append(f"\n## `{heading}`\n\n{summary}\n")
+        parts += [entry(short, each, getattr(package, each)) for each in sorted(package.__all__)]
+    return "".join(parts)
+
+
+def first_line(thing: Any) -> str:
+    return (inspect.getdoc(thing) or "").partition("\n")[0]
+
+
+def entry(short: str, name: str, thing: Any) -> str:
+    """What is said of one public name."""
+    if inspect.isclass(thing):
+        return f"\n### class `{short}.{name}`\n\n{described(thing)}" + "".join(of_class(thing))
+    if callable(thing):
+        return f"\n### `{short}.{name}{signature(thing)}`\n\n{described(thing)}"
+    return f"\n### `{short}.{name}`\n\n"
+
+
+def signature(function: Any) -> str:
+    """Names of arguments with their defaults."""
+    plain = [
+        each.replace(annotation=inspect.Parameter.empty, default=default_of(each))
+        for each in inspect.signature(function).parameters.values()
+        if each.name not in {"self", "cls"}
+    ]
+    return str(inspect.Signature(plain))
+
+
+class Unnamed:
+    """A default that has no short name."""
+
+    def __repr__(self) -> str:
+        return "..."
+
+
+def default_of(parameter: inspect.Parameter) -> Any:
+    value = parameter.default
+    return Unnamed() if callable(value) and value is not inspect.Parameter.empty else value
+
+
+def described(thing: Any) -> str:
+    """Its docstring as Markdown."""
+    found = parse(inspect.getdoc(thing) or "", style=DocstringStyle.GOOGLE)
+    lines = [flowed(text) for text in (found.short_description, found.long_description) if text]
+    fields = {each.args[1]: each for each in found.params if len(each.args) > 1}
+    said = [f"* `{name}`: {flowed(each.description or '')}" for name, each in fields.items()]
+    if found.returns and found.returns.description:
+        said.append(f"* returns: {flowed(found.returns.description)}")
+    said += [f"* raises `{each.type_name}`: {flowed(each.description or '')}"
+             for each in found.raises]  # fmt: skip
+    return "\n\n".join([*lines, *(["\n".join(said)] if said else [])]) + "\n"
+
+
+def flowed(text: str) -> str:
+    """Paragraphs on one line each; what is indented stays."""
+    parts = [part if part.startswith("    ") else " ".join(part.split())
+             for part in text.strip().split("\n\n")]  # fmt: skip
+    return "\n\n".join(parts)
+
+
+def of_class(kind: type) -> Iterator[str]:
+    """Fields with what is said below each, then properties and methods."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
+    assert isinstance(tree, ast.ClassDef)
+    lines = []
+    for part, after in zip(tree.body, [*tree.body[1:], None], strict=True):
+        is_text = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+        said = flowed(str(after.value.value)) if is_text else ""
+        if isinstance(part, ast.AnnAssign) and not ast.unparse(part.target).startswith("_"):
+            default = f" = {ast.unparse(part.value)}" if part.value else ""
+            kind_of = ast.unparse(part.annotation)
+            lines.append(
+                f"* `{ast.unparse(part.target)}: {kind_of}{short_default(default)}`: {said}"
+            )
+        elif isinstance(part, ast.Assign) and isinstance(part.value, ast.Constant):
+            lines.append(f"* `{ast.unparse(part.targets[0])} = {part.value.value!r}`: {said}")
+        elif isinstance(part, ast.FunctionDef) and not part.name.startswith("_"):
+            lines.append(f"* `{called(kind, part)}`: {ast.get_docstring(part, clean=True) or ''}"
+                         .partition("\n")[0])  # fmt: skip
+    if lines:
+        yield "\n" + "\n".join(line.rstrip().removesuffix(":") for line in lines) + "\n"
+
+
+def short_default(text: str) -> str:
+    return "" if "(" in text else text
+
+
+def called(kind: type, part: ast.FunctionDef) -> str:
+    """How a property or a method is written."""
+    held = inspect.getattr_static(kind, part.name)
+    if isinstance(held, property):
+        return f".{part.name}"
+    return f".{part.name}{signature(getattr(kind, part.name))}"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
+    print(PAGE)
