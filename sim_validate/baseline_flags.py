@@ -22,9 +22,9 @@ class Record:
     limit: Count | None = None
     """How many grasps to keep; all of them if not given."""
     setup: Path | None = None
-    """TOML file of simulation settings (see README)."""
+    """TOML file of simulation settings (see docs/files.md)."""
     wrenches: Path | None = None
-    """JSON file of wrenches to hold beside the usual ones (see README)."""
+    """JSON file of wrenches to hold beside the usual ones (see docs/files.md)."""
     random_wrenches: Annotated[int, at_least(0, up_to=10_000)] = 0
     """Also hold so many random wrenches."""
     limits: Literal["none", "ramp", "bisection"] = "none"

@@ -27,6 +27,7 @@ from sim_validate.bounds import at_least, check
 from sim_validate.config_file import with_config
 from sim_validate.dataset_flags import Dataset
 from sim_validate.engines import available_cores
+from sim_validate.examples import examples_for
 from sim_validate.flags import (
     Count,
     Edges,
@@ -185,7 +186,7 @@ class Analyze:
     """Judge contacts from elsewhere: closure with its certificate, quality, wrench limits."""
 
     contacts: Positional[Path]
-    """A contacts file (see README), or a grasps.json."""
+    """A contacts file (see docs/files.md), or a grasps.json."""
     friction: Positive | None = None
     """Coulomb coefficient of contacts without their own; the file's if not given."""
     torque_scale_m: Positive | None = None
@@ -267,6 +268,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
         check(command)
     except SystemExit as stop:
+        sys.stdout.write(examples_for(arguments))
         return stop.code if isinstance(stop.code, int) else Exit.USAGE
     except InputError as error:
         return _complain(str(error), Exit.USAGE)

@@ -78,7 +78,7 @@ class Build:
 
     objects: Positional[tuple[str, ...]]
     """Mesh files, folders of mesh files, or names of built-in objects; or one TOML file that says
-    all but where to (see README)."""
+    all but where to (see docs/datasets.md)."""
     out: Path
     """Folder of the dataset."""
     planning: OmitArgPrefixes[Planning] = field(default_factory=Planning)
@@ -92,7 +92,7 @@ class Import:
     """Judge grasps of other tools, and write them as a dataset."""
 
     contacts: Positional[Path]
-    """A contacts file (JSON) or npz file of four contacts for each grasp (see README)."""
+    """A contacts file (JSON) or npz file of four contacts for each grasp (see docs/datasets.md)."""
     object: Positional[str]
     """The mesh file they are on, or the name of a built-in object."""
     out: Path

@@ -153,7 +153,7 @@ class Testing:
     random_wrenches: Annotated[int, at_least(0, up_to=10_000)] = 0
     """Also hold so many random wrenches, each at a share of what the analysis says is resisted."""
     wrenches: Path | None = None
-    """A file of wrenches to hold as they are (see README)."""
+    """A file of wrenches to hold as they are (see docs/files.md)."""
     weight_n: Usual | None = None
     """Also hold the object's weight [N], along and against each axis or in the directions given."""
     down: Annotated[UseAppendAction[tuple[Direction, ...]], arg(metavar="X Y Z")] = ()
@@ -171,7 +171,7 @@ class Testing:
     surface: Literal["pads", "mesh"] = "pads"
     """What fingertips touch: a pad each, exact on any object, or a convex object's own mesh."""
     setup: Path | None = None
-    """A TOML file with settings of the simulation (see README)."""
+    """A TOML file with settings of the simulation (see docs/files.md)."""
     timeout_s: Positive = 600.0
     """Stop trials of one contact set that take longer."""
     jobs: Count = field(default_factory=available_cores)

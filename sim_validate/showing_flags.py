@@ -16,14 +16,7 @@ from sim_validate.flags import Count, Positive, Speech
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """Look at a grasp: in MuJoCo's viewer where there is a display, or in a file.
-
-    For example:
-
-    graspproof view DIR/grasps.json --grasp c-0-1-2-7
-
-    graspproof view DIR/grasps.json --picture grasp.png --page grasp.html --clip grasp.webp
-    """
+    """Look at a grasp: in MuJoCo's viewer where there is a display, or in a file."""
 
     grasps: Positional[Path]
     """A grasps.json."""
@@ -43,14 +36,7 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """Write what a run has found as pages that open in a browser, without any network.
-
-    For example:
-
-    graspproof report graspproof-out/wedge
-
-    graspproof report graspproof-out --out all-objects
-    """
+    """Write what a run has found as pages that open in a browser, without any network."""
 
     folder: Positional[Path]
     """Of a run, with its grasps.json; or of several, in folders."""

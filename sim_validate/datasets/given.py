@@ -41,7 +41,7 @@ def read_given(path: Path, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
     """Read contacts to judge.
 
     Args:
-        path: A contacts file (JSON, see README), or an npz file with the arrays above.
+        path: A contacts file (JSON, see docs/files.md), or an npz file with the arrays above.
         outward: Whether normals in the file point out of the object.
 
     Raises:

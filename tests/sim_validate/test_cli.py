@@ -1,5 +1,6 @@
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -10,7 +11,9 @@ import pytest
 
 import scenes
 from grasp_core.requests import FAMILIES
+from sim_validate import commands
 from sim_validate.cli import Exit, main
+from sim_validate.examples import EXAMPLES
 from tests.grasp_core.curved import bumpy_ellipsoid
 
 ROOT = Path(__file__).parent.parent.parent
@@ -306,3 +309,21 @@ def test_planning_flags_reach_the_planner(capsys):
 def test_flags_that_do_not_fit_are_refused(capsys, flags, said):
     assert main(["plan", "box", *flags]) == Exit.INPUT
     assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", EXAMPLES)
+def test_help_on_a_command_shows_examples_that_can_be_typed(monkeypatch, capsys, words):
+    assert main([*words.split(), "--help"]) == Exit.GOOD
+    shown = capsys.readouterr().out.partition("\nexamples:\n")[2].splitlines()
+    assert [line.strip() for line in shown] == [f"graspproof {each}" for each in EXAMPLES[words]]
+    asked = []
+    monkeypatch.setattr(commands, "execute", lambda command: asked.append(command) or Exit.GOOD)
+    for line in shown:
+        assert main(shlex.split(line)[1:]) == Exit.GOOD
+    assert len(asked) == len(shown) > 0
+
+
+def test_every_command_has_examples(capsys):
+    assert len(EXAMPLES) == len(commands.ACTIONS)
+    assert main(["--help"]) == Exit.GOOD
+    assert "examples:" not in capsys.readouterr().out

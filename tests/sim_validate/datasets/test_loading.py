@@ -12,7 +12,7 @@ from tests.sim_validate.datasets.small import build_small
 
 pytest.importorskip("pyarrow")
 SPLITS = ("train", "validation", "test")
-README = Path(__file__).parents[3] / "README.md"
+PAGE = Path(__file__).parents[3] / "docs" / "datasets.md"
 
 
 @pytest.fixture(scope="module")
@@ -148,8 +148,8 @@ def test_graspproof_loads_it_as_the_card_says(beside):
     np.testing.assert_array_equal(found["contact_points_m"], expected["contact_points_m"])
 
 
-def test_the_readme_says_the_same_lines(folder):
-    said = README.read_text()
+def test_the_page_says_the_same_lines(folder):
+    said = PAGE.read_text()
     lines = [
         line.partition("= ")[2] if line.startswith("grasps =") else line
         for package in ("polars", "pandas", "datasets", "sim_validate")

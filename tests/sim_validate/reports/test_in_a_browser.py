@@ -38,9 +38,8 @@ return [...document.querySelectorAll("h1, h2, p, a, th, td, label, summary, .ver
 """
 
 
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    """A headless one that tells of every request and of every message of its console."""
+def headless(profile):
+    """A browser without a window that tells of every request and of every message of its console."""
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
 
@@ -48,12 +47,16 @@ def browser(tmp_path_factory):
     options.binary_location = BROWSER
     flags = ("headless", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run",
              "disable-background-networking", "disable-component-update", "disable-sync",
-             "disable-dev-shm-usage",
-             f"user-data-dir={tmp_path_factory.mktemp('profile')}")  # fmt: skip
+             "disable-dev-shm-usage", f"user-data-dir={profile}")  # fmt: skip
     for flag in flags:
         options.add_argument(f"--{flag}")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    driver = webdriver.Chrome(options=options, service=Service(DRIVER))
+    return webdriver.Chrome(options=options, service=Service(DRIVER))
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    driver = headless(tmp_path_factory.mktemp("profile"))
     yield driver
     driver.quit()
 

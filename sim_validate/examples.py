@@ -1,0 +1,63 @@
+"""Examples that `--help` shows below what it says of a command."""
+
+EXAMPLES: dict[str, tuple[str, ...]] = {
+    "run": (
+        "run wedge",
+        "run part.stl --unit mm --friction 0.3 --limit 20 --limits ramp --out results",
+    ),
+    "plan": (
+        "plan wedge --limit 10 --out plan",
+        "plan part.stl --unit mm --finger-radius-m 0.006 --approach-m 0.05 --out plan",
+    ),
+    "validate": (
+        "validate plan/grasps.json --out verdicts",
+        "validate plan/grasps.json --weight-n 3 --down 0 0 -1 --limits ramp --trials 20",
+    ),
+    "scene": (
+        "scene plan/grasps.json --out scenes",
+        "scene plan/grasps.json --grasp c-0-1-2-7",
+    ),
+    "regions": (
+        "regions plan/grasps.json --out regions",
+        "regions plan/grasps.json --reserve 0.1 --balance area --limit 5 --out regions",
+    ),
+    "replay": (
+        "replay graspproof-out/wedge --grasp c-0-1-2-7 --out replay",
+        "replay wedge.baseline.json --grasp c-0-1-2-7 --wrench weakest --out replay",
+    ),
+    "analyze": (
+        "analyze contacts.json --friction 0.5 --wrench 0 0 -3 0 0 0",
+        "analyze plan/grasps.json --json",
+    ),
+    "inspect": ("inspect part.stl --unit mm",),
+    "objects": ("objects",),
+    "doctor": ("doctor",),
+    "view": (
+        "view DIR/grasps.json --grasp c-0-1-2-7",
+        "view DIR/grasps.json --picture grasp.png --page grasp.html --clip grasp.webp",
+    ),
+    "report": (
+        "report graspproof-out/wedge",
+        "report graspproof-out --out all-objects",
+    ),
+    "dataset build": (
+        "dataset build meshes/ wedge --friction 0.3 --friction 0.5 --limit 20 --out ds",
+        "dataset build ds/config.toml --out again",
+    ),
+    "dataset import": ("dataset import contacts.npz mug.obj --out judged",),
+    "dataset verify": ("dataset verify ds",),
+    "dataset export": ("dataset export ds --to csv --out tables",),
+    "baseline record": ("baseline record grasps.json -o wedge.baseline.json",),
+    "baseline check": ("baseline check wedge.baseline.json --junit results.xml",),
+}
+"""By the words of the command, without the program's name."""
+HELP = {"-h", "--help"}
+
+
+def examples_for(arguments: list[str]) -> str:
+    """What to show where help on a command was asked for; nothing elsewhere."""
+    if not HELP & set(arguments):
+        return ""
+    shown = next((EXAMPLES[" ".join(arguments[:words])] for words in (2, 1)
+                  if " ".join(arguments[:words]) in EXAMPLES), ())  # fmt: skip
+    return "\nexamples:\n" + "".join(f"  graspproof {line}\n" for line in shown) if shown else ""
