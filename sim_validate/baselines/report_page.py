@@ -8,23 +8,18 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
-from xml.etree import ElementTree
 
 from sim_validate.baselines.explaining import number
 from sim_validate.files import write_text
+from sim_validate.reports.pages import asset, page
 
 Line: TypeAlias = Mapping[str, Any]
 PAGE, DATA = "index.html", "report.json"
 COLUMNS = ("test", "grasp", "what became of it", "outcome", "critical friction", "in simulation",
            "weakest wrench, N", "in simulation", "moved, um", "held with noise", "why")  # fmt: skip
+MEASURED = ("outcome", "critical_friction", "simulated_critical_friction", "limit_n",
+            "simulated_limit_n", "displacement_m")  # fmt: skip
 CALM = ("same", "within bands", "stable", "blessed")
-STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem; color: #223; }
-table { border-collapse: collapse; } th, td { padding: .3rem .7rem; text-align: left; }
-th { border-bottom: 2px solid #889; } td { border-bottom: 1px solid #dde; vertical-align: top; }
-tr.calm td:nth-child(3) { color: #275; } tr.alarm td:nth-child(3) { color: #b21; font-weight: 600; }
-td pre { margin: 0; white-space: pre-wrap; font-size: 12px; } .was { color: #889; }
-"""
 
 
 def write_report(folder: Path, lines: Iterable[Line]) -> Path:
@@ -45,41 +40,37 @@ def write_report(folder: Path, lines: Iterable[Line]) -> Path:
 
 
 def _page(lines: Sequence[Line]) -> str:
-    html = ElementTree.Element("html", lang="en")
-    head = _add(html, "head")
-    ElementTree.SubElement(head, "meta", charset="utf-8")
-    _add(head, "title", "Stability of grasps")
-    _add(head, "style", STYLE)
-    body = _add(html, "body")
-    _add(body, "h1", "Stability of grasps")
     counts = Counter(str(line["status"]) for line in lines)
-    _add(body, "p", ", ".join(f"{count} {name}" for name, count in sorted(counts.items())))
-    table = _add(body, "table")
-    titles = _add(table, "tr")
-    for title in COLUMNS:
-        _add(titles, "th", title)
-    for line in lines:
-        _row(table, line)
-    text = ElementTree.tostring(html, encoding="unicode", method="html")
-    return f"<!DOCTYPE html>\n{text}\n"
+    return page(
+        "stability.html",
+        style=asset("style.css"),
+        counts=", ".join(f"{count} {name}" for name, count in sorted(counts.items())),
+        columns=COLUMNS,
+        rows=[_row(line) for line in lines],
+    )
 
 
-def _row(table: ElementTree.Element, line: Line) -> None:
-    row = _add(table, "tr")
-    row.set("class", "calm" if line["status"] in CALM else "alarm")
-    for text in (line["test"], line["grasp"], line["status"]):
-        _add(row, "td", str(text))
+def _row(line: Line) -> dict[str, Any]:
+    """What a row of the table says."""
     after: Line = line["after"] or {}
     before: Line = line["before"] or {}
-    for name in ("outcome", "critical_friction", "simulated_critical_friction", "limit_n",
-                 "simulated_limit_n", "displacement_m"):  # fmt: skip
-        cell = _add(row, "td", _said(name, after))
-        if before and _said(name, before) != _said(name, after):
-            _add(cell, "div", f"was {_said(name, before)}").set("class", "was")
     trials = after.get("noisy_trials")
     held = trials - len(after["noisy_not_held"]) if trials else 0
-    _add(row, "td", f"{held} of {trials}" if trials else "")
-    _add(_add(row, "td"), "pre", str(line["why"]))
+    return {
+        "calm": line["status"] in CALM,
+        "test": line["test"],
+        "grasp": line["grasp"],
+        "status": line["status"],
+        "measured": [_measured(name, before, after) for name in MEASURED],
+        "repeats": f"{held} of {trials}" if trials else "",
+        "why": line["why"],
+    }
+
+
+def _measured(name: str, before: Line, after: Line) -> tuple[str, str]:
+    """A figure, and what it was if that is another one."""
+    now, was = _said(name, after), _said(name, before)
+    return now, was if before and was != now else ""
 
 
 def _said(name: str, entry: Line) -> str:
@@ -87,9 +78,3 @@ def _said(name: str, entry: Line) -> str:
     if not entry or isinstance(value, str):
         return value or ""
     return number(1e6 * value if name == "displacement_m" and value is not None else value)
-
-
-def _add(parent: ElementTree.Element, tag: str, text: str = "") -> ElementTree.Element:
-    child = ElementTree.SubElement(parent, tag)
-    child.text = "".join(c if c.isprintable() or c == "\n" else " " for c in text)
-    return child

@@ -39,7 +39,7 @@ return [...document.querySelectorAll("h1, h2, p, a, th, td, label, summary, .ver
 
 
 def headless(profile):
-    """A browser without a window that tells of every request and of every message of its console."""
+    """A browser without a window that tells of every request, and of what its console says."""
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
 
