@@ -16,7 +16,12 @@ def shown_report(asked: showing_flags.Report, reporter: Reporter) -> Report:
     """Write a report, and say where it is."""
     with reporter.progress("drawing") as steps:
         report = write_report(
-            asked.folder, asked.out, jobs=asked.jobs, clips=asked.clips, progress=steps.update
+            asked.folder,
+            asked.out,
+            jobs=asked.jobs,
+            limit=asked.limit,
+            clips=asked.clips,
+            progress=steps.update,
         )
     if report.no_clip:
         reporter.warn(f"no clips: {report.no_clip}")

@@ -20,6 +20,10 @@ RESULTS = Path("graspproof-out")
 """Where results go, a folder for each object, if not told otherwise."""
 
 
+REPORTED = 200
+"""Most grasps that a run draws by itself, in a minute; `report` draws all."""
+
+
 def run_object(command: cli.Run, reporter: Reporter) -> int:
     """Plan on an object, simulate its grasps, write and show everything."""
     planning = command.planning
@@ -53,7 +57,7 @@ def run_object(command: cli.Run, reporter: Reporter) -> int:
 def _report(folder: Path, jobs: int, reporter: Reporter) -> None:
     """Show the results as pages; what has been found stands without them, too."""
     try:
-        shown_report(Report(folder, jobs=jobs), reporter)
+        shown_report(Report(folder, limit=REPORTED, jobs=jobs), reporter)
     except (GraspError, OSError) as error:
         reporter.warn(f"no report: {cli.reason_of(error)}")
 

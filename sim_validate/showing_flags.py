@@ -40,8 +40,10 @@ class Report:
 
     folder: Positional[Path]
     """Of a run, with its grasps.json; or of several, in folders."""
+    limit: Count | None = None
+    """Draw only so many grasps per run, those with bad news before others; all if not given."""
     clips: Annotated[int, at_least(0)] = 0
-    """Also film a trial of so many grasps per run, those that were not held first, where graphics
+    """Also film a trial of so many grasps per run, those with bad news first, where graphics
     are available."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes."""

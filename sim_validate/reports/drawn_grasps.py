@@ -72,10 +72,9 @@ class Drawn:
 
 
 def tasks_of(run: RunFolder, folder: Path, prefix: str, clips: int) -> list[Task]:
-    """What there is to draw of a run: clips of so many grasps, those that were not held first."""
+    """What there is to draw of a run: clips of so many grasps, those with bad news first."""
     grasps = run.saved.grasps
-    held = {grasp.id: bool(run.verdicts.get(grasp.id, {}).get("held", True)) for grasp in grasps}
-    filmed = [grasp.id for grasp in sorted(grasps, key=lambda grasp: held[grasp.id])][:clips]
+    filmed = {each.id for each in sorted(grasps, key=lambda each: not run.alarms(each.id))[:clips]}
     return [
         Task(
             saved=replace(run.saved, grasps=(grasp,), friction=run.friction),

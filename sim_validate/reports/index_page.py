@@ -91,7 +91,7 @@ def _weakest(verdict: Record) -> float | None:
 
 def _described(run: RunFolder) -> dict[str, Any]:
     counts = run.summary.get("summary")
-    said = f"{len(run.saved.grasps)} grasps at friction {run.friction:g}"
+    said = f"{len(run.saved.grasps) + run.left_out} grasps at friction {run.friction:g}"
     if counts:
         said += (
             f"; {counts['grasps_held']} of {counts['grasps']} held, "
@@ -99,7 +99,13 @@ def _described(run: RunFolder) -> dict[str, Any]:
             f"{counts['mismatches']} figures contradict the analysis"
         )
         said += "" if run.summary.get("complete", True) else "; the run was interrupted"
-    return {"name": run.saved.body.name, "summary": said + ".", "about": list(_about(run))}
+    said += "."
+    if run.left_out:
+        said += (
+            f" {len(run.saved.grasps)} are shown, those with bad news among them; "
+            "`graspproof report` draws all."
+        )
+    return {"name": run.saved.body.name, "summary": said, "about": list(_about(run))}
 
 
 def _about(run: RunFolder) -> Iterable[tuple[str, str]]:

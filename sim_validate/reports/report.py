@@ -37,6 +37,7 @@ def write_report(
     out: str | Path | None = None,
     *,
     jobs: int | None = None,
+    limit: int | None = None,
     clips: int = 0,
     progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> Report:
@@ -46,6 +47,7 @@ def write_report(
         folder: Of a run, with its grasps.json; or of several runs, in folders.
         out: Where to write; `report` in the folder if None.
         jobs: Largest number of processes; all cores if None.
+        limit: Draw only so many grasps per run, those with bad news before others; all if None.
         clips: Also film the trials of so many grasps per run, those that were not held first, where
             there are graphics.
         progress: Told how many grasps are drawn, of how many.
@@ -58,7 +60,7 @@ def write_report(
     """
     folder = Path(folder)
     out = folder / REPORT if out is None else Path(out)
-    runs = runs_in(folder)
+    runs = tuple(run.first(limit) for run in runs_in(folder))
     remove_report(out)
     return _written(runs, out, jobs or available_cores(), clips, progress)
 

@@ -1,7 +1,7 @@
 """The files of a run -> what a report is made of."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,28 @@ class RunFolder:
     """All of `verdicts.json` but the verdicts; empty if there is none."""
     regions: Mapping[str, Record]
     """Certified ones, by the grasps' ids; empty if there are none."""
+    left_out: int = 0
+    """Grasps of the files that are not among the `saved` ones."""
+
+    def first(self, limit: int | None) -> "RunFolder":
+        """The run with so many of its grasps, those with bad news before others; all verdicts."""
+        grasps = self.saved.grasps
+        if limit is None or len(grasps) <= limit:
+            return self
+        chosen = {
+            grasp.id for grasp in sorted(grasps, key=lambda each: not self.alarms(each.id))[:limit]
+        }
+        kept = tuple(grasp for grasp in grasps if grasp.id in chosen)
+        return replace(self, saved=replace(self.saved, grasps=kept), left_out=len(grasps) - limit)
+
+    def alarms(self, name: str) -> bool:
+        """Whether a grasp was not held, contradicts the analysis, or has a control that held."""
+        verdict = self.verdicts.get(name)
+        return verdict is not None and not (
+            verdict["held"]
+            and not verdict["mismatches"]
+            and not any(control["held"] for control in verdict["controls"].values())
+        )
 
     @property
     def verdicts_path(self) -> Path:

@@ -188,6 +188,18 @@ def test_an_interrupted_run_is_called_that(copy, tmp_path):
     assert "not simulated" in said
 
 
+def test_of_many_grasps_those_with_bad_news_are_shown(copy, tmp_path):
+    last = json.loads((copy / "verdicts.json").read_text())["verdicts"][-1]["id"]
+    changed(copy / "verdicts.json", lambda each: each["verdicts"][-1].update(held=False))
+    report = write_report(copy, tmp_path / "out", jobs=1, limit=1)
+    assert report.grasps == 1
+    assert [path.stem for path in (tmp_path / "out" / "grasps").iterdir()] == [last]
+    said = " ".join(Page(report.index.read_text()).said)
+    assert "3 grasps at friction 0.5" in said
+    assert "1 are shown" in said
+    assert "critical friction: 3 pairs" in said
+
+
 def test_several_runs_make_one_report(copy, tmp_path):
     both = tmp_path / "both"
     shutil.copytree(copy, both / "b")
