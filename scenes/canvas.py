@@ -10,14 +10,19 @@ import importlib
 import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from scenes.palette import INK
+from scenes.whole_files import replacing, write_parts
+
+Given = ParamSpec("Given")
+Made = TypeVar("Made")
 
 FORMATS = ("png", "svg", "pdf", "webp", "jpg")
 LETTERS = 9.0
@@ -27,7 +32,7 @@ STYLE = {
     "axes.spines.right": False, "axes.edgecolor": INK, "axes.labelcolor": INK, "text.color": INK,
     "xtick.color": INK, "ytick.color": INK, "axes.titlesize": LETTERS, "legend.frameon": False,
     "legend.fontsize": LETTERS - 1.0, "svg.hashsalt": "graspproof", "svg.fonttype": "path",
-    "path.simplify": True, "lines.linewidth": 1.4,
+    "lines.linewidth": 1.4, "hatch.linewidth": 0.8,
 }  # fmt: skip
 INTERVALS = 4
 """Between ticks of an axis; ticks are what takes longest to draw."""
@@ -37,6 +42,18 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "jpg": {"quality": 90},
 }
 """How pictures are packed: lines keep their colours, files stay small."""
+
+
+def in_style(make: Callable[Given, Made]) -> Callable[Given, Made]:
+    """A function that makes figures, in the style of all figures here, whatever users have set."""
+
+    @wraps(make)
+    def styled(*args: Given.args, **kwargs: Given.kwargs) -> Made:
+        style: Any = importlib.import_module("matplotlib.style")
+        with style.context(["default", STYLE]):
+            return make(*args, **kwargs)
+
+    return styled
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,22 +68,18 @@ class Around:
 
 
 def new_figure(width_in: float, height_in: float) -> Any:
-    """An empty figure of a size in inches, in the style of all figures here."""
-    matplotlib: Any = importlib.import_module("matplotlib")
+    """An empty figure of a size in inches."""
     figure: Any = importlib.import_module("matplotlib.figure")
-    with matplotlib.rc_context(STYLE):
-        return figure.Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout=None)
+    return figure.Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout=None)
 
 
 def panels(figure: Any, count: int, *, around: Around = Around()) -> list[Any]:
     """Axes side by side, where a figure says: to find room for labels would take as long again."""
-    matplotlib: Any = importlib.import_module("matplotlib")
     room = {"left": around.left, "right": 1.0 - around.right, "bottom": around.below,
             "top": 1.0 - around.above, "wspace": around.between}  # fmt: skip
-    with matplotlib.rc_context(STYLE):
-        found = list(figure.subplots(1, count, squeeze=False, gridspec_kw=room)[0])
-        for axes in found:
-            axes.locator_params(nbins=INTERVALS)
+    found = list(figure.subplots(1, count, squeeze=False, gridspec_kw=room)[0])
+    for axes in found:
+        axes.locator_params(nbins=INTERVALS)
     return found
 
 
@@ -101,6 +114,7 @@ def legend_line(colour: str, label: str, *, style: str = "-", marker: str = "") 
     return lines.Line2D([], [], color=colour, linestyle=style, marker=marker, label=label)
 
 
+@in_style
 def encoded(figure: Any, form: str) -> bytes:
     """A figure as the bytes of a file, the same for the same figure.
 
@@ -108,14 +122,10 @@ def encoded(figure: Any, form: str) -> bytes:
         figure: From `new_figure`.
         form: One of `FORMATS`.
     """
-    matplotlib: Any = importlib.import_module("matplotlib")
     stream = io.BytesIO()
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     options = {"pil_kwargs": OPTIONS[form]} if form in OPTIONS else {}
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(
-            stream, format=form, metadata=undated.get(form), facecolor="white", **options
-        )
+    figure.savefig(stream, format=form, metadata=undated.get(form), facecolor="white", **options)
     return stream.getvalue()
 
 
@@ -132,9 +142,8 @@ def write_frames(
         path: Of the file, gif or webp.
     """
     animation: Any = importlib.import_module("matplotlib.animation")
-    path.parent.mkdir(parents=True, exist_ok=True)
     writer = animation.PillowWriter(fps=rate)
-    with writer.saving(figure, str(path), dpi=DOTS_PER_INCH):
+    with replacing(path) as temporary, writer.saving(figure, str(temporary), dpi=DOTS_PER_INCH):
         for frame in range(count):
             draw(frame)
             writer.grab_frame(facecolor="white")
@@ -147,9 +156,16 @@ def write_figure(figure: Any, path: Path) -> Path:
     Raises:
         InputError: The ending is none of the known ones.
     """
+    return write_parts(path, [encoded(figure, format_of(path))])
+
+
+def format_of(path: Path) -> str:
+    """The format that the ending of a picture's name says.
+
+    Raises:
+        InputError: It is none of the known ones.
+    """
     form = path.suffix.lower().removeprefix(".").replace("jpeg", "jpg")
     if form not in FORMATS:
         raise InputError(f"{path}: pictures end in {', '.join('.' + name for name in FORMATS)}")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(encoded(figure, form))
-    return path
+    return form

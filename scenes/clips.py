@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array
 from grasp_core.errors import GraspError, InputError
 from scenes.mjcf import Scene
+from scenes.whole_files import write_parts
 
 FORMATS = (".gif", ".webp")
 ANGLES_DEG = (-50.0, 25.0)
@@ -59,7 +60,6 @@ def write_clip(
         GraphicsError: No graphics library draws here; the message has its words.
     """
     require_clip(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         job, out = Path(folder) / "job.npz", Path(folder) / f"clip{path.suffix.lower()}"
         np.savez(
@@ -70,8 +70,7 @@ def write_clip(
         for graphics in _graphics():
             said = _drawn(job, out, graphics)
             if not said:
-                path.write_bytes(out.read_bytes())
-                return path
+                return write_parts(path, [out.read_bytes()])
     raise GraphicsError(f"no graphics: {said}; with a display or libEGL there would be a clip")
 
 

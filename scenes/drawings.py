@@ -23,6 +23,9 @@ BEYOND = 0.2
 """How far lines go on behind the points that they are drawn for, in object radii."""
 REACH = 0.95
 """How far from the object's centre the surface of a regulus is drawn, in object radii."""
+FARTHEST = 4.0
+"""Length of a line of force at most, and how far foci of planes that are drawn are from the centre,
+in object radii; the foci of built-in objects are within three."""
 POLYGON = 3
 """Corners of the smallest region that can be shaded."""
 MOST_TRIANGLES = 2500
@@ -113,9 +116,11 @@ def _family(body: Polyhedron, grasp: Grasp) -> list[Shape]:
     foci = np.repeat(grasp.focus_points, len(grasp.contacts) // len(grasp.focus_points), axis=0)
     shapes = [Shape("focus", points=grasp.focus_points)]
     for finger, (start, focus) in enumerate(zip(grasp.positions, foci, strict=True)):
-        far = focus + beyond * _unit(focus - start)
-        shapes.append(Shape("line of force", finger, lines=(np.array([start, far]),)))
-    if grasp.family == "pencil":
+        length = min(float(np.linalg.norm(focus - start)) + beyond, FARTHEST * body.radius)
+        line = np.array([start, start + length * _unit(focus - start)])
+        shapes.append(Shape("line of force", finger, lines=(line,)))
+    away = np.linalg.norm(grasp.focus_points - body.center_of_mass, axis=1)
+    if grasp.family == "pencil" and away.max() <= FARTHEST * body.radius:
         shapes += _planes(grasp, beyond)
     return shapes
 

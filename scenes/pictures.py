@@ -11,6 +11,7 @@ from grasp_core.values import Grasp, Polyhedron
 from scenes.canvas import (
     Around,
     add_polygons,
+    in_style,
     legend_line,
     legend_patch,
     new_figure,
@@ -63,6 +64,7 @@ def write_picture(
     return write_figure(figure, Path(path))
 
 
+@in_style
 def grasp_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
     legend: bool = True,
@@ -72,8 +74,8 @@ def grasp_figure(
     shapes = draw_grasp(axes, body, grasp, friction, view or best_view(body, grasp))
     if legend:
         figure.legend(
-            handles=_legend(shapes), loc="lower center", ncols=4, frameon=False,
-            fontsize=8.0, handlelength=1.4, columnspacing=1.2,
+            handles=_legend(shapes), loc="lower center", ncols=4, handlelength=1.4,
+            columnspacing=1.2,
         )  # fmt: skip
     return figure
 

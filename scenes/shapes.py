@@ -25,7 +25,7 @@ class Shape:
     finger: int | None = None
     """Whose it is."""
     polygons: tuple[Array, ...] = ()
-    """Flat ones, corners in order, each (k, 3) [m]."""
+    """Flat, or nearly so, corners in order, each (k, 3) [m]."""
     lines: tuple[Array, ...] = ()
     """Polylines, each (k, 3) [m]."""
     points: Array | None = None

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from grasp_core.values import Grasp, Polyhedron
-from scenes.canvas import write_frames
+from scenes.canvas import in_style, write_frames
 from scenes.clips import require_clip
 from scenes.pictures import draw_grasp, empty_picture
 from scenes.views import View
@@ -13,6 +13,7 @@ FRAMES, RATE = 48, 12.0
 ELEVATION_DEG = 25.0
 
 
+@in_style
 def write_turning_clip(body: Polyhedron, grasp: Grasp, path: Path, friction: float) -> Path:
     """Draw a grasp from all around.
 

@@ -10,7 +10,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "plan part.stl --unit mm --finger-radius-m 0.006 --approach-m 0.05 --out plan",
     ),
     "validate": (
-        "validate plan/grasps.json --out verdicts",
+        "validate plan/grasps.json --out plan",
         "validate plan/grasps.json --weight-n 3 --down 0 0 -1 --limits ramp --trials 20",
     ),
     "scene": (
@@ -18,8 +18,8 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "scene plan/grasps.json --grasp c-0-1-2-7",
     ),
     "regions": (
-        "regions plan/grasps.json --out regions",
-        "regions plan/grasps.json --reserve 0.1 --balance area --limit 5 --out regions",
+        "regions plan/grasps.json --out plan",
+        "regions plan/grasps.json --reserve 0.1 --balance area --limit 5 --out smaller",
     ),
     "replay": (
         "replay graspproof-out/wedge --grasp c-0-1-2-7 --out replay",

@@ -1,7 +1,6 @@
 """Files in and out: whole or not at all."""
 
 import io
-import os
 import shutil
 import tempfile
 import zipfile
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
+from scenes.whole_files import write_parts
 
 MAX_TEXT_BYTES = 256 * 2**20
 
@@ -36,17 +36,17 @@ def read_text(path: Path) -> str:
 
 def write_text(path: Path, text: str) -> Path:
     """Write a file by renaming a complete one into place; folders are made as needed."""
-    return _write(path, [text.encode()])
+    return write_parts(path, [text.encode()])
 
 
 def write_bytes(path: Path, data: bytes) -> Path:
     """As `write_text`."""
-    return _write(path, [data])
+    return write_parts(path, [data])
 
 
 def write_lines(path: Path, lines: Iterable[str]) -> Path:
     """As `write_text`, of lines that are not all in memory; each ends with its line break."""
-    return _write(path, (line.encode() for line in lines))
+    return write_parts(path, (line.encode() for line in lines))
 
 
 def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
@@ -59,7 +59,7 @@ def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
             )  # of no date, so that equal arrays give equal files
             with archive.open(member, "w") as stream:
                 np.lib.format.write_array(stream, array, allow_pickle=False)
-    return _write(path, [held.getvalue()])
+    return write_parts(path, [held.getvalue()])
 
 
 def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
@@ -100,27 +100,10 @@ def whole_folder(folder: Path) -> Generator[Path]:
         raise
 
 
-def _write(path: Path, parts: Iterable[bytes]) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    temporary = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.writelines(parts)
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.chmod(0o644)
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-    return path
-
-
 def remove_results(folder: Path) -> None:
     """Remove what an earlier run has told of its grasps, which would contradict the new ones."""
     old = [folder / "verdicts.json", folder / "regions.json",
-           *folder.glob("scenes/[cprf]-*-*-*-*.xml"), *folder.glob("traces/[cprf]-*-*-*-*.npz"),
-           *folder.glob("proofs/[cprf]-*-*-*-*.npz")]  # fmt: skip
+           *folder.glob("scenes/*[cprf]-*-*-*-*.xml"), *folder.glob("traces/*[cprf]-*-*-*-*.npz"),
+           *folder.glob("proofs/*[cprf]-*-*-*-*.npz")]  # fmt: skip
     for path in old:
         path.unlink(missing_ok=True)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.certified_regions import CertifiedRegions
+from grasp_core.contact_hash import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.face_pieces import inscribed_disc_radius_of
 from grasp_core.twist_covers import TwistCover
@@ -62,7 +63,12 @@ def _record(
     grasp: Grasp, proved: CertifiedRegions | str, body: Polyhedron, folder: Path | None
 ) -> Mapping[str, Any]:
     """What is told of a grasp; its proof is written, or one of before is removed."""
-    named = {"id": grasp.id, "family": grasp.family, "planned_radius_m": grasp.radius}
+    named = {
+        "id": grasp.id,
+        "contacts_sha256": contacts_sha256(grasp.contacts),
+        "family": grasp.family,
+        "planned_radius_m": grasp.radius,
+    }
     name = f"{PROOFS}/{grasp.id}.npz"
     if isinstance(proved, str):
         if folder is not None:

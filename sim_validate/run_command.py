@@ -12,7 +12,7 @@ from sim_validate.gate import require_faithful
 from sim_validate.improving import show_gains
 from sim_validate.plan_command import asked_finger, plan_object, say_counts, with_regions
 from sim_validate.report_command import shown_report
-from sim_validate.reports.report import REPORT, remove_report
+from sim_validate.reports.report import REPORT, remove_report, require_report_folder
 from sim_validate.showing_flags import Report
 from sim_validate.validate_command import prepared, simulate_grasps, with_planned_fingers
 
@@ -32,6 +32,8 @@ def run_object(command: cli.Run, reporter: Reporter) -> int:
     body, found, moves = plan_object(command.object, planning, testing.jobs, reporter)
     folder = command.out or RESULTS / _folder_name(body.name)
     require_faithful(setup, found.friction, body.radius)
+    if not command.no_report:
+        require_report_folder(folder / REPORT)
     remove_results(folder)
     remove_report(folder / REPORT)
     found = with_regions(body, found, planning, folder, testing.jobs, reporter)

@@ -1,7 +1,7 @@
 """One grasp -> the pictures and charts of its page, in files; work for any process.
 
 Charts of motion need a trial: the first that was not held, or else the weakest, is simulated again,
-which gives bit for bit what was judged.
+which gives bit for bit what was judged, unless it was stopped then.
 """
 
 from dataclasses import dataclass, replace
@@ -15,6 +15,7 @@ from grasp_core.records import SavedGrasps
 from grasp_core.values import ContactRegion, Grasp, four
 from scenes.canvas import write_figure
 from scenes.clips import GraphicsError, magnified, write_clip
+from scenes.fingertips import FingerSettings
 from scenes.pictures import grasp_figure
 from scenes.views import best_view
 from sim_validate.replaying.bench import Replayed, replayed
@@ -80,7 +81,7 @@ def tasks_of(run: RunFolder, folder: Path, prefix: str, clips: int) -> list[Task
             saved=replace(run.saved, grasps=(grasp,), friction=run.friction),
             friction=run.friction,
             verdict=run.verdicts.get(grasp.id),
-            regions=run.regions.get(grasp.id),
+            regions=run.shaded.get(grasp.id),
             source=run.verdicts_path,
             folder=folder,
             name=f"{prefix}{grasp.id}",
@@ -142,6 +143,8 @@ def _with_motion(task: Task, verdict: Record, drawn: Drawn) -> Drawn:
 def _with_clip(task: Task, found: Replayed, drawn: Drawn) -> Drawn:
     path = task.folder / CLIPS / f"{task.name}.webp"
     known = np.isfinite(found.watched.joints).all(axis=1)
+    if not known.any():
+        return replace(drawn, no_clip=f"{task.name}: nothing finite to draw")
     joints, factor = magnified(found.watched.joints[known], found.scene)
     caption = f"{found.name}: {found.hold.outcome.value}, motion {factor:g} times as large"
     try:
@@ -159,4 +162,6 @@ def _written(task: Task, kind: str, ending: str, figure: Any) -> str:
 
 def _largest_push(verdict: Record | None) -> float:
     """Of each finger [N]."""
-    return 10.0 if verdict is None else float(verdict["settings"]["fingers"]["max_normal_force_n"])
+    if verdict is None:
+        return FingerSettings().max_normal_force_n
+    return float(verdict["settings"]["fingers"]["max_normal_force_n"])

@@ -61,7 +61,7 @@ class _Trial(_ControlTrial):
 class _Control(_Record):
     held: bool
     friction: Finite
-    wrenches: list[_ControlTrial]
+    wrenches: Annotated[list[_ControlTrial], Field(min_length=1)]
 
 
 class _Fingers(_Record):
@@ -116,6 +116,7 @@ class _Proof(_Record):
 
 class _GraspRegions(_Record):
     id: str
+    contacts_sha256: str
     disc_radius_m: Finite | None
     regions: Annotated[list[_Region], Field(min_length=4, max_length=4)] | None
     reason: str = ""
@@ -127,4 +128,5 @@ class RegionsFile(_Record):
 
     schema_: Annotated[int, Field(alias="schema")]
     object: _Object
+    friction: Positive
     grasps: list[_GraspRegions]

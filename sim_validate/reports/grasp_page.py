@@ -9,15 +9,13 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.values import Grasp
+from sim_validate.reports.agreement import as_predicted
 from sim_validate.reports.drawn_grasps import Drawn, certified
 from sim_validate.reports.pages import NOTHING, number, page
-from sim_validate.reports.run_folder import GRASPS, Record, RunFolder
+from sim_validate.reports.run_folder import GONE, GRASPS, HELD, Record, RunFolder, let_go
 from sim_validate.reports.turntable import as_text, grasp_data
-from sim_validate.verdict import LET_GO, Outcome
 
 MILLI, MICRO = 1e3, 1e6
-HELD = Outcome.HELD.value
-GONE = tuple(outcome.value for outcome in LET_GO)
 GOOD, BAD, QUIET = "good", "bad", "quiet"
 """Classes of what is said."""
 LESS = 1e-3
@@ -36,8 +34,8 @@ def grasp_page(
     run: RunFolder, grasp: Grasp, drawn: Drawn, object_script: str, neighbours: Neighbours
 ) -> str:
     """The text of a page."""
-    verdict, regions = run.verdicts.get(grasp.id), run.regions.get(grasp.id)
-    shown = certified(grasp, regions)
+    verdict = run.verdicts.get(grasp.id)
+    shown = certified(grasp, run.shaded.get(grasp.id))
     said, tone = said_of(verdict)
     return page(
         "grasp.html",
@@ -55,12 +53,12 @@ def grasp_page(
         shown_outcome=drawn.outcome,
         clip=drawn.clip,
         object_script=object_script,
-        facts=list(_facts(grasp, verdict)),
+        facts=list(_facts(run, grasp, verdict)),
         contacts=list(_contacts(shown)),
-        certified=_certified(regions),
+        certified=_certified(run, grasp),
         trials=[] if verdict is None else [_trial(each) for each in verdict["wrenches"]],
         controls=[] if verdict is None else _controls(verdict["controls"]),
-        commands=list(_commands(grasp, verdict)),
+        commands=list(_commands(run, grasp, verdict)),
         drawing=as_text(grasp_data(run.saved.body, shown, run.friction)),
     )
 
@@ -69,25 +67,31 @@ def said_of(verdict: Record | None) -> tuple[str, str]:
     """What became of a grasp, in a word or two, and whether that is good."""
     if verdict is None:
         return "not simulated", QUIET
+    outcome, controls = str(verdict["outcome"]), verdict["controls"].values()
+    if outcome not in (HELD, *GONE):
+        return outcome.replace("_", " "), BAD
     if verdict["mismatches"]:
         return "contradicts the analysis", BAD
-    if any(control["held"] for control in verdict["controls"].values()):
+    if any(control["held"] for control in controls):
         return "a control held", BAD
-    outcome = str(verdict["outcome"]).replace("_", " ")
-    return outcome, GOOD if verdict["held"] else BAD
+    if not all(map(let_go, controls)):
+        return "a control is undecided", BAD
+    return outcome.replace("_", " "), GOOD if verdict["held"] else BAD
 
 
-def _facts(grasp: Grasp, verdict: Record | None) -> Iterable[tuple[str, str]]:
+def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[tuple[str, str]]:
     """Names of figures and what they are."""
     lower, upper = grasp.ferrari_canny
+    planned = run.saved.friction
+    at_plan = "" if planned == run.friction else f", at friction {planned:g} as planned"
     yield "Family", grasp.family
     yield "Faces", ", ".join(map(str, grasp.faces))
-    yield "Smallest independent disc", f"{number(MILLI * grasp.radius)} mm"
+    yield "Smallest independent disc", f"{number(MILLI * grasp.radius)} mm{at_plan}"
     simulated = None if verdict is None else verdict["critical_friction"]["simulated"]
     in_simulation = "" if simulated is None else f", in simulation {number(simulated)}"
     yield "Critical friction", f"{number(grasp.critical_friction)}{in_simulation}"
-    yield "Margin of closure", number(grasp.closure_margin)
-    yield "Ferrari-Canny quality", f"{number(lower, 5)} to {number(upper, 5)} N"
+    yield "Margin of closure", f"{number(grasp.closure_margin)}{at_plan}"
+    yield "Ferrari-Canny quality", f"{number(lower, 5)} to {number(upper, 5)} N{at_plan}"
     yield "Normals span up to", f"{number(math.degrees(grasp.span_angle), 3)} deg"
     for place, focus in enumerate(grasp.focus_points):
         yield f"Focus {place}", f"{vector(MILLI * focus)} mm"
@@ -122,29 +126,32 @@ def _contacts(grasp: Grasp) -> Iterable[Record]:
         }
 
 
-def _certified(record: Record | None) -> str:
+def _certified(run: RunFolder, grasp: Grasp) -> str:
+    record = run.regions.get(grasp.id)
     if record is None:
         return ""
+    if not run.shaded:
+        return f"Certified regions are for friction {run.regions_friction:g}: not shown."
     if record["regions"] is None:
         return f"No certified regions: {record['reason']}."
     proof = record.get("proof")
     where = f" Proof: {proof['file']}." if proof else ""
-    return f"Regions are certified: discs of {number(MILLI * record['disc_radius_m'])} mm.{where}"
+    discs = number(MILLI * record["disc_radius_m"])
+    return (
+        f"Regions are certified for friction {run.regions_friction:g}: discs of {discs} mm.{where}"
+    )
 
 
 def _trial(trial: Record) -> Record:
-    limit, simulated = trial["predicted_limit"], trial["simulated_limit"]
-    resisted = limit is not None and limit >= 1.0
-    as_predicted = trial["outcome"] == HELD if resisted else trial["outcome"] in GONE
     moved = trial["displacement_m"]
     return {
         "name": trial["name"],
         "wrench": ", ".join(f"{part:.3g}" for part in trial["wrench"]),
-        "limit": number(limit),
-        "simulated": number(simulated),
+        "limit": number(trial["predicted_limit"]),
+        "simulated": number(trial["simulated_limit"]),
         "friction": number(trial["required_friction"], 3),
         "outcome": str(trial["outcome"]).replace("_", " "),
-        "tone": GOOD if as_predicted else BAD,
+        "tone": GOOD if as_predicted(trial) else BAD,
         "moved": NOTHING if moved is None else number(MICRO * moved, 2),
     }
 
@@ -165,15 +172,11 @@ def _controls(controls: Record) -> Sequence[Record]:
     ]
 
 
-def let_go(control: Record) -> bool:
-    """Whether each of a control's loads moved it, as the analysis says."""
-    return all(trial["outcome"] in GONE for trial in control["wrenches"])
-
-
-def _commands(grasp: Grasp, verdict: Record | None) -> Iterable[str]:
+def _commands(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[str]:
     """What shows, and simulates, the grasp again."""
     asked = f"--grasp {shlex.quote(grasp.id)}"
-    yield f"graspproof view {GRASPS} {asked}"
+    other = "" if run.friction == run.saved.friction else f" --friction {run.friction:g}"
+    yield f"graspproof view {GRASPS} {asked}{other}"
     if verdict is not None:
         yield f"graspproof replay . {asked} --out replay"
         for name in verdict["controls"]:

@@ -1,18 +1,21 @@
 """Runs and the pictures of their grasps -> the page that shows them all."""
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
-import numpy as np
-
 from grasp_core.values import Grasp
 from grasp_core.versions import versions
-from sim_validate.reports.fidelity_charts import Agreement, frictions_in, limits_in, quadrants_in
-from sim_validate.reports.grasp_page import MILLI, let_go, said_of
+from sim_validate.reports.agreement import (
+    Agreement,
+    frictions_in,
+    limits_in,
+    quadrants_in,
+    wrench_size,
+)
+from sim_validate.reports.grasp_page import MILLI, said_of
 from sim_validate.reports.pages import page
-from sim_validate.reports.run_folder import Record, RunFolder
+from sim_validate.reports.run_folder import Record, RunFolder, let_go
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,12 +83,11 @@ def _card(shown: Shown) -> dict[str, Any]:
 
 def _weakest(verdict: Record) -> float | None:
     """The least of the limits [N], torques over the grasp's size."""
-    lever = verdict["settings"]["grasp_size_m"]
-    found = list[float]()
-    for trial in verdict["wrenches"]:
-        if trial["predicted_limit"] is not None:
-            force, torque = np.reshape(trial["wrench"], (2, 3))
-            found.append(trial["predicted_limit"] * math.hypot(*force, *(torque / lever)))
+    found = [
+        trial["predicted_limit"] * wrench_size(verdict, trial)
+        for trial in verdict["wrenches"]
+        if trial["predicted_limit"] is not None
+    ]
     return min(found, default=None)
 
 

@@ -11,7 +11,8 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.resisted_wrenches import wrench_limits
 from grasp_core.values import Grasp, Polyhedron
-from scenes.canvas import Around, entitle, new_figure, panels
+from scenes.canvas import Around, entitle, in_style, new_figure, panels
+from scenes.fingertips import FingerSettings
 from scenes.palette import BAD, INK, NEUTRAL
 
 LONGITUDES, LATITUDES = 21, 11
@@ -19,6 +20,7 @@ LONGITUDES, LATITUDES = 21, 11
 COLOURS = "cividis"
 """From small to large; differs in brightness, too."""
 MILLI = 1e3
+USUAL_PUSH_N = FingerSettings().max_normal_force_n
 SAME = 12
 """Decimals in which equal directions are equal."""
 NAMED = {
@@ -27,8 +29,9 @@ NAMED = {
 """Longitudes and latitudes at which directions are written [deg], those of z a little below."""
 
 
+@in_style
 def margin_figure(
-    body: Polyhedron, grasp: Grasp, friction: float, *, max_normal_force_n: float = 10.0
+    body: Polyhedron, grasp: Grasp, friction: float, *, max_normal_force_n: float = USUAL_PUSH_N
 ) -> Any:
     """Largest force and largest torque resisted, by direction.
 

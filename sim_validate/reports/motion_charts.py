@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.canvas import entitle, new_figure, panels
+from scenes.canvas import entitle, in_style, new_figure, panels
 from scenes.palette import BAD, FINGERS, INK, NEUTRAL
 from sim_validate.replaying.bench import Replayed
 
@@ -17,6 +17,7 @@ LEAST_PUSH = 1e-3
 """Share of a finger's largest push below which its friction says nothing."""
 
 
+@in_style
 def motion_figure(found: Replayed, threshold_m: float) -> Any:
     """Displacement, normal forces, and friction used, over the time of one trial.
 
@@ -38,12 +39,13 @@ def motion_figure(found: Replayed, threshold_m: float) -> Any:
     moved.axhline(MICRO * threshold_m, color=BAD, linestyle="--", label="counts as moved")
     moved.set_yscale("log")
     moved.minorticks_off()
-    highest = max(MICRO * threshold_m, float(np.nanmax(MICRO * trace.displacements_m, initial=0.0)))
+    finite = trace.displacements_m[np.isfinite(trace.displacements_m)]
+    highest = MICRO * max(threshold_m, float(finite.max(initial=0.0)))
     moved.set_ylim(LEAST_UM, 100.0 * highest)
     moved.yaxis.set_ticks(10.0 ** np.arange(-4, math.log10(100.0 * highest), 2))
     moved.yaxis.set_major_formatter("{x:g}")
     _label(moved, "displacement [um]")
-    moved.legend(fontsize=7.0, frameon=False, loc="upper left", ncols=2)
+    moved.legend(fontsize=7.0, loc="upper left", ncols=2)
     _forces(pushed, watched.times_s, watched.pushes_n[..., 0])
     _label(pushed, "normal force [N]")
     _forces(used, watched.times_s, friction_used(watched.pushes_n, watched.friction))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
+from grasp_core.errors import InputError
 from scenes.canvas import write_figure
 from sim_validate.engines import available_cores, each
 from sim_validate.files import write_text
@@ -19,6 +20,10 @@ from sim_validate.reports.turntable import as_text, object_data
 REPORT, INDEX, GRASPS = "report", "index.html", "grasps"
 STATIC = ("style.css", "gallery.js", "turntable.js")
 FIDELITY = "fidelity.svg"
+MARK, MARKED = (
+    ".graspproof-report",
+    "The pages here were written by graspproof, which may replace them.\n",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +53,7 @@ def write_report(
         out: Where to write; `report` in the folder if None.
         jobs: Largest number of processes; all cores if None.
         limit: Draw only so many grasps per run, those with bad news before others; all if None.
-        clips: Also film the trials of so many grasps per run, those that were not held first, where
+        clips: Also film the trials of so many grasps per run, those with bad news first, where
             there are graphics.
         progress: Told how many grasps are drawn, of how many.
 
@@ -56,17 +61,32 @@ def write_report(
         Where the report is.
 
     Raises:
-        InputError: The folder holds no run, or a file in it is not what it should be.
+        InputError: The folder holds no run, a file in it is not what it should be, or the pages'
+            folder holds other things.
     """
     folder = Path(folder)
     out = folder / REPORT if out is None else Path(out)
     runs = tuple(run.first(limit) for run in runs_in(folder))
+    require_report_folder(out)
     remove_report(out)
+    write_text(out / MARK, MARKED)
     return _written(runs, out, jobs or available_cores(), clips, progress)
 
 
+def require_report_folder(folder: Path) -> None:
+    """That pages may be written into a folder: there is nothing in it, or a report.
+
+    Raises:
+        InputError: It holds other things.
+    """
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():
+        raise InputError(f"{folder}: is there, and holds no report; give another --out")
+
+
 def remove_report(folder: Path) -> None:
-    """Remove the pages of an earlier report, and nothing else."""
+    """Remove the pages of an earlier report, if there is one, and nothing else."""
+    if not (folder / MARK).is_file():
+        return
     old = chain(
         (folder / name for name in (INDEX, FIDELITY, *STATIC)),
         folder.glob("object-*.js"),

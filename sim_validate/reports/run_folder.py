@@ -1,22 +1,26 @@
 """The files of a run -> what a report is made of."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from grasp_core.contact_hash import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.records import SavedGrasps
 from sim_validate.files import read_text
 from sim_validate.grasps_file import read_grasps
 from sim_validate.region_files import REGIONS
 from sim_validate.reports.files_schema import RegionsFile, VerdictsFile
+from sim_validate.verdict import LET_GO, Outcome
 
 GRASPS, VERDICTS = "grasps.json", "verdicts.json"
 Record = Mapping[str, Any]
 """An object of a JSON file."""
+HELD = Outcome.HELD.value
+GONE = tuple(outcome.value for outcome in LET_GO)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +37,8 @@ class RunFolder:
     """All of `verdicts.json` but the verdicts; empty if there is none."""
     regions: Mapping[str, Record]
     """Certified ones, by the grasps' ids; empty if there are none."""
+    regions_friction: float | None
+    """For which they are certified; None if there are none."""
     left_out: int = 0
     """Grasps of the files that are not among the `saved` ones."""
 
@@ -53,8 +59,14 @@ class RunFolder:
         return verdict is not None and not (
             verdict["held"]
             and not verdict["mismatches"]
-            and not any(control["held"] for control in verdict["controls"].values())
+            and all(map(let_go, verdict["controls"].values()))
         )
+
+    @property
+    def shaded(self) -> Mapping[str, Record]:
+        """Regions that are certified for the friction of the verdicts, or less."""
+        enough = self.regions_friction is not None and self.regions_friction <= self.friction
+        return self.regions if enough else {}
 
     @property
     def verdicts_path(self) -> Path:
@@ -85,14 +97,29 @@ def _run(path: Path) -> RunFolder:
     saved = read_grasps(path / GRASPS)
     tried = _read(path / VERDICTS, VerdictsFile, saved)
     certified = _read(path / REGIONS, RegionsFile, saved)
+    verdicts: Sequence[Record] = [] if tried is None else tried["verdicts"]
+    regions: Sequence[Record] = [] if certified is None else certified["grasps"]
     return RunFolder(
         path=path,
         saved=saved,
         friction=saved.friction if tried is None else tried["friction"],
-        verdicts={} if tried is None else {each["id"]: each for each in tried["verdicts"]},
+        verdicts=_by_id(path / VERDICTS, verdicts, saved),
         summary={} if tried is None else {key: tried[key] for key in tried if key != "verdicts"},
-        regions={} if certified is None else {each["id"]: each for each in certified["grasps"]},
+        regions=_by_id(path / REGIONS, regions, saved),
+        regions_friction=None if certified is None else certified["friction"],
     )
+
+
+def _by_id(path: Path, records: Sequence[Record], saved: SavedGrasps) -> Mapping[str, Record]:
+    """Records of grasps, of the contacts that these have."""
+    contacts = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
+    for each in records:
+        if contacts.get(each["id"]) != each["contacts_sha256"]:
+            raise InputError(
+                f"{path}: {each['id']} has other contacts than in {GRASPS} beside it, or is not "
+                "there: make the file anew, or remove it"
+            )
+    return {each["id"]: each for each in records}
 
 
 def _read(path: Path, kind: type[BaseModel], saved: SavedGrasps) -> Record | None:
@@ -108,3 +135,8 @@ def _read(path: Path, kind: type[BaseModel], saved: SavedGrasps) -> Record | Non
     if found["object"]["content_sha256"] != saved.body.content_sha256:
         raise InputError(f"{path}: is about another object than {GRASPS} beside it")
     return found
+
+
+def let_go(control: Record) -> bool:
+    """Whether each of a control's loads moved it, as the analysis says."""
+    return all(trial["outcome"] in GONE for trial in control["wrenches"])

@@ -15,7 +15,7 @@ from grasp_core.arrays import Array
 from grasp_core.quality import ferrari_canny
 from grasp_core.values import Grasp, Polyhedron
 from grasp_core.wrench_sets import WrenchSet
-from scenes.canvas import entitle, new_figure, panels
+from scenes.canvas import entitle, in_style, new_figure, panels
 from scenes.palette import BAD, GOOD, INK
 from scenes.views import View, best_view
 
@@ -24,6 +24,7 @@ TURNS = 181
 TINY = np.finfo(np.float64).tiny
 
 
+@in_style
 def wrench_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None
 ) -> Any:
@@ -49,7 +50,7 @@ def wrench_figure(
     weakest, forces, torques = panels(figure, 3)
     _shadow(weakest, wrenches, _weakest_plane(wrenches, quality.direction), radius)
     weakest.axvline(radius, color=BAD, linewidth=1.2, label="limiting facet")
-    weakest.legend(loc="upper left", fontsize=8.0, frameon=False)
+    weakest.legend(loc="upper left")
     _label(weakest, "weakest direction", f"along it [N], quality {radius:.3g}", "across it [N]")
     _shadow(forces, wrenches, np.array([[*right, *still], [*up, *still]]), radius)
     _label(forces, "forces", "to the right of the picture [N]", "up [N]")

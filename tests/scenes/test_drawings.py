@@ -1,6 +1,7 @@
 """What is drawn of a grasp is where the grasp is."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -74,6 +75,15 @@ def test_lines_of_force_are_inside_the_cones_and_pass_the_foci(case):
         if grasp.family != "regulus":
             focus = grasp.focus_points[finger * len(grasp.focus_points) // 4]
             assert np.linalg.norm(np.cross(focus - start, way)) < 1e-9 * body.radius
+
+
+def test_far_foci_do_not_make_far_lines():
+    body, (grasp,) = grasps("double-wedge-bar", 0.3, 1, ("pencil",))
+    far = replace(grasp, focus_points=body.center_of_mass + 1e6 * np.eye(3)[:2])
+    shapes = drawing_of(body, far, 0.3)
+    assert not of_role(shapes, "plane")
+    for line in of_role(shapes, "line of force"):
+        assert np.linalg.norm(line.lines[0][1] - line.lines[0][0]) <= 5.0 * body.radius
 
 
 def test_planes_of_a_pencil_hold_both_contacts_and_both_foci():

@@ -74,6 +74,8 @@ def test_with_a_display_the_viewer_is_opened(planned, monkeypatch):
         (["--grasp", "c-9"], "no grasp c-9; there is"),
         (["--picture", "a.bmp"], "pictures end in"),
         (["--clip", "a.mp4"], "clips end in"),
+        (["--picture", "a.png", "--clip", "a.mp4"], "clips end in"),
+        (["--picture", "a.png", "--page", "a.png"], "pages end in"),
     ],
 )
 def test_what_cannot_be_shown_is_refused(planned, tmp_path, monkeypatch, capsys, flags, says):

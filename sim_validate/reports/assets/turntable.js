@@ -1,6 +1,6 @@
 "use strict";
-// Draws a grasp on a canvas and turns it. The same as scenes/painting.py: lines and points
-// become parts with a depth of their own, and the farthest are drawn first.
+// Draws a grasp on a canvas and turns it. As in scenes/painting.py, lines and points become parts
+// with a depth of their own, and the farthest are drawn first.
 (() => {
   const DISTANCE = 9000; // of the camera; lengths are thousandths of the object's radius
   const LIGHT = [-0.398, 0.697, 0.597];

@@ -10,9 +10,14 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
+from scenes.painting import DARKEST, LIGHT
+from scenes.palette import FINGERS
+from scenes.views import DISTANCE
 from sim_validate import commands
 from sim_validate.cli import Exit, main
 from sim_validate.grasps_file import read_grasps
+from sim_validate.reports.grasp_page import said_of
+from sim_validate.reports.pages import asset
 from sim_validate.reports.report import write_report
 from sim_validate.reports.turntable import UNITS
 
@@ -118,6 +123,17 @@ def test_the_drawing_is_that_of_the_grasp(small_run, small_report):
     assert [shape["role"] for shape in drawn] == ["object", "edge"]
 
 
+def test_colours_and_camera_are_the_same_everywhere():
+    style, script = asset("style.css"), asset("turntable.js")
+    for finger, colour in enumerate(FINGERS):
+        assert f".finger{finger} {{ background: {colour}; }}" in style
+    said = dict(re.findall(r"const (DISTANCE|DARKEST) = ([\d.]+);", script))
+    assert float(said["DISTANCE"]) == DISTANCE * UNITS
+    assert float(said["DARKEST"]) == DARKEST
+    (light,) = re.findall(r"const LIGHT = \[(.*)\];", script)
+    np.testing.assert_allclose([float(part) for part in light.split(",")], LIGHT, atol=1e-3)
+
+
 def test_its_commands_are_commands(small_run, small_report, monkeypatch):
     monkeypatch.chdir(small_run)
     asked = []
@@ -143,6 +159,10 @@ def changed(path, change):
     path.write_text(json.dumps(document))
 
 
+def without_proofs(document):
+    document["grasps"][0].update(regions=None, reason=EVIL)
+
+
 def spoiled(document):
     document["verdicts"][0]["mismatches"] = [EVIL]
     controls = document["verdicts"][0]["controls"]
@@ -153,7 +173,7 @@ def spoiled(document):
 def test_names_are_escaped(copy, tmp_path):
     changed(copy / "grasps.json", lambda each: each["object"].update(name=EVIL))
     changed(copy / "verdicts.json", spoiled)
-    changed(copy / "regions.json", lambda each: each["grasps"][0].update(regions=None, reason=EVIL))
+    changed(copy / "regions.json", without_proofs)
     index = write_report(copy, tmp_path / "out", jobs=1).index
     pages = pages_of(index.parent)
     assert len(pages) == 4
@@ -216,14 +236,67 @@ def test_several_runs_make_one_report(copy, tmp_path):
 
 
 def test_pages_of_an_earlier_report_are_removed_and_nothing_else(copy):
+    write_report(copy, jobs=1, limit=1)
     old = copy / "report" / "grasps" / "c-9-9-9-9.html"
     own = copy / "report" / "notes.txt"
     for path in (old, own):
-        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("old")
-    write_report(copy, jobs=1)
+    write_report(copy, jobs=1, limit=1)
     assert not old.exists()
     assert own.read_text() == "old"
+
+
+def test_pages_are_not_put_among_other_things(copy, tmp_path, capsys):
+    """Such as the pages and pictures of somebody else's site."""
+    names = ("index.html", "style.css", "pictures/a.webp")
+    for name in names:
+        (tmp_path / "site" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "site" / name).write_text("mine")
+    assert main(["report", str(copy), "--out", str(tmp_path / "site")]) == Exit.INPUT
+    assert "holds no report" in capsys.readouterr().err
+    assert all((tmp_path / "site" / name).read_text() == "mine" for name in names)
+    shutil.copytree(tmp_path / "site", copy / "report")
+    assert main(["run", "wedge", "--limit", "1", "--out", str(copy), "-q"]) == Exit.INPUT
+    assert (copy / "verdicts.json").is_file()
+
+
+def test_regions_for_more_friction_are_not_shown(copy, tmp_path):
+    changed(copy / "regions.json", lambda each: each.update(friction=0.6))
+    pages = pages_of(write_report(copy, tmp_path / "out", jobs=1, limit=1).index.parent)
+    said = " ".join(next(page for path, page in pages.items() if path.stem != "index").said)
+    assert "Certified regions are for friction 0.6: not shown" in said
+    assert "Regions are certified" not in said
+
+
+def test_figures_of_the_plan_say_its_friction(small_run, tmp_path):
+    shutil.copy(small_run / "grasps.json", tmp_path / "grasps.json")
+    asked = ["validate", str(tmp_path / "grasps.json"), "--limit", "1", "--friction", "0.4"]
+    assert main([*asked, "--out", str(tmp_path), "-q"]) == Exit.GOOD
+    folder = write_report(tmp_path, jobs=1, limit=1).index.parent / "grasps"
+    said = " ".join(Page(next(folder.iterdir()).read_text()).said)
+    assert said.count("at friction 0.5 as planned") == 3
+    assert "--friction 0.4" in said
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"outcome": "timeout", "held": False, "mismatches": ["not found"]}, "timeout"),
+        ({"outcome": "slipped", "held": False}, "slipped"),
+        ({"mismatches": ["not found"]}, "contradicts the analysis"),
+    ],
+)
+def test_bad_news_has_a_name(small_run, change, says):
+    verdict = json.loads((small_run / "verdicts.json").read_text())["verdicts"][0]
+    assert said_of(verdict) == ("held", "good")
+    assert said_of(verdict | change) == (says, "bad")
+
+
+def test_a_control_that_says_nothing_is_bad_news(small_run):
+    verdict = json.loads((small_run / "verdicts.json").read_text())["verdicts"][0]
+    for trial in next(iter(verdict["controls"].values()))["wrenches"]:
+        trial["outcome"] = "diverged"
+    assert said_of(verdict) == ("a control is undecided", "bad")
 
 
 @pytest.mark.parametrize(
@@ -235,6 +308,8 @@ def test_pages_of_an_earlier_report_are_removed_and_nothing_else(copy):
          r"verdicts\.0\.wrenches\.0\.wrench"),
         ("verdicts.json", lambda each: each["object"].update(content_sha256="0"), "another object"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(contacts_sha256="0"), "contacts"),
+        ("verdicts.json", lambda each: each["verdicts"][0].update(id="c-9-9-9-9"), "is not there"),
+        ("regions.json", lambda each: each["grasps"][0].update(contacts_sha256="0"), "contacts"),
         ("regions.json", lambda each: each["grasps"][0]["regions"].pop(), "at least 4 items"),
         ("regions.json", lambda each: each["grasps"].append(3), r"regions\.json: grasps\.3"),
     ],

@@ -1,0 +1,108 @@
+"""How far verdicts in JSON agree with the analysis: pairs of figures, and counts of trials.
+
+Four counts say whether a load was predicted to be resisted, and whether the object held. What was
+predicted to hold and did not, or the other way round, contradicts one of the two. As in `validate`,
+loads within `AGREEMENT` of their limit, and trials that say nothing, count as neither.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim_validate.reports.run_folder import GONE, HELD, Record
+from sim_validate.wrench_verdict import AGREEMENT
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """One quantity as predicted and as simulated."""
+
+    quantity: str
+    """With its unit."""
+    pairs: tuple[tuple[float, float], ...]
+    """(predicted, simulated)"""
+    below: int = 0
+    """Cases that held at the least friction that is tried, and so have no figure."""
+
+    def differ(self) -> tuple[bool, ...]:
+        """Of each pair, whether it is a mismatch."""
+        return tuple(abs(two - one) > AGREEMENT * one for one, two in self.pairs)
+
+    @property
+    def worst(self) -> float:
+        """Largest relative difference; 0 without pairs."""
+        shares = [abs(two - one) / one if one > 0.0 else math.inf for one, two in self.pairs]
+        return max(shares, default=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Quadrants:
+    """Trials by what was predicted and what happened."""
+
+    resisted_held: int = 0
+    resisted_let_go: int = 0
+    not_resisted_held: int = 0
+    not_resisted_let_go: int = 0
+    neither: int = 0
+    """Trials that say nothing, such as those that diverged, or are too near the limit."""
+
+
+def frictions_in(verdicts: Iterable[Record]) -> Agreement:
+    """Critical frictions; a simulated one of zero says that the least one tried was enough."""
+    found = [verdict["critical_friction"] for verdict in verdicts]
+    measured = [each for each in found if each["simulated"] is not None]
+    pairs = tuple((each["predicted"], each["simulated"]) for each in measured if each["simulated"])
+    return Agreement("critical friction", pairs, len(measured) - len(pairs))
+
+
+def limits_in(verdicts: Iterable[Record]) -> Agreement:
+    """Sizes of the largest wrenches resisted."""
+    pairs = tuple(
+        (size * trial["predicted_limit"], size * trial["simulated_limit"])
+        for verdict in verdicts
+        for trial in verdict["wrenches"]
+        if None not in (trial["predicted_limit"], trial["simulated_limit"])
+        for size in [wrench_size(verdict, trial)]
+    )
+    return Agreement("largest wrench [N], torques over grasp size", pairs)
+
+
+def wrench_size(verdict: Record, trial: Record) -> float:
+    """Of a trial's wrench [N], torques over the size of the grasp."""
+    force, torque = np.reshape(trial["wrench"], (2, 3))
+    return math.hypot(*force, *(torque / verdict["settings"]["grasp_size_m"]))
+
+
+def quadrants_in(verdicts: Sequence[Record]) -> Quadrants:
+    """Trials of grasps and of their controls; what controls are loaded with, nothing resists."""
+    counts = Counter[str]()
+    for verdict in verdicts:
+        counts.update(_place(trial, resisted(trial)) for trial in verdict["wrenches"])
+        for control in verdict["controls"].values():
+            counts.update(_place(trial, False) for trial in control["wrenches"])
+    return Quadrants(**counts)
+
+
+def resisted(trial: Record) -> bool | None:
+    """Whether a load is predicted to be resisted; None where it is too near the limit to say."""
+    limit = trial["predicted_limit"]
+    if limit is not None and abs(limit - 1.0) <= AGREEMENT:
+        return None
+    return limit is not None and limit > 1.0
+
+
+def as_predicted(trial: Record) -> bool:
+    """Whether a trial ended as predicted, or as it might."""
+    wanted = resisted(trial)
+    ends = (HELD, *GONE) if wanted is None else (HELD,) if wanted else GONE
+    return trial["outcome"] in ends
+
+
+def _place(trial: Record, wanted: bool | None) -> str:
+    if wanted is None or trial["outcome"] not in (HELD, *GONE):
+        return "neither"
+    held = "held" if trial["outcome"] == HELD else "let_go"
+    return f"{'resisted' if wanted else 'not_resisted'}_{held}"
