@@ -95,6 +95,16 @@ def remove_report(folder: Path) -> None:
     )
     for path in old:
         path.unlink(missing_ok=True)
+    for kind in (GRASPS, PICTURES, CHARTS, CLIPS):
+        _remove_if_empty(folder / kind)
+    if [path.name for path in folder.iterdir()] == [MARK]:
+        (folder / MARK).unlink()
+        folder.rmdir()
+
+
+def _remove_if_empty(folder: Path) -> None:
+    if folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()
 
 
 def _written(

@@ -398,10 +398,9 @@ def test_control_characters_in_an_id_do_not_reach_the_terminal(capsys):
     assert "\x1b[31m" not in capsys.readouterr().out
 
 
-def test_the_readme_shows_a_file_that_is_read(analyze):
-    readme = (ROOT / "README.md").read_text()
-    assert "`graspproof analyze" in readme
-    shown = json.loads(re.search(r"```json\n(.*?)```", readme, re.DOTALL)[1])
+def test_the_page_of_files_shows_one_that_is_read(analyze):
+    page = (ROOT / "docs" / "files.md").read_text()
+    shown = json.loads(re.search(r"```json\n(.*?)```", page, re.DOTALL)[1])
     code, document = analyze(shown)
     assert code == Exit.GOOD
     assert len(document["grasps"][0]["contacts"]) == 4

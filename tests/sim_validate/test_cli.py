@@ -50,6 +50,7 @@ def test_a_second_run_leaves_nothing_of_the_first_behind(here):
     assert main(["run", "box", *nothing]) == Exit.NONE
     names = sorted(p.name for p in (here / "results").rglob("*") if p.is_file())
     assert names == ["grasps.json", "mine.xml"]
+    assert not (here / "results" / "report").exists()
 
 
 @pytest.mark.usefixtures("here")
