@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array
 from grasp_core.errors import GraspError, InputError
 from scenes.mjcf import Scene
+from scenes.palette import FINGERS, rgb
 from scenes.whole_files import write_parts
 
 FORMATS = (".gif", ".webp")
@@ -30,6 +31,10 @@ SIZE = (480, 360)
 """Of the picture [pixels]."""
 RATE = 25.0
 """Frames per second."""
+NEARER = 0.9
+"""Fingertips may come so much nearer to the border of the picture than the object."""
+RIGID = 7
+"""Numbers of a scene whose fingertips do not slide: the pose of the object."""
 VISIBLE = 0.1
 """Motion that is easily seen, in grasp sizes."""
 MOST = 1000.0
@@ -63,15 +68,27 @@ def write_clip(
     with tempfile.TemporaryDirectory() as folder:
         job, out = Path(folder) / "job.npz", Path(folder) / f"clip{path.suffix.lower()}"
         np.savez(
-            job, xml=scene.xml, joints=joints, size=SIZE, radius=scene.layout.radius_m, rate=RATE,
+            job, xml=scene.xml, joints=joints, size=SIZE, radius=_reach(scene, joints), rate=RATE,
             caption=caption, angles=np.broadcast_to(angles_deg, (len(joints), 2)),
+            colours=[rgb(colour) for colour in FINGERS],
         )  # fmt: skip
         said = ""
         for graphics in _graphics():
             said = _drawn(job, out, graphics)
             if not said:
                 return write_parts(path, [out.read_bytes()])
-    raise GraphicsError(f"no graphics: {said}; with a display or libEGL there would be a clip")
+    raise GraphicsError(f"no graphics: {said}; {remedy()}")
+
+
+def _reach(scene: Scene, joints: Array) -> float:
+    """How far from the object's centre there is something to see [m]."""
+    layout = scene.layout
+    slides = np.zeros((1, len(layout.contacts), 3))
+    if joints.shape[1] > RIGID:
+        slides = joints[:, RIGID:].reshape(len(joints), len(layout.contacts), 3)
+    tips = layout.tip_centers + np.einsum("kij,nkj->nki", layout.frames, slides)
+    farthest = float(np.linalg.norm(tips, axis=2).max()) + layout.drive.radius_m
+    return max(layout.radius_m, NEARER * farthest)
 
 
 def require_clip(path: Path) -> None:
@@ -97,6 +114,13 @@ def available_graphics() -> str:
             return graphics
         said.append(trouble)
     raise GraphicsError("; ".join(said))
+
+
+def remedy() -> str:
+    """What would help where there are no graphics."""
+    if (chosen := os.environ.get("MUJOCO_GL")) is not None:
+        return f"MUJOCO_GL is set to {chosen!r}: unset it to have others tried"
+    return "install libegl1 or libosmesa6, or use a display"
 
 
 def has_display() -> bool:

@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, positive
+from grasp_core.on_faces import check_on_faces
 from grasp_core.values import Grasp, Polyhedron
 from scenes.ruled_surfaces import between, rulings
 from scenes.shapes import Shape, closed, cone_rim, cone_sides, tube
@@ -26,6 +27,8 @@ REACH = 0.95
 FARTHEST = 4.0
 """Length of a line of force at most, and how far foci of planes that are drawn are from the centre,
 in object radii; the foci of built-in objects are within three."""
+SLACK_RAD = 1e-6
+"""By which a force cone may seem to stick out of its friction cone."""
 POLYGON = 3
 """Corners of the smallest region that can be shaded."""
 MOST_TRIANGLES = 2500
@@ -41,8 +44,14 @@ def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, 
         friction: Coulomb coefficient of the friction cones.
 
     Returns:
-        Shapes in the object's frame.
+        Shapes in the object's frame. Force cones that are wider than this friction allows are left
+        out.
+
+    Raises:
+        InputError: The friction is not positive, or the grasp is not on this object.
     """
+    positive(friction, "friction")
+    check_on_faces(body, grasp)
     shapes = [*glass(body)]
     for finger in range(len(grasp.contacts)):
         shapes += _finger(body, grasp, finger, math.atan(friction))
@@ -99,9 +108,11 @@ def _finger(body: Polyhedron, grasp: Grasp, finger: int, half_angle: float) -> l
     shapes = [
         Shape("finger", finger, polygons=bar),
         Shape("friction cone", finger, lines=(closed(rim), *spokes)),
-        Shape("force cone", finger,
-              polygons=cone_sides(tip, cone.axis, cone.half_angle, length)),
-    ]  # fmt: skip
+    ]
+    lean = math.acos(min(float(cone.axis @ contact.normal), 1.0))
+    if lean + cone.half_angle <= half_angle + SLACK_RAD:
+        sides = cone_sides(tip, cone.axis, cone.half_angle, length)
+        shapes.append(Shape("force cone", finger, polygons=sides))
     region = grasp.regions[finger].polygon
     if len(region) >= POLYGON:
         shapes.append(Shape("region", finger, polygons=(region,)))

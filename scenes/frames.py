@@ -16,7 +16,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont  # noqa: TID251
 
 DISTANCE = 3.2
-"""Of the camera, in object radii."""
+"""Of the camera, in radii of what is seen."""
 SKY, AMBIENT, DIFFUSE = (0.93, 0.95, 0.97), 0.45, 0.45
 """Colour of the background, and of the light from the camera."""
 INK, LETTERS = (30, 30, 40), 18
@@ -27,6 +27,10 @@ def main(job: str, out: str) -> None:
     """Draw every row of joint positions."""
     given = np.load(job, allow_pickle=False)
     model = _lit(str(given["xml"]))
+    for finger, colour in enumerate(given["colours"]):
+        for place in range(model.ngeom):
+            if model.geom(place).name == f"finger{finger}":
+                model.geom_rgba[place, :3] = colour
     data = mujoco.MjData(model)
     width, height = (int(size) for size in given["size"])
     model.vis.global_.offwidth, model.vis.global_.offheight = width, height

@@ -105,7 +105,7 @@ def draw_grasp(
         What was drawn.
     """
     shapes = drawing_of(body, grasp, friction)
-    numbers = _number_places(body, grasp)
+    numbers = number_places(body, grasp)
     low, high = _frame(shapes, numbers, body, None if steady else view)
     patches = painted(shapes, view, float(high[0] - low[0]))
     add_polygons(
@@ -125,7 +125,7 @@ def draw_grasp(
     return shapes
 
 
-def _number_places(body: Polyhedron, grasp: Grasp) -> Array:
+def number_places(body: Polyhedron, grasp: Grasp) -> Array:
     """Where the fingers' numbers are: behind the ends of their bars, (4, 3) [m]."""
     ways = grasp.normals if grasp.approach_directions is None else grasp.approach_directions
     return grasp.positions - (BAR_LENGTH + NUMBER_BEYOND) * body.radius * ways

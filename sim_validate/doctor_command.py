@@ -12,7 +12,7 @@ from grasp_core.kernels import SWITCH, compiled
 from grasp_core.planner import plan
 from grasp_core.values import Grasp, Polyhedron
 from grasp_core.versions import versions
-from scenes.clips import GraphicsError, available_graphics, has_display
+from scenes.clips import GraphicsError, available_graphics, has_display, remedy
 from scenes.objects import example_object
 from sim_validate import cli
 from sim_validate.console import Reporter
@@ -77,10 +77,7 @@ def _machine() -> Mapping[str, str]:
     try:
         graphics = f"MuJoCo draws with {available_graphics() or 'its default'}"
     except GraphicsError as error:
-        graphics = (
-            f"none ({error}); pictures and reports need none, clips of `replay` do: "
-            "install libegl1 or libosmesa6, or choose with MUJOCO_GL"
-        )
+        graphics = f"none ({error}); pictures and reports need none, clips do: {remedy()}"
     loops = "yes"
     if compiled(USUAL_KERNEL) is None:
         loops = f"no, {SWITCH} says so" if os.environ.get(SWITCH) == "off" else (

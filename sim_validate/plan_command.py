@@ -173,7 +173,7 @@ def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
     counts = found.counts
     reporter.say(
         f"{body.name}: {counts.faces} faces, {counts.quadruples} face quadruples, "
-        + (f"{counts.spanning} spanning (P3), " if counts.spanning is not None else "")
+        + (f"normals of {counts.spanning} span (P3), " if counts.spanning is not None else "")
         + f"friction {found.friction:g}, "
         f"theta {math.degrees(found.theta):.4g} deg"
     )

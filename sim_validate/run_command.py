@@ -5,6 +5,7 @@ from pathlib import Path
 
 from grasp_core.errors import GraspError
 from grasp_core.records import SavedGrasps, plan_to_json
+from grasp_core.values import Polyhedron
 from sim_validate import cli
 from sim_validate.console import Reporter
 from sim_validate.files import remove_results, write_text
@@ -18,8 +19,8 @@ from sim_validate.validate_command import prepared, simulate_grasps, with_planne
 
 RESULTS = Path("graspproof-out")
 """Where results go, a folder for each object, if not told otherwise."""
-
-
+HASHED = 8
+"""Digits of a hash that tell objects apart whose names look alike."""
 REPORTED = 200
 """Most grasps that a run draws by itself, in a minute; `report` draws all."""
 
@@ -30,7 +31,7 @@ def run_object(command: cli.Run, reporter: Reporter) -> int:
     testing = with_planned_fingers(command.testing, asked_finger(planning))
     setup, _ = prepared(testing, planning.seed, command.out or RESULTS)
     body, found, moves = plan_object(command.object, planning, testing.jobs, reporter)
-    folder = command.out or RESULTS / _folder_name(body.name)
+    folder = command.out or RESULTS / _folder_name(body)
     require_faithful(setup, found.friction, body.radius)
     if not command.no_report:
         require_report_folder(folder / REPORT)
@@ -64,6 +65,7 @@ def _report(folder: Path, jobs: int, reporter: Reporter) -> None:
         reporter.warn(f"no report: {cli.reason_of(error)}")
 
 
-def _folder_name(name: str) -> str:
-    """A file name that is one plain part of a path."""
-    return re.sub(r"[^\w-]+", "_", name) or "object"
+def _folder_name(body: Polyhedron) -> str:
+    """A file name that is one plain part of a path; of names that are not, with a hash."""
+    plain = re.sub(r"[^\w-]+", "_", body.name) or "object"
+    return plain if plain == body.name else f"{plain}-{body.content_sha256[:HASHED]}"

@@ -19,7 +19,7 @@ class View:
     """Look at a grasp: in MuJoCo's viewer where there is a display, or in a file."""
 
     grasps: Positional[Path]
-    """A grasps.json."""
+    """A grasps.json, or the folder of a run."""
     grasp: str | None = None
     """Id of the grasp; the first one if not given."""
     friction: Positive | None = None

@@ -24,9 +24,10 @@ from sim_validate.schedules import Clock, Schedule
 try:
     import mujoco  # noqa: TID251 - this is the door
     from mujoco import batch as mujoco_batch  # noqa: TID251
-except RuntimeError as error:  # it looks for its graphics when it is imported
-    raise InputError(
-        f"MuJoCo cannot be imported: {error}; MUJOCO_GL may be egl, osmesa, glfw, or not set"
+except (ImportError, RuntimeError, AttributeError, OSError) as error:
+    raise InputError(  # it looks for graphics when it is imported, which nothing here needs
+        f"MuJoCo cannot be imported ({error}); is MUJOCO_GL set to graphics that are not here? "
+        "Unset it, or install the package anew"
     ) from error
 
 CHUNK = 5

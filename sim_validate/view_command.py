@@ -23,6 +23,7 @@ from sim_validate.console import Reporter
 from sim_validate.files import write_text
 from sim_validate.flags import Fingers
 from sim_validate.grasps_file import grasp_with_id, read_grasps
+from sim_validate.reports.run_folder import GRASPS
 from sim_validate.reports.turntable import turntable_page
 
 PAGES = (".html", ".htm")
@@ -34,11 +35,17 @@ SWING_DEG, ELEVATION_DEG = 120.0, 25.0
 
 def view_grasp(command: showing_flags.View, reporter: Reporter) -> int:
     """Show a grasp."""
-    saved = read_grasps(command.grasps)
+    path = command.grasps / GRASPS if command.grasps.is_dir() else command.grasps
+    saved = read_grasps(path)
     if not saved.grasps:
-        raise InputError(f"{command.grasps}: holds no grasp")
-    grasp = grasp_with_id(command.grasps, saved, command.grasp or saved.grasps[0].id)
+        raise InputError(f"{path}: holds no grasp")
+    grasp = grasp_with_id(path, saved, command.grasp or saved.grasps[0].id)
     friction = saved.friction if command.friction is None else command.friction
+    if friction <= grasp.critical_friction:
+        reporter.warn(
+            f"{grasp.id} is not in force closure at friction {friction:g}: it needs more than "
+            f"{grasp.critical_friction:.4g}"
+        )
     if command.picture is None and command.page is None and command.clip is None:
         _in_viewer(_scene(saved, grasp, friction), grasp, reporter)
         reporter.document({"id": grasp.id, "files": []})

@@ -115,7 +115,7 @@ def draw(task: Task) -> Drawn:
     )
     drawn = Drawn(picture, None, None)
     if force_closure(grasp, friction=task.friction).closed:
-        largest = _largest_push(task.verdict)
+        largest = largest_push(task.verdict)
         wrenches = wrench_figure(body, grasp, task.friction, view=view)
         margins = margin_figure(body, grasp, task.friction, max_normal_force_n=largest)
         drawn = replace(
@@ -160,7 +160,7 @@ def _written(task: Task, kind: str, ending: str, figure: Any) -> str:
     return f"{kind}/{path.name}"
 
 
-def _largest_push(verdict: Record | None) -> float:
+def largest_push(verdict: Record | None) -> float:
     """Of each finger [N]."""
     if verdict is None:
         return FingerSettings().max_normal_force_n

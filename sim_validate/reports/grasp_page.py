@@ -5,12 +5,10 @@ import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from grasp_core.arrays import Array
 from grasp_core.values import Grasp
-from sim_validate.reports.agreement import as_predicted
-from sim_validate.reports.drawn_grasps import Drawn, certified
+from sim_validate.reports.agreement import as_predicted, wrench_size
+from sim_validate.reports.drawn_grasps import Drawn, certified, largest_push
 from sim_validate.reports.pages import NOTHING, number, page
 from sim_validate.reports.run_folder import GONE, GRASPS, HELD, Record, RunFolder, let_go
 from sim_validate.reports.turntable import as_text, grasp_data
@@ -18,8 +16,8 @@ from sim_validate.reports.turntable import as_text, grasp_data
 MILLI, MICRO = 1e3, 1e6
 GOOD, BAD, QUIET = "good", "bad", "quiet"
 """Classes of what is said."""
-LESS = 1e-3
-"""Parts of a vector below this share of its length are said to be zero."""
+LESS = 1e-9
+"""Parts of a vector below this share of a size are said to be zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +39,7 @@ def grasp_page(
         "grasp.html",
         grasp=grasp,
         object=run.saved.body.name,
+        notes=run.saved.body.notes,
         friction=run.friction,
         verdict=verdict,
         verdict_text=said,
@@ -48,15 +47,16 @@ def grasp_page(
         before=neighbours.before,
         after=neighbours.after,
         picture=drawn.picture,
+        push=largest_push(verdict),
         charts=drawn if drawn.wrenches else None,
         shown=drawn.trial,
         shown_outcome=drawn.outcome,
         clip=drawn.clip,
         object_script=object_script,
         facts=list(_facts(run, grasp, verdict)),
-        contacts=list(_contacts(shown)),
+        contacts=list(_contacts(shown, run.saved.body.radius)),
         certified=_certified(run, grasp),
-        trials=[] if verdict is None else [_trial(each) for each in verdict["wrenches"]],
+        trials=[] if verdict is None else [_trial(verdict, each) for each in verdict["wrenches"]],
         controls=[] if verdict is None else _controls(verdict["controls"]),
         commands=list(_commands(run, grasp, verdict)),
         drawing=as_text(grasp_data(run.saved.body, shown, run.friction)),
@@ -85,8 +85,11 @@ def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[tup
     planned = run.saved.friction
     at_plan = "" if planned == run.friction else f", at friction {planned:g} as planned"
     yield "Family", grasp.family
-    yield "Faces", ", ".join(map(str, grasp.faces))
-    yield "Smallest independent disc", f"{number(MILLI * grasp.radius)} mm{at_plan}"
+    yield "Faces" if run.saved.body.patches is None else "Patches", ", ".join(map(str, grasp.faces))
+    yield (
+        "Smallest independent disc",
+        (f"{number(MILLI * grasp.radius)} mm{at_plan}" if grasp.radius else "none is claimed"),
+    )
     simulated = None if verdict is None else verdict["critical_friction"]["simulated"]
     in_simulation = "" if simulated is None else f", in simulation {number(simulated)}"
     yield "Critical friction", f"{number(grasp.critical_friction)}{in_simulation}"
@@ -94,11 +97,11 @@ def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[tup
     yield "Ferrari-Canny quality", f"{number(lower, 5)} to {number(upper, 5)} N{at_plan}"
     yield "Normals span up to", f"{number(math.degrees(grasp.span_angle), 3)} deg"
     for place, focus in enumerate(grasp.focus_points):
-        yield f"Focus {place}", f"{vector(MILLI * focus)} mm"
+        yield f"Focus {place}", f"{vector(MILLI * focus, MILLI * run.saved.body.radius)} mm"
     if verdict is not None:
         moved = [trial["displacement_m"] for trial in verdict["wrenches"]]
         known = [MICRO * each for each in moved if each is not None]
-        yield "Moved at most", f"{number(max(known, default=None), 2)} um"
+        yield "Moved at most", f"{number(max(known, default=None), 2)} µm"
         if (repeats := verdict.get("robustness")) is not None:
             low, high = repeats["pass_rate_interval"]
             yield (
@@ -110,7 +113,7 @@ def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[tup
             )
 
 
-def _contacts(grasp: Grasp) -> Iterable[Record]:
+def _contacts(grasp: Grasp, radius: float) -> Iterable[Record]:
     for face, contact, cone, region in zip(
         grasp.faces, grasp.contacts, grasp.force_cones, grasp.regions, strict=True
     ):
@@ -118,8 +121,8 @@ def _contacts(grasp: Grasp) -> Iterable[Record]:
         half = math.degrees(cone.half_angle)
         yield {
             "face": face,
-            "position": vector(MILLI * contact.position),
-            "normal": vector(contact.normal),
+            "position": vector(MILLI * contact.position, MILLI * radius),
+            "normal": vector(contact.normal, 1.0),
             "cone": f"{half:.1f} deg, leans {lean:.1f} deg",
             "region": region.kind,
             "disc": NOTHING if region.kind == "point" else number(MILLI * region.inscribed_radius),
@@ -142,13 +145,15 @@ def _certified(run: RunFolder, grasp: Grasp) -> str:
     )
 
 
-def _trial(trial: Record) -> Record:
-    moved = trial["displacement_m"]
+def _trial(verdict: Record, trial: Record) -> Record:
+    moved, size = trial["displacement_m"], wrench_size(verdict, trial)
+    limit, found = trial["predicted_limit"], trial["simulated_limit"]
     return {
         "name": trial["name"],
-        "wrench": ", ".join(f"{part:.3g}" for part in trial["wrench"]),
-        "limit": number(trial["predicted_limit"]),
-        "simulated": number(trial["simulated_limit"]),
+        "wrench": ", ".join(f"{part + 0.0:.3g}" for part in trial["wrench"]),
+        "share": "" if not limit else f"{100.0 / limit:.0f} %",
+        "limit": number(None if limit is None else size * limit),
+        "simulated": number(None if found is None else size * found),
         "friction": number(trial["required_friction"], 3),
         "outcome": str(trial["outcome"]).replace("_", " "),
         "tone": GOOD if as_predicted(trial) else BAD,
@@ -183,7 +188,7 @@ def _commands(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[
             yield f"graspproof replay . {asked} --control {shlex.quote(name)} --out replay"
 
 
-def vector(parts: Array) -> str:
-    """Its parts for people; what is next to nothing is zero."""
-    small = LESS * float(np.linalg.norm(parts))
+def vector(parts: Array, size: float) -> str:
+    """Its parts for people; what is next to nothing, beside a size, is zero."""
+    small = LESS * size
     return ", ".join(f"{0.0 if abs(part) < small else part:.4g}" for part in parts)

@@ -48,7 +48,6 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown]) -> str:
         limits=any(each.pairs for each in found[1:]),
         mismatches=[f"{each['id']}: {line}" for each in verdicts for line in each["mismatches"]],
         controls=_controls(verdicts),
-        gate=[check for run in runs for check in run.summary.get("gate", {}).get("checks", ())],
     )
 
 
@@ -107,7 +106,14 @@ def _described(run: RunFolder) -> dict[str, Any]:
             f" {len(run.saved.grasps)} are shown, those with bad news among them; "
             "`graspproof report` draws all."
         )
-    return {"name": run.saved.body.name, "summary": said, "about": list(_about(run))}
+    gate = run.summary.get("gate", {}).get("checks", ())
+    return {
+        "name": run.saved.body.name,
+        "summary": " ".join([said, *run.saved.body.notes]),
+        "about": list(_about(run)),
+        "gate": gate,
+        "gate_passed": sum(check["least"] <= check["value"] <= check["largest"] for check in gate),
+    }
 
 
 def _about(run: RunFolder) -> Iterable[tuple[str, str]]:

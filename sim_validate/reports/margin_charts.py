@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.closure import force_closure
+from grasp_core.errors import InputError
 from grasp_core.resisted_wrenches import wrench_limits
 from grasp_core.values import Grasp, Polyhedron
 from scenes.canvas import Around, entitle, in_style, new_figure, panels
@@ -25,6 +27,7 @@ SAME = 12
 """Decimals in which equal directions are equal."""
 NAMED = {
     "+x": (0.0, 0.0), "+y": (90.0, 0.0), "-y": (-90.0, 0.0), "+z": (0.0, 80.0), "-z": (0.0, -80.0),
+    "-x": (172.0, 0.0),
 }  # fmt: skip
 """Longitudes and latitudes at which directions are written [deg], those of z a little below."""
 
@@ -43,7 +46,15 @@ def margin_figure(
 
     Returns:
         A matplotlib figure.
+
+    Raises:
+        InputError: The contacts are not in force closure at this friction.
     """
+    if not force_closure(grasp, friction=friction).closed:
+        raise InputError(
+            f"{grasp.id} is not in force closure at friction {friction:g}, so nothing is resisted "
+            f"in some direction; it needs more than {grasp.critical_friction:.4g}"
+        )
     figure = new_figure(9.0, 2.5)
     around = Around(left=0.01, right=0.02, below=0.02, above=0.12, between=0.05)
     forces, torques = panels(figure, 2, around=around)
@@ -93,9 +104,19 @@ def on_map(longitudes: Array, latitudes: Array) -> tuple[Array, Array]:
 
 def _map(figure: Any, axes: Any, values: Array, title: str) -> None:
     x, y = on_map(*_nodes())
-    drawn = axes.pcolormesh(x, y, values, cmap=COLOURS, shading="gouraud", vmin=0.0)
+    drawn = axes.pcolormesh(x, y, values, cmap=COLOURS, shading="gouraud")
     least = int(values.argmin())
-    axes.plot(x.flat[least], y.flat[least], "o", mfc="none", mec=BAD, ms=9, mew=2, clip_on=False)
+    axes.plot(
+        x.flat[least],
+        y.flat[least],
+        "o",
+        mfc="none",
+        mec=BAD,
+        ms=9,
+        mew=2.5,
+        clip_on=False,
+        zorder=11,
+    )
     for name, angles in NAMED.items():
         place = on_map(*(np.array(math.radians(angle)) for angle in angles))
         axes.text(*map(float, place), name, ha="center", va="center", fontsize=8.0, color="white",

@@ -44,7 +44,7 @@ def motion_figure(found: Replayed, threshold_m: float) -> Any:
     moved.set_ylim(LEAST_UM, 100.0 * highest)
     moved.yaxis.set_ticks(10.0 ** np.arange(-4, math.log10(100.0 * highest), 2))
     moved.yaxis.set_major_formatter("{x:g}")
-    _label(moved, "displacement [um]")
+    _label(moved, "displacement [µm]")
     moved.legend(fontsize=7.0, loc="upper left", ncols=2)
     _forces(pushed, watched.times_s, watched.pushes_n[..., 0])
     _label(pushed, "normal force [N]")

@@ -80,6 +80,7 @@ def runs_in(folder: Path) -> tuple[RunFolder, ...]:
     Raises:
         InputError: There is none, or a file is not what it should be.
     """
+    folder = folder.parent if folder.name == GRASPS else folder
     if not folder.is_dir():
         raise InputError(f"{folder}: not a folder; give one that `graspproof run` has written")
     inside = [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]

@@ -14,6 +14,7 @@ from grasp_core.arrays import Array
 from grasp_core.values import Grasp, Polyhedron
 from scenes.drawings import drawing_of, glass
 from scenes.palette import LOOKS, colour_of
+from scenes.pictures import number_places
 from scenes.shapes import Shape
 from scenes.views import best_view
 from sim_validate.reports.pages import asset, page
@@ -32,6 +33,7 @@ def grasp_data(body: Polyhedron, grasp: Grasp, friction: float) -> dict[str, Any
     beyond = drawing_of(body, grasp, friction)[len(glass(body)) :]
     return {
         "shapes": _data(beyond, body),
+        "numbers": _whole(number_places(body, grasp), body),
         "axes": np.round(best_view(body, grasp).axes, 4).tolist(),
     }
 

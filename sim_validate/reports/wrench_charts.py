@@ -51,7 +51,8 @@ def wrench_figure(
     _shadow(weakest, wrenches, _weakest_plane(wrenches, quality.direction), radius)
     weakest.axvline(radius, color=BAD, linewidth=1.2, label="limiting facet")
     weakest.legend(loc="upper left")
-    _label(weakest, "weakest direction", f"along it [N], quality {radius:.3g}", "across it [N]")
+    closed = "weakest direction" if radius > 0.0 else "not in force closure: zero is outside"
+    _label(weakest, closed, f"along it [N], quality {radius:.3g}", "across it [N]")
     _shadow(forces, wrenches, np.array([[*right, *still], [*up, *still]]), radius)
     _label(forces, "forces", "to the right of the picture [N]", "up [N]")
     _shadow(torques, wrenches, np.array([[*still, *right], [*still, *up]]), radius)

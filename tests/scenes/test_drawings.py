@@ -77,6 +77,12 @@ def test_lines_of_force_are_inside_the_cones_and_pass_the_foci(case):
             assert np.linalg.norm(np.cross(focus - start, way)) < 1e-9 * body.radius
 
 
+def test_force_cones_that_do_not_fit_are_left_out():
+    body, (grasp,) = grasps("wedge", 0.5, 1, ("pencil",), "tilted")
+    assert len(of_role(drawing_of(body, grasp, 0.5), "force cone")) == 4
+    assert not of_role(drawing_of(body, grasp, 0.1), "force cone")
+
+
 def test_far_foci_do_not_make_far_lines():
     body, (grasp,) = grasps("double-wedge-bar", 0.3, 1, ("pencil",))
     far = replace(grasp, focus_points=body.center_of_mass + 1e6 * np.eye(3)[:2])

@@ -186,6 +186,14 @@ def test_other_endings_are_refused(wedge, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_what_is_no_grasp_of_the_object_is_refused(wedge, tmp_path):
+    body, grasp = wedge
+    with pytest.raises(InputError, match="does not lie on face"):
+        write_picture(scenes.example_object("box"), grasp, tmp_path / "a.png")
+    with pytest.raises(InputError, match="friction must be"):
+        write_picture(body, grasp, tmp_path / "a.png", friction=-1.0)
+
+
 @pytest.mark.slow
 def test_a_turning_clip_turns(wedge, tmp_path):
     path = write_turning_clip(*wedge, tmp_path / "new" / "a.webp", 0.5)

@@ -1,5 +1,6 @@
 import json
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -229,6 +230,31 @@ def test_control_characters_in_a_name_do_not_reach_the_terminal(here, capsys):
     assert main(["inspect", "a\x1b[31mb.stl"]) == Exit.GOOD
     shown = capsys.readouterr()
     assert "\x1b[31m" not in shown.out + shown.err
+
+
+@pytest.mark.parametrize("graphics", ["nonsense", "osmesa"])
+def test_graphics_that_are_not_here_are_named(graphics):
+    """Where OSMesa is, the second one is not wrong."""
+    code = "from sim_validate.cli import run_and_exit; run_and_exit()"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "doctor"], env=os.environ | {"MUJOCO_GL": graphics}, cwd=ROOT,
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == Exit.INPUT or (graphics, done.returncode) == ("osmesa", Exit.GOOD)
+    assert done.returncode == Exit.GOOD or "MUJOCO_GL" in done.stderr
+    assert "internal error" not in done.stderr
+
+
+def test_objects_whose_names_look_alike_have_folders_of_their_own(here):
+    import trimesh
+
+    for name, shape in (("a b", "box"), ("a'b", "prism")):
+        body = scenes.example_object(shape)
+        trimesh.Trimesh(body.vertices, body.triangles).export(here / f"{name}.stl")
+        assert main(["run", f"{name}.stl", "--limit", "1", "--no-report", "-q"]) == Exit.GOOD
+    folders = sorted(path.name for path in (here / "graspproof-out").iterdir())
+    assert len(folders) == 2
+    assert all(re.fullmatch(r"a_b-[0-9a-f]{8}", folder) for folder in folders)
 
 
 def test_an_interrupted_run_keeps_what_is_done(here):

@@ -93,6 +93,11 @@
         pen.fill();
       }
     }
+    pen.font = "bold 13px sans-serif";
+    pen.textAlign = "center";
+    pen.textBaseline = "middle";
+    pen.fillStyle = "#30363d";
+    drawing.numbers.forEach((point, finger) => pen.fillText(finger, ...place(seen(point))));
   }
 
   function turn(aside, up) {

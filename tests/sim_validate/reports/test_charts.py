@@ -109,6 +109,14 @@ def test_the_map_shows_what_is_resisted(wedge):
             assert value == pytest.approx(unit * lever * limit, rel=1e-6)
 
 
+def test_without_closure_there_is_no_map(wedge):
+    body, grasp = wedge
+    with pytest.raises(gc.InputError, match=r"not in force closure at friction 0\.001"):
+        margin_figure(body, grasp, 0.001)
+    title = wrench_figure(body, grasp, 0.001).axes[0].get_title()
+    assert "not in force closure" in title
+
+
 def test_pushes_balance_the_wrench(wedge, trial):
     """Newton: at rest, what the fingers push with and the wrench have no sum.
 

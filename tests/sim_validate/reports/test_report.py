@@ -89,7 +89,10 @@ def test_a_page_says_what_the_files_say(small_run, small_report):
         said = " ".join(page.said)
         for trial in verdict["wrenches"]:
             assert trial["name"] in said
-            assert f"{trial['simulated_limit']:.4g}" in said
+            force, torque = np.reshape(trial["wrench"], (2, 3))
+            lever = verdict["settings"]["grasp_size_m"]
+            size = np.linalg.norm([*force, *(torque / lever)])
+            assert f"{size * trial['simulated_limit']:.4g}" in said
         assert f"{verdict['critical_friction']['simulated']:.4g}" in said
         for name in verdict["controls"]:
             assert name.replace("_", " ") in said
