@@ -97,7 +97,8 @@ def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[tup
     yield "Ferrari-Canny quality", f"{number(lower, 5)} to {number(upper, 5)} N{at_plan}"
     yield "Normals span up to", f"{number(math.degrees(grasp.span_angle), 3)} deg"
     for place, focus in enumerate(grasp.focus_points):
-        yield f"Focus {place}", f"{vector(MILLI * focus, MILLI * run.saved.body.radius)} mm"
+        name = "Between the lines of pair" if grasp.family == "regulus" else "Focus"
+        yield f"{name} {place}", f"{vector(MILLI * focus, MILLI * run.saved.body.radius)} mm"
     if verdict is not None:
         moved = [trial["displacement_m"] for trial in verdict["wrenches"]]
         known = [MICRO * each for each in moved if each is not None]
