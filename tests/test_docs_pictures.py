@@ -44,7 +44,15 @@ def test_all_pictures_are_made_by_the_script():
     assert {path.name for path in FOLDER.iterdir()} == {f"{name}.webp" for name in PICTURES}
 
 
-@pytest.mark.parametrize("name", PICTURES)
+SLOW = {"fidelity"}
+"""Pictures that take seconds, as they need simulation."""
+
+
+def marked(name, *more):
+    return pytest.param(name, *more, marks=[pytest.mark.slow] if name in SLOW else [], id=name)
+
+
+@pytest.mark.parametrize("name", [marked(name) for name in PICTURES])
 def test_a_picture_is_the_one_that_is_kept(name):
     figure = PICTURES[name]()
     assert apart(figure, kept(name)) < ANOTHER
@@ -65,10 +73,12 @@ def with_other_figures():
 @pytest.mark.parametrize(
     ("name", "make"),
     [
-        ("grasp", lambda: grasp_figure(*another_grasp(), FRICTION)),
-        ("wrenches", lambda: wrench_figure(*another_grasp(), FRICTION)),
-        ("margins", lambda: margin_figure(*best("wedge", "pencil", FRICTION), 0.8 * FRICTION)),
-        ("fidelity", with_other_figures),
+        marked("grasp", lambda: grasp_figure(*another_grasp(), FRICTION)),
+        marked("wrenches", lambda: wrench_figure(*another_grasp(), FRICTION)),
+        marked(
+            "margins", lambda: margin_figure(*best("wedge", "pencil", FRICTION), 0.8 * FRICTION)
+        ),
+        marked("fidelity", with_other_figures),
     ],
 )
 def test_another_picture_would_be_noticed(name, make):

@@ -11,8 +11,10 @@ def small_run(tmp_path_factory):
     """The folder of a run of three grasps with certified regions and simulated limits."""
     folder = tmp_path_factory.mktemp("run")
     asked = ["run", "wedge", "--limit", "3", "--family", "pencil", "--family", "concurrent"]
-    asked += ["--regions", "--limits", "ramp", "--trials", "2", "--no-report", "-q"]
+    asked += ["--limits", "ramp", "--trials", "2", "--no-report", "-q"]
     assert main([*asked, "--out", str(folder)]) == Exit.GOOD
+    certify = ["regions", str(folder / "grasps.json"), "--cones", "64", "-q"]
+    assert main([*certify, "--out", str(folder)]) == Exit.GOOD
     return folder
 
 
