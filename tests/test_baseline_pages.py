@@ -38,6 +38,7 @@ def project(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_readme_in_a_project_of_somebody_else(project):
     assert (project / "results.xml").is_file()
     (project / "wedge.grasps.toml").write_text(block(README, "toml"))

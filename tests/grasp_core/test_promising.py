@@ -76,7 +76,7 @@ def opened(body, family, least):
     return promising(construction, listed, discs, lambda _: least[0], tally), made
 
 
-@pytest.mark.parametrize("family", ["concurrent", "pencil"])
+@pytest.mark.parametrize("family", ["concurrent", pytest.param("pencil", marks=pytest.mark.slow)])
 def test_quadruples_come_in_the_order_of_their_bounds_and_only_as_asked_for(family):
     body, least = example_object("random-40-1"), [1e-3]
     quadruples, made = opened(body, family, least)

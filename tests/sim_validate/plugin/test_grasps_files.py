@@ -71,7 +71,10 @@ def test_a_grasp_that_slips_says_at_which_wrench_and_how_to_replay_it(blessed, t
     assert (tmp_path / "replay" / "trace.csv").is_file()
 
 
-@pytest.mark.parametrize("workers", [(), ("-n", "2")], ids=["alone", "xdist"])
+@pytest.mark.parametrize(
+    "workers",
+    [pytest.param((), id="alone"), pytest.param(("-n", "2"), id="xdist", marks=pytest.mark.slow)],
+)
 def test_a_report_has_a_line_for_each_grasp(blessed, tmp_path, workers):
     copied(blessed, tmp_path)
     baseline = tmp_path / "wedge.baseline.json"
