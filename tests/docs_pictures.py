@@ -6,7 +6,7 @@ from pathlib import Path
 
 import grasp_core as gc
 import scenes
-from scenes.canvas import Around, entitle, new_figure, panels, write_figure
+from scenes.canvas import Around, entitle, in_style, new_figure, panels, write_figure
 from scenes.pictures import draw_grasp, grasp_figure
 from scenes.views import best_view
 from sim_validate.replaying.bench import replayed
@@ -34,6 +34,7 @@ def best(name, family, friction, cones="tilted"):
     return body, plan.grasps[0]
 
 
+@in_style
 def families():
     """A grasp of each of the paper's families, side by side."""
     figure = new_figure(12.0, 4.3)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_validate.reports.run_folder import GONE, HELD, Record
+from sim_validate.reports.news import GONE, HELD, Record
 from sim_validate.wrench_verdict import AGREEMENT
 
 

@@ -23,7 +23,8 @@ from sim_validate.replaying.of_verdicts import of_verdict
 from sim_validate.replaying.values import Wanted
 from sim_validate.reports.margin_charts import margin_figure
 from sim_validate.reports.motion_charts import motion_figure
-from sim_validate.reports.run_folder import Record, RunFolder
+from sim_validate.reports.news import Record
+from sim_validate.reports.run_folder import RunFolder
 from sim_validate.reports.wrench_charts import wrench_figure
 
 PICTURES, CHARTS, CLIPS = "pictures", "charts", "clips"

@@ -9,13 +9,12 @@ from grasp_core.arrays import Array
 from grasp_core.values import Grasp
 from sim_validate.reports.agreement import as_predicted, wrench_size
 from sim_validate.reports.drawn_grasps import Drawn, certified, largest_push
+from sim_validate.reports.news import BAD, GOOD, Record, let_go, said_of
 from sim_validate.reports.pages import NOTHING, number, page
-from sim_validate.reports.run_folder import GONE, GRASPS, HELD, Record, RunFolder, let_go
+from sim_validate.reports.run_folder import GRASPS, RunFolder
 from sim_validate.reports.turntable import as_text, grasp_data
 
 MILLI, MICRO = 1e3, 1e6
-GOOD, BAD, QUIET = "good", "bad", "quiet"
-"""Classes of what is said."""
 LESS = 1e-9
 """Parts of a vector below this share of a size are said to be zero."""
 
@@ -61,22 +60,6 @@ def grasp_page(
         commands=list(_commands(run, grasp, verdict)),
         drawing=as_text(grasp_data(run.saved.body, shown, run.friction)),
     )
-
-
-def said_of(verdict: Record | None) -> tuple[str, str]:
-    """What became of a grasp, in a word or two, and whether that is good."""
-    if verdict is None:
-        return "not simulated", QUIET
-    outcome, controls = str(verdict["outcome"]), verdict["controls"].values()
-    if outcome not in (HELD, *GONE):
-        return outcome.replace("_", " "), BAD
-    if verdict["mismatches"]:
-        return "contradicts the analysis", BAD
-    if any(control["held"] for control in controls):
-        return "a control held", BAD
-    if not all(map(let_go, controls)):
-        return "a control is undecided", BAD
-    return outcome.replace("_", " "), GOOD if verdict["held"] else BAD
 
 
 def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[tuple[str, str]]:

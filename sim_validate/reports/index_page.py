@@ -13,9 +13,10 @@ from sim_validate.reports.agreement import (
     quadrants_in,
     wrench_size,
 )
-from sim_validate.reports.grasp_page import MILLI, said_of
+from sim_validate.reports.grasp_page import MILLI
+from sim_validate.reports.news import Record, let_go, said_of
 from sim_validate.reports.pages import page
-from sim_validate.reports.run_folder import Record, RunFolder, let_go
+from sim_validate.reports.run_folder import RunFolder
 
 
 @dataclass(frozen=True, slots=True)

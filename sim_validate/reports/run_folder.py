@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
@@ -14,13 +13,9 @@ from sim_validate.files import read_text
 from sim_validate.grasps_file import read_grasps
 from sim_validate.region_files import REGIONS
 from sim_validate.reports.files_schema import RegionsFile, VerdictsFile
-from sim_validate.verdict import LET_GO, Outcome
+from sim_validate.reports.news import BAD, Record, said_of
 
 GRASPS, VERDICTS = "grasps.json", "verdicts.json"
-Record = Mapping[str, Any]
-"""An object of a JSON file."""
-HELD = Outcome.HELD.value
-GONE = tuple(outcome.value for outcome in LET_GO)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,13 +49,8 @@ class RunFolder:
         return replace(self, saved=replace(self.saved, grasps=kept), left_out=len(grasps) - limit)
 
     def alarms(self, name: str) -> bool:
-        """Whether a grasp was not held, contradicts the analysis, or has a control that held."""
-        verdict = self.verdicts.get(name)
-        return verdict is not None and not (
-            verdict["held"]
-            and not verdict["mismatches"]
-            and all(map(let_go, verdict["controls"].values()))
-        )
+        """Whether there is bad news of a grasp."""
+        return said_of(self.verdicts.get(name))[1] == BAD
 
     @property
     def shaded(self) -> Mapping[str, Record]:
@@ -136,8 +126,3 @@ def _read(path: Path, kind: type[BaseModel], saved: SavedGrasps) -> Record | Non
     if found["object"]["content_sha256"] != saved.body.content_sha256:
         raise InputError(f"{path}: is about another object than {GRASPS} beside it")
     return found
-
-
-def let_go(control: Record) -> bool:
-    """Whether each of a control's loads moved it, as the analysis says."""
-    return all(trial["outcome"] in GONE for trial in control["wrenches"])

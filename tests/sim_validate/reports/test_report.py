@@ -16,7 +16,7 @@ from scenes.views import DISTANCE
 from sim_validate import commands
 from sim_validate.cli import Exit, main
 from sim_validate.grasps_file import read_grasps
-from sim_validate.reports.grasp_page import said_of
+from sim_validate.reports.news import said_of
 from sim_validate.reports.pages import asset
 from sim_validate.reports.report import write_report
 from sim_validate.reports.turntable import UNITS
