@@ -44,6 +44,10 @@ class MeshRefusal(StrEnum):
     OVERLAP = "GP-MESH-OVERLAP"
     SEPARATE = "GP-MESH-SEPARATE"
     NOT_FLAT = "GP-MESH-NOT-FLAT"
+    POLYGON = "GP-MESH-POLYGON"
+    UNSUPPORTED = "GP-MESH-UNSUPPORTED"
+    AMBIGUOUS = "GP-MESH-AMBIGUOUS"
+    LIMIT = "GP-MESH-LIMIT"
 
 
 class MeshError(InputError):
@@ -51,8 +55,13 @@ class MeshError(InputError):
 
     Attributes:
         reason: The stable code of the refusal.
+        message: What was expected, what came, and what to do.
     """
 
     def __init__(self, reason: MeshRefusal, message: str) -> None:
-        super().__init__(f"{reason.value}: {message}")
-        self.reason = reason
+        super().__init__(reason, message)
+        self.reason, self.message = reason, message
+
+    def __str__(self) -> str:
+        """The code, and what it is about."""
+        return f"{self.reason.value}: {self.message}"

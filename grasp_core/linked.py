@@ -1,15 +1,24 @@
 """Points that are close to each other, and what hangs together through links.
 
-With numpy alone: a library for graphs takes longer to import than a small object to plan on.
+With numpy alone: a library for graphs takes longer to import than a small object to plan on. It is
+asked where points crowd.
 """
+
+import importlib
+from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.errors import InputError
 
 GENERAL = np.array([0.41421, 0.56714, 0.69315])
 """A direction square to no face that anyone builds, where shadows would crowd; shorter than one, so
 that shadows are closer than points."""
+CROWDED = 64
+"""Neighbours of a shadow with which it is compared one by one."""
+MOST_LINKS = 100
+"""For each point."""
 
 
 def close_pairs(points: Array, reach: float) -> Indices:
@@ -21,6 +30,9 @@ def close_pairs(points: Array, reach: float) -> Indices:
     Args:
         points: (n, 3)
         reach: In the same unit.
+
+    Raises:
+        InputError: So many points are close to each other that their links cannot be listed.
     """
     shadows = ((points - points[0]) * GENERAL).sum(axis=1)
     order = np.argsort(shadows, kind="stable")
@@ -31,10 +43,24 @@ def close_pairs(points: Array, reach: float) -> Indices:
         near = shadows[order[step:]] - shadows[order[:-step]] <= reach
         if not near.any():
             break
+        if step > CROWDED:
+            links.append(order[_pairs_of_tree(points[order], reach)])
+            break
         pairs = np.column_stack([order[:-step][near], order[step:][near]])
         apart = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
         links.append(pairs[apart <= reach])
     return np.concatenate(links)
+
+
+def _pairs_of_tree(points: Array, reach: float) -> Indices:
+    spatial: Any = importlib.import_module("scipy.spatial")
+    tree = spatial.KDTree(points)
+    pairs = (int(tree.count_neighbors(tree, reach)) - len(points)) // 2
+    if pairs > MOST_LINKS * len(points):
+        raise InputError(
+            f"{pairs} pairs of points are within {reach:.3g} of each other; weld them first"
+        )
+    return np.asarray(tree.query_pairs(reach, output_type="ndarray"), dtype=np.int64)
 
 
 def components(count: int, links: Indices) -> Indices:

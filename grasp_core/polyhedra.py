@@ -19,7 +19,8 @@ from grasp_core.arrays import Array, Indices, frozen
 from grasp_core.curved_patches import flat_patches
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.mass import mass_properties
-from grasp_core.mesh import read_triangles
+from grasp_core.mesh_child import read_triangles
+from grasp_core.mesh_files import MeshLimits
 from grasp_core.planar_faces import MAX_FACES, FlatnessLimits, coplanar_groups, planar_faces
 from grasp_core.solid_checks import largest_part, oriented, surface_fault, welded
 from grasp_core.solids import Solid, hull, triangulate
@@ -29,15 +30,15 @@ AnyPolyhedron = TypeVar("AnyPolyhedron", bound=Polyhedron)
 
 UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 
-MAX_TRIANGLES = 200_000
 SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0
 """Half a millimetre to twenty metres: outside it the unit is almost surely wrong."""
 SURROUNDINGS = 1e-6
 """How far outside the object's bounds a centre of mass may be, relative to the extent."""
 DEFAULT_FLATNESS = FlatnessLimits()
+DEFAULT_LIMITS = MeshLimits()
 
 
-def load_polyhedron(
+def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
     path: str | Path,
     *,
     unit: str = "m",
@@ -45,6 +46,7 @@ def load_polyhedron(
     faces: FaceKind = "auto",
     patches: PatchLimits | None = None,
     center_of_mass: ArrayLike | None = None,
+    limits: MeshLimits = DEFAULT_LIMITS,
 ) -> Polyhedron:
     """Read a solid from a mesh file.
 
@@ -58,6 +60,7 @@ def load_polyhedron(
         patches: How flat patches are, and how many.
         center_of_mass: (3,) [m], in the file's frame; that of uniform density if not given,
             estimated from the convex hull where the surface has holes.
+        limits: How large the file may be, and what reading it may cost.
 
     Raises:
         InputError: The unit is unknown.
@@ -66,17 +69,21 @@ def load_polyhedron(
     if unit not in UNITS_M:
         raise InputError(f"unit must be one of {', '.join(UNITS_M)}, got {unit!r}")
     path = Path(path)
-    vertices, triangles, data = read_triangles(path)
-    return polyhedron_from_mesh(
-        vertices * UNITS_M[unit],
-        triangles,
-        name=path.stem,
-        source_sha256=hashlib.sha256(data).hexdigest(),
-        flatness=flatness,
-        faces=faces,
-        patches=patches,
-        center_of_mass=center_of_mass,
-    )
+    vertices, triangles, data = read_triangles(path, limits)
+    try:
+        return polyhedron_from_mesh(
+            vertices * UNITS_M[unit],
+            triangles,
+            name=path.stem,
+            source_sha256=hashlib.sha256(data).hexdigest(),
+            flatness=flatness,
+            faces=faces,
+            patches=patches,
+            center_of_mass=center_of_mass,
+            limits=limits,
+        )
+    except MeshError as error:
+        raise MeshError(error.reason, f"{path.name}: {error.message}") from error
 
 
 def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
@@ -89,6 +96,7 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
     faces: FaceKind = "auto",
     patches: PatchLimits | None = None,
     center_of_mass: ArrayLike | None = None,
+    limits: MeshLimits = DEFAULT_LIMITS,
     kind: type[AnyPolyhedron] = Polyhedron,
 ) -> AnyPolyhedron:
     """Check a triangle mesh and build the polyhedron of its faces.
@@ -102,24 +110,31 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
         faces: As `load_polyhedron`.
         patches: As `load_polyhedron`.
         center_of_mass: As `load_polyhedron`.
+        limits: As `load_polyhedron`.
         kind: The class to build.
 
     Raises:
         InputError: The centre of mass is not a point.
         MeshError: The mesh is not a solid; its `reason` says why.
     """
-    points, corners = _checked_arrays(vertices, triangles)
+    points, corners = _checked_arrays(vertices, triangles, limits.max_triangles)
     points, corners, dropped = welded(points, corners)
     notes = [f"dropped {dropped} triangles without area"] if dropped else []
     groups = _planar_groups(points, corners, flatness, faces)
-    limits = (patches or PatchLimits()) if groups is None else None
+    if len(groups or ()) > limits.max_faces:
+        message = (
+            f"{len(groups or ())} planar faces are over the limit of {limits.max_faces}; simplify "
+            "it, or take patches (--faces patches)"
+        )
+        raise MeshError(MeshRefusal.TOO_MANY, message)
+    flat = (patches or PatchLimits()) if groups is None else None
     fault = surface_fault(corners)
-    if fault and (limits is None or fault.reason is MeshRefusal.WINDING):
+    if fault and (flat is None or fault.reason is MeshRefusal.WINDING):
         raise fault
-    points, corners, said = _sound_surface(points, corners, fault)
+    points, corners, said = _sound_surface(points, corners, fault, limits.max_parts)
     notes += said
-    if limits is not None:
-        found, said = _patched(points, corners, limits, fault)
+    if flat is not None:
+        found, said = _patched(points, corners, flat, fault)
         notes += said
     else:
         found = planar_faces(points, corners, groups or [], flatness, triangulate)
@@ -136,7 +151,7 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
         inertia=mass.inertia,
         content_sha256=content,
         source_sha256=source_sha256 or content,
-        patches=limits,
+        patches=flat,
         notes=tuple(notes),
     )
 
@@ -169,12 +184,12 @@ def _planar_groups(
 
 
 def _sound_surface(
-    points: Array, corners: Indices, fault: MeshError | None
+    points: Array, corners: Indices, fault: MeshError | None, most: int
 ) -> tuple[Array, Indices, list[str]]:
     """The surface with its outside outside, of a faulty one the largest part as it is."""
     if fault:
         return largest_part(points, corners)
-    corners, flipped = oriented(points, corners)
+    corners, flipped = oriented(points, corners, most)
     said = ["the mesh was inside out; its triangles were turned"] if flipped else []
     return points, corners, said
 
@@ -207,7 +222,7 @@ def _patched(
     return patches, notes
 
 
-def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike) -> tuple[Array, Indices]:
+def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tuple[Array, Indices]:
     points = np.array(vertices, dtype=np.float64)
     corners = np.array(triangles)
     if points.ndim != 2 or corners.ndim != 2 or points.shape[1:] != (3,) or not corners.size:  # noqa: PLR2004
@@ -216,8 +231,8 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike) -> tuple[Array, I
     if corners.shape[1] != 3 or corners.dtype.kind not in "iu":  # noqa: PLR2004
         message = f"triangles must be whole numbers (t, 3), got {corners.dtype} {corners.shape}"
         raise MeshError(MeshRefusal.INDEX, message)
-    if len(corners) > MAX_TRIANGLES:
-        message = f"{len(corners)} triangles are over the limit of {MAX_TRIANGLES}; simplify it"
+    if len(corners) > most:
+        message = f"{len(corners)} triangles are over the limit of {most}; simplify it"
         raise MeshError(MeshRefusal.TOO_MANY, message)
     if not np.isfinite(points).all():
         bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])

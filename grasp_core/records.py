@@ -14,6 +14,7 @@ import numpy as np
 
 from grasp_core.certified import check_witness
 from grasp_core.errors import InputError
+from grasp_core.mesh_files import MeshLimits
 from grasp_core.on_faces import check_on_faces
 from grasp_core.plans import Plan
 from grasp_core.polyhedra import polyhedron_from_mesh
@@ -36,6 +37,9 @@ if TYPE_CHECKING:
 SCHEMA = 1
 SAME_DIRECTION = 1e-6
 """How far a witness direction may be from its force's: what six digits in a file keep."""
+
+RECORDED = MeshLimits(max_triangles=2_000_000, max_faces=50_000, max_parts=640)
+"""Of the objects in grasps files: ten times what is usual, for those who raised a limit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,6 +174,7 @@ def grasps_from_json(text: str) -> SavedGrasps:
         faces="patches" if patches else "planar",
         patches=PatchLimits(**patches.model_dump()) if patches else None,
         center_of_mass=record.object.center_of_mass_m,
+        limits=RECORDED,
     )
     if body.content_sha256 != record.object.content_sha256:
         raise InputError("grasps file: object.content_sha256 does not match its mesh")

@@ -3,7 +3,7 @@
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.errors import MeshError, MeshRefusal
+from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.linked import close_pairs, components
 from grasp_core.planar_faces import SIDES
 from grasp_core.solids import Solid, intersection_volume, union_volume
@@ -23,12 +23,19 @@ def welded(points: Array, corners: Indices) -> tuple[Array, Indices, int]:
     used, corners = np.unique(corners, return_inverse=True)
     points, corners = points[used], corners.reshape(-1, 3)
     reach = WELD * float(np.ptp(points, axis=0).max())
-    label = components(len(points), close_pairs(points, reach))
+    label = components(len(points), _links(points, reach))
     _, first, order = np.unique(label, return_index=True, return_inverse=True)
     rank = np.argsort(np.argsort(first))
     points, corners = points[np.sort(first)], rank[order][corners]
     whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
     return points, corners[whole], int((~whole).sum())
+
+
+def _links(points: Array, reach: float) -> Indices:
+    try:
+        return close_pairs(points, reach)
+    except InputError as error:
+        raise MeshError(MeshRefusal.LIMIT, str(error)) from error
 
 
 def surface_fault(corners: Indices) -> MeshError | None:
@@ -85,8 +92,13 @@ def largest_part(points: Array, corners: Indices) -> tuple[Array, Indices, list[
     return points[used], local.reshape(-1, 3), notes
 
 
-def oriented(points: Array, corners: Indices) -> tuple[Indices, bool]:
+def oriented(points: Array, corners: Indices, most: int) -> tuple[Indices, bool]:
     """The triangles with their outsides outside, and whether they were turned.
+
+    Args:
+        points: (n, 3) [m]
+        corners: (t, 3)
+        most: Parts that may be.
 
     Raises:
         MeshError: The mesh is flat, or its parts are separate, overlap or contradict each other.
@@ -98,7 +110,7 @@ def oriented(points: Array, corners: Indices) -> tuple[Indices, bool]:
         raise MeshError(MeshRefusal.ZERO_VOLUME, message)
     if total < 0.0:
         corners = corners[:, ::-1]
-    parts = _parts(points, corners)
+    parts = _parts(points, corners, most)
     bodies = [part for part in parts if part.volume > 0.0]
     cavities = [Solid(part.vertices, part.triangles[:, ::-1]) for part in parts if part.volume <= 0]
     slack = OVERLAP * abs(total)
@@ -116,9 +128,16 @@ def oriented(points: Array, corners: Indices) -> tuple[Indices, bool]:
     return corners, total < 0.0
 
 
-def _parts(points: Array, corners: Indices) -> list[Solid]:
-    """The edge-connected parts of a mesh."""
+def _parts(points: Array, corners: Indices, most: int) -> list[Solid]:
+    """The edge-connected parts of a mesh.
+
+    Raises:
+        MeshError: There are too many.
+    """
     label, parts = _labels(points, corners), list[Solid]()
+    if label.max() >= most:
+        message = f"{label.max() + 1} separate parts are over the limit of {most}; give one solid"
+        raise MeshError(MeshRefusal.SEPARATE, message)
     for part in range(int(label.max()) + 1):
         used, local = np.unique(corners[label == part], return_inverse=True)
         parts.append(Solid(points[used], local.reshape(-1, 3)))

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError
-from grasp_core.mesh import FORMATS
+from grasp_core.mesh_files import FORMATS
 from grasp_core.requests import METHODS
 from sim_validate import cli, dataset_flags
 from sim_validate.clusters import dask_workers, ray_workers

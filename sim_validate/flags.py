@@ -42,6 +42,24 @@ class Speech:
 
 
 @dataclass(frozen=True, slots=True)
+class MeshLimits:
+    """How large a mesh may be, and what reading its file may cost."""
+
+    max_mesh_bytes: Count = 64 * 2**20
+    """Larger mesh files are refused."""
+    max_triangles: Count = 200_000
+    """Meshes of more are refused."""
+    max_faces: Count = 5_000
+    """Objects of more planar faces are refused."""
+    max_parts: Count = 64
+    """Surfaces of more separate parts are refused."""
+    max_mesh_seconds: Positive = 30.0
+    """Of a processor, for reading a mesh file."""
+    max_mesh_memory: Count = 2 * 2**30
+    """Bytes, for reading a mesh file."""
+
+
+@dataclass(frozen=True, slots=True)
 class Mesh:
     """How a mesh file is to be read."""
 
@@ -59,6 +77,7 @@ class Mesh:
     center_of_mass_m: Annotated[Point | None, arg(metavar="X Y Z")] = None
     """In the file's frame, in metres; that of uniform density if not given, or of the convex hull
     where the surface has holes."""
+    limits: OmitArgPrefixes[MeshLimits] = MeshLimits()
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from grasp_core.errors import InputError
-from grasp_core.mesh import FORMATS
+from grasp_core.mesh_files import FORMATS, MeshLimits
 from grasp_core.planner import plan
 from grasp_core.plans import Plan
 from grasp_core.polyhedra import load_polyhedron
@@ -29,17 +29,25 @@ def load_object(name: str, mesh: flags.Mesh) -> Polyhedron:
     """A mesh file, or a built-in object when the name has no mesh ending."""
     path = Path(name)
     if path.suffix.lower().lstrip(".") in FORMATS or path.is_file():
-        limits = PatchLimits(mesh.patch_spread_deg, mesh.patch_depth, mesh.patches)
+        given = mesh.limits
         return load_polyhedron(
             path,
             unit=mesh.unit,
             faces=mesh.faces,
-            patches=limits,
+            patches=PatchLimits(mesh.patch_spread_deg, mesh.patch_depth, mesh.patches),
             center_of_mass=mesh.center_of_mass_m,
+            limits=MeshLimits(
+                max_bytes=given.max_mesh_bytes,
+                max_triangles=given.max_triangles,
+                max_faces=given.max_faces,
+                max_parts=given.max_parts,
+                max_seconds=given.max_mesh_seconds,
+                max_memory_bytes=given.max_mesh_memory,
+            ),
         )
     if path.suffix or len(path.parts) > 1:
         raise InputError(f"{name}: no such file, and the ending is none of {', '.join(FORMATS)}")
-    if mesh != flags.Mesh():
+    if replace(mesh, limits=flags.MeshLimits()) != flags.Mesh():
         raise InputError(
             f"{name} is built in; --unit, --faces, --patches, --patch-spread-deg, --patch-depth "
             "and --center-of-mass-m say how mesh files are read"

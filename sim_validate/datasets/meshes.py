@@ -5,8 +5,8 @@ from pathlib import Path
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
-from grasp_core.mesh import read_triangles
-from grasp_core.polyhedra import content_hash, load_polyhedron
+from grasp_core.mesh_child import read_triangles
+from grasp_core.polyhedra import DEFAULT_LIMITS, content_hash, load_polyhedron
 from grasp_core.values import FaceKind, Polyhedron
 
 FOLDER = "meshes"
@@ -32,7 +32,7 @@ def stored_surface(folder: Path, object_id: str) -> tuple[Array, Indices]:
         InputError: It is another object's.
     """
     path = mesh_path(folder, object_id)
-    vertices, triangles, _ = read_triangles(path)
+    vertices, triangles, _ = read_triangles(path, DEFAULT_LIMITS)
     if (found := content_hash(vertices, triangles)) != object_id:
         raise InputError(f"{path}: is the mesh of another object, {found}")
     return vertices, triangles

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from grasp_core.errors import GraspError, InputError
-from grasp_core.mesh import FORMATS
+from grasp_core.mesh_files import FORMATS
 from grasp_core.polyhedra import load_polyhedron
 from grasp_core.values import Polyhedron
 from grasp_core.versions import versions

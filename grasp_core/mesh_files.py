@@ -1,0 +1,87 @@
+"""A mesh file's bytes: of a regular file, of a known kind, and no more than are allowed."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from grasp_core.errors import InputError, MeshError, MeshRefusal
+from grasp_core.mesh_formats import stl
+from grasp_core.regular_files import bounded_bytes
+
+FORMATS = ("obj", "stl", "ply", "off", "glb")
+OTHER_FILES = {
+    b"\x1f\x8b": "a gzip archive", b"PK\x03\x04": "a zip archive", b"BZh": "a bzip2 archive",
+    b"\xfd7zXZ": "an xz archive", b"7z\xbc\xaf": "a 7z archive", b"Rar!": "a rar archive",
+    b"\x28\xb5\x2f\xfd": "a zstd archive", b"<?xml": "an XML file", b"<!DOCTYPE": "an HTML file",
+    b"%PDF": "a PDF file", b"\x89PNG": "a picture", b"DRACO": "a Draco file",
+}  # fmt: skip
+"""How files begin that are none of ours."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeshLimits:
+    """How much a mesh file may be, and may cost to read."""
+
+    max_bytes: int = 64 * 2**20
+    max_triangles: int = 200_000
+    max_faces: int = 5_000
+    """Planar faces."""
+    max_parts: int = 64
+    """Of the surface: bodies and cavities."""
+    max_seconds: float = 30.0
+    """For reading the file; what follows is bounded by the numbers above."""
+    max_memory_bytes: int = 2 * 2**30
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
+                raise InputError(f"{name} must be a positive number, got {value!r}")
+
+
+def mesh_kind(path: Path) -> str:
+    """The format of a file, by its ending.
+
+    Raises:
+        MeshError: It is none of those that are read.
+    """
+    kind = path.suffix.lower().lstrip(".")
+    if kind not in FORMATS:
+        message = f"{path.name}: the ending must be one of {', '.join(FORMATS)}, got {kind!r}"
+        raise MeshError(MeshRefusal.FORMAT, message)
+    return kind
+
+
+def mesh_bytes(path: Path, limits: MeshLimits) -> bytes:
+    """The bytes of a mesh file, which begin as its ending promises.
+
+    Raises:
+        MeshError: It cannot be read, is no regular file, too large, empty, or of another kind.
+    """
+    kind = mesh_kind(path)
+    try:
+        data = bounded_bytes(path, limits.max_bytes)
+    except OSError as error:
+        message = f"{path}: cannot be read ({error.strerror}); check the path and its rights"
+        raise MeshError(MeshRefusal.UNREADABLE, message) from error
+    if len(data) > limits.max_bytes:
+        message = f"{path.name}: over {limits.max_bytes} bytes, the limit; simplify the mesh"
+        raise MeshError(MeshRefusal.TOO_MANY, message)
+    if not data:
+        raise MeshError(MeshRefusal.EMPTY, f"{path.name}: the file is empty; export it again")
+    _check_beginning(path.name, kind, data)
+    return data
+
+
+def _check_beginning(name: str, kind: str, data: bytes) -> None:
+    for beginning, other in OTHER_FILES.items():
+        if data.startswith(beginning):
+            message = f"{name}: is {other}, expected {kind.upper()}; unpack or convert it first"
+            raise MeshError(MeshRefusal.FORMAT, message)
+    begins = {
+        "ply": data.startswith((b"ply\n", b"ply\r")),
+        "glb": data.startswith(b"glTF"),
+        "stl": stl.is_text(data) or stl.is_binary(data),
+    }
+    if not begins.get(kind, True):
+        message = f"{name}: does not begin as a {kind.upper()} file does; export it again"
+        raise MeshError(MeshRefusal.UNREADABLE, message)

@@ -1,0 +1,56 @@
+"""OBJ text: `v` and `f` lines; looks and groups are passed over, curved surfaces refused."""
+
+import re
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.mesh_formats.refusals import broken, outside, unsupported
+from grasp_core.mesh_formats.surfaces import Surface
+from grasp_core.mesh_formats.words import numbers, whole, worded_lines
+
+PASSED_OVER = frozenset(
+    b"vt vn g o s usemtl mtllib usemap maplib lod bevel c_interp d_interp shadow_obj trace_obj mg "
+    b"l p".split()
+)
+"""They change looks, names or curves, not the surface."""
+CONTINUED = re.compile(rb"\\\r?\n")
+WIDTHS = (3, 4, 6, 7)
+"""Numbers of a vertex: a point, perhaps its weight, perhaps a colour."""
+WEIGHTED = (4, 7)
+FLOATS = 3
+
+
+def read(text: bytes, most: int) -> tuple[Array, Indices]:
+    """Vertices (n, 3) and triangles (t, 3) of an OBJ text.
+
+    Raises:
+        MeshError: It breaks a rule, with the line, or has more than `most` triangles.
+    """
+    surface = Surface(most)
+    for number, (keyword, *words) in worded_lines(CONTINUED.sub(b"", text)):
+        where = f"line {number}"
+        if keyword == b"v":
+            surface.points.append(_vertex(words, where))
+        elif keyword == b"f":
+            surface.add(_corners(words, len(surface.points), where), where)
+        elif keyword not in PASSED_OVER:
+            shown = keyword[:40].decode("ascii", "replace")
+            unsupported(f"{where}: {shown!r} is no part of a polyhedron", "export polygons only")
+    return surface.arrays()
+
+
+def _vertex(words: list[bytes], where: str) -> list[float]:
+    values = numbers(words, where)
+    if len(values) not in WIDTHS:
+        broken(where, f"a vertex needs three numbers, got {len(values)}")
+    if len(values) in WEIGHTED and values[FLOATS] != 1.0:
+        unsupported(f"{where}: a vertex of weight {values[FLOATS]:g}", "export weights of 1")
+    return values[:FLOATS]
+
+
+def _corners(words: list[bytes], vertices: int, where: str) -> list[int]:
+    """Numbers of vertices from 0 on; those in the file count from 1, or back from the last."""
+    corners = [whole(word.partition(b"/")[0], where) for word in words]
+    for corner in corners:
+        if not 1 <= abs(corner) <= vertices:
+            outside(where, corner, vertices)
+    return [corner - 1 if corner > 0 else vertices + corner for corner in corners]

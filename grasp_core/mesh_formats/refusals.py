@@ -1,0 +1,33 @@
+"""Refusals of mesh files, in one line each."""
+
+from typing import NoReturn
+
+from grasp_core.errors import MeshError, MeshRefusal
+
+
+def broken(where: str, said: str) -> NoReturn:
+    """The file breaks the rules of its format.
+
+    Raises:
+        MeshError: Always.
+    """
+    raise MeshError(MeshRefusal.UNREADABLE, f"{where}: {said}; export it again")
+
+
+def unsupported(said: str, remedy: str) -> NoReturn:
+    """The file uses a part of its format that is not read, so that geometry would be lost.
+
+    Raises:
+        MeshError: Always.
+    """
+    raise MeshError(MeshRefusal.UNSUPPORTED, f"{said}; {remedy}")
+
+
+def outside(where: str, corner: int, vertices: int) -> NoReturn:
+    """A triangle names a vertex that there is not.
+
+    Raises:
+        MeshError: Always.
+    """
+    message = f"{where}: names vertex {corner}, the file has {vertices}; export it again"
+    raise MeshError(MeshRefusal.INDEX, message)

@@ -1,0 +1,76 @@
+"""Lines of text as words, words as numbers: in ASCII only, which all readers see alike."""
+
+import io
+import math
+import re
+from collections.abc import Iterator, Sequence
+
+from grasp_core.errors import MeshError, MeshRefusal
+from grasp_core.mesh_formats.refusals import broken
+
+LONGEST_LINE = 2**20
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+CONTROL = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
+OTHER_ALPHABETS = bytes(range(128)) + b"?" * 128
+NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,9})?")
+WHOLE = re.compile(rb"[+-]?\d{1,18}")
+NOT_FINITE = re.compile(rb"[+-]?(nan|inf(inity)?)", re.IGNORECASE)
+Where = str
+
+
+def plain_text(data: bytes) -> bytes:
+    """Text with one byte a character: comments and names in other alphabets become `?`.
+
+    Raises:
+        MeshError: It is UTF-16, holds control characters, or a line is too long.
+    """
+    if data.startswith(UTF_16):
+        broken("byte 0", "expected UTF-8 text, got UTF-16")
+    text = data.removeprefix(BYTE_ORDER_MARK).translate(OTHER_ALPHABETS)
+    if found := CONTROL.search(text):
+        broken(f"byte {found.start()}", f"expected text, got the control character {found[0]!r}")
+    for number, line in enumerate(io.BytesIO(text), 1):
+        if len(line) > LONGEST_LINE:
+            broken(f"line {number}", f"is longer than {LONGEST_LINE} bytes")
+    return text
+
+
+def worded_lines(text: bytes) -> Iterator[tuple[int, list[bytes]]]:
+    """The words of each line that has some before a `#`, with the number of the line."""
+    for number, line in enumerate(io.BytesIO(text), 1):
+        words = line.partition(b"#")[0].split()
+        if words:
+            yield number, words
+
+
+def numbers(words: Sequence[bytes], where: Where) -> list[float]:
+    """Finite numbers.
+
+    Raises:
+        MeshError: A word is not one.
+    """
+    values = [float(word) if NUMBER.fullmatch(word) else _refused(word, where) for word in words]
+    for word, value in zip(words, values, strict=True):
+        if not math.isfinite(value):
+            _refused(word, where)
+    return values
+
+
+def _refused(word: bytes, where: Where) -> float:
+    shown = word[:40].decode("ascii", "replace")
+    if NOT_FINITE.fullmatch(word) or NUMBER.fullmatch(word):
+        message = f"{where}: a coordinate must be finite, got {shown}; repair it"
+        raise MeshError(MeshRefusal.NON_FINITE, message)
+    broken(where, f"expected a number, got {shown!r}")
+
+
+def whole(word: bytes, where: Where) -> int:
+    """A whole number.
+
+    Raises:
+        MeshError: It is not one.
+    """
+    if not WHOLE.fullmatch(word):
+        broken(where, f"expected a whole number, got {word[:40].decode('ascii', 'replace')!r}")
+    return int(word)
