@@ -68,14 +68,22 @@ def mesh_bytes(path: Path, limits: MeshLimits) -> bytes:
         raise MeshError(MeshRefusal.TOO_MANY, message)
     if not data:
         raise MeshError(MeshRefusal.EMPTY, f"{path.name}: the file is empty; export it again")
-    _check_beginning(path.name, kind, data)
+    try:
+        check_beginning(kind, data)
+    except MeshError as error:
+        raise MeshError(error.reason, f"{path.name}: {error.message}") from error
     return data
 
 
-def _check_beginning(name: str, kind: str, data: bytes) -> None:
+def check_beginning(kind: str, data: bytes) -> None:
+    """Refuse bytes that begin otherwise than files of a kind do.
+
+    Raises:
+        MeshError: They do.
+    """
     for beginning, other in OTHER_FILES.items():
         if data.startswith(beginning):
-            message = f"{name}: is {other}, expected {kind.upper()}; unpack or convert it first"
+            message = f"is {other}, expected {kind.upper()}; unpack or convert it first"
             raise MeshError(MeshRefusal.FORMAT, message)
     begins = {
         "ply": data.startswith((b"ply\n", b"ply\r")),
@@ -83,5 +91,5 @@ def _check_beginning(name: str, kind: str, data: bytes) -> None:
         "stl": stl.is_text(data) or stl.is_binary(data),
     }
     if not begins.get(kind, True):
-        message = f"{name}: does not begin as a {kind.upper()} file does; export it again"
+        message = f"does not begin as a {kind.upper()} file does; export it again"
         raise MeshError(MeshRefusal.UNREADABLE, message)

@@ -26,8 +26,8 @@ class Target:
     """Files that are read; small ones."""
     agrees: Callable[[bytes, Any], None] = lambda _data, _found: None
     """Raises `AssertionError` where what was read is not what is written, by another reading."""
-    written: Literal["json", "toml", "npz", "bytes"] = "bytes"
-    """How files are mutated: as text of that kind, as the members of an archive, or bytewise."""
+    written: Literal["json", "toml", "npz", "glb", "words", "bytes"] = "bytes"
+    """How files are mutated: as text of that kind, as members of an archive, or bytewise."""
 
     def inputs(self) -> Iterator[tuple[str, bytes]]:
         """Seeds, and what was found before, by name."""
@@ -68,7 +68,7 @@ def _check_message(text: str) -> None:
 
 def targets() -> dict[str, Target]:
     """All readers, by name."""
-    from tests.fuzzing import data_files
+    from tests.fuzzing import data_files, mesh_files
 
-    listed = [*data_files.TARGETS]
+    listed = [*data_files.TARGETS, *mesh_files.TARGETS]
     return {target.name: target for target in listed}

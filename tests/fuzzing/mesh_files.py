@@ -1,0 +1,199 @@
+"""Readers of mesh files as targets, and the making of solids; each against a plain reading."""
+
+import io
+import json
+import struct
+from functools import partial
+
+import numpy as np
+import trimesh
+
+import grasp_core as gc
+from grasp_core.mesh_files import FORMATS, check_beginning
+from grasp_core.mesh_reader import triangles_of
+from tests.fuzzing.plain_meshes import PLAIN
+from tests.fuzzing.targets import Target
+
+MOST = 10_000
+"""Triangles of a fuzzed file."""
+ROUNDING = 1e-9
+VOLUME_ROUNDING = 1e-6
+
+
+def read(kind, data):
+    check_beginning(kind, data)
+    return triangles_of(kind, data, MOST)
+
+
+def first_least(corners):
+    """The nine numbers of a triangle, from its least corner on, as it is wound."""
+    points = [tuple(float(x) + 0.0 for x in point) for point in corners]
+    least = points.index(min(points))
+    return tuple(x for point in points[least:] + points[:least] for x in point)
+
+
+def same_triangles(kind, data, found):
+    """All coordinates are those of the plain reading, triangle by triangle, in any order."""
+    points, corners = found
+    rows = sorted(first_least(each) for each in points[corners])
+    plain = sorted(first_least(each) for each in PLAIN[kind](data))
+    assert len(rows) == len(plain), (len(rows), len(plain))
+    if rows == plain:
+        return
+    assert kind == "glb"  # products of matrices are rounded
+    one, other = (np.array(each).reshape(-1, 3, 3) for each in (rows, plain))
+    gap = [
+        np.abs(np.roll(one, k, axis=1)[:, None] - other[None]).max(axis=(2, 3)) for k in range(3)
+    ]
+    near = np.min(gap, axis=0) <= ROUNDING * np.abs(other).max()
+    assert near.any(axis=0).all()
+    assert near.any(axis=1).all()
+
+
+def tetrahedron():
+    return trimesh.Trimesh([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]],
+                           [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])  # fmt: skip
+
+
+OBJ = """# a wedge
+mtllib a.mtl
+o wedge
+v 0 0 0
+v 1e-1 0 0 1
+v .1 .1 0
+v 0 +0.1 0.0
+v 0 0 .05 0.5 0.5 0.5
+v 1.0E-01 0 5e-2
+vn 0 0 1
+vt 0 0
+g base
+f 1/1/1 4/1/1 3/1/1 2/1/1
+f 5 6 3 4
+f 1//1 2//1 6//1 \\
+5//1
+f 2 3 6
+f -6 -2 -3
+"""
+OFF = "OFF 4 4 6\n0 0 0\n.1 0 0\n0 .1 0 # a comment\n0 0 1e-1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"
+PLY = """ply
+format ascii 1.0
+comment four faces
+element vertex 4
+property float x
+property double y
+property float32 z
+element face 4
+property uchar red
+property list uchar int vertex_indices
+end_header
+0 0 0
+.1 0 0
+0 .1 0
+0 0 1e-1
+1 3 0 2 1
+2 3 0 1 3
+3 3 0 3 2
+4 3 1 2 3
+"""
+
+
+def big_endian():
+    faces = tetrahedron().faces
+    head = PLY.split("end_header")[0].replace("ascii", "binary_big_endian")
+    head = head.replace("property uchar red\n", "") + "end_header\n"
+    rows = [struct.pack(">fdf", *point) for point in tetrahedron().vertices.tolist()]
+    return head.encode() + b"".join(rows + [struct.pack(">B3i", 3, *face) for face in faces])
+
+
+def moved_scene():
+    """Two nodes above a mesh, turned, stretched and moved; a strip beside it."""
+    scene = trimesh.Scene()
+    scene.add_geometry(tetrahedron(), geom_name="part")
+    data = scene.export(file_type="glb")
+    tree, binary = glb_parts(data)
+    tree["nodes"].append(
+        {"rotation": [0.6, 0, 0, 0.8], "translation": [1, 2, 3], "scale": [1, 2, -1],
+         "children": tree["scenes"][0]["nodes"]}
+    )  # fmt: skip
+    tree["scenes"][0]["nodes"] = [len(tree["nodes"]) - 1]
+    return glb_of(tree, binary)
+
+
+def glb_parts(data):
+    size = struct.unpack_from("<I", data, 12)[0]
+    return json.loads(data[20 : 20 + size]), data[28 + size :]
+
+
+def glb_of(tree, binary):
+    """A GLB file with right lengths."""
+    text = tree if isinstance(tree, bytes) else json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text
+    chunks += struct.pack("<I4s", len(binary), b"BIN\0") + binary
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+SEEDS = {
+    "obj": lambda: [OBJ.encode(), tetrahedron().export(file_type="obj").encode()],
+    "stl": lambda: [tetrahedron().export(file_type=kind) for kind in ("stl", "stl_ascii")],
+    "off": lambda: [OFF.encode(), tetrahedron().export(file_type="off").encode()],
+    "ply": lambda: [
+        PLY.encode(), big_endian(), tetrahedron().export(file_type="ply"),
+        tetrahedron().export(file_type="ply", encoding="ascii"),
+    ],
+    "glb": lambda: [tetrahedron().export(file_type="glb"), moved_scene()],
+}  # fmt: skip
+WRITTEN = {"obj": "words", "off": "words", "glb": "glb", "stl": "words", "ply": "words"}
+
+
+def seeds(kind):
+    return [data if isinstance(data, bytes) else data.encode() for data in SEEDS[kind]()]
+
+
+def solid(data):
+    """A solid of an archive of vertices and triangles."""
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as held:
+            vertices, triangles = held["vertices"], held["triangles"]
+    except Exception as error:  # an archive that is none is no business of this target
+        raise gc.InputError("no archive") from error
+    if len(triangles) > MOST:
+        raise gc.InputError("too many")
+    return gc.Polyhedron.from_mesh(vertices, triangles), vertices, triangles
+
+
+def same_volume(_, found):
+    """The volume is that of the triangles that were given, and so is the hull of used vertices."""
+    body, vertices, triangles = found
+    corners = np.asarray(vertices, dtype=np.float64)[triangles]
+    volume = abs(np.linalg.det(corners - corners.mean(axis=(0, 1))).sum() / 6.0)
+    extent = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    if body.patches is None:
+        assert abs(body.volume - volume) <= VOLUME_ROUNDING * extent**3
+        assert np.allclose(np.ptp(body.vertices, axis=0).max(), extent, rtol=1e-6)
+    assert all(np.isfinite(face.normal).all() and face.area > 0.0 for face in body.faces)
+
+
+def solid_seeds():
+    held = io.BytesIO()
+    mesh = tetrahedron()
+    np.savez(held, vertices=mesh.vertices, triangles=mesh.faces)
+    box = io.BytesIO()
+    mesh = trimesh.creation.box(extents=(0.1, 0.2, 0.3))
+    np.savez(box, vertices=mesh.vertices, triangles=mesh.faces)
+    return [held.getvalue(), box.getvalue()]
+
+
+TARGETS = [
+    *(
+        Target(
+            kind,
+            partial(read, kind),
+            partial(seeds, kind),
+            partial(same_triangles, kind),
+            WRITTEN[kind],
+        )
+        for kind in FORMATS
+    ),
+    Target("solid", solid, solid_seeds, same_volume, "npz"),
+]

@@ -1,0 +1,169 @@
+"""Mesh files read once more, in the plainest way: lists of triangles of three points."""
+
+import json
+import math
+import re
+import struct
+
+Point = tuple[float, float, float]
+Triangle = tuple[Point, Point, Point]
+
+
+def fan(corners):
+    return [(corners[0], corners[i], corners[i + 1]) for i in range(1, len(corners) - 1)]
+
+
+def of_obj(data: bytes) -> list[Triangle]:
+    text = data.decode("latin-1").replace("\\\r\n", "").replace("\\\n", "")
+    points, triangles = [], []
+    for line in text.split("\n"):
+        words = line.split("#")[0].lstrip("ï»¿").split()
+        if words[:1] == ["v"]:
+            points.append(tuple(map(float, words[1:4])))
+        elif words[:1] == ["f"]:
+            numbers = [int(word.split("/")[0]) for word in words[1:]]
+            assert all(numbers)
+            triangles += fan([points[n - 1 if n > 0 else n] for n in numbers])
+    return triangles
+
+
+def of_stl(data: bytes) -> list[Triangle]:
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) == 84 + 50 * count:
+        rows = [struct.unpack_from("<12f", data, 84 + 50 * i)[3:] for i in range(count)]
+        return [(row[:3], row[3:6], row[6:]) for row in rows]
+    lines = [line.split("#")[0].split() for line in data.decode("latin-1").split("\n")]
+    points = [tuple(map(float, w[1:])) for w in lines if w[:1] and w[0].lower() == "vertex"]
+    assert len(points) % 3 == 0
+    return [tuple(points[i : i + 3]) for i in range(0, len(points), 3)]
+
+
+def of_off(data: bytes) -> list[Triangle]:
+    text = data.decode("latin-1").lstrip("ï»¿")
+    lines = [line for line in (line.split("#")[0].split() for line in text.split("\n")) if line]
+    head = lines[0][1:] or lines[1]
+    rows = lines[1:] if lines[0][1:] else lines[2:]
+    vertices, faces = int(head[0]), int(head[1])
+    points = [tuple(map(float, row[:3])) for row in rows[:vertices]]
+    assert len(rows) == vertices + faces
+    indices = [[int(word) for word in row[1 : 1 + int(row[0])]] for row in rows[vertices:]]
+    assert all(n >= 0 for row in indices for n in row)
+    return [each for row in indices for each in fan([points[n] for n in row])]
+
+
+PLY_CODES = {
+    "char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f",
+    "double": "d", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i",
+    "uint32": "I", "float32": "f", "float64": "d",
+}  # fmt: skip
+
+
+def of_ply(data: bytes) -> list[Triangle]:
+    ended = re.search(rb"\nend_header[ \t]*\r?\n", data)
+    header = [line.split() for line in data[: ended.start()].decode("latin-1").splitlines()]
+    body, kind = data[ended.end() :], next(w[1] for w in header if w[:1] == ["format"])
+    words = re.sub(rb"#[^\n]*", b"", body).split()
+    place = 0
+
+    def one(code):
+        nonlocal place
+        if kind == "ascii":
+            place += 1
+            return float(words[place - 1])
+        form = ("<" if kind == "binary_little_endian" else ">") + code
+        place += struct.calcsize(form)
+        return struct.unpack_from(form, body, place - struct.calcsize(form))[0]
+
+    points, triangles = [], []
+    elements = []
+    for line in header:
+        if line[:1] == ["element"]:
+            elements.append((line[1], int(line[2]), []))
+        elif line[:1] == ["property"]:
+            elements[-1][2].append(line[1:])
+    for name, count, properties in elements:
+        for _ in range(count):
+            row = {}
+            for said in properties:
+                code = PLY_CODES[said[-2]]
+                if said[0] == "list":
+                    row[said[-1]] = [one(code) for _ in range(int(one(PLY_CODES[said[1]])))]
+                else:
+                    row[said[-1]] = one(code)
+            if name == "vertex":
+                points.append((row["x"], row["y"], row["z"]))
+            elif name == "face":
+                corners = row.get("vertex_indices", row.get("vertex_index"))
+                assert all(n >= 0 for n in corners)
+                triangles += fan([int(n) for n in corners])
+    assert place == (len(words) if kind == "ascii" else len(body))
+    return [tuple(points[n] for n in each) for each in triangles]
+
+
+def of_glb(data: bytes) -> list[Triangle]:
+    size = struct.unpack_from("<I", data, 12)[0]
+    tree, binary = json.loads(data[20 : 20 + size]), data[28 + size :]
+    found = []
+
+    def row(number, i, code, count):
+        accessor = tree["accessors"][number]
+        view = tree["bufferViews"][accessor["bufferView"]]
+        width = struct.calcsize("<" + code) * count
+        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        assert 0 <= i < accessor["count"]
+        return struct.unpack_from(
+            f"<{count}{code}", binary, start + i * view.get("byteStride", width)
+        )
+
+    def primitive(given, place):
+        position = given["attributes"]["POSITION"]
+        count = tree["accessors"][position]["count"]
+        if "indices" in given:
+            number = given["indices"]
+            code = {5121: "B", 5123: "H", 5125: "I"}[tree["accessors"][number]["componentType"]]
+            order = [row(number, i, code, 1)[0] for i in range(tree["accessors"][number]["count"])]
+        else:
+            order = list(range(count))
+        points = [place(row(position, n, "f", 3)) for n in order]
+        if given.get("mode", 4) == 5:
+            strips = [points[i : i + 3] for i in range(len(points) - 2)]
+            return [tuple(t) if i % 2 == 0 else (t[1], t[0], t[2]) for i, t in enumerate(strips)]
+        assert len(points) % 3 == 0
+        return [tuple(points[i : i + 3]) for i in range(0, len(points), 3)]
+
+    def node(number, above):
+        given = tree["nodes"][number]
+
+        def place(point):
+            return above(moved(given, point))
+
+        if "mesh" in given:
+            for each in tree["meshes"][given["mesh"]]["primitives"]:
+                found.extend(primitive(each, place))
+        for child in given.get("children", []):
+            node(child, place)
+
+    for root in tree["scenes"][tree.get("scene", 0)].get("nodes", []):
+        node(root, lambda point: point)
+    return found
+
+
+def moved(node, point):
+    if "matrix" in node:
+        m = node["matrix"]
+        return tuple(sum(m[4 * j + i] * (*point, 1)[j] for j in range(4)) for i in range(3))
+    x, y, z = (a * b for a, b in zip(point, node.get("scale", (1, 1, 1)), strict=True))
+    i, j, k, w = node.get("rotation", (0, 0, 0, 1))
+    size = math.hypot(i, j, k, w)
+    i, j, k, w = (each / size for each in (i, j, k, w))
+    # v + 2 w (q x v) + 2 q x (q x v)
+    a, b, c = 2 * (j * z - k * y), 2 * (k * x - i * z), 2 * (i * y - j * x)
+    turned = (
+        x + w * a + j * c - k * b,
+        y + w * b + k * a - i * c,
+        z + w * c + i * b - j * a,
+    )
+    return tuple(a + b for a, b in zip(turned, node.get("translation", (0, 0, 0)), strict=True))
+
+
+PLAIN = {"obj": of_obj, "stl": of_stl, "off": of_off, "ply": of_ply, "glb": of_glb}
