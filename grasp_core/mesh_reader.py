@@ -21,7 +21,7 @@ from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.mesh import parsed_by_trimesh
 from grasp_core.mesh_formats import glb, obj, off, ply, stl
 from grasp_core.mesh_formats.agreement import same_triangles
-from grasp_core.mesh_formats.words import plain_text
+from grasp_core.mesh_formats.words import plain_text, without_comments
 
 STRICT = {"obj": obj.read, "stl": stl.read, "ply": ply.read, "off": off.read, "glb": glb.read}
 FORBIDDEN = ("socket.", "subprocess.", "os.exec", "os.fork", "os.posix_spawn", "os.system", "pty.")
@@ -65,9 +65,10 @@ def _ambiguous(kind: str, said: str) -> MeshError:
 
 def _text_of(kind: str, data: bytes) -> bytes:
     """Text as both readers see it alike; binary data as it is."""
-    if kind in {"obj", "off"} or (kind == "stl" and not stl.is_binary(data)):
-        return plain_text(data)
-    return plain_text(data) if kind == "ply" and ply.is_text(data) else data
+    if kind in {"obj", "off"}:
+        return without_comments(plain_text(data))
+    binary = {"stl": stl.is_binary, "ply": ply.is_binary}.get(kind, lambda _: True)
+    return data if binary(data) else plain_text(data)
 
 
 def answer(requests: BinaryIO, answers: BinaryIO) -> bool:

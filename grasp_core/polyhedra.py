@@ -21,6 +21,7 @@ from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.mass import mass_properties
 from grasp_core.mesh_child import read_triangles
 from grasp_core.mesh_files import MeshLimits
+from grasp_core.mesh_formats.refusals import shown
 from grasp_core.planar_faces import MAX_FACES, FlatnessLimits, coplanar_groups, planar_faces
 from grasp_core.solid_checks import largest_part, oriented, surface_fault, welded
 from grasp_core.solids import Solid, hull, triangulate
@@ -223,8 +224,11 @@ def _patched(
 
 
 def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tuple[Array, Indices]:
-    points = np.array(vertices, dtype=np.float64)
-    corners = np.array(triangles)
+    try:
+        points, corners = np.array(vertices, dtype=np.float64), np.array(triangles)
+    except (TypeError, ValueError) as error:
+        message = f"need vertices (n, 3) and triangles (t, 3) as numbers: {shown(error)}"
+        raise MeshError(MeshRefusal.UNREADABLE, message) from error
     if points.ndim != 2 or corners.ndim != 2 or points.shape[1:] != (3,) or not corners.size:  # noqa: PLR2004
         message = f"need vertices (n, 3) and triangles (t, 3), got {points.shape}, {corners.shape}"
         raise MeshError(MeshRefusal.EMPTY, message)

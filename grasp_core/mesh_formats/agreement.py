@@ -13,12 +13,19 @@ ROUNDING = 1e-9
 
 def same_triangles(one: tuple[Array, Indices], other: tuple[Array, Indices]) -> bool:
     """Whether vertices (n, 3) and triangles (t, 3) of two readings give the same triangles."""
+    if not _sound(*one) or not _sound(*other):
+        return False  # the other reader has lost vertices, or found other numbers
     rows = [_rows(*reading) for reading in (one, other)]
     if rows[0].shape != rows[1].shape:
         return False
     if (rows[0] == rows[1]).all():
         return True
     return _near(rows[0], rows[1]) and _near(rows[1], rows[0])
+
+
+def _sound(points: Array, triangles: Indices) -> bool:
+    known = not triangles.size or 0 <= triangles.min() <= triangles.max() < len(points)
+    return bool(known and np.isfinite(points).all())
 
 
 def _rows(points: Array, triangles: Indices) -> Array:

@@ -1,6 +1,7 @@
 """GLB: a JSON tree of nodes and meshes whose numbers lie in one binary chunk.
 
-The frame of a mesh is the product of the matrices from the root of its scene to its node. What
+The frame of a mesh is the product of the matrices from the root of its scene to its node; a mirror
+turns its triangles, so that outside stays outside. What
 would change shapes and is not read - compression, sparse numbers, skins, morphs, other files - is
 refused.
 """
@@ -14,7 +15,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.mesh_formats.refusals import broken, unsupported
+from grasp_core.mesh_formats.refusals import broken, shown, unsupported
 from grasp_core.mesh_formats.surfaces import CORNERS, check_corners, too_many
 
 MAGIC, VERSION = b"glTF", 2
@@ -39,7 +40,7 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     try:
         return _scene(tree, binary, most)
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        message = f"the JSON part is no glTF ({type(error).__name__}: {str(error)[:80]})"
+        message = f"the JSON part is no glTF ({type(error).__name__}: {shown(error)})"
         raise MeshError(MeshRefusal.UNREADABLE, f"{message}; export it again") from error
 
 
@@ -68,7 +69,7 @@ def _tree(text: bytes) -> Tree:
     try:
         tree: object = json.loads(text.decode("utf-8"))
     except (ValueError, RecursionError) as error:
-        message = f"the first chunk is not JSON ({str(error)[:80]}); export it again"
+        message = f"the first chunk is not JSON ({shown(error)}); export it again"
         raise MeshError(MeshRefusal.UNREADABLE, message) from error
     if not isinstance(tree, dict):
         broken("the first chunk", "expected a JSON object")
@@ -86,7 +87,8 @@ def _scene(tree: Tree, binary: bytes, most: int) -> tuple[Array, Indices]:
             if count > most:
                 too_many(count, most)
             points.append(local @ matrix[:3, :3].T + matrix[:3, 3])
-            triangles.append(corners + before)
+            mirrored = np.linalg.det(matrix[:3, :3]) < 0.0
+            triangles.append(before + (corners[:, ::-1] if mirrored else corners))
             before += len(local)
     moved = np.vstack(points)
     if not np.isfinite(moved).all():
@@ -102,7 +104,7 @@ def _check_features(tree: Tree) -> None:
     used = [*tree.get("extensionsRequired", ()), *tree.get("extensionsUsed", ())]
     for name in used:
         if not str(name).startswith(PLAIN_EXTENSIONS):
-            unsupported(f"extension {str(name)[:60]!r}", "export plain glTF, without compression")
+            unsupported(f"extension {shown(name)!r}", "export plain glTF, without compression")
     if any("skin" in node or "weights" in node for node in tree.get("nodes", [])):
         unsupported("skins and morphs move vertices", "export the mesh as it stands")
 
@@ -138,7 +140,7 @@ def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
 
 def _check_place(place: object, listed: list[Any]) -> None:
     if type(place) is not int or not 0 <= place < len(listed):
-        broken("the JSON part", f"names number {place!s:.40} of {len(listed)}")
+        broken("the JSON part", f"names number {shown(place)} of {len(listed)}")
 
 
 def _matrix(node: Tree) -> Array:
@@ -146,15 +148,28 @@ def _matrix(node: Tree) -> Array:
     if "matrix" in node:
         if {"translation", "rotation", "scale"} & node.keys():
             broken("a node", "has a matrix and parts of one")
-        matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+        matrix = _floats(node, "matrix", 16).reshape(4, 4).T
         if (matrix[3] != (0.0, 0.0, 0.0, 1.0)).any():
             unsupported("a node with a projective matrix", "export it without")
         return matrix
-    scale = np.array(node.get("scale", (1.0, 1.0, 1.0)), dtype=np.float64).reshape(3)
-    rotation = np.array(node.get("rotation", (0.0, 0.0, 0.0, 1.0)), dtype=np.float64).reshape(4)
-    matrix[:3, :3] = _rotation(rotation) * scale
-    matrix[:3, 3] = np.array(node.get("translation", (0.0, 0.0, 0.0)), dtype=np.float64).reshape(3)
+    if "rotation" in node:
+        matrix[:3, :3] = _rotation(_floats(node, "rotation", 4))
+    if "scale" in node:
+        matrix[:3, :3] *= _floats(node, "scale", 3)
+    if "translation" in node:
+        matrix[:3, 3] = _floats(node, "translation", 3)
     return matrix
+
+
+def _floats(node: Tree, name: str, count: int) -> Array:
+    given = node[name]
+    if len(given) != count or any(type(each) not in (int, float) for each in given):
+        broken("a node", f"its {name} must be {count} numbers, got {shown(given)}")
+    values = np.array([float(each) for each in given])
+    if not np.isfinite(values).all():
+        message = f"a node: its {name} must be finite, got {shown(given)}; repair it"
+        raise MeshError(MeshRefusal.NON_FINITE, message)
+    return values
 
 
 def _rotation(quaternion: Array) -> Array:
@@ -178,7 +193,7 @@ def _primitive(tree: Tree, binary: bytes, primitive: Tree) -> tuple[Indices, Arr
     if "targets" in primitive or primitive.get("extensions"):
         unsupported("a part with morphs or compression", "export plain triangles")
     if mode not in (TRIANGLES, STRIP):
-        unsupported(f"a part of mode {mode!s:.20}, not of triangles", "export triangles only")
+        unsupported(f"a part of mode {shown(mode)}, not of triangles", "export triangles only")
     points = _numbers(tree, binary, primitive["attributes"]["POSITION"], "VEC3").astype(np.float64)
     if "indices" in primitive:
         flat = _numbers(tree, binary, primitive["indices"], "SCALAR").ravel().astype(np.int64)
@@ -202,7 +217,10 @@ def _numbers(tree: Tree, binary: bytes, number: int, shape: str) -> Any:
     kind = accessor["componentType"]
     wanted = {FLOAT_TYPE: "<f4"} if shape == "VEC3" else INDEX_TYPES
     if accessor["type"] != shape or kind not in wanted or accessor.get("normalized"):
-        unsupported(f"accessor {number} is {accessor['type']} of {kind}", "export plain triangles")
+        unsupported(
+            f"accessor {number} is {shown(accessor['type'])} of {shown(kind)}",
+            "export plain triangles",
+        )
     if "sparse" in accessor or "bufferView" not in accessor:
         unsupported(f"accessor {number} is sparse or empty", "export plain triangles")
     _check_place(accessor["bufferView"], tree["bufferViews"])

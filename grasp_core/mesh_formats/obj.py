@@ -3,7 +3,7 @@
 import re
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.mesh_formats.refusals import broken, outside, unsupported
+from grasp_core.mesh_formats.refusals import broken, outside, shown, unsupported
 from grasp_core.mesh_formats.surfaces import Surface
 from grasp_core.mesh_formats.words import numbers, whole, worded_lines
 
@@ -33,8 +33,9 @@ def read(text: bytes, most: int) -> tuple[Array, Indices]:
         elif keyword == b"f":
             surface.add(_corners(words, len(surface.points), where), where)
         elif keyword not in PASSED_OVER:
-            shown = keyword[:40].decode("ascii", "replace")
-            unsupported(f"{where}: {shown!r} is no part of a polyhedron", "export polygons only")
+            unsupported(
+                f"{where}: {shown(keyword)!r} is no part of a polyhedron", "export polygons only"
+            )
     return surface.arrays()
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.mesh_formats.refusals import broken, unsupported
+from grasp_core.mesh_formats.refusals import broken, shown, unsupported
 from grasp_core.mesh_formats.surfaces import Surface
 from grasp_core.mesh_formats.words import numbers, plain_text, whole, worded_lines
 
@@ -22,6 +22,8 @@ TYPES = {
 ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 END = re.compile(rb"\nend_header[ \t]*\r?\n")
 LONGEST_HEADER = 2**16
+NAME = re.compile(r"\w{1,100}", re.ASCII)
+LARGEST_CORNER = 2**32
 LISTS = ("vertex_indices", "vertex_index")
 POINT = ("x", "y", "z")
 Cell = tuple[str, list[float]]
@@ -68,10 +70,14 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     if not found:
         broken("header", "expected `end_header`")
     order, elements = _header(data[: found.start()])
+    if not order:
+        broken("header", "expected a format")
+    for element in elements:
+        _check_element(element)
     body = data[found.end() :]
     tables = {each.name: each for each in elements}
     if len(tables) < len(elements) or not {"vertex", "face"} <= tables.keys():
-        broken("header", f"expected elements vertex and face, once each, got {list(tables)}")
+        broken("header", f"expected elements vertex and face, once each, got {shown(list(tables))}")
     _check_properties(tables["vertex"], tables["face"])
     surface = Surface(most)
     if order == "=":
@@ -81,9 +87,9 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     return surface.arrays()
 
 
-def is_text(data: bytes) -> bool:
-    """Whether the header says that text follows."""
-    return b"\nformat ascii" in data[:LONGEST_HEADER]
+def is_binary(data: bytes) -> bool:
+    """Whether the header does not say that text follows."""
+    return b"\nformat ascii" not in data[:LONGEST_HEADER]
 
 
 def _check_properties(vertex: Element, face: Element) -> None:
@@ -112,17 +118,23 @@ def _header(text: bytes) -> tuple[str, list[Element]]:
             case ["property", first, *others] if elements:
                 elements[-1].properties.append(_property([first, *others], where))
             case _:
-                broken(where, f"got {' '.join(words)[:60]!r}")
-    if not order or any(element.rows < 0 for element in elements):
-        broken("header", "expected a format, and counts that are not negative")
+                broken(where, f"got {shown(' '.join(words))!r}")
     return order, elements
+
+
+def _check_element(element: Element) -> None:
+    names = [element.name, *(each.name for each in element.properties)]
+    if not all(NAME.fullmatch(name) for name in names) or len(names[1:]) > len(set(names[1:])):
+        broken("header", "names must be of letters and digits, and differ")
+    if element.rows < 0 or not element.properties:
+        broken("header", f"element {element.name} needs properties, and a count from 0 on")
 
 
 def _property(said: list[str], where: str) -> Property:
     lists = said[0] == "list"
     kinds = said[1:-1] if lists else said[:-1]
     if len(kinds) != 1 + lists or not TYPES.keys() >= set(kinds):
-        broken(where, f"got the property {' '.join(said)[:60]!r}")
+        broken(where, f"got the property {shown(' '.join(said))!r}")
     if lists and TYPES[kinds[0]].startswith("f"):
         broken(where, "the length of a list must be a whole number")
     return Property(said[-1], TYPES[kinds[-1]], TYPES[kinds[0]] if lists else None)
@@ -149,9 +161,21 @@ def _cells(element: Element, words: Iterator[bytes], where: str) -> Iterator[Cel
         if len(found) != length:
             broken(where, f"{each.name} lists {length} values, {len(found)} are there")
         kept = element.name in {"vertex", "face"} and each.name in (*POINT, *LISTS)
-        yield each.name, numbers(found, where) if kept else []
+        yield each.name, _rounded(numbers(found, where), each.kind, where) if kept else []
     if next(words, None) is not None:
         broken(where, "more values than properties")
+
+
+def _rounded(values: list[float], kind: str, where: str) -> list[float]:
+    """Numbers as their type keeps them."""
+    if not kind.startswith("f"):
+        return values
+    with np.errstate(over="ignore", under="ignore"):
+        kept = np.array(values).astype(kind)
+    if not np.isfinite(kept).all():
+        message = f"{where}: a coordinate must be finite in single precision; repair it"
+        raise MeshError(MeshRefusal.NON_FINITE, message)
+    return kept.tolist()
 
 
 def _add_row(surface: Surface, name: str, values: dict[str, list[float]], where: str) -> None:
@@ -159,8 +183,8 @@ def _add_row(surface: Surface, name: str, values: dict[str, list[float]], where:
         surface.points.append([values[axis][0] for axis in POINT])
     elif name == "face":
         corners = next(values[each] for each in LISTS if each in values)
-        if any(corner != int(corner) for corner in corners):
-            broken(where, "corners must be whole numbers")
+        if any(corner != int(corner) or abs(corner) > LARGEST_CORNER for corner in corners):
+            broken(where, "corners must be numbers of vertices")
         surface.add([int(corner) for corner in corners], where)
 
 

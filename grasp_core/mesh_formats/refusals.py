@@ -4,6 +4,15 @@ from typing import NoReturn
 
 from grasp_core.errors import MeshError, MeshRefusal
 
+LONGEST = 60
+"""Characters of a file that a message shows."""
+
+
+def shown(value: object) -> str:
+    """What stands in a file, for a message: short, and without what could steer a terminal."""
+    text = value.decode("latin-1") if isinstance(value, bytes) else str(value)
+    return "".join(c if c.isascii() and c.isprintable() else "?" for c in text[:LONGEST])
+
 
 def broken(where: str, said: str) -> NoReturn:
     """The file breaks the rules of its format.

@@ -6,7 +6,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.mesh_formats.refusals import broken
+from grasp_core.mesh_formats.refusals import broken, shown
 from grasp_core.mesh_formats.surfaces import too_many
 from grasp_core.mesh_formats.words import numbers, worded_lines
 
@@ -98,5 +98,4 @@ def _expect(
     found = [word.lower() for word in (words if whole_line else words[: len(expected)])]
     if found != expected:
         wanted = b" ".join(expected).decode("ascii")
-        shown = b" ".join(words)[:40].decode("ascii", "replace")
-        broken(f"line {number}", f"expected `{wanted}`, got {shown!r}")
+        broken(f"line {number}", f"expected `{wanted}`, got {shown(b' '.join(words))!r}")

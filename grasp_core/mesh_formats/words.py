@@ -6,13 +6,14 @@ import re
 from collections.abc import Iterator, Sequence
 
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.mesh_formats.refusals import broken
+from grasp_core.mesh_formats.refusals import broken, shown
 
 LONGEST_LINE = 2**20
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 CONTROL = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 OTHER_ALPHABETS = bytes(range(128)) + b"?" * 128
+COMMENT = re.compile(rb"#[^\n]*")
 NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,9})?")
 WHOLE = re.compile(rb"[+-]?\d{1,18}")
 NOT_FINITE = re.compile(rb"[+-]?(nan|inf(inity)?)", re.IGNORECASE)
@@ -36,10 +37,15 @@ def plain_text(data: bytes) -> bytes:
     return text
 
 
+def without_comments(text: bytes) -> bytes:
+    """Text without what follows a `#` in its line."""
+    return COMMENT.sub(b"", text)
+
+
 def worded_lines(text: bytes) -> Iterator[tuple[int, list[bytes]]]:
-    """The words of each line that has some before a `#`, with the number of the line."""
+    """The words of each line that has some, with the number of the line."""
     for number, line in enumerate(io.BytesIO(text), 1):
-        words = line.partition(b"#")[0].split()
+        words = line.split()
         if words:
             yield number, words
 
@@ -58,11 +64,10 @@ def numbers(words: Sequence[bytes], where: Where) -> list[float]:
 
 
 def _refused(word: bytes, where: Where) -> float:
-    shown = word[:40].decode("ascii", "replace")
     if NOT_FINITE.fullmatch(word) or NUMBER.fullmatch(word):
-        message = f"{where}: a coordinate must be finite, got {shown}; repair it"
+        message = f"{where}: a coordinate must be finite, got {shown(word)}; repair it"
         raise MeshError(MeshRefusal.NON_FINITE, message)
-    broken(where, f"expected a number, got {shown!r}")
+    broken(where, f"expected a number, got {shown(word)!r}")
 
 
 def whole(word: bytes, where: Where) -> int:
@@ -72,5 +77,5 @@ def whole(word: bytes, where: Where) -> int:
         MeshError: It is not one.
     """
     if not WHOLE.fullmatch(word):
-        broken(where, f"expected a whole number, got {word[:40].decode('ascii', 'replace')!r}")
+        broken(where, f"expected a whole number, got {shown(word)!r}")
     return int(word)

@@ -28,8 +28,7 @@ def read(kind, data):
 def first_least(corners):
     """The nine numbers of a triangle, from its least corner on, as it is wound."""
     points = [tuple(float(x) + 0.0 for x in point) for point in corners]
-    least = points.index(min(points))
-    return tuple(x for point in points[least:] + points[:least] for x in point)
+    return min(sum(points[k:] + points[:k], ()) for k in range(3))
 
 
 def same_triangles(kind, data, found):

@@ -58,7 +58,7 @@ PLY_CODES = {
 }  # fmt: skip
 
 
-def of_ply(data: bytes) -> list[Triangle]:
+def of_ply(data: bytes) -> list[Triangle]:  # noqa: C901 - one loop, as the format is
     ended = re.search(rb"\nend_header[ \t]*\r?\n", data)
     header = [line.split() for line in data[: ended.start()].decode("latin-1").splitlines()]
     body, kind = data[ended.end() :], next(w[1] for w in header if w[:1] == ["format"])
@@ -69,7 +69,8 @@ def of_ply(data: bytes) -> list[Triangle]:
         nonlocal place
         if kind == "ascii":
             place += 1
-            return float(words[place - 1])
+            value = float(words[place - 1])
+            return struct.unpack("f", struct.pack("f", value))[0] if code == "f" else value
         form = ("<" if kind == "binary_little_endian" else ">") + code
         place += struct.calcsize(form)
         return struct.unpack_from(form, body, place - struct.calcsize(form))[0]
@@ -100,7 +101,7 @@ def of_ply(data: bytes) -> list[Triangle]:
     return [tuple(points[n] for n in each) for each in triangles]
 
 
-def of_glb(data: bytes) -> list[Triangle]:
+def of_glb(data: bytes) -> list[Triangle]:  # noqa: C901 - one tree, as the format is
     size = struct.unpack_from("<I", data, 12)[0]
     tree, binary = json.loads(data[20 : 20 + size]), data[28 + size :]
     found = []
@@ -138,14 +139,24 @@ def of_glb(data: bytes) -> list[Triangle]:
             return above(moved(given, point))
 
         if "mesh" in given:
+            mirrored = spat(*(place(p) for p in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)))) < 0
             for each in tree["meshes"][given["mesh"]]["primitives"]:
-                found.extend(primitive(each, place))
+                made = primitive(each, place)
+                found.extend([t[::-1] for t in made] if mirrored else made)
         for child in given.get("children", []):
             node(child, place)
 
     for root in tree["scenes"][tree.get("scene", 0)].get("nodes", []):
         node(root, lambda point: point)
     return found
+
+
+def spat(o, a, b, c):
+    """Six times the signed volume of a tetrahedron."""
+    (x, y, z), (u, v, w), (p, q, r) = (
+        [m - n for m, n in zip(point, o, strict=True)] for point in (a, b, c)
+    )
+    return x * (v * r - w * q) - y * (u * r - w * p) + z * (u * q - v * p)
 
 
 def moved(node, point):

@@ -19,6 +19,12 @@ def test_no_input_does_harm(name):
     assert accepted >= 1  # else nothing is compared with what is written
 
 
+@pytest.mark.parametrize("name", targets())
+def test_what_is_whole_is_read(name):
+    target = targets()[name]
+    assert all([target.check(data) for data in target.seeds()])
+
+
 def test_every_folder_of_inputs_is_of_a_reader():
     folders = {path.name for path in CORPUS.iterdir() if path.is_dir()}
     assert folders <= set(targets())

@@ -1,0 +1,51 @@
+"""Bad input as a catalogue: what is made, which command is given it, and what must come of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+Make = Callable[[Path], list[str]]
+"""Writes files into an empty folder, which is the working directory, and gives a command line."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One bad file or value."""
+
+    group: str
+    name: str
+    make: Make
+    code: int
+    """Exit code that docs/errors.md promises."""
+    says: tuple[str, ...]
+    """In the message: the file or flag, the field, the remedy."""
+    environment: tuple[tuple[str, str], ...] = ()
+
+
+def file_case(  # noqa: PLR0913 - a table's columns
+    group: str, name: str, file: str, data: bytes | str, says: str, *, command: str = "inspect"
+) -> Case:
+    """A file that a command is to refuse, naming it.
+
+    Args:
+        group: Of the catalogue.
+        name: Of the case.
+        file: What the file is called.
+        data: What it holds.
+        says: Words of the message, parted by `|`.
+        command: The command, of which FILE stands for the file, or it comes last.
+    """
+
+    def make(folder: Path) -> list[str]:
+        (folder / file).write_bytes(data if isinstance(data, bytes) else data.encode())
+        words = command.split()
+        if "FILE" not in words:
+            words.append("FILE")
+        return [file if word == "FILE" else word for word in words]
+
+    return Case(group, name, make, 4, (file, *says.split("|")))
+
+
+def flag_case(group: str, line: str, says: str, code: int = 2) -> Case:
+    """A command line that is to be refused."""
+    return Case(group, line, lambda _: line.split(), code, tuple(says.split("|")))

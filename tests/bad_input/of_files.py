@@ -1,0 +1,142 @@
+"""Group 1: what a name of a file may lead to, whatever is in the file."""
+
+import gzip
+import os
+from functools import partial
+from pathlib import Path
+
+from tests.bad_input.cases import Case, file_case
+from tests.bad_input.mesh_texts import obj, off, ply, stl, stl_text
+
+GROUP = "files"
+READERS = {
+    "inspect": ("part.obj", "inspect FILE"),
+    "plan": ("part.stl", "plan FILE"),
+    "validate": ("grasps.json", "validate FILE"),
+    "scene": ("grasps.json", "scene FILE"),
+    "analyze": ("contacts.json", "analyze FILE"),
+    "wrenches": ("task.json", "validate {grasps} --wrenches FILE"),
+    "setup": ("setup.toml", "validate {grasps} --setup FILE"),
+    "config": ("flags.toml", "plan box --config FILE"),
+    "suite": ("suite.toml", "baseline record --suite FILE"),
+    "baseline": ("baseline.json", "baseline check FILE"),
+    "dataset": ("dataset.toml", "dataset build FILE --out made"),
+}
+"""Commands by what they read, each with a file of the right ending."""
+
+
+def _pipe(path: Path) -> None:
+    os.mkfifo(path)
+
+
+def _device(path: Path) -> None:
+    path.symlink_to("/dev/zero")
+
+
+def _loop(path: Path) -> None:
+    path.symlink_to(path.name)
+
+
+def _folder(path: Path) -> None:
+    path.mkdir()
+
+
+def _nothing(_: Path) -> None:
+    pass
+
+
+def _empty(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def _bytes(path: Path) -> None:
+    path.write_bytes(bytes(range(256)) * 4)
+
+
+def _utf16(path: Path) -> None:
+    path.write_text('{"a": 1}\n', encoding="utf-16")
+
+
+KINDS = {
+    "that is not there": _nothing, "that is a folder": _folder, "that is a pipe": _pipe,
+    "that is an endless device": _device, "that links to itself": _loop, "without a byte": _empty,
+    "of all bytes": _bytes, "in UTF-16": _utf16,
+}  # fmt: skip
+
+
+def _read(command: str, file: str, spoil, folder: Path) -> list[str]:
+    path = folder / file
+    spoil(path)
+    line = command.replace("FILE", file)
+    if "{grasps}" in line:
+        (folder / "good.json").write_text(good_grasps())
+        line = line.replace("{grasps}", "good.json")
+    return line.split()
+
+
+def good_grasps() -> str:
+    """A grasps.json of one grasp, made once."""
+    from tests.bad_input.good_files import grasps_text
+
+    return grasps_text()
+
+
+def _named(name: str, folder: Path) -> list[str]:
+    (folder / name).write_text("v 0 0 0\n")
+    return ["inspect", name]
+
+
+NAMES = {
+    "with a line break": "two\nlines.obj", "with quotes": "it's \"here\".obj",
+    "that is markup": "<b>part.obj", "with an escape": "red\x1b[31m.obj", "of 255 bytes": "x" * 251 + ".obj",
+    "not in UTF-8": os.fsdecode(b"caf\xe9.obj"), "that is a flag": "-v.obj", "with a bell": "a\x07.obj",
+}  # fmt: skip
+OTHERS = {
+    "an archive called stl": ("part.stl", gzip.compress(stl(), mtime=0), "gzip|unpack"),
+    "a zip called obj": ("part.obj", b"PK\x03\x04" + bytes(200), "zip|unpack"),
+    "a zip called glb": ("part.glb", b"PK\x03\x04" + bytes(200), "zip|unpack"),
+    "7z called ply": ("part.ply", b"7z\xbc\xaf\x27\x1c" + bytes(200), "7z|unpack"),
+    "XML called off": ("part.off", '<?xml version="1.0"?><COLLADA/>', "XML|convert"),
+    "a page called obj": ("part.obj", "<!DOCTYPE html><p>404", "HTML|convert"),
+    "Draco called glb": ("part.glb", b"DRACO\x02\x02" + bytes(50), "Draco|convert"),
+    "a picture called ply": ("part.ply", b"\x89PNG\r\n\x1a\n" + bytes(50), "picture|convert"),
+    "a step file": ("part.step", "ISO-10303-21;", "ending|obj"),
+    "a 3mf file": ("part.3mf", b"PK\x03\x04", "ending|obj"),
+    "a glTF in text": ("part.gltf", "{}", "ending|glb"),
+    "MJCF": ("part.xml", "<mujoco/>", "ending|obj"),
+    "a pickle": ("part.pkl", b"\x80\x04N.", "ending|obj"),
+    "no ending": ("part", obj(), "ending|obj"),
+    "a text STL called ply": ("part.ply", stl_text(), "PLY|export"),
+    "a PLY called stl": ("part.stl", ply(), "STL|export"),
+    "an OBJ called off": ("part.off", obj(), "OFF|export"),
+    "an OFF called obj": ("part.obj", off(), "OFF|export"),
+    "a GLB called obj": ("part.obj", b"glTF\x02\0\0\0" + bytes(99), "control character|export"),
+    "one byte": ("part.stl", b"s", "STL|export"),
+    "65 MB": ("part.stl", bytes(65 * 2**20), "over|bytes|simplify"),
+    "a kilobyte over a limit": ("part.obj", obj() + "#" * 2000, "over 1024|simplify"),
+}
+
+
+def cases() -> list[Case]:
+    """All of the group."""
+    found = [
+        Case(GROUP, f"{reader}: a file {name}", partial(_read, command, file, spoil), 4, (file,))
+        for reader, (file, command) in READERS.items()
+        for name, spoil in KINDS.items()
+    ]
+    found = [_as_promised(case) for case in found]
+    found += [
+        Case(GROUP, f"a name {name}", partial(_named, word), 2 if word.startswith("-") else 4, ())
+        for name, word in NAMES.items()
+    ]
+    for name, (file, data, says) in OTHERS.items():
+        command = "inspect --max-mesh-bytes 1024" if "kilobyte" in name else "inspect"
+        found.append(file_case(GROUP, name, file, data, says, command=command))
+    return found
+
+
+def _as_promised(case: Case) -> Case:
+    """The settings of flags are flags: their file is refused as they are."""
+    if case.name.startswith("config"):
+        return Case(case.group, case.name, case.make, 2, case.says)
+    return case

@@ -1,0 +1,94 @@
+"""Group 2: OBJ texts that a lenient reader takes for something else."""
+
+from functools import partial
+from pathlib import Path
+
+from tests.bad_input.cases import Case, file_case
+from tests.bad_input.mesh_texts import CORNERS, TRIANGLES, obj
+
+GROUP = "OBJ"
+GOOD = obj()
+
+
+def _with(old: str, new: str) -> str:
+    assert old in GOOD
+    return GOOD.replace(old, new, 1)
+
+
+X = "v 0.1 0.0 0.0"
+DENT = [(0, 0, 0), (0.1, 0, 0), (0.1, 0.1, 0), (0.05, 0.02, 0), (0, 0.1, 0)]
+BAD = {
+    "nan": (_with(X, "v nan 0 0"), "line 2|finite|repair"),
+    "inf": (_with(X, "v inf 0 0"), "line 2|finite|repair"),
+    "-Infinity": (_with(X, "v -Infinity 0 0"), "line 2|finite"),
+    "1e400": (_with(X, "v 1e400 0 0"), "line 2|finite"),
+    "1e300": (_with(X, "v 1e300 0 0"), "GP-MESH-SIZE|unit"),
+    "1e-300 everywhere": (GOOD.replace("0.1", "1e-300"), "GP-MESH-SIZE|unit"),
+    "a coordinate missing": (_with(X, "v 0.1 0"), "line 2|three numbers"),
+    "five coordinates": (_with(X, "v 0.1 0 0 1 1"), "line 2|three numbers"),
+    "a weight": (_with(X, "v 0.1 0 0 2"), "line 2|weight"),
+    "a comma": (_with(X, "v 0,1 0 0"), "line 2|number"),
+    "an underscore": (_with(X, "v 0_1 0 0"), "line 2|number"),
+    "a hexadecimal": (_with(X, "v 0x1 0 0"), "line 2|number"),
+    "another alphabet's digits": (_with(X, "v ١ 0 0"), "line 2|number"),
+    "a word": (_with(X, "v wide 0 0"), "line 2|number"),
+    "half an exponent": (_with(X, "v 1e 0 0"), "line 2|number"),
+    "index 0": (_with("f 1 3 2", "f 0 3 2"), "line 5|vertex 0"),
+    "index 99": (_with("f 1 3 2", "f 99 3 2"), "line 5|vertex 99|4"),
+    "index 2^63": (_with("f 1 3 2", "f 9223372036854775808 3 2"), "line 5"),
+    "index -99": (_with("f 1 3 2", "f -99 3 2"), "line 5|-99"),
+    "an index that is no whole number": (_with("f 1 3 2", "f 1.5 3 2"), "line 5|whole number"),
+    "a face before its vertices": ("f 1 2 3\n" + GOOD, "line 1|vertex 1"),
+    "relative indices amid the file": (
+        _with("v 0.0 0.0 0.1\n", "f -3 -2 -1\nv 0.0 0.0 0.1\n").replace("f 1 3 2\n", ""),
+        "two readings|export",
+    ),
+    "a face of two corners": (_with("f 1 3 2", "f 1 3"), "line 5|three corners"),
+    "a face of none": (_with("f 1 3 2", "f"), "line 5|three corners"),
+    "a face with a dent": (obj(DENT, [(1, 2, 3, 4, 0)]), "dent|triangles"),
+    "a face of 5000 corners that crosses itself": (
+        obj(CORNERS, [tuple(i % 4 for i in range(5000))]), "line 5|dent"),
+    "a curved surface": (GOOD + "cstype bezier\nsurf 0 1 0 1 1 2 3\n", "cstype|polygons"),
+    "an unknown word": (GOOD + "extrude 1\n", "line 9|extrude"),
+    "a zero byte": (GOOD + "# \0\n", "control character"),
+    "a form feed": (GOOD + "# \f\n", "control character"),
+    "a line of two megabytes": (GOOD + "#" + "x" * 2**21 + "\n", "line 9|longer"),
+    "a line of fifty megabytes": ("v " + "1 " * (25 * 2**20), "line 1|longer"),
+    "a million comments only": ("# nothing here\n" * 10**6, "no triangles"),
+    "vertices only": (GOOD.split("f ")[0], "no triangles"),
+    "lines only": (GOOD.split("f ")[0] + "l 1 2 3 4\n", "no triangles"),
+    "points only": (GOOD.split("f ")[0] + "p 1 2 3 4\n", "no triangles"),
+    "all in one line": (GOOD.replace("\n", " "), "line 1"),
+    "old line ends": (GOOD.replace("\n", "\r"), "line 1"),
+    "cut in a number": (GOOD[:-4], "line 8"),
+    "UTF-16": (GOOD.encode("utf-16"), "UTF-16"),
+    "UTF-32": (GOOD.encode("utf-32"), "UTF-16"),
+    "three hundred thousand faces": (
+        obj(CORNERS, TRIANGLES * 75_000), "GP-MESH-TOO-MANY|simplify"),
+}  # fmt: skip
+GOOD_TEXTS = {
+    "Windows' line ends": GOOD.replace("\n", "\r\n").encode(),
+    "a byte order mark": b"\xef\xbb\xbf" + GOOD.encode(),
+    "a continued line": _with("f 1 3 2", "f 1 \\\n3 2").encode(),
+    "a library of materials elsewhere": ("mtllib ../../etc/passwd\nusemtl a\n" + GOOD).encode(),
+    "a library of materials with a pipe": ("mtllib |id\n" + GOOD).encode(),
+    "an absolute library": ("mtllib /etc/passwd\n" + GOOD).encode(),
+    "comments in Latin-1": b"# caf\xe9\no caf\xe9\n" + GOOD.encode(),
+    "names in any script": "o деталь\ng 部品\n".encode() + GOOD.encode(),
+    "ten thousand comments": b"# nothing here\n" * 10_000 + GOOD.encode(),
+}
+
+
+def _good(data: bytes, folder: Path) -> list[str]:
+    (folder / "good.obj").write_bytes(data)
+    return ["inspect", "good.obj"]
+
+
+def cases() -> list[Case]:
+    """All of the group, with texts beside them that must be read."""
+    found = [file_case(GROUP, name, "part.obj", *said) for name, said in BAD.items()]
+    found += [
+        Case(GROUP, f"read: {name}", partial(_good, data), 0, ())
+        for name, data in GOOD_TEXTS.items()
+    ]
+    return found
