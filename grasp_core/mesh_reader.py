@@ -47,8 +47,8 @@ def triangles_of(kind: str, data: bytes, most: int) -> tuple[Array, Indices]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             found = parsed_by_trimesh(kind, text)
-    except MemoryError:
-        raise
+    except (MemoryError, ImportError) as error:  # libraries that do not fit, either
+        raise MemoryError from error
     except Exception as error:  # trimesh's parsers raise whatever the bytes led them to
         raise _ambiguous(kind, f"trimesh cannot read it ({type(error).__name__})") from error
     if not same_triangles(strict, found):

@@ -85,8 +85,9 @@ def coplanar_groups(vertices: Array, triangles: Indices, limits: FlatnessLimits)
                 if tilt <= limits.angle and _off(corners[other], origin, normal) <= distance:
                     group_of[other] = seed
                     stack.append(int(other))
-    _, first, member = np.unique(group_of, return_index=True, return_inverse=True)
-    return [np.flatnonzero(member == group) for group in np.argsort(first, kind="stable")]
+    _, first, counts = np.unique(group_of, return_index=True, return_counts=True)
+    members = np.split(np.argsort(group_of, kind="stable"), np.cumsum(counts)[:-1])
+    return [members[group] for group in np.argsort(first, kind="stable")]
 
 
 def _off(points: Array, origin: Array, normal: Array) -> float:

@@ -23,7 +23,7 @@ from grasp_core.mesh_child import read_triangles
 from grasp_core.mesh_files import MeshLimits
 from grasp_core.mesh_formats.refusals import shown
 from grasp_core.planar_faces import MAX_FACES, FlatnessLimits, coplanar_groups, planar_faces
-from grasp_core.solid_checks import largest_part, oriented, surface_fault, welded
+from grasp_core.solid_checks import check_volume, largest_part, oriented, surface_fault, welded
 from grasp_core.solids import Solid, hull, triangulate
 from grasp_core.values import FINGERS, Face, FaceKind, PatchLimits, Polyhedron
 
@@ -85,6 +85,8 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
         )
     except MeshError as error:
         raise MeshError(error.reason, f"{path.name}: {error.message}") from error
+    except InputError as error:
+        raise InputError(f"{path.name}: {error}") from error
 
 
 def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
@@ -140,6 +142,7 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
     else:
         found = planar_faces(points, corners, groups or [], flatness, triangulate)
     solid = hull(points) if fault and fault.reason is MeshRefusal.OPEN else Solid(points, corners)
+    check_volume(solid)
     mass = mass_properties(solid, _given_center(points, center_of_mass))
     content = content_hash(points, corners)
     return kind(
@@ -245,7 +248,8 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tup
         wrong = corners.min() if corners.min() < 0 else corners.max()
         message = f"a triangle names vertex {wrong}, there are 0..{len(points) - 1}"
         raise MeshError(MeshRefusal.INDEX, message)
-    extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
+    with np.errstate(over="ignore"):
+        extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
     if not SMALLEST_EXTENT_M <= extent <= LARGEST_EXTENT_M:
         message = (
             f"the object is {extent:.3g} m across, expected {SMALLEST_EXTENT_M} to "

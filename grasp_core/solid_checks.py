@@ -5,7 +5,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.linked import close_pairs, components
-from grasp_core.planar_faces import SIDES
+from grasp_core.planar_faces import SIDES, triangle_neighbours
 from grasp_core.solids import Solid, intersection_volume, union_volume
 
 WELD = 1e-8
@@ -72,7 +72,7 @@ def surface_fault(corners: Indices) -> MeshError | None:
 
 
 def largest_part(points: Array, corners: Indices) -> tuple[Array, Indices, list[str]]:
-    """The largest edge-connected part of a faulty surface, wound as it is, and what to say of it.
+    """The largest connected part of a faulty surface, wound as it is, and what to say of it.
 
     Nothing tells the outside of an open surface but its winding, so it is never turned.
     """
@@ -92,6 +92,18 @@ def largest_part(points: Array, corners: Indices) -> tuple[Array, Indices, list[
     return points[used], local.reshape(-1, 3), notes
 
 
+def check_volume(solid: Solid) -> None:
+    """Refuse what is flat.
+
+    Raises:
+        MeshError: The volume is next to nothing.
+    """
+    extent = float(np.ptp(solid.vertices, axis=0).max())
+    if abs(solid.volume) < THINNEST * extent**3:
+        message = f"the volume is {solid.volume:.3g} m^3; a solid must have one"
+        raise MeshError(MeshRefusal.ZERO_VOLUME, message)
+
+
 def oriented(points: Array, corners: Indices, most: int) -> tuple[Indices, bool]:
     """The triangles with their outsides outside, and whether they were turned.
 
@@ -103,11 +115,8 @@ def oriented(points: Array, corners: Indices, most: int) -> tuple[Indices, bool]
     Raises:
         MeshError: The mesh is flat, or its parts are separate, overlap or contradict each other.
     """
-    extent = float(np.ptp(points, axis=0).max())
+    check_volume(Solid(points, corners))
     total = Solid(points, corners).volume
-    if abs(total) < THINNEST * extent**3:
-        message = f"the volume is {total:.3g} m^3; a solid must have one"
-        raise MeshError(MeshRefusal.ZERO_VOLUME, message)
     if total < 0.0:
         corners = corners[:, ::-1]
     parts = _parts(points, corners, most)
@@ -129,12 +138,15 @@ def oriented(points: Array, corners: Indices, most: int) -> tuple[Indices, bool]
 
 
 def _parts(points: Array, corners: Indices, most: int) -> list[Solid]:
-    """The edge-connected parts of a mesh.
+    """The edge-connected parts of a closed mesh; two that meet in a point are two.
 
     Raises:
         MeshError: There are too many.
     """
-    label, parts = _labels(points, corners), list[Solid]()
+    across = triangle_neighbours(corners)
+    links = np.column_stack([np.repeat(np.arange(len(corners)), SIDES + 1), across.ravel()])
+    _, label = np.unique(components(len(corners), links), return_inverse=True)
+    parts = list[Solid]()
     if label.max() >= most:
         message = f"{label.max() + 1} separate parts are over the limit of {most}; give one solid"
         raise MeshError(MeshRefusal.SEPARATE, message)
@@ -145,7 +157,7 @@ def _parts(points: Array, corners: Indices, most: int) -> list[Solid]:
 
 
 def _labels(points: Array, corners: Indices) -> Indices:
-    """Of each triangle the number of its connected part, (t,)."""
+    """Of each triangle the number of its part, of those that share vertices, (t,)."""
     sides = np.column_stack([corners.ravel(), np.roll(corners, 1, axis=1).ravel()])
     label = components(len(points), sides)
     _, part = np.unique(label[corners[:, 0]], return_inverse=True)

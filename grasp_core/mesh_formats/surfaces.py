@@ -13,6 +13,8 @@ CORNERS = 3
 QUAD = 4
 FOLDED = 1e-9
 """A triangle of a fan that faces backwards by more than this share of its polygon."""
+FLATTEST = 0.5
+"""Least area of a polygon seen along its normal, relative to that of its triangles."""
 
 
 @dataclass(slots=True)
@@ -91,6 +93,9 @@ def _check_fan(corners: Array, where: str) -> None:
     spokes = corners[1:] - corners[0]
     crosses = np.cross(spokes[:-1], spokes[1:])
     whole = crosses.sum(axis=0)
-    if ((crosses @ whole) < -FOLDED * (whole @ whole)).any():
+    areas, dots = np.linalg.norm(crosses, axis=1), (spokes[:-1] * spokes[1:]).sum(axis=1)
+    folds = ((crosses @ whole) < -FOLDED * (whole @ whole)).any()
+    winds = np.arctan2(areas, dots).sum() > 2.0 * np.pi + FOLDED
+    if folds or winds or np.linalg.norm(whole) < FLATTEST * areas.sum():
         message = f"{where}: a face with a dent, which can be cut in several ways; export triangles"
         raise MeshError(MeshRefusal.POLYGON, message)

@@ -22,7 +22,7 @@ class Case:
     environment: tuple[tuple[str, str], ...] = ()
 
 
-def file_case(  # noqa: PLR0913 - a table's columns
+def file_case(
     group: str, name: str, file: str, data: bytes | str, says: str, *, command: str = "inspect"
 ) -> Case:
     """A file that a command is to refuse, naming it.

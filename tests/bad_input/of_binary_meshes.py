@@ -1,0 +1,230 @@
+"""Group 3: STL, PLY, OFF and GLB files whose counts, lengths and types lie."""
+
+import json
+import struct
+from functools import partial
+from pathlib import Path
+
+from tests.bad_input.cases import Case, file_case
+from tests.bad_input.mesh_texts import CORNERS, TRIANGLES, off, ply, ply_binary, stl, stl_text
+
+GROUP = "binary meshes"
+NAN = struct.pack("<f", float("nan"))
+HUGE = struct.pack("<I", 4_000_000_000)
+STL, STL_TEXT = stl(), stl_text()
+PENTAGON = "ply\nformat binary_little_endian 1.0\nelement vertex 5\n"
+STLS = {
+    "a count of 4e9 in 100 bytes": (bytes(80) + HUGE + bytes(16), "STL"),
+    "fewer triangles counted than there are": (STL[:80] + b"\3\0\0\0" + STL[84:], "STL"),
+    "more triangles counted than there are": (STL[:80] + b"\5\0\0\0" + STL[84:], "STL"),
+    "a byte too many": (STL + b"\0", "STL"),
+    "a byte too few": (STL[:-1], "STL"),
+    "a coordinate that is nan": (STL[:96] + NAN + STL[100:], "triangle 0|finite|repair"),
+    "no triangles": (bytes(84), "no triangles"),
+    "binary that begins with solid, cut": (stl(head=b"solid")[:-7], "control character|export"),
+    "text without its end": (STL_TEXT.replace("endsolid hand\n", ""), "the end|endsolid"),
+    "text cut in a triangle": (STL_TEXT[:200], "the end|whole"),
+    "text of two corners a triangle": (
+        STL_TEXT.replace("vertex 0.0 0.0 0.0\n", "", 1), "vertex|endloop"),
+    "text with a word for a number": (STL_TEXT.replace("0.1", "O.1", 1), "number"),
+    "text with nan": (STL_TEXT.replace("0.1", "nan", 1), "finite"),
+    "text with 1e999": (STL_TEXT.replace("0.1", "1e999", 1), "finite"),
+    "text with two numbers a corner": (STL_TEXT.replace(" 0.1", "", 1), "three numbers"),
+    "text of a square": (
+        STL_TEXT.replace("endloop", "vertex 1 1 1\nendloop", 1), "endloop"),
+    "text without triangles": ("solid a\nendsolid a\n", "no triangles"),
+    "text that ends before it begins": ("solid\nendsolid\nendsolid\n", "solid"),
+    "a name that means something": (STL_TEXT.replace("hand", "a vertex 1 2 3"), "two readings"),
+}  # fmt: skip
+BODY = ply_binary()
+PLYS = {
+    "4e9 vertices in 100 bytes": (ply(vertices=4_000_000_000), "vertex"),
+    "4e9 faces in 100 bytes": (ply(faces=4_000_000_000), "face"),
+    "2^64 faces": (ply(faces=2**64), "whole number"),
+    "-1 vertices": (ply(vertices=-1), "count"),
+    "a vertex too many": (ply(vertices=3), "face 0|whole number|export"),
+    "text where binary is said": (ply(form="binary_little_endian"), "vertex"),
+    "binary where text is said": (ply(body=BODY), "control"),
+    "the other byte order": (ply(form="binary_big_endian", body=BODY), "vertex 33554432|export"),
+    "cut": (ply(form="binary_little_endian", body=BODY[:-3]), "face|counted"),
+    "bytes after the end": (ply(form="binary_little_endian", body=BODY + b"\0"), "after"),
+    "a list of 255": (
+        ply(form="binary_little_endian", body=BODY.replace(b"\3", b"\xff", 1)), "export"),
+    "differing lists": (
+        ply(form="binary_little_endian",
+            body=ply_binary()[:61] + b"\4" + struct.pack("<4i", 0, 1, 3, 2) + BODY[74:]), "face"),
+    "nan": (ply(form="binary_little_endian", body=NAN + BODY[4:]), "vertex 0|finite"),
+    "text nan": (ply().replace(b"0.1", b"nan", 1), "finite"),
+    "beyond single precision": (ply().replace(b"0.1", b"1e39", 1), "finite|precision"),
+    "a corner that is not there": (ply().replace(b"3 0 2 1", b"3 0 2 9"), "vertex 9"),
+    "a corner of -1": (ply().replace(b"3 0 2 1", b"3 0 2 -1"), "vertex -1"),
+    "half a corner": (ply().replace(b"3 0 2 1", b"3 0 2 .5"), "corner"),
+    "a list shorter than it says": (ply().replace(b"3 0 2 1", b"4 0 2 1"), "vertex_indices|4"),
+    "a list longer than it says": (ply().replace(b"3 0 2 1", b"2 0 2 1"), "face 0"),
+    "no header's end": (ply().replace(b"end_header", b"end"), "end_header"),
+    "no format": (ply().replace(b"format ascii 1.0\n", b""), "format"),
+    "a format from the future": (ply().replace(b"1.0", b"9.0"), "header"),
+    "no z": (ply().replace(b"property float z\n", b""), "z"),
+    "two x": (ply().replace(b"property float y", b"property float x"), "names"),
+    "x as a list": (ply().replace(b"float x", b"list uchar float x"), "x"),
+    "no list of corners": (ply().replace(b"list uchar int", b"int"), "list"),
+    "two elements of faces": (
+        ply().replace(b"element face 4\n", b"element face 4\nproperty int a\nelement face 4\n"),
+        "once"),
+    "a type that is none": (ply(kind="long"), "property"),
+    "a list counted in fractions": (ply().replace(b"uchar", b"float"), "whole number"),
+    "strips instead of faces": (ply().replace(b"element face", b"element tristrips"), "face"),
+    "no faces": (ply(faces=0, body=b"0 0 0\n" * 4), "no triangles"),
+}  # fmt: skip
+OFFS = {
+    "4e9 vertices": (off("4000000000 4 6"), "vertex|export"),
+    "4e9 faces": (off("4 4000000000 6"), "expected a face"),
+    "-4 vertices": (off("-4 4 6"), "negative"),
+    "one count": (off("4"), "counts"),
+    "counts in words": (off("four 4 6"), "whole number"),
+    "a vertex too few counted": (off("3 4 6"), "line|export"),
+    "a face too few counted": (off("4 3 6"), "after"),
+    "no counts": ("OFF\n", "counts"),
+    "binary OFF": (b"OFF BINARY\n" + bytes(40), "control"),
+    "a corner beyond": (off(faces=[(0, 2, 9), *TRIANGLES[1:]]), "vertex 9"),
+    "a corner before": (off(faces=[(0, 2, -1), *TRIANGLES[1:]]), "vertex -1"),
+    "a face of two": (off(faces=[(0, 2), *TRIANGLES[1:]]), "three corners"),
+    "a face that lies": (off().replace("3 0 2 1", "9 0 2 1"), "9 corners lists 3"),
+    "nan": (off().replace("0.1", "nan", 1), "finite"),
+    "1e999": (off().replace("0.1", "1e999", 1), "finite"),
+    "two coordinates": (off().replace("0.1 0.0 0.0", "0.1 0.0"), "three numbers"),
+    "homogeneous points": (off().replace("OFF", "4OFF"), "OFF"),
+}
+
+
+def tree() -> dict:
+    """A glTF of the tetrahedron, whose numbers lie in one buffer."""
+    return {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+             "min": [0, 0, 0], "max": [0.1, 0.1, 0.1]},
+            {"bufferView": 1, "componentType": 5121, "count": 12, "type": "SCALAR"},
+        ],
+        "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 48},
+                        {"buffer": 0, "byteOffset": 48, "byteLength": 12}],
+        "buffers": [{"byteLength": 60}],
+    }  # fmt: skip
+
+
+NUMBERS = b"".join(struct.pack("<3f", *each) for each in CORNERS) + bytes(sum(TRIANGLES, ()))
+
+
+def glb(said: object, binary: bytes = NUMBERS) -> bytes:
+    """A GLB file of a tree, or of bytes in its place."""
+    text = said if isinstance(said, bytes) else json.dumps(said).encode()
+    text += b" " * (-len(text) % 4)
+    binary += bytes(-len(binary) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text
+    chunks += struct.pack("<I4s", len(binary), b"BIN\0") + binary
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def changed(path: str, value: object) -> bytes:
+    """A GLB whose tree has another value at a path of keys and places."""
+    made = tree()
+    *way, last = [int(part) if part.isdigit() else part for part in path.split(".")]
+    place = made
+    for part in way:
+        place = place[part]
+    place[last] = value
+    return glb(made)
+
+
+GOOD = glb(tree())
+GLBS = {
+    "version 1": (GOOD[:4] + b"\1" + GOOD[5:], "glTF 2"),
+    "a length that lies": (GOOD[:8] + b"\xff" + GOOD[9:], "head"),
+    "a JSON chunk longer than the file": (GOOD[:12] + HUGE + GOOD[16:], "chunk"),
+    "cut": (GOOD[:-9], "head"),
+    "a head only": (GOOD[:12], "bytes"),
+    "binary first": (GOOD[:16] + b"BIN\0" + GOOD[20:], "chunks"),
+    "no JSON": (glb(b"not JSON"), "JSON"),
+    "a list for a tree": (glb(b"[]"), "object"),
+    "10^5 deep JSON": (glb(b"[" * 100_000), "JSON"),
+    "JSON in UTF-16": (glb('{"a":1}'.encode("utf-16")), "JSON"),
+    "an accessor of 2e9": (changed("accessors.0.count", 2_000_000_000), "accessor 0|fit"),
+    "an accessor of -1": (changed("accessors.0.count", -1), "accessor 0"),
+    "an accessor of 1.5": (changed("accessors.0.count", 1.5), "accessor 0"),
+    "an accessor out of its view": (changed("accessors.0.byteOffset", 40), "accessor 0|fit"),
+    "an accessor of words": (changed("accessors.0.count", "four"), "accessor 0"),
+    "a view out of its buffer": (changed("bufferViews.0.byteOffset", 4000), "accessor 0|fit"),
+    "a view that is not there": (changed("accessors.0.bufferView", 7), "7 of 2"),
+    "a view of -1": (changed("accessors.0.bufferView", -1), "-1 of 2"),
+    "an accessor that is not there": (
+        changed("meshes.0.primitives.0.indices", 99), "99 of 2"),
+    "a mesh that is not there": (changed("nodes.0.mesh", 5), "5 of 1"),
+    "a node that is not there": (changed("scenes.0.nodes", [5]), "5 of 1"),
+    "a scene that is not there": (changed("scene", 5), "5 of 1"),
+    "a cycle of nodes": (changed("nodes.0.children", [0]), "tree"),
+    "a node twice": (changed("scenes.0.nodes", [0, 0]), "tree"),
+    "corners in floats": (changed("accessors.1.componentType", 5126), "accessor 1"),
+    "points in shorts": (changed("accessors.0.componentType", 5122), "accessor 0"),
+    "points in two dimensions": (changed("accessors.0.type", "VEC2"), "accessor 0"),
+    "sparse numbers": (changed("accessors.0.sparse", {"count": 1}), "sparse"),
+    "a corner beyond": (glb(tree(), NUMBERS[:-1] + b"\x63"), "vertex 99"),
+    "nan": (glb(tree(), NAN + NUMBERS[4:]), "finite"),
+    "a matrix of nan": (
+        glb(json.dumps({**tree(), "nodes": [{"mesh": 0, "matrix": [float("nan")] * 16}]}).encode()),
+        "finite"),
+    "a matrix of three": (changed("nodes.0.matrix", [1, 0, 0]), "matrix|16"),
+    "a matrix that projects": (changed("nodes.0.matrix", [1] * 16), "projective"),
+    "a rotation of length 9": (changed("nodes.0.rotation", [9, 0, 0, 0]), "quaternion"),
+    "a scale of 1e300": (changed("nodes.0.scale", [1e300] * 3), "SIZE|unit"),
+    "a scale of 0": (changed("nodes.0.scale", [0, 0, 0]), "across"),
+    "lines": (changed("meshes.0.primitives.0.mode", 1), "mode 1|triangles"),
+    "points": (changed("meshes.0.primitives.0.mode", 0), "mode 0|triangles"),
+    "fans": (changed("meshes.0.primitives.0.mode", 6), "mode 6|triangles"),
+    "11 corners": (changed("accessors.1.count", 11), "whole triangles"),
+    "Draco": (
+        changed("extensionsRequired", ["KHR_draco_mesh_compression"]), "draco|compression"),
+    "quantized numbers": (changed("extensionsUsed", ["KHR_mesh_quantization"]), "compression"),
+    "a part's compression": (
+        changed("meshes.0.primitives.0.extensions", {"KHR_draco_mesh_compression": {}}), "plain"),
+    "a skin": (changed("nodes.0.skin", 0), "skin|stands"),
+    "morphs": (changed("meshes.0.primitives.0.targets", [{"POSITION": 0}]), "morph"),
+    "numbers behind http": (changed("buffers.0.uri", "http://localhost/a.bin"), "other files"),
+    "numbers in ../": (changed("buffers.0.uri", "../a.bin"), "other files"),
+    "numbers in /etc/passwd": (changed("buffers.0.uri", "/etc/passwd"), "other files"),
+    "numbers in base64": (
+        changed("buffers.0.uri", "data:;base64," + "A" * 10_000_000), "other files"),
+    "two buffers": (changed("buffers", [{"byteLength": 60}] * 2), "other files"),
+    "no meshes": (glb({"asset": {"version": "2.0"}}), "no triangles"),
+    "meshes of no scene": (changed("scenes.0.nodes", []), "no triangles"),
+    "10^5 deep nodes": (
+        glb({**tree(), "nodes": [*({"children": [i + 1]} for i in range(100_000)), {"mesh": 0}]}),
+        "tree"),
+}  # fmt: skip
+GOODS = {
+    "good.glb": GOOD,
+    "normals.stl": STL[:84] + 3 * NAN + STL[96:],
+    "solid.stl": stl(head=b"solid but binary"),
+    "double.ply": ply(kind="double", form="binary_big_endian", body=ply_binary(">", "d")),
+    "textures.glb": changed("images", [{"uri": "../../etc/passwd"}]),
+    "materials.glb": changed("extensionsUsed", ["KHR_materials_unlit"]),
+}
+
+
+def _good(name: str, data: bytes, folder: Path) -> list[str]:
+    (folder / name).write_bytes(data)
+    return ["inspect", name]
+
+
+def cases() -> list[Case]:
+    """All of the group, with files beside them that must be read."""
+    tables = {"stl": STLS, "ply": PLYS, "off": OFFS, "glb": GLBS}
+    found = [
+        file_case(GROUP, f"{kind}: {name}", f"part.{kind}", *said)
+        for kind, table in tables.items()
+        for name, said in table.items()
+    ]
+    found += [
+        Case(GROUP, f"read: {n}", partial(_good, n, data), 0, ()) for n, data in GOODS.items()
+    ]
+    return found
