@@ -7,12 +7,18 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 
-ROUNDING = 1e-9
-"""Of matrices of a scene, multiplied in another order, relative to the largest coordinate."""
+Reading = tuple[Array, Indices]
+"""Vertices (n, 3) and triangles (t, 3)."""
 
 
-def same_triangles(one: tuple[Array, Indices], other: tuple[Array, Indices]) -> bool:
-    """Whether vertices (n, 3) and triangles (t, 3) of two readings give the same triangles."""
+def same_triangles(one: Reading, other: Reading, rounding: float) -> bool:
+    """Whether two readings give the same triangles.
+
+    Args:
+        one: A reading.
+        other: Another.
+        rounding: How far coordinates may differ, relative to the largest.
+    """
     if not _sound(*one) or not _sound(*other):
         return False  # the other reader has lost vertices, or found other numbers
     rows = [_rows(*reading) for reading in (one, other)]
@@ -20,7 +26,8 @@ def same_triangles(one: tuple[Array, Indices], other: tuple[Array, Indices]) -> 
         return False
     if (rows[0] == rows[1]).all():
         return True
-    return _near(rows[0], rows[1]) and _near(rows[1], rows[0])
+    reach = rounding * float(np.abs(rows[0]).max())
+    return reach > 0.0 and _near(rows[0], rows[1], reach) and _near(rows[1], rows[0], reach)
 
 
 def _sound(points: Array, triangles: Indices) -> bool:
@@ -34,7 +41,7 @@ def _rows(points: Array, triangles: Indices) -> Array:
     return rows[np.lexsort(rows.T)]
 
 
-def _near(rows: Array, others: Array) -> bool:
+def _near(rows: Array, others: Array, reach: float) -> bool:
     spatial: Any = importlib.import_module("scipy.spatial")
     distances, _ = spatial.KDTree(others).query(rows)
-    return bool((distances <= ROUNDING * np.abs(others).max()).all())
+    return bool((distances <= reach).all())
