@@ -18,8 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, positive
+from grasp_core.arrays import Array
 from grasp_core.certified import certify, to_grasp
+from grasp_core.checked import coefficient, number
+from grasp_core.checked import seed as checked_seed
 from grasp_core.closure import force_closure
 from grasp_core.constructions import point_region, regions_of
 from grasp_core.errors import InputError, UndecidedError
@@ -88,6 +90,11 @@ def optimize_contacts(
         SolverError: A program's answer failed its check.
     """
     check_on_faces(body, grasp)
+    coefficient(friction)
+    seed = checked_seed(seed)
+    if finger_radius is not None:
+        where = ", the object's radius in m, or None"
+        number(finger_radius, "finger_radius", above=0.0, most=body.radius, where=where)
     before = _quality(body, grasp, friction)
     if before.lower <= 0.0:
         raise InputError(f"grasp {grasp.id} is not in force closure at friction {friction}")
@@ -114,7 +121,7 @@ def _insets(
 ) -> list[float]:
     """How far contacts stay from the edges of each piece, at unit size."""
     if finger_radius is not None:
-        return [positive(finger_radius, "finger_radius") / body.radius] * FINGERS
+        return [finger_radius / body.radius] * FINGERS
     return [
         min(FINGER_RADIUS, max(float((piece.b - piece.E @ _in_plane(piece, at)).min()), 0.0))
         for piece, at in zip(pieces, _unit_points(body, grasp), strict=True)

@@ -56,3 +56,8 @@ class MeshError(InputError):
     def __init__(self, reason: MeshRefusal, message: str) -> None:
         super().__init__(f"{reason.value}: {message}")
         self.reason = reason
+        self._message = message
+
+    def __reduce__(self) -> tuple[type["MeshError"], tuple[MeshRefusal, str]]:
+        """So that it can be sent between processes: exceptions are made again of their text."""
+        return type(self), (self.reason, self._message)

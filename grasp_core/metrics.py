@@ -13,13 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, positive
+from grasp_core.arrays import Array, frozen
+from grasp_core.checked import positive
 from grasp_core.closure import unit_size
+from grasp_core.contact_arrays import contact_arrays
 from grasp_core.errors import InputError
 from grasp_core.kernels import compiled
 from grasp_core.lp import RESIDUAL, LinearProgram, Optimum, maximize
 from grasp_core.many_contacts import many_contact_arrays, many_frames, many_frictions, unit_sizes
-from grasp_core.values import Grasp, contact_arrays
+from grasp_core.values import Grasp
 from grasp_core.wrench_sets import WrenchSet
 from grasp_core.wrenches import WRENCH, grasp_map
 

@@ -28,11 +28,12 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.best_contacts import FINGER_RADIUS
+from grasp_core.contact_arrays import contact_frictions
 from grasp_core.errors import InputError
 from grasp_core.face_parts import Path, corner_contacts, cover_everything, part_at
 from grasp_core.face_pieces import FacePiece, inset_piece, unit_pieces
 from grasp_core.quality import wrench_set_quality
-from grasp_core.values import FINGERS, FaceQuadruple, Polyhedron, contact_frictions
+from grasp_core.values import FINGERS, FaceQuadruple, Polyhedron
 from grasp_core.wrench_sets import WrenchSet
 from grasp_core.wrenches import contact_frames, grasp_map, in_frames
 

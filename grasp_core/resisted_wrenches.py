@@ -18,10 +18,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, positive
+from grasp_core.arrays import Array, frozen
+from grasp_core.checked import positive
 from grasp_core.conic import ConicProgram, minimize
+from grasp_core.contact_arrays import contact_arrays, contact_frictions
 from grasp_core.errors import InputError
-from grasp_core.values import Grasp, contact_arrays, contact_frictions
+from grasp_core.values import Grasp
 from grasp_core.wrench_sets import WrenchSet
 from grasp_core.wrenches import WRENCH, contact_frames, grasp_map, in_frames
 

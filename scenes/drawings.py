@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from grasp_core.arrays import Array, positive
+from grasp_core.arrays import Array
+from grasp_core.checked import positive
 from grasp_core.on_faces import check_on_faces
 from grasp_core.values import Grasp, Polyhedron
 from scenes.ruled_surfaces import between, rulings

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, positive, to_digits
+from grasp_core.arrays import Array, Indices, to_digits
+from grasp_core.checked import positive
 from grasp_core.closure import force_closure
 from grasp_core.errors import UndecidedError
 from grasp_core.on_faces import face_under

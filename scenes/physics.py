@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from grasp_core.arrays import positive
+from grasp_core.checked import positive
 from grasp_core.errors import InputError
 
 
