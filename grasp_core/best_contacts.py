@@ -20,8 +20,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.certified import certify, to_grasp
-from grasp_core.checked import coefficient, number
-from grasp_core.checked import seed as checked_seed
+from grasp_core.checked import SMALLEST, coefficient, number, seed_of
 from grasp_core.closure import force_closure
 from grasp_core.constructions import point_region, regions_of
 from grasp_core.errors import InputError, UndecidedError
@@ -91,10 +90,10 @@ def optimize_contacts(
     """
     check_on_faces(body, grasp)
     coefficient(friction)
-    seed = checked_seed(seed)
+    seed = seed_of(seed)
     if finger_radius is not None:
         where = ", the object's radius in m, or None"
-        number(finger_radius, "finger_radius", above=0.0, most=body.radius, where=where)
+        number(finger_radius, "finger_radius", least=SMALLEST, most=body.radius, where=where)
     before = _quality(body, grasp, friction)
     if before.lower <= 0.0:
         raise InputError(f"grasp {grasp.id} is not in force closure at friction {friction}")

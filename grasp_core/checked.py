@@ -4,11 +4,10 @@ Arrays have `arrays`. Nothing heavy is imported here, so that flags can have the
 """
 
 import math
-import os
 from collections.abc import Callable, Iterable
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from grasp_core.errors import InputError
 
@@ -52,7 +51,7 @@ def number(  # noqa: PLR0913 - the ways in which a range can end
     Raises:
         InputError: It is no real number, or outside.
     """
-    real = isinstance(value, Real) and not isinstance(value, bool)
+    real = not isinstance(value, bool) and isinstance(value, Real)
     size = _as_float(value) if real else math.nan
     inside = math.isfinite(size) if most is None else size <= most
     inside &= (above is None or size > above) and (least is None or size >= least)
@@ -77,7 +76,7 @@ def coefficient(value: Any, name: str = "friction") -> float:
     Raises:
         InputError: It is not.
     """
-    return number(value, name, above=0.0, most=LARGEST_FRICTION)
+    return number(value, name, least=SMALLEST, most=LARGEST_FRICTION)
 
 
 def whole(value: Any, name: str, *, least: int = 0, most: int = MOST_COUNT) -> int:
@@ -86,14 +85,16 @@ def whole(value: Any, name: str, *, least: int = 0, most: int = MOST_COUNT) -> i
     Raises:
         InputError: It is none.
     """
-    if not isinstance(value, Integral) or isinstance(value, bool) or not least <= value <= most:
+    integral = not isinstance(value, bool) and isinstance(value, Integral)
+    count = int(value) if integral else None
+    if count is None or not least <= count <= most:
         raise InputError(
             f"{name} must be a whole number from {least} to {most}, got {shown(value)}"
         )
-    return int(value)
+    return count
 
 
-def seed(value: Any, name: str = "seed") -> int:
+def seed_of(value: Any, name: str = "seed") -> int:
     """A seed of random numbers.
 
     Raises:
@@ -123,18 +124,19 @@ def switch(value: Any, name: str) -> None:
         raise InputError(f"{name} must be True or False, got {shown(value)}")
 
 
-def text(value: Any, name: str) -> None:
-    """Refuse what is not text.
+def text(value: Any, name: str) -> str:
+    """Text.
 
     Raises:
         InputError: It is not.
     """
     if not isinstance(value, str):
         raise InputError(f"{name} must be text, got {shown(value)}")
+    return value
 
 
-def instance(value: Any, kind: type[Value], name: str, remedy: str = "") -> None:
-    """Refuse what is not a value of a class.
+def instance(value: Any, kind: type[Value], name: str, remedy: str = "") -> Value:
+    """A value of a class.
 
     Args:
         value: Anything.
@@ -148,6 +150,7 @@ def instance(value: Any, kind: type[Value], name: str, remedy: str = "") -> None
     if not isinstance(value, kind):
         hint = f"; {remedy}" if remedy else ""
         raise InputError(f"{name} must be a {kind.__name__}, got {shown(value)}{hint}")
+    return value
 
 
 def function(value: Any, name: str) -> None:
@@ -160,25 +163,25 @@ def function(value: Any, name: str) -> None:
         raise InputError(f"{name} must be a function, got {shown(value)}")
 
 
-def path(value: Any, name: str) -> Path:
+def path_of(value: Any, name: str) -> Path:
     """The name of a file or folder.
 
     Raises:
         InputError: It is no text or path, is empty, or holds a zero byte.
     """
-    if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
+    if not isinstance(value, str | Path):
         raise InputError(f"{name} must be a path, as text or pathlib.Path, got {shown(value)}")
-    if not os.fspath(value) or "\0" in os.fspath(value):
+    if not str(value) or "\0" in str(value):
         raise InputError(f"{name} must name a file or folder, got {shown(value)}")
     return Path(value)
 
 
-def several(value: Any, each: Callable[[Any], object], name: str, kind: str) -> tuple[Any, ...]:
+def several(value: Any, each: Callable[[Any], Value], name: str, kind: str) -> tuple[Value, ...]:
     """Things in order, each of them checked; text is not taken for its letters.
 
     Args:
         value: Anything.
-        each: Refuses what is not such a thing.
+        each: Makes such a thing of a value, or refuses it.
         name: What to call the value in a message.
         kind: What the things are.
 
@@ -187,10 +190,7 @@ def several(value: Any, each: Callable[[Any], object], name: str, kind: str) -> 
     """
     if isinstance(value, str | bytes) or not isinstance(value, Iterable):
         raise InputError(f"{name} must be several {kind}, as a tuple, got {shown(value)}")
-    things: tuple[Any, ...] = tuple(value)
-    for thing in things:
-        each(thing)
-    return things
+    return tuple(each(thing) for thing in cast("Iterable[Any]", value))
 
 
 def shown(value: Any) -> str:

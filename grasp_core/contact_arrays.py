@@ -34,18 +34,18 @@ def contact_arrays(positions: ArrayLike | Grasp, normals: ArrayLike | None) -> t
     if normals is None:
         raise InputError("normals are missing: pass positions and normals, or a Grasp")
     points = frozen(positions, (None, 3), "positions")
-    units = frozen_units(normals, (len(points), 3), "normals")
     if len(points) < 2:  # noqa: PLR2004 - one contact alone can balance nothing
-        raise InputError(f"at least two contacts are needed, got {len(points)}")
+        raise InputError(f"positions: at least two contacts are needed, got {len(points)}")
     check_spread(np.ptp(points, axis=0))
-    return points, units
+    return points, frozen_units(normals, (len(points), 3), "normals")
 
 
-def check_spread(extents: Array) -> None:
+def check_spread(extents: Array, name: str = "positions") -> None:
     """Refuse contacts so close together, but not in one place, that squares of lengths vanish.
 
     Args:
         extents: Of each set along each axis, (..., 3) [m].
+        name: What to call the contacts in a message.
 
     Raises:
         InputError: They are.
@@ -54,7 +54,7 @@ def check_spread(extents: Array) -> None:
     tiny = (sizes > 0.0) & (sizes < SMALLEST_SPREAD)
     if tiny.any():
         raise InputError(
-            f"positions must spread over at least {SMALLEST_SPREAD:g} m, got "
+            f"{name} must spread over at least {SMALLEST_SPREAD:g} m, got "
             f"{float(sizes[tiny].min()):.3g}; use other units"
         )
 

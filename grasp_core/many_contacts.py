@@ -35,11 +35,10 @@ def many_contact_arrays(
         points, units = np.moveaxis(both.reshape(-1, 2, FINGERS, 3), 1, 0)
         return points, units
     points = frozen(given, (None, None, 3), "positions")
-    units = frozen_units(normals, points.shape, "normals")
     if points.shape[1] < FEWEST:
-        raise InputError(f"at least two contacts are needed, got {points.shape[1]}")
+        raise InputError(f"positions: at least two contacts are needed, got {points.shape[1]}")
     check_spread(np.ptp(points, axis=1))
-    return points, units
+    return points, frozen_units(normals, points.shape, "normals")
 
 
 def many_frictions(friction: ArrayLike, shape: tuple[int, int]) -> Array:

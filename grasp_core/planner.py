@@ -11,6 +11,7 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from functools import partial
+from typing import cast
 
 from grasp_core.candidates import LEAST_SPAN_ANGLE
 from grasp_core.certified import to_grasp
@@ -122,7 +123,8 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
 def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
     if isinstance(families, str):
         return (families,)
-    return several(families, partial(text, name="families"), "families", "names")
+    names = several(families, partial(text, name="families"), "families", "names")
+    return cast("tuple[Method, ...]", names)  # those that there are, see `check_request`
 
 
 def _planned(body: Polyhedron, request: PlanRequest, searches: Searches) -> Plan:

@@ -6,11 +6,12 @@ from typing import Any, Literal, TypeAlias, get_args
 
 from grasp_core.arrays import UNIT_SLACK
 from grasp_core.checked import (
+    SMALLEST,
     coefficient,
     instance,
     number,
     one_of,
-    seed,
+    seed_of,
     shown,
     switch,
     whole,
@@ -91,7 +92,7 @@ def _check_counts(request: PlanRequest) -> None:
     if request.limit is not None:
         whole(request.limit, "limit", least=1)
     whole(request.cells, "cells", least=1)
-    seed(request.seed)
+    seed_of(request.seed)
     switch(request.complete, "complete")
 
 
@@ -103,9 +104,9 @@ def _check_lengths(body: Polyhedron, request: PlanRequest) -> None:
     if request.finger is not None:
         instance(request.finger, Finger, "finger", "gc.Finger(radius_m, approach_m)")
         radius, approach = request.finger.radius_m, request.finger.approach_m
-        number(radius, "finger.radius_m", above=0.0, most=body.radius, where=ITS_RADIUS)
+        number(radius, "finger.radius_m", most=body.radius, where=ITS_RADIUS)
         farthest = FARTHEST_APPROACH * body.radius
-        number(approach, "finger.approach_m", above=0.0, most=farthest, where=", a thousand radii")
+        number(approach, "finger.approach_m", most=farthest, where=", a thousand radii")
 
 
 def _check_size(body: Polyhedron, request: PlanRequest) -> None:
@@ -149,4 +150,4 @@ def _check_angle(request: PlanRequest) -> None:
         widest * (1.0 + UNIT_SLACK),
         f", the angle of friction {request.friction}, or None",
     )
-    number(request.theta_deg, "theta_deg", above=0.0, most=most, where=where)
+    number(request.theta_deg, "theta_deg", least=SMALLEST, most=most, where=where)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices, frozen_units
 from grasp_core.checked import (
+    LARGEST,
     instance,
     number,
     one_of,
@@ -69,12 +70,12 @@ class Face:
         object.__setattr__(self, "centroid", frozen(self.centroid, (3,), "centroid"))
         object.__setattr__(self, "polygon", frozen(self.polygon, (None, 3), "polygon"))
         for name in ("holes", "pieces"):
-            loops = several(getattr(self, name), len, name, "polygons")
-            kept = tuple(frozen(loop, (None, 3), name) for loop in loops)
-            object.__setattr__(self, name, kept)
-        number(self.area, "area", above=0.0)
+            each = partial(frozen, shape=(None, 3), name=name)
+            loops = several(getattr(self, name), each, name, "polygons")
+            object.__setattr__(self, name, loops)
+        number(self.area, "area", above=0.0, most=LARGEST)
         number(self.spread, "spread", least=0.0, below=RIGHT_ANGLE)
-        number(self.depth, "depth", least=0.0)
+        number(self.depth, "depth", least=0.0, most=LARGEST)
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +133,7 @@ class Polyhedron:
         object.__setattr__(self, "inertia", frozen(self.inertia, (3, 3), "inertia"))
         for name in ("name", "content_sha256", "source_sha256"):
             text(getattr(self, name), name)
-        number(self.volume, "volume", above=0.0)
+        number(self.volume, "volume", above=0.0, most=LARGEST)
         if triangles.max(initial=0) >= max(len(self.vertices), 1):
             raise InputError(f"triangles must name vertices from 0 to {len(self.vertices) - 1}")
         several(self.faces, partial(instance, kind=Face, name="faces"), "faces", "Face values")
@@ -229,7 +230,7 @@ class ContactRegion:
     def __post_init__(self) -> None:
         one_of(self.kind, get_args(RegionKind), "kind")
         object.__setattr__(self, "polygon", frozen(self.polygon, (None, 3), "polygon"))
-        number(self.inscribed_radius, "inscribed_radius", least=0.0)
+        number(self.inscribed_radius, "inscribed_radius", least=0.0, most=LARGEST)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -294,7 +295,7 @@ class Grasp:
             _one_per_finger(getattr(self, name), each, name, f"{kind.__name__} values")
         points = frozen(self.focus_points, (None, 3), "focus_points")
         object.__setattr__(self, "focus_points", points)
-        number(self.radius, "radius", least=0.0)
+        number(self.radius, "radius", least=0.0, most=LARGEST)
         number(self.span_angle, "span_angle", least=0.0, below=RIGHT_ANGLE)
         number(self.critical_friction, "critical_friction", least=0.0, most=np.inf)
         number(self.closure_margin, "closure_margin")
