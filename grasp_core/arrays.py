@@ -6,6 +6,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from grasp_core.checked import MOST_COUNT, shown
 from grasp_core.errors import InputError
 
 Array: TypeAlias = NDArray[np.float64]
@@ -16,25 +17,29 @@ Indices: TypeAlias = NDArray[np.int64]
 DIGITS = 9
 """Digits kept by `to_digits`: a thousand times more than any result needs, a million times fewer
 than solvers' noise reaches."""
+LARGEST_ENTRY = 1e50
+"""The product of three such numbers has a finite square."""
+REAL = "iuf"
+"""Kinds of numpy's numbers that are real ones."""
 UNIT_SLACK = 1e-9
 """How far the length of a unit vector may be from 1: rounding of a file with ten digits."""
 
 
-def frozen(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
+def frozen(
+    value: ArrayLike, shape: tuple[int | None, ...], name: str, *, most: float = LARGEST_ENTRY
+) -> Array:
     """Copy `value` into a read-only float array of the given shape.
 
     Args:
         value: Anything numpy reads as numbers.
         shape: Expected length along each axis; None leaves that axis free.
         name: What to call the value in an error message.
+        most: Largest size of an entry.
 
     Raises:
-        InputError: The shape differs, or an entry is not a finite number.
+        InputError: The shape differs, or an entry is not a finite number, or too large.
     """
-    try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name} must be an array of numbers: {error}") from error
+    array = real_array(value, name)
     fits = array.ndim == len(shape) and all(
         want is None or want == got for want, got in zip(shape, array.shape, strict=True)
     )
@@ -43,8 +48,30 @@ def frozen(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
         raise InputError(f"{name} must have shape {wanted}, got {array.shape}")
     if not np.isfinite(array).all():
         raise InputError(f"{name} must be finite, got NaN or infinity")
+    largest = float(np.abs(array).max(initial=0.0))
+    if largest > most:
+        raise InputError(
+            f"{name} must be at most {most:g} in size, got {largest:.6g}; use other units"
+        )
     array.setflags(write=False)
     return array
+
+
+def real_array(value: ArrayLike, name: str) -> Array:
+    """A new array of real numbers: what numpy would turn into some is none.
+
+    Raises:
+        InputError: It is not of real numbers.
+    """
+    try:
+        given: NDArray[Any] = np.asarray(value)
+    except (TypeError, ValueError) as error:  # rows of different lengths
+        raise InputError(f"{name} must be an array of numbers: {error}") from error
+    if given.dtype.kind not in REAL:
+        got = shown(value) if given.ndim == 0 else f"entries of type {given.dtype}"
+        raise InputError(f"{name} must be an array of numbers, got {got}")
+    with np.errstate(over="ignore"):  # of extended precision
+        return np.array(given, dtype=np.float64)
 
 
 def frozen_units(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
@@ -61,26 +88,20 @@ def frozen_units(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> 
     return array
 
 
+def frozen_each(value: ArrayLike, count: int, name: str) -> Array:
+    """Like `frozen`, for one number for all of `count` things, or one each, (count,)."""
+    given = real_array(value, name)
+    return frozen(np.full(count, given) if given.ndim == 0 else given, (count,), name)
+
+
 def frozen_indices(value: Any, shape: tuple[int | None, ...], name: str) -> Indices:
     """Like `frozen`, for non-negative whole numbers."""
     numbers = frozen(value, shape, name)
-    if (numbers != np.floor(numbers)).any() or (numbers < 0).any():
-        raise InputError(f"{name} must hold whole numbers from 0 on")
+    if ((numbers != np.floor(numbers)) | (numbers < 0) | (numbers > MOST_COUNT)).any():
+        raise InputError(f"{name} must hold whole numbers from 0 to {MOST_COUNT}")
     indices = numbers.astype(np.int64)
     indices.setflags(write=False)
     return indices
-
-
-def positive(value: float, name: str) -> float:
-    """A positive finite number.
-
-    Raises:
-        InputError: It is not.
-    """
-    number = float(value)
-    if not (math.isfinite(number) and number > 0.0):
-        raise InputError(f"{name} must be positive, got {value}")
-    return number
 
 
 def to_digits(values: Array) -> Array:

@@ -18,8 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, positive
+from grasp_core.arrays import Array
 from grasp_core.certified import certify, to_grasp
+from grasp_core.checked import SMALLEST, coefficient, number, seed_of
 from grasp_core.closure import force_closure
 from grasp_core.constructions import point_region, regions_of
 from grasp_core.errors import InputError, UndecidedError
@@ -88,6 +89,11 @@ def optimize_contacts(
         SolverError: A program's answer failed its check.
     """
     check_on_faces(body, grasp)
+    coefficient(friction)
+    seed = seed_of(seed)
+    if finger_radius is not None:
+        where = ", the object's radius in m, or None"
+        number(finger_radius, "finger_radius", least=SMALLEST, most=body.radius, where=where)
     before = _quality(body, grasp, friction)
     if before.lower <= 0.0:
         raise InputError(f"grasp {grasp.id} is not in force closure at friction {friction}")
@@ -114,7 +120,7 @@ def _insets(
 ) -> list[float]:
     """How far contacts stay from the edges of each piece, at unit size."""
     if finger_radius is not None:
-        return [positive(finger_radius, "finger_radius") / body.radius] * FINGERS
+        return [finger_radius / body.radius] * FINGERS
     return [
         min(FINGER_RADIUS, max(float((piece.b - piece.E @ _in_plane(piece, at)).min()), 0.0))
         for piece, at in zip(pieces, _unit_points(body, grasp), strict=True)

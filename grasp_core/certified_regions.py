@@ -13,12 +13,23 @@ loses the angle by which the surface leans, so that normals are counted as the p
 import math
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from grasp_core.arrays import Array, frozen, positive
+from grasp_core.arrays import Array, frozen
+from grasp_core.checked import (
+    coefficient,
+    instance,
+    number,
+    one_of,
+    positive,
+    several,
+    switch,
+    whole,
+)
 from grasp_core.closure import force_closure
+from grasp_core.contact_arrays import contact_frictions, stacked
 from grasp_core.errors import InputError, SolverError, UndecidedError
 from grasp_core.face_pieces import FacePiece, inscribed_radius, piece_of
 from grasp_core.on_faces import check_on_faces
@@ -34,19 +45,13 @@ from grasp_core.region_centers import better_centers, larger_inside
 from grasp_core.region_growth import BEGINNINGS, disc_polygons, most_area, shared_out
 from grasp_core.region_search import Grounds, Proved, largest_discs
 from grasp_core.twist_covers import TwistCover
-from grasp_core.values import (
-    ContactRegion,
-    Grasp,
-    Polyhedron,
-    contact_frictions,
-    four,
-    stacked,
-)
+from grasp_core.values import FINGERS, ContactRegion, Grasp, Polyhedron, four
 
 Balance: TypeAlias = Literal["radius", "area"]
 """What regions are grown for: the smallest inscribed disc, or the total area."""
 FEWEST = 64
 """Cones that the search begins with."""
+MOST_CONES = 1_000_000
 CONES = 10_000
 """Cones of one cover at most, unless told otherwise: half a second's work."""
 
@@ -87,7 +92,7 @@ class CertifiedRegions:
         if self.open_choice is not None:
             choice = frozen(self.open_choice, (4, 3), "open_choice")
             object.__setattr__(self, "open_choice", choice)
-        positive(self.scale, "scale")
+        _check_parts(self)
         if (self.depths < 0.0).any():
             raise InputError(f"depths must not be negative, got {float(self.depths.min()):.6g}")
 
@@ -102,6 +107,22 @@ class CertifiedRegions:
             for r, n, depth in zip(self.regions, self.normals, self.depths, strict=True)
         ]
         return self.cover.verify(prisms, self.normals, self.friction)
+
+
+def _check_parts(found: CertifiedRegions) -> None:
+    """Refuse what is no region, no cover, or no length.
+
+    Raises:
+        InputError: A part is none.
+    """
+    each = partial(instance, kind=ContactRegion, name="regions")
+    count = len(several(found.regions, each, "regions", "ContactRegion values"))
+    if count != FINGERS:
+        raise InputError(f"regions must be {FINGERS}, one per finger, got {count}")
+    instance(found.cover, TwistCover, "cover")
+    positive(found.scale, "scale")
+    number(found.radius, "radius", least=0.0)
+    number(found.limit, "limit", least=0.0, most=math.inf)
 
 
 def certify_regions(  # noqa: PLR0913 - what a user may choose
@@ -141,8 +162,12 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
         SolverError: A proof failed its check.
     """
     check_on_faces(body, grasp)
-    _check_settings(reserve, balance, clearance, cones)
-    left = positive(friction, "friction") * (1.0 - reserve)
+    number(reserve, "reserve", least=0.0, below=1.0)
+    one_of(balance, get_args(Balance), "balance")
+    switch(recenter, "recenter")
+    number(clearance, "clearance", least=0.0, below=body.radius, where=", the object's radius in m")
+    whole(cones, "cones", least=FEWEST, most=MOST_CONES)
+    left = coefficient(friction) * (1.0 - reserve)
     positions, normals = stacked(grasp.contacts)
     if not force_closure(positions, normals, left).closed:
         raise InputError(f"grasp {grasp.id} is not in force closure at friction {left:.6g}")
@@ -152,7 +177,7 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     if pieces is None or least <= 0.0:
         return None
     leaning = [math.tan(math.atan(left) - p.spread) if p.spread else left for p in pieces]
-    grounds = Grounds(pieces, np.array(leaning), int(cones))
+    grounds = Grounds(pieces, np.array(leaning), cones)
     ys = np.array([
         nearest_point(piece.corners, piece.frame.T @ (x - piece.origin))
         for piece, x in zip(pieces, unit.at(positions), strict=True)
@@ -170,17 +195,6 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     if not found.verify():
         raise SolverError(f"grasp {grasp.id}: the proof of its regions fails its check")
     return found
-
-
-def _check_settings(reserve: float, balance: str, clearance: float, cones: int) -> None:
-    if not 0.0 <= reserve < 1.0:
-        raise InputError(f"reserve must be from 0 to below 1, got {reserve}")
-    if balance not in {"radius", "area"}:
-        raise InputError(f"balance must be 'radius' or 'area', got {balance!r}")
-    if not (math.isfinite(clearance) and clearance >= 0.0):
-        raise InputError(f"clearance must be at least 0, got {clearance}")
-    if not (float(cones).is_integer() and cones >= FEWEST):
-        raise InputError(f"cones must be a whole number from {FEWEST} on, got {cones}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -28,8 +28,9 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
 from grasp_core.closure_margin import decide, proves_closure, refutes_closure
+from grasp_core.contact_arrays import contact_arrays, contact_frictions
 from grasp_core.errors import UndecidedError
-from grasp_core.values import Grasp, contact_arrays, contact_frictions
+from grasp_core.values import Grasp
 
 UNSAFE = 1e-6
 """A margin larger than this is not itself why nothing can be proved."""

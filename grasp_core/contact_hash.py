@@ -5,7 +5,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from grasp_core.values import Contact, stacked
+from grasp_core.contact_arrays import stacked
+from grasp_core.values import Contact
 
 
 def contacts_sha256(contacts: Iterable[Contact]) -> str:

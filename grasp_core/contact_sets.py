@@ -12,10 +12,11 @@ from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from grasp_core.arrays import Array, frozen, frozen_units, positive
+from grasp_core.arrays import Array, frozen, frozen_units
+from grasp_core.checked import LARGEST_FRICTION, positive
+from grasp_core.contact_arrays import contact_frictions
 from grasp_core.errors import InputError
 from grasp_core.records import grasps_from_json
-from grasp_core.values import LARGEST_FRICTION, contact_frictions
 
 FEWEST_CONTACTS = 2
 MOST_CONTACTS = 100

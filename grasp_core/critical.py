@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
+from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure import unit_size
 from grasp_core.closure_margin import (
     RANK,
@@ -35,11 +36,12 @@ from grasp_core.closure_margin import (
     many_refute_closure,
     proves_closure,
 )
+from grasp_core.contact_arrays import contact_arrays
 from grasp_core.errors import UndecidedError
 from grasp_core.kernels import compiled
 from grasp_core.many_contacts import many_contact_arrays, unit_sizes
 from grasp_core.margin_program import deepest_forces
-from grasp_core.values import LARGEST_FRICTION, Grasp, contact_arrays
+from grasp_core.values import Grasp
 from grasp_core.wrenches import WRENCH, normal_and_tangential
 
 FRICTION_ACCURACY = 5e-8

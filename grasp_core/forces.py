@@ -17,7 +17,7 @@ not read: an answer counts when its own residuals are small.
 import importlib
 import math
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Any, Literal
 
 import numpy as np
@@ -25,10 +25,12 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.balance import RESIDUAL, Balance, needed_friction
+from grasp_core.checked import LARGEST, SMALLEST, number, one_of, several, shown
+from grasp_core.contact_arrays import contact_arrays, contact_frictions
 from grasp_core.errors import InputError, NoForcesError, SolverError
 from grasp_core.least_distance import least_distance
 from grasp_core.least_friction import lower_friction
-from grasp_core.values import Grasp, contact_arrays, contact_frictions
+from grasp_core.values import Grasp
 
 REQUESTED = 1e-8
 MAX_ITERATIONS = 300
@@ -78,6 +80,7 @@ def contact_forces(  # noqa: PLR0913 - the contract's arguments
         NoForcesError: No forces found that meet the limits and the friction; the text gives the
             index of the first of many wrenches for which there are none.
     """
+    _objective(objective)
     loads, single = _rows(wrench)
     balance = _balance(positions, normals, loads, normal_force, center, by_load=True)
     mu = contact_frictions(friction, len(balance.frames))
@@ -146,8 +149,7 @@ def _least_imbalance(P: Array, q: Array, rows: Array, balance: Balance) -> Array
 
 def _objective(name: str) -> Callable[[Balance, Array], Array]:
     known = {"least_norm": _least_norm, "least_friction": _least_friction_each}
-    if name not in known:
-        raise InputError(f"objective must be one of {', '.join(known)}, got {name!r}")
+    one_of(name, known, "objective")
     return known[name]
 
 
@@ -227,10 +229,21 @@ def _balance(
     normal_force: tuple[float, float], center: ArrayLike, *, by_load: bool = False,
 ) -> Balance:  # fmt: skip
     points, units = contact_arrays(positions, normals)
-    if not 0.0 <= normal_force[0] < normal_force[1]:
-        raise InputError(f"normal_force must be (least, largest), got {normal_force}")
+    _check_limits(normal_force)
     arms = points - frozen(center, (3,), "center")
     return Balance.of(arms, units, wrenches, normal_force, by_load=by_load)
+
+
+def _check_limits(normal_force: tuple[float, float]) -> None:
+    each = partial(number, name="normal_force", least=0.0, most=math.inf)
+    limits = several(normal_force, each, "normal_force", "limits")
+    if len(limits) != len(("least", "largest")) or not limits[0] < limits[1]:
+        raise InputError(f"normal_force must be (least, largest), got {shown(normal_force)}")
+    if limits[0] > LARGEST or limits[1] < SMALLEST:
+        raise InputError(
+            f"normal_force: least must be up to {LARGEST:g} N and largest from {SMALLEST:g} N, got "
+            f"{shown(normal_force)}"
+        )
 
 
 def _rows(wrench: ArrayLike) -> tuple[Array, bool]:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
+from grasp_core.contact_arrays import SMALLEST_SPREAD, check_spread
 from grasp_core.errors import InputError
 
 LineClass: TypeAlias = Literal["planar", "concurrent", "pencil", "regulus", "independent"]
@@ -55,8 +56,12 @@ def classify_lines(points: ArrayLike, directions: ArrayLike) -> LineClass:
     x = frozen(points, (4, 3), "points")
     d = frozen(directions, (4, 3), "directions")
     lengths = np.linalg.norm(d, axis=1, keepdims=True)
-    if lengths.min() == 0.0:
-        raise InputError("directions must not be zero: a line needs a direction")
+    if lengths.min() < SMALLEST_SPREAD:
+        raise InputError(
+            f"directions must not be zero: a line needs a direction of length {SMALLEST_SPREAD:g} "
+            f"at least, got {float(lengths.min()):.6g}"
+        )
+    check_spread(np.ptp(x, axis=0), "points")
     d = d / lengths
     arms = x - x.mean(axis=0)
     spread = float(np.linalg.norm(arms, axis=1).max())

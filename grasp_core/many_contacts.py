@@ -1,16 +1,20 @@
 """Many sets of contacts, as many contacts in each, in one pair of arrays."""
 
 from collections.abc import Iterable
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, frozen_units
+from grasp_core.arrays import Array, frozen, frozen_units, real_array
+from grasp_core.checked import instance, several
+from grasp_core.contact_arrays import check_spread, contact_arrays, contact_frictions
 from grasp_core.errors import InputError
-from grasp_core.values import FINGERS, Grasp, contact_arrays, contact_frictions
+from grasp_core.values import FINGERS, Grasp
 
 FEWEST = 2
+NO_NORMALS = "or give normals"
 
 
 def many_contact_arrays(
@@ -23,15 +27,18 @@ def many_contact_arrays(
     """
     given: Any = positions
     if normals is None:
-        grasps: list[Any] = [given] if isinstance(given, Grasp) else list(given)
+        grasps = (given,) if isinstance(given, Grasp) else several(
+            given, partial(instance, kind=Grasp, name="positions", remedy=NO_NORMALS),
+            "positions", "Grasp values",
+        )  # fmt: skip
         both = np.array([contact_arrays(grasp, None) for grasp in grasps], dtype=np.float64)
         points, units = np.moveaxis(both.reshape(-1, 2, FINGERS, 3), 1, 0)
         return points, units
     points = frozen(given, (None, None, 3), "positions")
-    units = frozen_units(normals, points.shape, "normals")
     if points.shape[1] < FEWEST:
-        raise InputError(f"at least two contacts are needed, got {points.shape[1]}")
-    return points, units
+        raise InputError(f"positions: at least two contacts are needed, got {points.shape[1]}")
+    check_spread(np.ptp(points, axis=1))
+    return points, frozen_units(normals, points.shape, "normals")
 
 
 def many_frictions(friction: ArrayLike, shape: tuple[int, int]) -> Array:
@@ -44,7 +51,7 @@ def many_frictions(friction: ArrayLike, shape: tuple[int, int]) -> Array:
     Raises:
         InputError: The shape differs, or a coefficient is negative or too large.
     """
-    values = np.asarray(friction, dtype=np.float64)
+    values = real_array(friction, "friction")
     if values.ndim < len(shape):
         return np.broadcast_to(contact_frictions(values, shape[1]), shape)
     return contact_frictions(frozen(values, shape, "friction").ravel(), values.size).reshape(shape)

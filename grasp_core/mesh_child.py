@@ -74,7 +74,7 @@ def read_triangles(path: Path, limits: MeshLimits) -> tuple[Array, Indices, byte
 
 def _asked(request: bytes, limits: MeshLimits) -> tuple[Array, Indices]:
     """What a child answers; it is ended when it does not, and then the answer is a refusal."""
-    child = _child(limits.max_memory_bytes)
+    child = _child(limits.max_memory_mib)
     alarm = threading.Timer(limits.max_seconds + GRACE_S, child.process.kill)
     alarm.start()
     try:
@@ -87,7 +87,7 @@ def _asked(request: bytes, limits: MeshLimits) -> tuple[Array, Indices]:
         child.end()
         message = (
             f"reading it took more than {limits.max_seconds:g} s or "
-            f"{limits.max_memory_bytes / 2**30:.3g} GiB, or broke the reader; simplify the mesh, "
+            f"{limits.max_memory_mib} MiB, or broke the reader; simplify the mesh, "
             "or export it again"
         )
         raise MeshError(MeshRefusal.LIMIT, message) from error

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from grasp_core.errors import InputError, MeshError, MeshRefusal
+from grasp_core.checked import positive, whole
+from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.mesh_formats import stl
 from grasp_core.regular_files import bounded_bytes
 
@@ -29,13 +30,12 @@ class MeshLimits:
     """Of the surface: bodies and cavities."""
     max_seconds: float = 30.0
     """For reading the file; what follows is bounded by the numbers above."""
-    max_memory_bytes: int = 2 * 2**30
+    max_memory_mib: int = 2048
 
     def __post_init__(self) -> None:
-        for name in self.__slots__:
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
-                raise InputError(f"{name} must be a positive number, got {value!r}")
+        for name in ("max_bytes", "max_triangles", "max_faces", "max_parts", "max_memory_mib"):
+            whole(getattr(self, name), name, least=1)
+        positive(self.max_seconds, "max_seconds")
 
 
 def mesh_kind(path: Path) -> str:

@@ -69,8 +69,8 @@ def _text_of(kind: str, data: bytes) -> bytes:
     """Text as both readers see it alike; binary data as it is."""
     if kind in {"obj", "off"}:
         return without_comments(plain_text(data))
-    binary = {"stl": stl.is_binary, "ply": ply.is_binary}.get(kind, lambda _: True)
-    return data if binary(data) else plain_text(data)
+    text = (kind == "stl" and not stl.is_binary(data)) or (kind == "ply" and ply.is_text(data))
+    return plain_text(data) if text else data
 
 
 def answer(requests: BinaryIO, answers: BinaryIO) -> bool:
@@ -132,11 +132,11 @@ def _is_library(name: str | bytes) -> bool:
 ROOTS = tuple({sys.prefix, sys.base_prefix, *filter(None, sys.path)})
 
 
-def main(memory: str) -> None:
+def main(memory_mib: str) -> None:
     """Answer requests on standard input until it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # that is for the program that asks
     sys.dont_write_bytecode = True
-    _limit_memory(int(memory))
+    _limit_memory(2**20 * int(memory_mib))
     sys.addaudithook(_guard)
     while answer(sys.stdin.buffer, sys.stdout.buffer):
         pass

@@ -13,14 +13,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, positive
+from grasp_core.arrays import Array, frozen
+from grasp_core.checked import MOST_EDGES, whole
 from grasp_core.closure import unit_size
+from grasp_core.contact_arrays import contact_arrays
 from grasp_core.errors import InputError
 from grasp_core.kernels import compiled
 from grasp_core.lp import RESIDUAL, LinearProgram, Optimum, maximize
 from grasp_core.many_contacts import many_contact_arrays, many_frames, many_frictions, unit_sizes
-from grasp_core.values import Grasp, contact_arrays
-from grasp_core.wrench_sets import WrenchSet
+from grasp_core.values import Grasp
+from grasp_core.wrench_sets import WrenchSet, scaled_arms
 from grasp_core.wrenches import WRENCH, grasp_map
 
 FEWEST_EDGES = 3
@@ -35,7 +37,7 @@ def pyramid_wrenches(wrenches: WrenchSet, edges: int) -> Array:
     """Wrenches of the edges of pyramids inscribed in the friction cones, (k edges, 6).
 
     Raises:
-        InputError: Fewer than three edges.
+        InputError: Fewer than three edges, or more than a thousand.
     """
     circle = _circle(edges)
     slopes = wrenches.friction
@@ -48,10 +50,9 @@ def _circle(edges: int) -> Array:
     """Edges of a pyramid of friction one, (normal, tangent, tangent), (edges, 3).
 
     Raises:
-        InputError: Fewer than three edges.
+        InputError: Fewer than three edges, or more than a thousand.
     """
-    if edges < FEWEST_EDGES:
-        raise InputError(f"edges must be at least {FEWEST_EDGES}, got {edges}")
+    whole(edges, "edges", least=FEWEST_EDGES, most=MOST_EDGES)
     turns = 2.0 * np.pi * np.arange(edges) / edges
     return np.column_stack([np.ones(edges), np.cos(turns), np.sin(turns)])
 
@@ -236,6 +237,7 @@ def smallest_singular_value(
     """
     given = positions.positions if isinstance(positions, Grasp) else positions
     points = frozen(given, (None, 3), "positions")
-    arms = (points - frozen(center, (3,), "center")) / positive(torque_scale, "torque_scale")
-    values = np.linalg.svd(grasp_map(arms), compute_uv=False)
+    if not len(points):
+        raise InputError("positions must be those of at least one contact, got none")
+    values = np.linalg.svd(grasp_map(scaled_arms(points, center, torque_scale)), compute_uv=False)
     return float(values[-1]) if len(values) == WRENCH else 0.0

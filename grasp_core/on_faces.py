@@ -3,6 +3,7 @@
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.values import Contact, Face, Grasp, Polyhedron
 
@@ -10,12 +11,24 @@ ON_FACE = 1e-6
 """How far a contact may be off its face, in object radii: what six digits in a file keep."""
 
 
+def check_body(body: Polyhedron) -> None:
+    """Refuse what is no object.
+
+    Raises:
+        InputError: It is none.
+    """
+    instance(body, Polyhedron, "body", "gc.load_polyhedron reads one from a mesh file")
+
+
 def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
     """Refuse a grasp whose contacts are not on the faces it names.
 
     Raises:
-        InputError: A face does not exist, or a contact is off its surface or outside its border.
+        InputError: One of them is no object or no grasp, a face does not exist, or a contact is off
+            its surface or outside its border.
     """
+    check_body(body)
+    instance(grasp, Grasp, "grasp", "gc.plan finds them")
     slack = ON_FACE * body.radius
     for finger, (face, contact) in enumerate(zip(grasp.faces, grasp.contacts, strict=True)):
         where = f"grasp {grasp.id}: contact {finger}"

@@ -12,6 +12,7 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.checked import number
 from grasp_core.polygons import (
     area_and_centroid,
     is_convex,
@@ -40,6 +41,10 @@ class FlatnessLimits:
     precision, and far below any friction angle of interest."""
     distance: float = 1e-6
     """Relative to the object's largest extent; some ten single-precision steps."""
+
+    def __post_init__(self) -> None:
+        number(self.angle, "angle", least=0.0, most=1.0)
+        number(self.distance, "distance", least=0.0, most=0.1)
 
 
 def planar_faces(

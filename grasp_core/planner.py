@@ -10,9 +10,12 @@ for the others that they hold no grasp.
 import math
 import time
 from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import cast
 
 from grasp_core.candidates import LEAST_SPAN_ANGLE
 from grasp_core.certified import to_grasp
+from grasp_core.checked import function, several, text
 from grasp_core.choice import chosen
 from grasp_core.constructions import LEAST_RADIUS
 from grasp_core.planar_faces import MAX_FACES
@@ -81,6 +84,8 @@ def plan(  # noqa: PLR0913 - the contract's keywords
         finger, clearance, share_faces,
     )  # fmt: skip
     check_request(body, request)
+    if progress is not None:
+        function(progress, "progress")
     searches = Searches(body, request)
     for _ in searches.run(progress):
         pass
@@ -116,7 +121,10 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
 
 
 def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
-    return (families,) if isinstance(families, str) else tuple(families)
+    if isinstance(families, str):
+        return (families,)
+    names = several(families, partial(text, name="families"), "families", "names")
+    return cast("tuple[Method, ...]", names)  # those that there are, see `check_request`
 
 
 def _planned(body: Polyhedron, request: PlanRequest, searches: Searches) -> Plan:

@@ -15,13 +15,13 @@ from typing import TypeVar, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices, frozen
+from grasp_core.arrays import Array, Indices, frozen, real_array
+from grasp_core.checked import instance, one_of, path_of, text
 from grasp_core.curved_patches import flat_patches
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.mass import mass_properties
 from grasp_core.mesh_child import read_triangles
 from grasp_core.mesh_files import MeshLimits
-from grasp_core.mesh_formats.refusals import shown
 from grasp_core.planar_faces import MAX_FACES, FlatnessLimits, coplanar_groups, planar_faces
 from grasp_core.solid_checks import check_volume, largest_part, oriented, surface_fault, welded
 from grasp_core.solids import Solid, hull, triangulate
@@ -67,9 +67,10 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
         InputError: The unit is unknown.
         MeshError: The file is not a solid; its `reason` says why.
     """
-    if unit not in UNITS_M:
-        raise InputError(f"unit must be one of {', '.join(UNITS_M)}, got {unit!r}")
-    path = Path(path)
+    one_of(unit, UNITS_M, "unit")
+    _check_choices(faces, patches, flatness)
+    path = path_of(path, "path")
+    instance(limits, MeshLimits, "limits")
     vertices, triangles, data = read_triangles(path, limits)
     try:
         return polyhedron_from_mesh(
@@ -120,7 +121,10 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
         InputError: The centre of mass is not a point.
         MeshError: The mesh is not a solid; its `reason` says why.
     """
+    text(name, "name")
+    _check_choices(faces, patches, flatness)
     points, corners = _checked_arrays(vertices, triangles, limits.max_triangles)
+    center = _given_center(points, center_of_mass)
     points, corners, dropped = welded(points, corners)
     notes = [f"dropped {dropped} triangles without area"] if dropped else []
     groups = _planar_groups(points, corners, flatness, faces)
@@ -143,7 +147,7 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
         found = planar_faces(points, corners, groups or [], flatness, triangulate)
     solid = hull(points) if fault and fault.reason is MeshRefusal.OPEN else Solid(points, corners)
     check_volume(solid)
-    mass = mass_properties(solid, _given_center(points, center_of_mass))
+    mass = mass_properties(solid, center)
     content = content_hash(points, corners)
     return kind(
         name=name,
@@ -158,6 +162,13 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
         patches=flat,
         notes=tuple(notes),
     )
+
+
+def _check_choices(faces: FaceKind, patches: PatchLimits | None, flatness: FlatnessLimits) -> None:
+    one_of(faces, get_args(FaceKind), "faces")
+    if patches is not None:
+        instance(patches, PatchLimits, "patches")
+    instance(flatness, FlatnessLimits, "flatness")
 
 
 def _given_center(points: Array, center_of_mass: ArrayLike | None) -> Array | None:
@@ -179,8 +190,6 @@ def _planar_groups(
     points: Array, corners: Indices, flatness: FlatnessLimits, faces: FaceKind
 ) -> list[Indices] | None:
     """Triangles grouped into planar faces; None where patches are to be used instead."""
-    if faces not in get_args(FaceKind):
-        raise InputError(f"faces must be one of {get_args(FaceKind)}, got {faces!r}")
     if faces == "patches":
         return None
     groups = coplanar_groups(points, corners, flatness)
@@ -227,11 +236,9 @@ def _patched(
 
 
 def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tuple[Array, Indices]:
-    try:
-        points, corners = np.array(vertices, dtype=np.float64), np.array(triangles)
-    except (TypeError, ValueError) as error:
-        message = f"need vertices (n, 3) and triangles (t, 3) as numbers: {shown(error)}"
-        raise MeshError(MeshRefusal.UNREADABLE, message) from error
+    points = real_array(vertices, "vertices")
+    real_array(triangles, "triangles")  # before numpy makes an array of anything
+    corners = np.array(triangles)
     if points.ndim != 2 or corners.ndim != 2 or points.shape[1:] != (3,) or not corners.size:  # noqa: PLR2004
         message = f"need vertices (n, 3) and triangles (t, 3), got {points.shape}, {corners.shape}"
         raise MeshError(MeshRefusal.EMPTY, message)

@@ -26,7 +26,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
-from grasp_core.errors import InputError, SolverError
+from grasp_core.checked import number
+from grasp_core.errors import SolverError
 from grasp_core.growing_hull import ABOVE, FLAT, MOST_POINTS, GrowingHull, spread_simplex
 from grasp_core.inner_polytope import InnerPolytope
 from grasp_core.kernels import compiled
@@ -111,8 +112,7 @@ def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
         InputError: Shapes, lengths or signs are wrong.
         SolverError: The cone program's answer failed its check.
     """
-    if not FINEST_GAP <= gap < 1.0:
-        raise InputError(f"gap must be at least {FINEST_GAP:g} and below 1, got {gap}")
+    number(gap, "gap", least=FINEST_GAP, below=1.0)
     wrenches = WrenchSet.of(
         positions, normals, friction, center=center, torque_scale=torque_scale, norm=norm
     )

@@ -20,24 +20,28 @@ Every part left carries its direction, so the bound can be checked again in plai
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from heapq import heappop, heappush
 from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen
+from grasp_core.arrays import Array, frozen_each
 from grasp_core.best_contacts import FINGER_RADIUS
+from grasp_core.checked import LARGEST, coefficient, number, several, whole
 from grasp_core.errors import InputError
 from grasp_core.face_parts import Path, corner_contacts, cover_everything, part_at
 from grasp_core.face_pieces import FacePiece, inset_piece, unit_pieces
+from grasp_core.on_faces import check_body
 from grasp_core.quality import wrench_set_quality
-from grasp_core.values import FINGERS, FaceQuadruple, Polyhedron, contact_frictions
+from grasp_core.values import FINGERS, FaceQuadruple, Polyhedron
 from grasp_core.wrench_sets import WrenchSet
 from grasp_core.wrenches import contact_frames, grasp_map, in_frames
 
 PART_GAP = 0.02
 """Gap of the quality of corner contacts: finer bounds do not help while parts are large."""
+MOST_PARTS = 1_000_000
 ENOUGH = 0.01
 """Parts whose bound is within this share of what is known are not cut any more."""
 ROUNDING = 1e-9
@@ -108,12 +112,22 @@ def quality_ceiling(
         InputError: An argument is out of range.
         SolverError: A program's answer failed its check.
     """
+    check_body(body)
+    friction = coefficient(friction)
+    number(known, "known", least=0.0, most=LARGEST)
+    whole(parts, "parts", least=1, most=MOST_PARTS)
     given = FINGER_RADIUS * body.radius if finger_radius is None else finger_radius
-    radii = frozen(np.broadcast_to(np.asarray(given), (FINGERS,)), (FINGERS,), "finger_radius")
+    radii = frozen_each(given, FINGERS, "finger_radius")
+    if (radii < 0.0).any() or (radii > body.radius).any():
+        raise InputError(
+            f"finger_radius must be from 0 to the object's radius of {body.radius:.4g} m, got "
+            f"{radii.tolist()}"
+        )
     choices = _choices(body, faces, radii / body.radius)
-    friction = float(contact_frictions(friction, 1)[0])
     if parts < len(choices):
-        raise InputError(f"parts must be at least {len(choices)}, one per choice of pieces")
+        raise InputError(
+            f"parts must be at least {len(choices)}, one per choice of pieces, got {parts}"
+        )
     directions: list[Array] = []
     waiting: list[tuple[float, int, Path, Array]] = []
     fresh: list[tuple[int, Path]] = [(index, ()) for index in range(len(choices))]
@@ -135,8 +149,10 @@ def quality_ceiling(
 def _choices(
     body: Polyhedron, faces: Sequence[int], insets: Array
 ) -> tuple[tuple[FacePiece, ...], ...]:
-    if len(faces) != FINGERS or not all(0 <= face < len(body.faces) for face in faces):
-        raise InputError(f"faces must be {FINGERS} of 0..{len(body.faces) - 1}, got {faces}")
+    each = partial(whole, name="faces", most=len(body.faces) - 1)
+    given = several(faces, each, "faces", "indices")
+    if len(given) != FINGERS:
+        raise InputError(f"faces must be {FINGERS} indices of faces, got {len(given)}")
     pieces = unit_pieces(body)
     by_face = [[piece for piece in pieces if piece.face == face] for face in faces]
     if not all(by_face):

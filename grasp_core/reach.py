@@ -21,7 +21,8 @@ from itertools import combinations, islice, product
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array, positive
+from grasp_core.arrays import Array
+from grasp_core.checked import positive
 from grasp_core.polygons import plane_frame
 from grasp_core.values import FaceQuadruple, Polyhedron
 

@@ -2,13 +2,25 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 from grasp_core.arrays import UNIT_SLACK
+from grasp_core.checked import (
+    SMALLEST,
+    coefficient,
+    instance,
+    number,
+    one_of,
+    seed_of,
+    shown,
+    switch,
+    whole,
+)
 from grasp_core.errors import InputError
+from grasp_core.on_faces import check_body
 from grasp_core.planar_faces import MAX_FACES
 from grasp_core.reach import Finger
-from grasp_core.values import LARGEST_FRICTION, Family, Method, Polyhedron
+from grasp_core.values import Family, Method, Polyhedron
 
 FAMILIES: tuple[Family, ...] = get_args(Family)
 """The families of the paper, each with its construction."""
@@ -17,6 +29,9 @@ METHODS: tuple[Method, ...] = get_args(Method)
 ConeKind: TypeAlias = Literal["tilted", "normal"]
 RankBy: TypeAlias = Literal["radius", "friction-margin", "ferrari-canny", "diverse"]
 """What makes one grasp better than another."""
+ITS_RADIUS = ", the object's radius in m"
+FARTHEST_APPROACH = 1e3
+"""Longest free line of a finger, in object radii."""
 COMPLETE_CELLS = 20_000
 """Parts into which `complete` may cut the faces of one quadruple."""
 MOST_FACES = 1000
@@ -64,26 +79,34 @@ def check_request(body: Polyhedron, request: PlanRequest) -> None:
     Raises:
         InputError: A keyword is out of range, or the object has too many faces.
     """
-    if not 0.0 < request.friction <= LARGEST_FRICTION:
-        raise InputError(
-            f"friction must be a positive number up to {LARGEST_FRICTION:g}, got {request.friction}"
-        )
+    check_body(body)
+    coefficient(request.friction)
     _check_angle(request)
     _check_kinds(request)
-    for name, value in (("limit", request.limit), ("cells", request.cells)):
-        if value is not None and value < 1:
-            raise InputError(f"{name} must be at least 1, got {value}")
-    if not 0.0 <= request.clearance < body.radius:
-        raise InputError(
-            f"clearance must be from 0 to the object's radius of {body.radius:.4g} m, got "
-            f"{request.clearance}"
-        )
-    if request.share_faces is not None and not 0.0 <= request.share_faces < 2.0 * body.radius:
-        raise InputError(
-            f"share_faces must be from 0 to the object's size of {2.0 * body.radius:.4g} m, got "
-            f"{request.share_faces}"
-        )
+    _check_counts(request)
+    _check_lengths(body, request)
     _check_size(body, request)
+
+
+def _check_counts(request: PlanRequest) -> None:
+    if request.limit is not None:
+        whole(request.limit, "limit", least=1)
+    whole(request.cells, "cells", least=1)
+    seed_of(request.seed)
+    switch(request.complete, "complete")
+
+
+def _check_lengths(body: Polyhedron, request: PlanRequest) -> None:
+    number(request.clearance, "clearance", least=0.0, below=body.radius, where=ITS_RADIUS)
+    if request.share_faces is not None:
+        size, where = 2.0 * body.radius, ", the object's size, or None"
+        number(request.share_faces, "share_faces", least=0.0, below=size, where=where)
+    if request.finger is not None:
+        instance(request.finger, Finger, "finger", "gc.Finger(radius_m, approach_m)")
+        radius, approach = request.finger.radius_m, request.finger.approach_m
+        number(radius, "finger.radius_m", most=body.radius, where=ITS_RADIUS)
+        farthest = FARTHEST_APPROACH * body.radius
+        number(approach, "finger.approach_m", most=farthest, where=", a thousand radii")
 
 
 def _check_size(body: Polyhedron, request: PlanRequest) -> None:
@@ -109,28 +132,22 @@ def _check_size(body: Polyhedron, request: PlanRequest) -> None:
 
 
 def _check_kinds(request: PlanRequest) -> None:
-    unknown = [family for family in request.families if family not in METHODS]
-    if unknown or not request.families:
-        raise InputError(
-            f"families must be among {', '.join(METHODS)}; got {list(request.families)}"
-        )
+    families: tuple[Any, ...] = request.families
+    unknown = [family for family in families if family not in METHODS]
+    if unknown or not families:
+        raise InputError(f"families must be among {', '.join(METHODS)}; got {shown(families)}")
     if request.complete and "free" not in request.families:
         raise InputError("complete decides all faces, which takes the free method; add it")
-    for name, value, kinds in (
-        ("cones", request.cones, get_args(ConeKind)),
-        ("rank_by", request.rank_by, get_args(RankBy)),
-    ):
-        if value not in kinds:
-            raise InputError(f"{name} must be one of {', '.join(kinds)}, got {value!r}")
+    one_of(request.cones, get_args(ConeKind), "cones")
+    one_of(request.rank_by, get_args(RankBy), "rank_by")
 
 
 def _check_angle(request: PlanRequest) -> None:
     if request.theta_deg is None:
         return
     widest = math.degrees(math.atan(request.friction))
-    if not 0.0 < request.theta_deg <= widest * (1.0 + UNIT_SLACK):
-        raise InputError(
-            f"theta_deg must be in (0, {widest:.6g}], up to the friction angle of "
-            f"friction {request.friction}; got {request.theta_deg}. Raise the friction or lower "
-            "theta"
-        )
+    most, where = (
+        widest * (1.0 + UNIT_SLACK),
+        f", the angle of friction {request.friction}, or None",
+    )
+    number(request.theta_deg, "theta_deg", least=SMALLEST, most=most, where=where)

@@ -18,10 +18,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, positive
+from grasp_core.arrays import Array, frozen
+from grasp_core.checked import LARGEST, SMALLEST, positive
 from grasp_core.conic import ConicProgram, minimize
+from grasp_core.contact_arrays import contact_arrays, contact_frictions
 from grasp_core.errors import InputError
-from grasp_core.values import Grasp, contact_arrays, contact_frictions
+from grasp_core.values import Grasp
 from grasp_core.wrench_sets import WrenchSet
 from grasp_core.wrenches import WRENCH, contact_frames, grasp_map, in_frames
 
@@ -71,6 +73,7 @@ def max_resisted_wrench(
         InputError: Shapes or limits are wrong, or the wrench is zero.
     """
     loads = frozen(wrench, (6,), "wrench")[None]
+    _check_sizes(loads, "wrench")
     return wrench_limits(
         positions, normals, friction, loads, max_normal_force=max_normal_force, center=center
     )[0].limit
@@ -103,13 +106,23 @@ def wrench_limits(
     """
     points, units = contact_arrays(positions, normals)
     loads = frozen(wrenches, (None, 6), "wrenches")
-    if not loads.any(axis=1).all():
-        raise InputError("wrench must not be zero: every multiple of it is resisted")
+    _check_sizes(loads, "wrenches")
     about = frozen(center, (3,), "center")
     body = WrenchBody(
         points - about, units, contact_frictions(friction, len(points)), max_normal_force
     )
     return tuple(body.limit(load) for load in loads)
+
+
+def _check_sizes(loads: Array, name: str) -> None:
+    """Refuse wrenches (n, 6) that are zero, of which every multiple is resisted, or nearly so."""
+    sizes = np.abs(loads).max(axis=1)
+    if len(loads) and not SMALLEST <= float(sizes.min()) <= float(sizes.max()) <= LARGEST:
+        wrong = sizes[(sizes < SMALLEST) | (sizes > LARGEST)][0]
+        raise InputError(
+            f"{name} must not be zero: the largest part is from {SMALLEST:g} to {LARGEST:g}, got "
+            f"{float(wrong):.6g}"
+        )
 
 
 class WrenchBody:

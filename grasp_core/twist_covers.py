@@ -78,7 +78,8 @@ class TwistCover:
         object.__setattr__(self, "axes", frozen(self.axes, (TWIST, TWIST), "axes"))
         object.__setattr__(self, "codes", frozen_indices(self.codes, (None,), "codes"))
         leaves = int(np.count_nonzero(self.codes == LEAF))
-        object.__setattr__(self, "forces", frozen(self.forces, (leaves, None, 3), "forces"))
+        forces = frozen(self.forces, (leaves, None, 3), "forces", most=np.inf)  # of any size
+        object.__setattr__(self, "forces", forces)
         if self.codes.min(initial=0) < 0 or self.codes.max(initial=0) > LEAF:
             raise InputError(f"codes of a cover are from 0 to {LEAF}")
 

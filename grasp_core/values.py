@@ -4,14 +4,25 @@ Every vector is in the object's frame and in SI units. Normals are unit vectors 
 point into the object. Arrays are copied, checked and made read-only on construction.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Literal, Self, TypeAlias, TypeVar
+from functools import partial
+from typing import Any, Literal, Self, TypeAlias, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices, frozen_units
+from grasp_core.checked import (
+    LARGEST,
+    instance,
+    number,
+    one_of,
+    several,
+    shown,
+    text,
+    whole,
+)
 from grasp_core.errors import InputError
 
 Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
@@ -27,8 +38,7 @@ FaceQuadruple: TypeAlias = tuple[int, int, int, int]
 Item = TypeVar("Item")
 
 FINGERS = 4
-LARGEST_FRICTION = 1e3
-"""Coefficients above this are reported as infinite; no material comes near it."""
+RIGHT_ANGLE = np.pi / 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,8 +70,12 @@ class Face:
         object.__setattr__(self, "centroid", frozen(self.centroid, (3,), "centroid"))
         object.__setattr__(self, "polygon", frozen(self.polygon, (None, 3), "polygon"))
         for name in ("holes", "pieces"):
-            loops = tuple(frozen(loop, (None, 3), name) for loop in getattr(self, name))
+            each = partial(frozen, shape=(None, 3), name=name)
+            loops = several(getattr(self, name), each, name, "polygons")
             object.__setattr__(self, name, loops)
+        number(self.area, "area", above=0.0, most=LARGEST)
+        number(self.spread, "spread", least=0.0, below=RIGHT_ANGLE)
+        number(self.depth, "depth", least=0.0, most=LARGEST)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,12 +94,9 @@ class PatchLimits:
     """So many patches, those with the largest discs."""
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.spread_deg <= 45.0:  # noqa: PLR2004 - above it nothing is flat
-            raise InputError(f"spread_deg must be above 0 and at most 45, got {self.spread_deg}")
-        if not 0.0 < self.depth <= 0.1:  # noqa: PLR2004
-            raise InputError(f"depth must be above 0 and at most 0.1, got {self.depth}")
-        if not 4 <= self.most <= 200:  # noqa: PLR2004 - four fingers; what the planner takes
-            raise InputError(f"most must be from 4 to 200, got {self.most}")
+        number(self.spread_deg, "spread_deg", above=0.0, most=45.0)  # above it nothing is flat
+        number(self.depth, "depth", above=0.0, most=0.1)
+        whole(self.most, "most", least=FINGERS, most=200)  # what the planner takes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,6 +131,15 @@ class Polyhedron:
         center = frozen(self.center_of_mass, (3,), "center_of_mass")
         object.__setattr__(self, "center_of_mass", center)
         object.__setattr__(self, "inertia", frozen(self.inertia, (3, 3), "inertia"))
+        for name in ("name", "content_sha256", "source_sha256"):
+            text(getattr(self, name), name)
+        number(self.volume, "volume", above=0.0, most=LARGEST)
+        if triangles.max(initial=0) >= max(len(self.vertices), 1):
+            raise InputError(f"triangles must name vertices from 0 to {len(self.vertices) - 1}")
+        several(self.faces, partial(instance, kind=Face, name="faces"), "faces", "Face values")
+        several(self.notes, partial(text, name="notes"), "notes", "texts")
+        if self.patches is not None:
+            instance(self.patches, PatchLimits, "patches")
 
     @classmethod
     def from_mesh(
@@ -177,8 +197,7 @@ class ForceCone:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", frozen_units(self.axis, (3,), "axis"))
-        if not 0.0 <= self.half_angle < np.pi / 2:
-            raise InputError(f"half_angle must be in [0, pi/2), got {self.half_angle:.6g}")
+        number(self.half_angle, "half_angle", least=0.0, below=RIGHT_ANGLE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -209,7 +228,9 @@ class ContactRegion:
     """Radius of the largest disc inside the region [m]."""
 
     def __post_init__(self) -> None:
+        one_of(self.kind, get_args(RegionKind), "kind")
         object.__setattr__(self, "polygon", frozen(self.polygon, (None, 3), "polygon"))
+        number(self.inscribed_radius, "inscribed_radius", least=0.0, most=LARGEST)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -263,14 +284,29 @@ class Grasp:
     vectors, (4, 3); None if none was asked for (`plan(finger=...)`)."""
 
     def __post_init__(self) -> None:
+        text(self.id, "id")
+        one_of(self.family, get_args(Family), "family")
         if self.approach_directions is not None:
             ways = frozen_units(self.approach_directions, (FINGERS, 3), "approach_directions")
             object.__setattr__(self, "approach_directions", ways)
-        for name in ("faces", "contacts", "force_cones", "regions"):
-            if len(getattr(self, name)) != FINGERS:
-                count = len(getattr(self, name))
-                raise InputError(f"a grasp has {FINGERS} {name}, got {count}")
-        object.__setattr__(self, "focus_points", frozen(self.focus_points, (None, 3), "focus"))
+        _one_per_finger(self.faces, partial(whole, name="faces"), "faces", "indices")
+        for name, kind in PER_FINGER.items():
+            each = partial(instance, kind=kind, name=name)
+            _one_per_finger(getattr(self, name), each, name, f"{kind.__name__} values")
+        points = frozen(self.focus_points, (None, 3), "focus_points")
+        object.__setattr__(self, "focus_points", points)
+        number(self.radius, "radius", least=0.0, most=LARGEST)
+        number(self.span_angle, "span_angle", least=0.0, below=RIGHT_ANGLE)
+        number(self.critical_friction, "critical_friction", least=0.0, most=np.inf)
+        number(self.closure_margin, "closure_margin")
+        bounds = several(
+            self.ferrari_canny, partial(number, name="ferrari_canny"), "ferrari_canny", "bounds"
+        )
+        if len(bounds) != len(("lower", "upper")) or bounds[0] > bounds[1]:
+            raise InputError(
+                f"ferrari_canny must be a lower and an upper bound, got {shown(bounds)}"
+            )
+        instance(self.witness, Witness, "witness")
 
     @property
     def positions(self) -> Array:
@@ -283,6 +319,16 @@ class Grasp:
         return np.array([contact.normal for contact in self.contacts])
 
 
+PER_FINGER = {"contacts": Contact, "force_cones": ForceCone, "regions": ContactRegion}
+"""What a grasp has one of per finger."""
+
+
+def _one_per_finger(value: Any, each: Callable[[Any], object], name: str, kind: str) -> None:
+    things = several(value, each, name, kind)
+    if len(things) != FINGERS:
+        raise InputError(f"a grasp has {FINGERS} {name}, got {len(things)}")
+
+
 def four(items: Iterable[Item]) -> tuple[Item, Item, Item, Item]:
     """Exactly four things, one per finger.
 
@@ -293,40 +339,3 @@ def four(items: Iterable[Item]) -> tuple[Item, Item, Item, Item]:
     if len(listed) != FINGERS:
         raise InputError(f"expected {FINGERS}, one per finger, got {len(listed)}")
     return listed
-
-
-def stacked(contacts: Iterable[Contact]) -> tuple[Array, Array]:
-    """Positions and inward normals of contacts, each (k, 3)."""
-    listed = tuple(contacts)
-    positions = np.array([contact.position for contact in listed])
-    return positions, np.array([contact.normal for contact in listed])
-
-
-def contact_arrays(positions: ArrayLike | Grasp, normals: ArrayLike | None) -> tuple[Array, Array]:
-    """Positions and inward normals, each (k, 3), from a grasp or from two arrays.
-
-    Raises:
-        InputError: Shapes differ, a normal is not a unit vector, or fewer than two contacts.
-    """
-    if isinstance(positions, Grasp):
-        return positions.positions, positions.normals
-    if normals is None:
-        raise InputError("normals are missing: pass positions and normals, or a Grasp")
-    points = frozen(positions, (None, 3), "positions")
-    units = frozen_units(normals, (len(points), 3), "normals")
-    if len(points) < 2:  # noqa: PLR2004 - one contact alone can balance nothing
-        raise InputError(f"at least two contacts are needed, got {len(points)}")
-    return points, units
-
-
-def contact_frictions(friction: ArrayLike, count: int) -> Array:
-    """One checked Coulomb coefficient per contact, (count,), from one for all or one each."""
-    values = np.asarray(friction, dtype=np.float64)
-    mu = frozen(np.full(count, values) if values.ndim == 0 else values, (count,), "friction")
-    if (mu < 0.0).any():
-        raise InputError(f"friction must not be negative, got {float(mu.min()):.6g}")
-    if (mu > LARGEST_FRICTION).any():
-        raise InputError(
-            f"friction must be at most {LARGEST_FRICTION:g}, got {float(mu.max()):.6g}"
-        )
-    return mu

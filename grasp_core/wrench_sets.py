@@ -15,14 +15,16 @@ Source: Ferrari & Canny, "Planning optimal grasps" (ICRA 1992), with circular co
 """
 
 from dataclasses import dataclass
-from typing import Literal, Self, TypeAlias
+from typing import Literal, Self, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, positive
+from grasp_core.arrays import Array, frozen
+from grasp_core.checked import one_of, positive, shown
+from grasp_core.contact_arrays import check_spread, contact_arrays, contact_frictions
 from grasp_core.errors import InputError
-from grasp_core.values import Grasp, contact_arrays, contact_frictions
+from grasp_core.values import Grasp
 from grasp_core.wrenches import contact_frames, grasp_map, in_frames
 
 Norm: TypeAlias = Literal["l1", "linf"]
@@ -30,6 +32,29 @@ Norm: TypeAlias = Literal["l1", "linf"]
 
 LARGEST_RATIO = 1e6
 """Between the torque scale and the contacts' extent: beyond it, rounding decides."""
+
+
+def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
+    """Levers of contacts (k, 3) about a centre, over the torque scale.
+
+    Raises:
+        InputError: The scale or the centre is so far from the contacts' own that rounding decides.
+    """
+    scale = positive(torque_scale, "torque_scale")
+    check_spread(np.ptp(points, axis=0))
+    extent = float(np.linalg.norm(points - points.mean(axis=0), axis=1).max()) or scale
+    if not 1.0 / LARGEST_RATIO <= scale / extent <= LARGEST_RATIO:
+        raise InputError(
+            f"torque_scale must be within a factor {LARGEST_RATIO:g} of the extent of the "
+            f"positions, {extent:.3g}; got {torque_scale}"
+        )
+    arms = (points - frozen(center, (3,), "center")) / scale
+    if float(np.abs(arms).max()) > LARGEST_RATIO:
+        raise InputError(
+            f"center must be within {LARGEST_RATIO:g} times torque_scale of the positions, got "
+            f"{shown(center)}"
+        )
+    return arms
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,16 +87,8 @@ class WrenchSet:
             InputError: Shapes, lengths or signs are wrong.
         """
         points, units = contact_arrays(positions, normals)
-        if norm not in {"l1", "linf"}:
-            raise InputError(f"norm must be l1 or linf, got {norm!r}")
-        scale = positive(torque_scale, "torque_scale")
-        extent = float(np.linalg.norm(points - points.mean(axis=0), axis=1).max()) or scale
-        if not 1.0 / LARGEST_RATIO <= scale / extent <= LARGEST_RATIO:
-            raise InputError(
-                f"torque_scale must be within a factor {LARGEST_RATIO:g} of the extent of the "
-                f"contacts, {extent:.3g}; got {torque_scale}"
-            )
-        arms = (points - frozen(center, (3,), "center")) / scale
+        one_of(norm, get_args(Norm), "norm")
+        arms = scaled_arms(points, center, torque_scale)
         G = in_frames(grasp_map(arms), contact_frames(units))
         return cls(G, contact_frictions(friction, len(points)), norm)
 

@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from grasp_core.arrays import Array, positive
+from grasp_core.arrays import Array
+from grasp_core.checked import coefficient
 from grasp_core.on_faces import check_on_faces
 from grasp_core.values import Grasp, Polyhedron
 from scenes.ruled_surfaces import between, rulings
@@ -50,7 +51,7 @@ def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, 
     Raises:
         InputError: The friction is not positive, or the grasp is not on this object.
     """
-    positive(friction, "friction")
+    coefficient(friction)
     check_on_faces(body, grasp)
     shapes = [*glass(body)]
     for finger in range(len(grasp.contacts)):

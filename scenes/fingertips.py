@@ -8,20 +8,20 @@ nearest to the centre of too large a sphere gives a smaller one, until no point 
 """
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import combinations
-from typing import Literal
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array, Indices, frozen
+from grasp_core.checked import LARGEST, SMALLEST, number, one_of, positive
 from grasp_core.errors import InputError
 from grasp_core.mesh import nearest_on_surface
 from grasp_core.on_faces import ON_FACE, face_under
 from grasp_core.values import Contact, Polyhedron
 
-SMALLEST, LARGEST = 1e-9, 1e9
-"""Settings outside are mistakes, in SI units."""
+Drive: TypeAlias = Literal["servo", "rigid"]
 TIP_RADIUS = 0.1
 """Fingertip radius that is used where it fits, in object radii."""
 LEAST_TIP_RADIUS = 1e-3
@@ -40,7 +40,7 @@ class FingerSettings:
     """How fingertips are built and driven; what is None is chosen to suit the grasp.
 
     Raises:
-        InputError: A number is not positive, or out of any usual range.
+        InputError: A number is not from 1e-9 to 1e9, or a choice is none.
     """
 
     max_normal_force_n: float = 10.0
@@ -53,21 +53,22 @@ class FingerSettings:
     approach: tuple[float, float, float] | None = None
     """Direction in which all fingers move in from their start; if None the one that was planned for
     each, or its normal."""
-    drive: Literal["servo", "rigid"] = "servo"
+    drive: Drive = "servo"
     """Rigid fingertips stay where they are put."""
     indentation: float = 0.0
     """How far a rigid fingertip is put into its face, in grasp sizes."""
 
     def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
-            if name in ("approach", "drive", "indentation") or value is None:
-                continue
-            if not SMALLEST <= value <= LARGEST:
-                raise InputError(f"{name} must be from {SMALLEST:g} to {LARGEST:g}, got {value}")
-        if self.approach is not None and not SMALLEST <= math.hypot(*self.approach) <= LARGEST:
-            raise InputError(f"approach must be a direction, got {self.approach}")
-        if not 0.0 <= self.indentation < 1.0:
-            raise InputError(f"indentation must be in [0, 1), got {self.indentation}")
+        positive(self.max_normal_force_n, "max_normal_force_n")
+        for name in ("radius_m", "mass_kg", "stiffness_n_per_m"):
+            if getattr(self, name) is not None:
+                positive(getattr(self, name), name)
+        if self.approach is not None:
+            way = frozen(self.approach, (3,), "approach")
+            if not SMALLEST <= float(np.linalg.norm(way)) <= LARGEST:
+                raise InputError(f"approach must be a direction, not zero, got {self.approach}")
+        one_of(self.drive, get_args(Drive), "drive")
+        number(self.indentation, "indentation", least=0.0, below=1.0)
 
 
 def fitting_radius(body: Polyhedron, positions: Array, normals: Array) -> float:

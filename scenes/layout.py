@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, positive, to_digits
+from grasp_core.arrays import Array, Indices, to_digits
+from grasp_core.checked import coefficient, number
 from grasp_core.closure import force_closure
 from grasp_core.errors import UndecidedError
 from grasp_core.on_faces import face_under
@@ -116,11 +117,11 @@ def arrange(
         fingers: How fingertips are built and driven.
 
     Raises:
-        InputError: The friction is not positive.
+        InputError: The friction is not positive, or a fingertip is larger than the object.
     """
+    coefficient(friction)
     fingers = fingers or FingerSettings()
     contacts = grasp.contacts if isinstance(grasp, Grasp) else tuple(grasp)
-    positive(friction, "friction")
     normals = np.array([contact.normal for contact in contacts])
     positions = np.array([contact.position for contact in contacts])
     size = max(grasp_size(positions), LEAST_SIZE * body.radius)
@@ -155,6 +156,9 @@ def _drive(
 ) -> FingerDrive:
     mass = fingers.mass_kg or fingers.max_normal_force_n * RESPONSE_TIME_S**2 / size
     stiffness = fingers.stiffness_n_per_m or STIFFNESS * fingers.max_normal_force_n / size
+    if fingers.radius_m is not None:
+        where = ", the object's radius in m, or None"
+        number(fingers.radius_m, "fingers.radius_m", most=body.radius, where=where)
     radius = fingers.radius_m or fitting_radius(body, positions, normals)
     return FingerDrive(
         radius_m=radius,

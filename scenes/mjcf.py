@@ -14,14 +14,17 @@ normal is limited to the largest normal force. Rigid fingers have neither slides
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 from xml.etree import ElementTree
 
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.checked import instance, one_of, path_of, several
 from grasp_core.errors import InputError
+from grasp_core.on_faces import check_body
 from grasp_core.values import Contact, Grasp, Polyhedron
 from scenes.fingertips import FingerSettings
 from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
@@ -29,6 +32,7 @@ from scenes.physics import PhysicsSettings
 
 Surface = Literal["pads", "mesh"]
 """What fingertips touch: a pad each, or the convex hull of the object's mesh."""
+FEWEST_CONTACTS = 2
 AXES = ("normal", "tangent1", "tangent2")
 FLUSH = 1e-6
 """How far a vertex of a convex object may be in front of a face, in object radii."""
@@ -67,12 +71,27 @@ def build_scene(
         InputError: A number is out of range, or the mesh of an object that is not convex is to be
             touched.
     """
+    check_body(body)
+    one_of(surface, get_args(Surface), "surface")
+    for name, value, kind in (
+        ("fingers", fingers, FingerSettings), ("physics", physics, PhysicsSettings)
+    ):  # fmt: skip
+        if value is not None:
+            instance(value, kind, name)
     if surface == "mesh" and not _is_convex(body):
         raise InputError(f"{body.name} is not convex: fingertips would touch its hull; use pads")
-    contacts = grasp if isinstance(grasp, Grasp) else tuple(grasp)
+    contacts = grasp if isinstance(grasp, Grasp) else _listed(grasp)
     layout = arrange(body, contacts, friction, fingers)
     physics = physics or PhysicsSettings()
     return Scene(to_text(layout, physics, surface), layout, physics, surface)
+
+
+def _listed(contacts: Iterable[Contact]) -> tuple[Contact, ...]:
+    each = partial(instance, kind=Contact, name="grasp", remedy="give a Grasp, or Contact values")
+    listed = several(contacts, each, "grasp", "Contact values or a Grasp")
+    if len(listed) < FEWEST_CONTACTS:
+        raise InputError(f"grasp must have {FEWEST_CONTACTS} contacts at least, got {len(listed)}")
+    return listed
 
 
 def _is_convex(body: Polyhedron) -> bool:
@@ -83,8 +102,13 @@ def _is_convex(body: Polyhedron) -> bool:
 
 
 def write_scene(scene: Scene, path: str | Path) -> Path:
-    """Write the scene's text to a file and return its path."""
-    path = Path(path)
+    """Write the scene's text to a file and return its path.
+
+    Raises:
+        InputError: There is no scene, or no path.
+    """
+    instance(scene, Scene, "scene", "build_scene makes one")
+    path = path_of(path, "path")
     path.write_text(scene.xml, encoding="utf-8")
     return path
 

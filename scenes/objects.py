@@ -15,12 +15,13 @@ from itertools import product
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.checked import SHOWN, shown, text
 from grasp_core.errors import InputError
 from grasp_core.solids import Solid, extrusion, hull
 from grasp_core.values import Polyhedron
 
 GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
-RANDOM_NAME = re.compile(r"random-(\d{1,3})-(\d{1,9})")
+RANDOM_NAME = re.compile(r"random-(\d{1,3})-(\d{1,9})", re.ASCII)
 RANDOM_FACES = range(4, 201)
 
 
@@ -39,6 +40,7 @@ def example_object(name: str) -> Polyhedron:
     Raises:
         InputError: There is no such object; the message suggests near names.
     """
+    text(name, "name")
     key = name.strip().lower().replace("_", "-")
     match = RANDOM_NAME.fullmatch(key)
     if match and int(match[1]) in RANDOM_FACES:
@@ -46,11 +48,11 @@ def example_object(name: str) -> Polyhedron:
     elif key in OBJECTS:
         solid = OBJECTS[key]()
     else:
-        near = difflib.get_close_matches(key, example_names(), n=3)
+        near = [] if len(key) > SHOWN else difflib.get_close_matches(key, example_names(), n=3)
         hint = f"did you mean {' or '.join(near)}?" if near else "see `graspproof objects`"
         if key.startswith("random"):
             hint = f"write random-FACES-SEED with {RANDOM_FACES[0]} to {RANDOM_FACES[-1]} faces"
-        raise InputError(f"there is no built-in object {name!r}; {hint}")
+        raise InputError(f"there is no built-in object {shown(name)}; {hint}")
     return Polyhedron.from_mesh(solid.vertices, solid.triangles, name=key)
 
 

@@ -9,9 +9,8 @@ impedance, and a dense Jacobian (the sparse Newton solver of MuJoCo 4.0.0 has a 
 
 from dataclasses import asdict, dataclass
 
-import numpy as np
-
-from grasp_core.arrays import positive
+from grasp_core.arrays import frozen
+from grasp_core.checked import LARGEST, SMALLEST, number, one_of, switch, whole
 from grasp_core.errors import InputError
 
 
@@ -20,11 +19,11 @@ class PhysicsSettings:
     """Options of the simulation, named as in MJCF.
 
     Raises:
-        InputError: A number is not finite, or one that must be positive is not.
+        InputError: A number is out of its range, or a word is none that MuJoCo knows.
     """
 
     timestep: float = 0.002
-    """[s]"""
+    """From 1e-5 to 0.05 [s]."""
     integrator: str = "discrete"
     cone: str = "elliptic"
     solver: str = "Newton"
@@ -59,11 +58,18 @@ class PhysicsSettings:
     """Contact impedances from the exact inertia that each contact sees."""
 
     def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
-            if not isinstance(value, str) and not np.isfinite(value).all():
-                raise InputError(f"{name} must be finite, got {value}")
-        for name in ("timestep", "impratio", "iterations"):
-            positive(getattr(self, name), name)
+        for name, words in WORDS.items():
+            one_of(getattr(self, name), words, name)
+        for name, (least, most) in COUNTS.items():
+            whole(getattr(self, name), name, least=least, most=most)
+        for name, (least, most) in RANGES.items():
+            number(getattr(self, name), name, least=least, most=most)
+        for name, (count, most) in VECTORS.items():
+            frozen(getattr(self, name), (count,), name, most=most)
+        for name in CHOSEN_FLAGS:
+            switch(getattr(self, name), name)
+        if self.condim not in CONTACT_DIMENSIONS:
+            raise InputError(f"condim must be one of {CONTACT_DIMENSIONS}, got {self.condim}")
 
     def options(self) -> dict[str, float | int | str | tuple[float, ...]]:
         """What goes into MJCF's `option` element."""
@@ -87,6 +93,45 @@ class PhysicsSettings:
         }
 
 
+WORDS = {
+    "integrator": ("Euler", "RK4", "implicit", "implicitfast", "discrete"),
+    "cone": ("pyramidal", "elliptic"),
+    "solver": ("PGS", "CG", "Newton"),
+    "jacobian": ("dense", "sparse", "auto"),
+}
+CONTACT_DIMENSIONS = (1, 3, 4, 6)
+MOST_ITERATIONS = 10_000
+COUNTS = {
+    "iterations": (1, MOST_ITERATIONS),
+    "ls_iterations": (1, MOST_ITERATIONS),
+    "noslip_iterations": (0, MOST_ITERATIONS),
+    "ccd_iterations": (1, MOST_ITERATIONS),
+    "sdf_iterations": (1, MOST_ITERATIONS),
+    "sdf_initpoints": (1, MOST_ITERATIONS),
+    "condim": (1, 6),
+}
+RANGES = {
+    "timestep": (1e-5, 0.05),
+    "impratio": (SMALLEST, LARGEST),
+    "tolerance": (0.0, 1.0),
+    "ls_tolerance": (0.0, 1.0),
+    "noslip_tolerance": (0.0, 1.0),
+    "ccd_tolerance": (0.0, 1.0),
+    "sleep_tolerance": (0.0, 1.0),
+    "density": (0.0, LARGEST),
+    "viscosity": (0.0, LARGEST),
+    "margin": (0.0, 1.0),
+    "gap": (0.0, 1.0),
+}
+"""Where numbers must lie: shorter steps take hours, longer ones fewer than a hold has phases."""
+VECTORS = {
+    "gravity": (3, 1e4),
+    "wind": (3, 1e4),
+    "magnetic": (3, 1e4),
+    "solref": (2, LARGEST),
+    "solimp": (5, LARGEST),
+}
+"""How many numbers, and the largest size of one."""
 CONTACT_SETTINGS = ("solref", "solimp", "condim", "margin", "gap")
 CHOSEN_FLAGS = ("autoreset", "diagexact")
 ENABLED_FLAGS = (

@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.checked import coefficient, instance, path_of, switch
+from grasp_core.on_faces import check_on_faces
 from grasp_core.values import Grasp, Polyhedron
 from scenes.canvas import (
     Around,
     add_polygons,
+    format_of,
     in_style,
     legend_line,
     legend_patch,
@@ -58,10 +61,13 @@ def write_picture(
         view: From where it is seen; from where it is seen best if None.
 
     Raises:
-        InputError: The ending is none of the known ones.
+        InputError: The ending is none of the known ones, the grasp is none of the body, or the
+            friction is out of range.
     """
+    path = path_of(path, "path")
+    format_of(path)
     figure = grasp_figure(body, grasp, friction, view=view)
-    return write_figure(figure, Path(path))
+    return write_figure(figure, path)
 
 
 @in_style
@@ -69,7 +75,13 @@ def grasp_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
     legend: bool = True,
 ) -> Any:  # fmt: skip
-    """The picture of a grasp: a matplotlib figure."""
+    """The picture of a grasp: a matplotlib figure.
+
+    Raises:
+        InputError: The grasp is none of the body, or the friction is out of range.
+    """
+    check_drawn(body, grasp, friction, view)
+    switch(legend, "legend")
     figure, axes = empty_picture(legend=legend)
     shapes = draw_grasp(axes, body, grasp, friction, view or best_view(body, grasp))
     if legend:
@@ -78,6 +90,19 @@ def grasp_figure(
             columnspacing=1.2,
         )  # fmt: skip
     return figure
+
+
+def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | None) -> None:
+    """Refuse what cannot be drawn.
+
+    Raises:
+        InputError: The grasp is none of the body, the friction is out of range, or there is no
+            such view.
+    """
+    check_on_faces(body, grasp)
+    coefficient(friction)
+    if view is not None:
+        instance(view, View, "view", "View.of_angles makes one")
 
 
 def empty_picture(*, legend: bool = False) -> tuple[Any, Any]:

@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 
 from grasp_core.arrays import Array, frozen
+from grasp_core.checked import number, positive
 from grasp_core.values import Grasp, Polyhedron
 
 DISTANCE = 9.0
@@ -33,10 +34,13 @@ class View:
     def __post_init__(self) -> None:
         object.__setattr__(self, "axes", frozen(self.axes, (3, 3), "axes"))
         object.__setattr__(self, "center", frozen(self.center, (3,), "center"))
+        positive(self.distance, "distance")
 
     @classmethod
     def of_angles(cls, azimuth_deg: float, elevation_deg: float, body: Polyhedron) -> Self:
         """A camera around an object, by its direction from there."""
+        number(azimuth_deg, "azimuth_deg")
+        number(elevation_deg, "elevation_deg")
         axes = _axes(math.radians(azimuth_deg), math.radians(elevation_deg))
         return cls(axes, body.center_of_mass, DISTANCE * body.radius)
 

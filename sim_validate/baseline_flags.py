@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, arg, subcommand
 
+from grasp_core.checked import MOST_RANDOM_WRENCHES
 from sim_validate.bounds import at_least
 from sim_validate.engines import available_cores
 from sim_validate.flags import Count, Repeats, Seed, Speech
@@ -25,7 +26,7 @@ class Record:
     """TOML file of simulation settings (see docs/files.md)."""
     wrenches: Path | None = None
     """JSON file of wrenches to hold beside the usual ones (see docs/files.md)."""
-    random_wrenches: Annotated[int, at_least(0, up_to=10_000)] = 0
+    random_wrenches: Annotated[int, at_least(0, up_to=MOST_RANDOM_WRENCHES)] = 0
     """Also hold so many random wrenches."""
     limits: Literal["none", "ramp", "bisection"] = "none"
     """Also find the largest multiple of each wrench in simulation."""

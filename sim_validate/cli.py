@@ -21,6 +21,7 @@ from tyro.conf import (
     arg,
 )
 
+from grasp_core.checked import MOST_COUNT
 from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError, UnfaithfulError
 from sim_validate.baseline_flags import Baseline
 from sim_validate.bounds import at_least, check
@@ -32,13 +33,14 @@ from sim_validate.flags import (
     Count,
     Edges,
     Fingers,
+    Friction,
     Mesh,
     NotNegative,
     Planning,
-    Positive,
     Seed,
     Speech,
     Testing,
+    Usual,
     Wrench,
 )
 from sim_validate.showing_flags import Report, View
@@ -98,7 +100,7 @@ class Validate:
 
     grasps: Positional[Path]
     """A grasps.json."""
-    friction: Positive | None = None
+    friction: Friction | None = None
     """Coulomb coefficient to test at; the one planned for if not given."""
     limit: Count | None = None
     """Test only the first so many."""
@@ -118,7 +120,7 @@ class Scene:
     """A grasps.json."""
     grasp: str | None = None
     """Id of one grasp; all of them if not given."""
-    friction: Positive | None = None
+    friction: Friction | None = None
     """Coulomb coefficient; the one planned for if not given."""
     fingers: OmitArgPrefixes[Fingers] = field(default_factory=Fingers)
     surface: Literal["pads", "mesh"] = "pads"
@@ -138,7 +140,7 @@ class Regions:
     """Id of one grasp; all of them if not given."""
     limit: Count | None = None
     """Only the first so many."""
-    friction: Positive | None = None
+    friction: Friction | None = None
     """Coulomb coefficient; the one planned for if not given."""
     reserve: Annotated[float, at_least(0.0, up_to=0.99)] = 0.0
     """Share of the friction that is not counted on."""
@@ -172,7 +174,7 @@ class Replay:
     """Name of the wrench; the first that was not held, or else the weakest, if not given."""
     control: str | None = None
     """Replay a negative control made from the grasp, by name."""
-    trial: Annotated[int, at_least(0)] | None = None
+    trial: Annotated[int, at_least(0, up_to=MOST_COUNT)] | None = None
     """Replay a repeat with noise, by number."""
     grasps: Path | None = None
     """The grasps.json that verdicts or a baseline are about, if it is not where they say."""
@@ -187,11 +189,11 @@ class Analyze:
 
     contacts: Positional[Path]
     """A contacts file (see docs/files.md), or a grasps.json."""
-    friction: Positive | None = None
+    friction: Friction | None = None
     """Coulomb coefficient of contacts without their own; the file's if not given."""
-    torque_scale_m: Positive | None = None
+    torque_scale_m: Usual | None = None
     """Length that makes a torque comparable with a force [m]; the file's if not given."""
-    max_normal_force: Positive = 10.0
+    max_normal_force: Usual = 10.0
     """Limit of each contact's push [N]."""
     wrench: Annotated[UseAppendAction[tuple[Wrench, ...]], arg(metavar="FX FY FZ TX TY TZ")] = ()
     """An external wrench [N, N m], torque about the center; may be repeated."""

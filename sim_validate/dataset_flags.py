@@ -6,9 +6,10 @@ from typing import Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, subcommand
 
+from grasp_core.checked import MOST_RANDOM_WRENCHES
 from sim_validate.bounds import FINITE, at_least
 from sim_validate.engines import available_cores
-from sim_validate.flags import Count, Positive, Seed, Speech
+from sim_validate.flags import Count, Friction, Positive, Seed, Speech
 
 ExportFormat = Literal["csv", "jsonl", "npz", "hdf5", "isaac", "mjcf"]
 SplitName = Literal["train", "validation", "test"]
@@ -46,7 +47,7 @@ class Work:
 class Settings:
     """What a dataset is made of, however its grasps are found."""
 
-    friction: UseAppendAction[tuple[Positive, ...]] = ()
+    friction: UseAppendAction[tuple[Friction, ...]] = ()
     """Coulomb coefficient to prove and try at, may be repeated; 0.5 if not given."""
     unit: Literal["m", "cm", "mm", "in"] = "m"
     """What one unit in a mesh file is."""
@@ -54,7 +55,7 @@ class Settings:
     """Exact planar faces, or nearly flat patches of a curved or scanned surface."""
     limits: Literal["none", "ramp", "bisection"] = "none"
     """Also find the largest multiple of each wrench in simulation."""
-    random_wrenches: Annotated[int, at_least(0, up_to=10_000)] = 0
+    random_wrenches: Annotated[int, at_least(0, up_to=MOST_RANDOM_WRENCHES)] = 0
     """Also hold so many random wrenches."""
     seed: Annotated[int, at_least(0, up_to=2**63 - 1)] = 0
     """For everything random."""

@@ -9,18 +9,27 @@ from typing import Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 
+from grasp_core.checked import (
+    LARGEST,
+    LARGEST_FRICTION,
+    MOST_COUNT,
+    MOST_EDGES,
+    MOST_RANDOM_WRENCHES,
+    MOST_SEED,
+    MOST_TRIALS,
+    SMALLEST,
+)
 from sim_validate.bounds import FINITE, at_least, more_than, not_zero
 from sim_validate.engines import available_cores
-
-SMALLEST, LARGEST = 1e-9, 1e9
 
 Finite = Annotated[float, FINITE]
 Positive = Annotated[float, FINITE, more_than(0.0)]
 NotNegative = Annotated[float, FINITE, at_least(0.0)]
 Usual = Annotated[float, at_least(SMALLEST, up_to=LARGEST)]
-Count = Annotated[int, at_least(1)]
-Seed = Annotated[int, at_least(0, up_to=2**64 - 1)]
-Edges = Annotated[int, at_least(3)]
+Friction = Annotated[float, at_least(SMALLEST, up_to=LARGEST_FRICTION)]
+Count = Annotated[int, at_least(1, up_to=MOST_COUNT)]
+Seed = Annotated[int, at_least(0, up_to=MOST_SEED)]
+Edges = Annotated[int, at_least(3, up_to=MOST_EDGES)]
 Point = tuple[Finite, Finite, Finite]
 Direction = Annotated[Point, not_zero(SMALLEST, LARGEST)]
 Wrench = Annotated[
@@ -55,8 +64,8 @@ class MeshLimits:
     """Surfaces of more separate parts are refused."""
     max_mesh_seconds: Positive = 30.0
     """Of a processor, for reading a mesh file."""
-    max_mesh_memory: Count = 2 * 2**30
-    """Bytes, for reading a mesh file."""
+    max_mesh_memory_mib: Count = 2048
+    """For reading a mesh file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +94,7 @@ class Planning:
     """What to plan."""
 
     mesh: OmitArgPrefixes[Mesh] = Mesh()
-    friction: Positive = 0.5
+    friction: Friction = 0.5
     """Coulomb coefficient at every contact."""
     theta_deg: Positive | None = None
     """Half-angle of the friction cones to plan with [deg]; the friction angle if not given."""
@@ -150,7 +159,7 @@ class Fingers:
 class Repeats:
     """Whether to repeat with noise, and how much: standard deviations of normal distributions."""
 
-    trials: Annotated[int, at_least(0, up_to=100_000)] = 0
+    trials: Annotated[int, at_least(0, up_to=MOST_TRIALS)] = 0
     """Also repeat all holds so many times with noise, and say how often the grasp held."""
     noise_shift: Annotated[float, at_least(0.0, up_to=1.0)] = 0.01
     """Of the object's position along each axis, in object radii."""
@@ -169,7 +178,7 @@ class Testing:
     """What to simulate, and how."""
 
     fingers: OmitArgPrefixes[Fingers] = Fingers()
-    random_wrenches: Annotated[int, at_least(0, up_to=10_000)] = 0
+    random_wrenches: Annotated[int, at_least(0, up_to=MOST_RANDOM_WRENCHES)] = 0
     """Also hold so many random wrenches, each at a share of what the analysis says is resisted."""
     wrenches: Path | None = None
     """A file of wrenches to hold as they are (see docs/files.md)."""

@@ -24,8 +24,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.contact_arrays import contact_frictions
 from grasp_core.resisted_wrenches import WrenchBody, axis_wrenches
-from grasp_core.values import Contact, Polyhedron, contact_frictions
+from grasp_core.values import Contact, Polyhedron
 from scenes.objects import example_object
 from sim_validate.limits import SimulatedLimit, bisected_limits, part, ramped_limits
 from sim_validate.released import bisected, forces_just_above, released_friction

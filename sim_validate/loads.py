@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
+from grasp_core.contact_arrays import contact_frictions, stacked
 from grasp_core.resisted_wrenches import WrenchBody, WrenchLimit, axis_wrenches
-from grasp_core.values import Contact, Polyhedron, contact_frictions, stacked
+from grasp_core.values import Contact, Polyhedron
 from grasp_core.wrenches import normal_and_tangential
 from sim_validate.limits import part
 from sim_validate.schedules import Load

@@ -42,7 +42,7 @@ def load_object(name: str, mesh: flags.Mesh) -> Polyhedron:
                 max_faces=given.max_faces,
                 max_parts=given.max_parts,
                 max_seconds=given.max_mesh_seconds,
-                max_memory_bytes=given.max_mesh_memory,
+                max_memory_mib=given.max_mesh_memory_mib,
             ),
         )
     if path.suffix or len(path.parts) > 1:

@@ -16,12 +16,15 @@ the trial value is bisected.
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from itertools import pairwise
+from typing import Any
 
+from grasp_core.checked import LARGEST, SMALLEST, number, several, whole
 from grasp_core.errors import InputError
 
 MOST_ROUNDS = 40
-SECONDS, POSITIVE = (0.05, 60.0), (1e-9, 1e9)
+SECONDS, POSITIVE = (0.05, 60.0), (SMALLEST, LARGEST)
 RANGES = {
     "load_share": (0.01, 0.999),
     "least_normal_share": (1e-9, 0.5),
@@ -122,18 +125,19 @@ class FrictionProtocol:
         _check(asdict(self))
 
 
-def _check(numbers: Mapping[str, float | tuple[float, ...]]) -> None:
+def _check(numbers: Mapping[str, Any]) -> None:
     for name, value in numbers.items():
-        if isinstance(value, tuple):
-            if not (value and value[0] > 0.0 and value[-1] < 1.0 and _rising(value)):
+        if name == "spans":
+            shares = several(
+                value, partial(number, name=name, above=0.0, below=1.0), name, "shares"
+            )
+            if not (shares and _rising(shares)):
                 raise InputError(f"{name} must be rising shares below 1, at least one, got {value}")
         elif name == "rounds":
-            if value not in range(1, MOST_ROUNDS + 1):
-                raise InputError(f"{name} must be a whole number up to {MOST_ROUNDS}, got {value}")
+            whole(value, name, least=1, most=MOST_ROUNDS)
         else:
             least, largest = RANGES.get(name, SECONDS if name.endswith("_s") else POSITIVE)
-            if not least <= value <= largest:
-                raise InputError(f"{name} must be from {least:g} to {largest:g}, got {value}")
+            number(value, name, least=least, most=largest)
 
 
 def _rising(values: tuple[float, ...]) -> bool:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.certified_regions import CertifiedRegions
+from grasp_core.checked import path_of
 from grasp_core.contact_hash import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.face_pieces import inscribed_disc_radius_of
@@ -131,12 +132,13 @@ def proof_arrays(
     }
 
 
-def read_regions(path: Path) -> CertifiedRegions:
+def read_regions(path: str | Path) -> CertifiedRegions:
     """Regions and their proof from a file that `graspproof regions` has written; not yet verified.
 
     Raises:
         InputError: The file is not such a one.
     """
+    path = path_of(path, "path")
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as held:
             kept = {name: held[name] for name in held.files}

@@ -4,11 +4,26 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
 from grasp_core.arrays import Array, frozen, to_digits
+from grasp_core.checked import (
+    LARGEST,
+    MOST_RANDOM_WRENCHES,
+    MOST_TRIALS,
+    SMALLEST,
+    instance,
+    number,
+    one_of,
+    seed_of,
+    several,
+    switch,
+    text,
+    whole,
+)
 from grasp_core.errors import InputError
 from grasp_core.values import Contact, Grasp, Polyhedron
 from scenes.fingertips import FingerSettings
@@ -22,18 +37,28 @@ AXIS_NAMES = tuple(
     f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"
 )
 NAME = re.compile(r"[\w+\- ]{1,100}")
-SMALLEST, LARGEST = 1e-9, 1e9
-"""Smaller and larger forces and torques are mistakes [N, N m]."""
 WEAKEST = "weakest"
 RANDOM = "random_{}"
 
 
+PARTS = {
+    "fingers": FingerSettings,
+    "physics": PhysicsSettings,
+    "hold": HoldProtocol,
+    "limit": LimitProtocol,
+    "friction": FrictionProtocol,
+}
+MOST_THREADS = 1024
 LimitSearch: TypeAlias = Literal["none", "ramp", "bisection"]
 
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """How trials are simulated."""
+    """How trials are simulated.
+
+    Raises:
+        InputError: A part is none, or a number is out of its range.
+    """
 
     fingers: FingerSettings = field(default_factory=FingerSettings)
     physics: PhysicsSettings = field(default_factory=PhysicsSettings)
@@ -46,6 +71,13 @@ class Setup:
     """Of the simulator; results do not depend on it."""
     timeout_s: float = math.inf
     """Trials of one contact set that run longer are stopped."""
+
+    def __post_init__(self) -> None:
+        for name, kind in PARTS.items():
+            instance(getattr(self, name), kind, name)
+        one_of(self.surface, get_args(Surface), "surface")
+        whole(self.threads, "threads", least=1, most=MOST_THREADS)
+        number(self.timeout_s, "timeout_s", above=0.0, most=math.inf)
 
     def scene(self, body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float) -> Scene:
         """The scene of a grasp with these settings."""
@@ -64,6 +96,7 @@ class NamedWrench:
 
     def __post_init__(self) -> None:
         """Refuse what could not be tested, or not be told apart in a file."""
+        text(self.name, "name")
         given = frozen(self.wrench, (6,), "wrench")
         object.__setattr__(self, "wrench", frozen(to_digits(given), (6,), "wrench"))
         size = float(np.abs(self.wrench).max())
@@ -107,11 +140,17 @@ class Agenda:
 
     def __post_init__(self) -> None:
         """Refuse what no trial can be made of, and names that two would share."""
-        if self.limits not in get_args(LimitSearch):
-            raise InputError(f"limits must be one of {get_args(LimitSearch)}, got {self.limits!r}")
-        if min(self.random_wrenches, self.trials, self.seed) < 0:
-            raise InputError("random_wrenches, trials and seed must not be negative")
+        one_of(self.limits, get_args(LimitSearch), "limits")
+        whole(self.random_wrenches, "random_wrenches", most=MOST_RANDOM_WRENCHES)
+        whole(self.trials, "trials", most=MOST_TRIALS)
+        seed_of(self.seed)
+        for name in ("critical_friction", "independent", "controls", "keep_traces"):
+            switch(getattr(self, name), name)
+        instance(self.noise, Noise, "noise")
+        several(self.rules, partial(text, name="rules"), "rules", "names")
         rules_named(self.rules)
+        each = partial(instance, kind=NamedWrench, name="wrenches")
+        several(self.wrenches, each, "wrenches", "NamedWrench values")
         drawn = (RANDOM.format(place) for place in range(self.random_wrenches))
         taken = {*AXIS_NAMES, WEAKEST, *drawn}
         for each in self.wrenches:

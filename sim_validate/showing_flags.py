@@ -11,7 +11,7 @@ from tyro.conf import OmitArgPrefixes, Positional
 
 from sim_validate.bounds import at_least
 from sim_validate.engines import available_cores
-from sim_validate.flags import Count, Positive, Speech
+from sim_validate.flags import Count, Friction, Speech
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class View:
     """A grasps.json, or the folder of a run."""
     grasp: str | None = None
     """Id of the grasp; the first one if not given."""
-    friction: Positive | None = None
+    friction: Friction | None = None
     """Coulomb coefficient; the one planned for if not given."""
     picture: Path | None = None
     """Write the picture as in the paper (png, svg, pdf, webp, jpg)."""

@@ -9,9 +9,11 @@ control holds.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
+from grasp_core.checked import coefficient, instance
 from grasp_core.closure import force_closure
 from grasp_core.critical import critical_friction
 from grasp_core.errors import InputError, UndecidedError
@@ -36,6 +38,8 @@ from sim_validate.traces import Trace
 from sim_validate.verdict import invalid_start, judge
 from sim_validate.wrench_verdict import WrenchVerdict
 
+Chosen = TypeVar("Chosen")
+
 
 def validate(
     body: Polyhedron,
@@ -58,8 +62,9 @@ def validate(
         InputError: The contacts are not on the body's faces, or not closed at this friction.
         UnfaithfulError: The simulator fails the gate with these settings.
     """
-    agenda, setup = agenda or Agenda(), setup or Setup()
     check_on_faces(body, grasp)
+    coefficient(friction)
+    agenda, setup = _given(agenda, Agenda(), "agenda"), _given(setup, Setup(), "setup")
     critical = critical_friction(grasp)
     if not (friction > critical and force_closure(grasp, friction=friction).closed):
         raise InputError(
@@ -104,8 +109,8 @@ def simulated_critical_friction(
         InputError: The contacts are not on the body's faces, or never in force closure.
         UnfaithfulError: The simulator fails the gate with these settings.
     """
-    setup = setup or Setup()
     check_on_faces(body, grasp)
+    setup = _given(setup, Setup(), "setup")
     predicted = critical_friction(grasp)
     if not np.isfinite(predicted):
         raise InputError(f"grasp {grasp.id}: no friction gives force closure")
@@ -115,6 +120,14 @@ def simulated_critical_friction(
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
     found = released_friction(bench, grasp.positions, grasp.normals, predicted, setup)
     return np.inf if found.simulated is None else found.simulated
+
+
+def _given(value: Chosen | None, default: Chosen, name: str) -> Chosen:
+    """What was given, or else the default, which says of what class it must be."""
+    if value is None:
+        return default
+    instance(value, type(default), name)
+    return value
 
 
 class _Bout:

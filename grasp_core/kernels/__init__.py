@@ -17,14 +17,27 @@ import os
 from functools import cache
 from typing import Any
 
+from grasp_core.errors import InputError
+
 SWITCH = "GRASPPROOF_KERNELS"
 """Environment variable; `off` leaves everything to the reference."""
+SETTINGS = ("on", "off")
 
 
 @cache
 def compiled(name: str) -> Any:
-    """A module of kernels after its `try_out`; None where kernels are not wanted or do not work."""
-    if os.environ.get(SWITCH) == "off":
+    """A module of kernels after its `try_out`; None where kernels are not wanted or do not work.
+
+    Raises:
+        InputError: The environment says what is neither on nor off.
+    """
+    asked = os.environ.get(SWITCH) or "on"
+    if asked not in SETTINGS:
+        raise InputError(
+            f"environment variable {SWITCH}: expected {' or '.join(SETTINGS)}, or none, got "
+            f"{asked!r}; unset it"
+        )
+    if asked == "off":
         return None
     try:
         failures: Any = importlib.import_module("numba.core.errors")

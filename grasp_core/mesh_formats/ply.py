@@ -87,9 +87,9 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     return surface.arrays()
 
 
-def is_binary(data: bytes) -> bool:
-    """Whether the header does not say that text follows."""
-    return b"\nformat ascii" not in data[:LONGEST_HEADER]
+def is_text(data: bytes) -> bool:
+    """Whether the header says that text follows."""
+    return b"\nformat ascii" in data[:LONGEST_HEADER]
 
 
 def _check_properties(vertex: Element, face: Element) -> None:

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.errors import InputError
-from grasp_core.values import LARGEST_FRICTION
 from sim_validate.baselines.explaining import unstable
 from sim_validate.baselines.grasp_cases import GraspCase
 from sim_validate.grasp_verdict import Verdict

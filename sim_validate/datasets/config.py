@@ -12,10 +12,11 @@ from datetime import date
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, cast, get_args
 
+from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.errors import InputError
 from grasp_core.polyhedra import UNITS_M
 from grasp_core.requests import METHODS, ConeKind
-from grasp_core.values import LARGEST_FRICTION, FaceKind, Method
+from grasp_core.values import FaceKind, Method
 from sim_validate.files import read_text
 
 LimitsKind: TypeAlias = Literal["none", "ramp", "bisection"]

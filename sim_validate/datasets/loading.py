@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from grasp_core.checked import path_of
 from sim_validate.datasets.columns import TABLES, Name
 from sim_validate.datasets.selection import select
 from sim_validate.datasets.tables import Columns, read_columns
@@ -21,5 +22,5 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
     Raises:
         InputError: There is no such split, no finished dataset, or a file is damaged.
     """
-    chosen = select(Path(folder), split)
+    chosen = select(path_of(folder, "folder"), split)
     return {name: read_columns(chosen.paths(name), name) for name in TABLES}

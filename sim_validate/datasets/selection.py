@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from grasp_core.checked import one_of
 from grasp_core.errors import InputError
 from sim_validate.datasets.columns import TABLES, Name
 from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_toml
@@ -82,6 +83,6 @@ def select(folder: Path, split: str | None = None) -> Selection:
         InputError: There is no such split, or no finished dataset.
     """
     splits = [name for name, _ in SPLITS]
-    if split is not None and split not in splits:
-        raise InputError(f"split: expected one of {', '.join(splits)}, got {split!r}")
+    if split is not None:
+        one_of(split, splits, "split")
     return Selection(folder, read_manifest(folder), split)

@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.errors import InputError
+from grasp_core.checked import number
 from grasp_core.on_faces import within
 from grasp_core.values import Contact, Grasp, Polyhedron
 from grasp_core.wrenches import contact_frames
@@ -48,8 +48,7 @@ class Noise:
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
-            if not 0.0 <= value <= LARGEST[name]:
-                raise InputError(f"noise {name} must be from 0 to {LARGEST[name]:g}, got {value}")
+            number(value, name, least=0.0, most=LARGEST[name])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

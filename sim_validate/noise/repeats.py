@@ -13,8 +13,9 @@ from typing import TypeAlias
 
 from grasp_core.arrays import Array
 from grasp_core.closure import force_closure
+from grasp_core.contact_arrays import stacked
 from grasp_core.errors import UndecidedError
-from grasp_core.values import Grasp, Polyhedron, stacked
+from grasp_core.values import Grasp, Polyhedron
 from scenes.fingertips import clashes
 from scenes.mjcf import Scene, to_text
 from sim_validate.control_trials import try_control

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from grasp_core.closure import force_closure
+from grasp_core.contact_arrays import stacked
 from grasp_core.errors import InputError
-from grasp_core.values import Contact, Grasp, Polyhedron, stacked
+from grasp_core.values import Contact, Grasp, Polyhedron
 from scenes.fingertips import clashes
 from scenes.mjcf import Scene
 from sim_validate.control_trials import control_case

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.checked import positive
 from grasp_core.closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.resisted_wrenches import wrench_limits
@@ -16,6 +17,7 @@ from grasp_core.values import Grasp, Polyhedron
 from scenes.canvas import Around, entitle, in_style, new_figure, panels
 from scenes.fingertips import FingerSettings
 from scenes.palette import BAD, INK, NEUTRAL
+from scenes.pictures import check_drawn
 
 LONGITUDES, LATITUDES = 21, 11
 """Nodes of a map: around, the first also the last, and from pole to pole."""
@@ -48,8 +50,10 @@ def margin_figure(
         A matplotlib figure.
 
     Raises:
-        InputError: The contacts are not in force closure at this friction.
+        InputError: The grasp is none of the body, or not in force closure at this friction.
     """
+    check_drawn(body, grasp, friction, None)
+    positive(max_normal_force_n, "max_normal_force_n")
     if not force_closure(grasp, friction=friction).closed:
         raise InputError(
             f"{grasp.id} is not in force closure at friction {friction:g}, so nothing is resisted "

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
+from grasp_core.checked import function, path_of, whole
 from grasp_core.errors import InputError
 from scenes.canvas import write_figure
 from sim_validate.engines import available_cores, each
@@ -64,8 +65,13 @@ def write_report(
         InputError: The folder holds no run, a file in it is not what it should be, or the pages'
             folder holds other things.
     """
-    folder = Path(folder)
-    out = folder / REPORT if out is None else Path(out)
+    folder = path_of(folder, "folder")
+    out = folder / REPORT if out is None else path_of(out, "out")
+    for name, value in (("jobs", jobs), ("limit", limit)):
+        if value is not None:
+            whole(value, name, least=1)
+    whole(clips, "clips")
+    function(progress, "progress")
     runs = tuple(run.first(limit) for run in runs_in(folder))
     require_report_folder(out)
     remove_report(out)

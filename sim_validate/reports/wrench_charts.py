@@ -17,6 +17,7 @@ from grasp_core.values import Grasp, Polyhedron
 from grasp_core.wrench_sets import WrenchSet
 from scenes.canvas import entitle, in_style, new_figure, panels
 from scenes.palette import BAD, GOOD, INK
+from scenes.pictures import check_drawn
 from scenes.views import View, best_view
 
 TURNS = 181
@@ -38,7 +39,11 @@ def wrench_figure(
 
     Returns:
         A matplotlib figure.
+
+    Raises:
+        InputError: The grasp is none of the body, or the friction is out of range.
     """
+    check_drawn(body, grasp, friction, view)
     view = view or best_view(body, grasp)
     quality = ferrari_canny(
         grasp, friction=friction, center=body.center_of_mass, torque_scale=body.radius

@@ -1,4 +1,4 @@
-"""Try out all bad input: `python -m tests.bad_input [GROUP ...]`; the exit code is 1 if any fails."""
+"""Try out all bad input: `python -m tests.bad_input [GROUP ...]`; exits with 1 if any fails."""
 
 import sys
 from collections import defaultdict

@@ -28,4 +28,6 @@ def complaints(case: Case, tried: Tried) -> list[str]:
             "no name of the program": case.code != USAGE and not said.startswith("graspproof: "),
         }
     missing = [word for word in case.says if word.lower() not in said.lower()]
-    return [name for name, holds in wrong.items() if holds] + [f"does not say {w!r}" for w in missing]
+    return [name for name, holds in wrong.items() if holds] + [
+        f"does not say {w!r}" for w in missing
+    ]

@@ -87,10 +87,15 @@ def _named(name: str, folder: Path) -> list[str]:
 
 
 NAMES = {
-    "with a line break": "two\nlines.obj", "with quotes": "it's \"here\".obj",
-    "that is markup": "<b>part.obj", "with an escape": "red\x1b[31m.obj", "of 255 bytes": "x" * 251 + ".obj",
-    "not in UTF-8": os.fsdecode(b"caf\xe9.obj"), "that is a flag": "-v.obj", "with a bell": "a\x07.obj",
-}  # fmt: skip
+    "with a line break": "two\nlines.obj",
+    "with quotes": 'it\'s "here".obj',
+    "that is markup": "<b>part.obj",
+    "with an escape": "red\x1b[31m.obj",
+    "of 255 bytes": "x" * 251 + ".obj",
+    "not in UTF-8": os.fsdecode(b"caf\xe9.obj"),
+    "that is a flag": "-v.obj",
+    "with a bell": "a\x07.obj",
+}
 OTHERS = {
     "an archive called stl": ("part.stl", gzip.compress(stl(), mtime=0), "gzip|unpack"),
     "a zip called obj": ("part.obj", b"PK\x03\x04" + bytes(200), "zip|unpack"),

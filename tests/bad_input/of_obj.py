@@ -30,7 +30,7 @@ BAD = {
     "a comma": (_with(X, "v 0,1 0 0"), "line 2|number"),
     "an underscore": (_with(X, "v 0_1 0 0"), "line 2|number"),
     "a hexadecimal": (_with(X, "v 0x1 0 0"), "line 2|number"),
-    "another alphabet's digits": (_with(X, "v ١ 0 0"), "line 2|number"),
+    "another alphabet's digits": (_with(X, "v \u0661 0 0"), "line 2|number"),
     "a word": (_with(X, "v wide 0 0"), "line 2|number"),
     "half an exponent": (_with(X, "v 1e 0 0"), "line 2|number"),
     "index 0": (_with("f 1 3 2", "f 0 3 2"), "line 5|vertex 0"),

@@ -1,8 +1,8 @@
 """Commands tried out: each in a process of its own, what it says, costs and leaves behind.
 
 Python and the packages are imported once, by a process that then forks for each command, so that
-hundreds take minutes. Run as `python -m tests.bad_input.trying`: a line of JSON for each command in,
-one out.
+hundreds take minutes. Run as `python -m tests.bad_input.trying`, it takes a line of JSON for each
+command, and answers with one.
 """
 
 import atexit

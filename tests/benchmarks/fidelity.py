@@ -16,8 +16,8 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
+from grasp_core.contact_arrays import contact_frictions
 from grasp_core.resisted_wrenches import WrenchBody
-from grasp_core.values import contact_frictions
 from scenes.mjcf import build_scene
 from sim_validate.control_trials import try_control
 from sim_validate.controls import negative_controls

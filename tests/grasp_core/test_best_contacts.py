@@ -70,7 +70,7 @@ def test_a_grasp_that_is_not_closed_or_not_there_is_refused():
         gc.optimize_contacts(body, grasp, 0.001)
     with pytest.raises(gc.InputError, match="face"):
         gc.optimize_contacts(example_object("tetrahedron"), grasp, 0.5)
-    with pytest.raises(gc.InputError, match="finger_radius must be positive"):
+    with pytest.raises(gc.InputError, match="finger_radius must be a number from 1e-09"):
         gc.optimize_contacts(body, grasp, 0.5, finger_radius=0.0)
 
 

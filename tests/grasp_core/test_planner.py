@@ -198,11 +198,11 @@ def test_progress_is_reported_as_quadruples_are_tried():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"friction": 0.0}, "friction must be a positive number"),
-        ({"friction": math.nan}, "friction must be a positive number"),
-        ({"theta_deg": 30.0}, "theta_deg must be in"),
-        ({"theta_deg": -1.0}, "theta_deg must be in"),
-        ({"limit": 0}, "limit must be at least 1"),
+        ({"friction": 0.0}, "friction must be a number from 1e-09"),
+        ({"friction": math.nan}, "friction must be a number from 1e-09"),
+        ({"theta_deg": 30.0}, "theta_deg must be a number from 1e-09"),
+        ({"theta_deg": -1.0}, "theta_deg must be a number from 1e-09"),
+        ({"limit": 0}, "limit must be a whole number from 1"),
         ({"families": ["spiral"]}, "families must be among"),
         ({"families": []}, "families must be among"),
     ],

@@ -237,9 +237,9 @@ def test_a_ray_through_a_corner_proves_nothing():
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        ({"torque_scale": 0.0}, "torque_scale must be positive"),
-        ({"norm": "l2"}, "norm must be l1 or linf"),
-        ({"gap": -1.0}, "gap must be at least 1e-07"),
+        ({"torque_scale": 0.0}, "torque_scale must be a number from 1e-09"),
+        ({"norm": "l2"}, "norm must be one of l1, linf"),
+        ({"gap": -1.0}, "gap must be a number from 1e-07"),
         ({"gap": 2.0}, "below 1, got 2"),
         ({"center": [0.0, 1.0]}, "center must have shape"),
     ],

@@ -134,7 +134,7 @@ def test_a_plan_for_fingers_holds_only_grasps_that_they_reach():
     known = some.outcomes
     assert known.held + known.absent + known.open + known.out_of_reach == some.counts.quadruples
     box = example_object("box")
-    nothing = gc.plan(box, 0.5, finger=Finger(5.0 * box.radius, box.radius))
+    nothing = gc.plan(box, 0.5, finger=Finger(box.radius, box.radius))
     assert not nothing.grasps
     assert "fingers reach" in nothing.absence
 

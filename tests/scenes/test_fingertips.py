@@ -128,7 +128,7 @@ def test_fingers_arrive_on_their_planned_lines():
      {"stiffness_n_per_m": math.inf}],
 )  # fmt: skip
 def test_bad_numbers_are_refused(bad):
-    with pytest.raises(gc.InputError, match=f"{next(iter(bad))} must be from 1e-09 to 1e\\+09"):
+    with pytest.raises(gc.InputError, match=f"{next(iter(bad))} must be a number from 1e-09"):
         scenes.FingerSettings(**bad)
 
 

@@ -201,7 +201,7 @@ def test_quaternions_turn_like_their_matrices():
 
 def test_a_friction_that_is_not_positive_is_refused():
     body = scenes.example_object("tetrahedron")
-    with pytest.raises(gc.InputError, match="friction must be positive"):
+    with pytest.raises(gc.InputError, match="friction must be a number from 1e-09"):
         scenes.build_scene(body, gc.plan(body).grasps[0], 0.0)
 
 

@@ -4,8 +4,8 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
+from grasp_core.contact_arrays import contact_frictions
 from grasp_core.resisted_wrenches import WrenchBody
-from grasp_core.values import contact_frictions
 from scenes.mjcf import build_scene
 from sim_validate.rig import squeezed
 from sim_validate.schedules import Load

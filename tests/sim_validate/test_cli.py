@@ -157,7 +157,7 @@ def test_a_mesh_file_and_its_unit(here, capsys):
         (["plan", "none.stl"], Exit.INPUT, "none.stl"),
         (["plan", "part.xyz"], Exit.INPUT, "part.xyz"),
         (["validate", "none.json"], Exit.INPUT, "none.json"),
-        (["plan", "wedge", "--theta-deg", "40"], Exit.INPUT, "theta_deg must be in"),
+        (["plan", "wedge", "--theta-deg", "40"], Exit.INPUT, "theta_deg must be a number from"),
         (["plan", "wedge", "--friction", "0"], Exit.USAGE, "friction"),
         (["plan", "wedge", "--friction", "nan"], Exit.USAGE, "friction"),
         (["plan", "wedge", "--limit", "0"], Exit.USAGE, "limit"),
@@ -326,7 +326,7 @@ def test_planning_flags_reach_the_planner(capsys):
     [
         (["--approach-m", "0.1"], "--approach-m also needs --finger-radius-m"),
         (["--finger-radius-m", "0.01"], "--finger-radius-m also needs --approach-m"),
-        (["--edge-clearance-m", "5"], "clearance must be from 0"),
+        (["--edge-clearance-m", "5"], "clearance must be a number from 0"),
         (["--complete", "--family", "pencil"], "takes the free method"),
         (["--optimize", "--share-faces-m", "0.01"], "leave it out, or them"),
         (["--unit", "mm"], "box is built in"),

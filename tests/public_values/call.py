@@ -1,0 +1,71 @@
+"""A public function or class with a call that succeeds, and what such calls are made of."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import grasp_core as gc
+import scenes
+import sim_validate as sv
+
+FOLDER = TemporaryDirectory()
+
+
+@cache
+def body():
+    return scenes.example_object("tetrahedron")
+
+
+@cache
+def grasp():
+    return gc.plan(body(), limit=1).grasps[0]
+
+
+@cache
+def scene():
+    return scenes.build_scene(body(), grasp())
+
+
+@cache
+def mesh_file():
+    """An OBJ file, as long as the tests last."""
+    path = Path(FOLDER.name) / "tetrahedron.obj"
+    points = [" ".join(map(str, point)) for point in body().vertices.tolist()]
+    corners = [" ".join(map(str, corner)) for corner in (body().triangles + 1).tolist()]
+    lines = [f"v {point}" for point in points] + [f"f {corner}" for corner in corners]
+    path.write_text("\n".join(lines))
+    return path
+
+
+@dataclass(frozen=True)
+class Call:
+    """A public function or class, and what is known of its arguments."""
+
+    name: str
+    """As users write it."""
+    valid: Callable[[], Mapping[str, Any]]
+    refused: Mapping[str, Mapping[str, Any]]
+    """By argument and label."""
+    succeeds_in: str = ""
+    """The test that makes a call that succeeds, where that needs more than values."""
+    slow: bool = False
+
+    @property
+    def target(self) -> Callable[..., Any]:
+        package, _, rest = self.name.partition(".")
+        found: Any = {"gc": gc, "scenes": scenes, "sv": sv}[package]
+        for part in rest.split("."):
+            found = getattr(found, part)
+        return found
+
+
+def of_grasp(**more):
+    return lambda: {"body": body(), "grasp": grasp(), **more}
+
+
+def fields_of(kind, value):
+    """The arguments that make such a value again."""
+    return {each.name: getattr(value, each.name) for each in fields(kind)}

@@ -1,0 +1,148 @@
+"""Functions of grasp_core: a call of each that succeeds, and what they must refuse."""
+
+import numpy as np
+
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS
+from tests.public_values.bad_values import (
+    AT_LEAST_ONE,
+    COUNT,
+    FRICTION,
+    NOT_NEGATIVE,
+    POSITIVE,
+    SEED,
+    SEVERAL,
+    SWITCH,
+    VALUE,
+    WORD,
+    array,
+    each_of,
+    optional,
+    spread,
+    units,
+)
+from tests.public_values.call import Call, body, of_grasp
+
+WRENCH = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+CENTER = np.zeros(3)
+CENTERED = array(CENTER) | {"far away": [1e40, 0.0, 0.0]}
+FACE_INDICES = SEVERAL | {
+    "three": (0, 1, 2), "beyond": (0, 1, 2, 9), "negative": (-1, 1, 2, 3),
+    "fraction": (0.5, 1, 2, 3), "bools": (True, 1, 2, 3), "huge": (0, 1, 2, 10**30),
+}  # fmt: skip
+BODY_AND_GRASP = {"body": VALUE, "grasp": VALUE}
+PLANNED = {
+    "body": VALUE,
+    "friction": FRICTION,
+    "families": SEVERAL | {"unknown": "nonsense", "numbers": (1, 2), "empty": ()},
+    "theta_deg": optional(POSITIVE) | {"wider than friction": 80.0},
+    "cones": WORD,
+    "seed": SEED,
+    "cells": AT_LEAST_ONE,
+    "finger": optional(VALUE) | {"radius": 0.006},
+    "clearance": NOT_NEGATIVE | {"larger than the object": 1.0},
+    "share_faces": optional(NOT_NEGATIVE) | {"larger than the object": 1.0},
+}
+
+
+def contacts(*, many=False):
+    """What is refused of positions and normals."""
+    points, normals = many_arrays().values() if many else (TETRA_CENTERS, TETRA_NORMALS)
+    single = {"one contact": points[..., :1, :]}
+    return {"positions": spread(points) | single, "normals": units(normals)}
+
+
+def two_arrays(**more):
+    return lambda: {"positions": TETRA_CENTERS, "normals": TETRA_NORMALS, **more}
+
+
+def many_arrays():
+    return {"positions": TETRA_CENTERS[None], "normals": TETRA_NORMALS[None]}
+
+
+CALLS = [
+    Call("gc.plan", lambda: {"body": body(), "limit": 1}, PLANNED | {
+        "limit": optional(AT_LEAST_ONE),
+        "rank_by": WORD,
+        "complete": SWITCH,
+        "progress": {"number": 3, "text": "a"},
+    }),
+    Call("gc.iter_grasps", lambda: {"body": body()}, PLANNED),
+    Call("gc.force_closure", two_arrays(friction=0.5), contacts() | {
+        "friction": each_of(FRICTION, "zero", "tiny"),
+    }),
+    Call("gc.critical_friction", two_arrays(), contacts()),
+    Call("gc.critical_frictions", many_arrays, contacts(many=True)),
+    Call("gc.contact_forces", two_arrays(friction=0.5, wrench=WRENCH), contacts() | {
+        "friction": each_of(FRICTION, "zero"),
+        "wrench": array(WRENCH),
+        "objective": WORD,
+        "normal_force": SEVERAL | {
+            "one": (1.0,), "three": (0.0, 1.0, 2.0), "turned": (2.0, 1.0), "equal": (1.0, 1.0),
+            "negative": (-1.0, 1.0), "not a number": (float("nan"), 1.0), "text": ("a", 1.0),
+            "tiny": (0.0, 1e-300), "huge": (1e300, float("inf")), "zero": (0.0, 0.0),
+        },
+        "center": array(CENTER),
+    }),
+    Call("gc.classify_lines", lambda: {"points": TETRA_CENTERS, "directions": TETRA_NORMALS}, {
+        "points": spread(TETRA_CENTERS),
+        "directions": spread(TETRA_NORMALS) | {"zero": np.zeros((4, 3))},
+    }),
+    Call("gc.hull_volume", two_arrays(friction=0.5, torque_scale=1.0), contacts() | {
+        "friction": each_of(FRICTION, "zero"), "center": CENTERED, "torque_scale": POSITIVE,
+        "edges": COUNT | {"two": 2, "a million": 10**6},
+    }),
+    Call("gc.min_weight", two_arrays(friction=0.5), contacts() | {
+        "friction": each_of(FRICTION, "zero"), "edges": COUNT | {"two": 2, "a million": 10**6},
+    }),
+    Call("gc.min_weights", many_arrays, contacts(many=True) | {
+        "friction": each_of(FRICTION, "zero"), "edges": COUNT | {"two": 2, "a million": 10**6},
+    }),
+    Call("gc.smallest_singular_value", lambda: {"positions": TETRA_CENTERS, "torque_scale": 1.0}, {
+        "positions": spread(TETRA_CENTERS), "center": CENTERED, "torque_scale": POSITIVE,
+    }),
+    Call("gc.ferrari_canny", two_arrays(friction=0.5, torque_scale=1.0), contacts() | {
+        "friction": each_of(FRICTION, "zero"), "center": CENTERED, "torque_scale": POSITIVE,
+        "norm": WORD,
+        "gap": POSITIVE | {"one": 1.0, "too fine": 1e-9},
+    }),
+    Call("gc.quality_ceiling", lambda: {"body": body(), "faces": (0, 1, 2, 3), "parts": 3}, {
+        "body": VALUE,
+        "faces": FACE_INDICES,
+        "friction": FRICTION,
+        "known": NOT_NEGATIVE,
+        "finger_radius": optional(each_of(NOT_NEGATIVE)) | {"larger than the object": 1.0},
+        "parts": AT_LEAST_ONE,
+    }),
+    Call("gc.max_resisted_wrench", two_arrays(friction=0.5, wrench=WRENCH, max_normal_force=1.0),
+         contacts() | {
+        "friction": each_of(FRICTION, "zero"),
+        "wrench": array(WRENCH) | {"zero": 0.0 * WRENCH, "tiny": 1e-300 * WRENCH},
+        "max_normal_force": POSITIVE,
+        "center": array(CENTER),
+    }),
+    Call("gc.wrench_limits", two_arrays(friction=0.5, wrenches=WRENCH[None], max_normal_force=1.0),
+         contacts() | {
+        "friction": each_of(FRICTION, "zero"),
+        "wrenches": array(WRENCH[None]) | {"zero": np.zeros((1, 6)), "tiny": 1e-300 * WRENCH[None]},
+        "max_normal_force": POSITIVE,
+        "center": array(CENTER),
+    }),
+    Call("gc.cones_positively_span", lambda: {"axes": TETRA_NORMALS, "half_angles": [0.1] * 4}, {
+        "axes": units(TETRA_NORMALS),
+        "half_angles": array([0.1] * 4) | {"negative": [-0.1] * 4, "right angles": [2.0] * 4},
+    }),
+    Call("gc.span_angle", lambda: {"normals": TETRA_NORMALS}, {"normals": units(TETRA_NORMALS)}),
+    Call("gc.optimize_contacts", of_grasp(), BODY_AND_GRASP | {
+        "friction": FRICTION,
+        "finger_radius": optional(POSITIVE) | {"larger than the object": 1.0},
+        "seed": SEED,
+    }),
+    Call("gc.certify_regions", of_grasp(friction=0.5), BODY_AND_GRASP | {
+        "friction": FRICTION,
+        "reserve": NOT_NEGATIVE | {"all": 1.0},
+        "balance": WORD,
+        "recenter": SWITCH,
+        "clearance": NOT_NEGATIVE | {"larger than the object": 1.0},
+        "cones": COUNT | {"few": 63},
+    }),
+]  # fmt: skip

@@ -1,0 +1,142 @@
+"""Scenes, trials and reports: a call of each that succeeds, and what they must refuse."""
+
+import numpy as np
+
+import scenes
+import sim_validate as sv
+from tests.public_values.bad_values import (
+    AT_LEAST_ONE,
+    COUNT,
+    FRICTION,
+    NOT_NEGATIVE,
+    PATH,
+    POSITIVE,
+    SEED,
+    SEVERAL,
+    SWITCH,
+    TEXT,
+    VALUE,
+    WORD,
+    array,
+    optional,
+    unless,
+)
+from tests.public_values.call import Call, of_grasp, scene
+
+WRENCH = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+CENTER = np.zeros(3)
+BODY_AND_GRASP = {"body": VALUE, "grasp": VALUE}
+CALLS = [
+    Call("scenes.build_scene", of_grasp(), {
+        "body": VALUE,
+        "grasp": VALUE | {"contacts of objects": [object()] * 4, "empty": (), "one": "grasp"},
+        "friction": FRICTION,
+        "fingers": optional(VALUE) | {"too large": scenes.FingerSettings(radius_m=1.0)},
+        "physics": optional(VALUE),
+        "surface": WORD,
+    }),
+    Call("scenes.write_scene", lambda: {"scene": scene(), "path": "no/such/folder/a.xml"}, {
+        "scene": VALUE, "path": PATH,
+    }, succeeds_in="tests/scenes/test_mjcf.py"),
+    Call("scenes.example_names", dict, {}),
+    Call("scenes.example_object", lambda: {"name": "box"}, {
+        "name": TEXT | {
+            "unknown": "bx", "empty": "", "long": "a" * 10**5, "few faces": "random-3-1",
+            "other digits": "random-\u0662\u0660-7", "no seed": "random-20",
+        },
+    }),
+    Call("scenes.grasp_figure", of_grasp(friction=0.5), BODY_AND_GRASP | {
+        "friction": FRICTION, "view": optional(VALUE), "legend": SWITCH,
+    }),
+    Call("scenes.write_picture", of_grasp(path="a.png"), BODY_AND_GRASP | {
+        "path": PATH | {"unknown ending": "a.gif", "no ending": "a"},
+        "friction": FRICTION,
+        "view": optional(VALUE),
+    }, succeeds_in="tests/scenes/test_pictures.py"),
+    Call("scenes.FingerSettings", dict, {
+        "max_normal_force_n": POSITIVE,
+        "radius_m": optional(POSITIVE),
+        "mass_kg": optional(POSITIVE) | {"a picogram": 1e-12, "a mountain": 1e12},
+        "stiffness_n_per_m": optional(POSITIVE),
+        "approach": optional(array([0.0, 0.0, 1.0])) | {"zero": (0.0, 0.0, 0.0)},
+        "drive": WORD,
+        "indentation": NOT_NEGATIVE | {"all": 1.0},
+    }),
+    Call("scenes.PhysicsSettings", dict, {
+        "timestep": POSITIVE | {"a second": 1.0, "a microsecond": 1e-6},
+        **dict.fromkeys(("integrator", "cone", "solver", "jacobian"), WORD),
+        "impratio": POSITIVE,
+        **{f"{kind}tolerance": NOT_NEGATIVE for kind in ("", "ls_", "noslip_", "ccd_", "sleep_")},
+        **{f"{kind}iterations": AT_LEAST_ONE for kind in ("", "ls_", "ccd_", "sdf_")},
+        "noslip_iterations": COUNT,
+        "sdf_initpoints": AT_LEAST_ONE,
+        **dict.fromkeys(("gravity", "wind", "magnetic"), array(CENTER)),
+        **dict.fromkeys(("density", "viscosity", "margin", "gap"), NOT_NEGATIVE),
+        "solref": array([0.004, 1.0]),
+        "solimp": array([0.99, 0.99, 0.001, 0.5, 2.0]),
+        "condim": AT_LEAST_ONE | {"two": 2, "seven": 7},
+        "autoreset": SWITCH,
+        "diagexact": SWITCH,
+    }),
+    Call("sv.load_dataset", lambda: {"folder": "no/such/folder"}, {
+        "folder": PATH | {"nowhere": "no/such/folder"}, "split": optional(WORD),
+    }, succeeds_in="tests/sim_validate/datasets/test_loading.py"),
+    Call("sv.read_regions", lambda: {"path": "no/such/file.npz"}, {
+        "path": PATH | {"nowhere": "no/such/file.npz"},
+    }, succeeds_in="tests/sim_validate/test_regions_command.py"),
+    Call("sv.margin_figure", of_grasp(friction=0.5), BODY_AND_GRASP | {
+        "friction": FRICTION, "max_normal_force_n": POSITIVE,
+    }, slow=True),
+    Call("sv.wrench_figure", of_grasp(friction=0.5), BODY_AND_GRASP | {
+        "friction": FRICTION, "view": optional(VALUE),
+    }),
+    Call("sv.write_report", lambda: {"folder": "no/such/folder"}, {
+        "folder": PATH | {"nowhere": "no/such/folder"},
+        "out": optional(PATH),
+        "jobs": optional(AT_LEAST_ONE),
+        "limit": optional(AT_LEAST_ONE),
+        "clips": COUNT,
+        "progress": {"none": None, "number": 3, "text": "a"},
+    }, succeeds_in="tests/sim_validate/reports/test_report.py"),
+    Call("sv.validate", of_grasp(agenda=sv.Agenda(critical_friction=False, controls=False)),
+         BODY_AND_GRASP | {
+        "friction": FRICTION,
+        "agenda": optional(VALUE),
+        "setup": optional(VALUE) | {"of another class": scenes.PhysicsSettings()},
+    }, slow=True),
+    Call("sv.simulated_critical_friction", of_grasp(), BODY_AND_GRASP | {"setup": optional(VALUE)},
+         slow=True),
+    Call("sv.Agenda", dict, {
+        "random_wrenches": COUNT,
+        "wrenches": SEVERAL,
+        **dict.fromkeys(("critical_friction", "independent", "controls", "keep_traces"), SWITCH),
+        "limits": WORD,
+        "rules": SEVERAL | {"unknown": ("nonsense",), "numbers": (1, 2)},
+        "trials": COUNT,
+        "noise": VALUE,
+        "seed": SEED,
+    }),
+    Call("sv.HoldProtocol", dict, {
+        **{f"{phase}_s": POSITIVE | {"a day": 86400.0}
+           for phase in ("squeeze", "load", "settle", "hold")},
+        **{f"{kind}_threshold": POSITIVE for kind in ("hold", "total", "gap")},
+        "settling_friction": POSITIVE | {"less": 0.5},
+        "load_share": POSITIVE | {"all": 1.0},
+        "control_load": POSITIVE,
+        "least_normal_share": POSITIVE | {"all": 1.0},
+        "least_excess": POSITIVE,
+    }),
+    Call("sv.NamedWrench", lambda: {"name": "pull", "wrench": WRENCH}, {
+        "name": TEXT | {"empty": "", "long": "a" * 101, "markup": "<b>"},
+        "wrench": array(WRENCH) | {"zero": np.zeros(6), "tiny": 1e-300 * WRENCH},
+    }),
+    Call("sv.Noise", dict, dict.fromkeys(
+        ("shift", "turn_deg", "normal_deg", "friction", "mass"), NOT_NEGATIVE,
+    )),
+    Call("sv.Setup", dict, {
+        **dict.fromkeys(("fingers", "physics", "hold", "limit", "friction"), VALUE),
+        "surface": WORD,
+        "threads": AT_LEAST_ONE,
+        "timeout_s": unless(POSITIVE, "infinite", "tiny", "huge"),
+    }),
+]  # fmt: skip
