@@ -1,14 +1,59 @@
 """Whole files of each kind, made by the program itself, for cases to spoil."""
 
+import json
 from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
-import grasp_core as gc
-from grasp_core.records import plan_to_json
-from scenes.objects import example_object
+from sim_validate.cli import main
 
 
 @cache
+def _folder() -> TemporaryDirectory[str]:
+    """What commands write about the tetrahedron, by name."""
+    folder = TemporaryDirectory()
+    out = Path(folder.name)
+    asked = "--random-wrenches 0 --no-report --limit 1 -q"
+    assert main(["run", "tetrahedron", *asked.split(), "--out", str(out)]) == 0
+    assert main(
+        ["regions", str(out / "grasps.json"), "--cones", "64", "--out", str(out), "-q"]
+    ) in {0, 1}
+    record = ["baseline", "record", str(out / "grasps.json"), "-o", str(out / "a.baseline.json")]
+    assert main([*record, "-q"]) == 0
+    return folder
+
+
+def good(name: str) -> bytes:
+    """A whole file: grasps.json, verdicts.json, regions.json or a.baseline.json."""
+    return (Path(_folder().name) / name).read_bytes()
+
+
 def grasps_text() -> str:
     """A grasps.json with one grasp of the tetrahedron."""
-    body = example_object("tetrahedron")
-    return plan_to_json(body, gc.plan(body, 0.5, limit=1))
+    return good("grasps.json").decode()
+
+
+def with_value(text: str | bytes, path: str, value: Any) -> str:
+    """A JSON text with another value at a path of keys and places; `raw:` stands for itself."""
+    document = json.loads(text)
+    *way, last = [int(part) if part.isdigit() else part for part in path.split(".")]
+    place = document
+    for part in way:
+        place = place[part]
+    place[last] = value
+    made = json.dumps(document)
+    if isinstance(value, str) and value.startswith("raw:"):
+        made = made.replace(json.dumps(value), value.removeprefix("raw:"), 1)
+    return made
+
+
+def without(text: str | bytes, path: str) -> str:
+    """A JSON text without the value at a path."""
+    document = json.loads(text)
+    *way, last = [int(part) if part.isdigit() else part for part in path.split(".")]
+    place = document
+    for part in way:
+        place = place[part]
+    del place[last]
+    return json.dumps(document)

@@ -18,9 +18,10 @@ READERS = {
     "wrenches": ("task.json", "validate {grasps} --wrenches FILE"),
     "setup": ("setup.toml", "validate {grasps} --setup FILE"),
     "config": ("flags.toml", "plan box --config FILE"),
-    "suite": ("suite.toml", "baseline record --suite FILE"),
+    "replay": ("grasps.json", "replay FILE --out made"),
     "baseline": ("baseline.json", "baseline check FILE"),
     "dataset": ("dataset.toml", "dataset build FILE --out made"),
+    "import": ("contacts.npz", "dataset import FILE tetrahedron --friction 0.5 --out made"),
 }
 """Commands by what they read, each with a file of the right ending."""
 
@@ -142,6 +143,8 @@ def cases() -> list[Case]:
 
 def _as_promised(case: Case) -> Case:
     """The settings of flags are flags: their file is refused as they are."""
+    if case.name in {"config: a file without a byte", "setup: a file without a byte"}:
+        return Case(case.group, case.name, case.make, 0, ())  # all settings are left out
     if case.name.startswith("config"):
         return Case(case.group, case.name, case.make, 2, case.says)
     return case

@@ -1,0 +1,103 @@
+"""Group 4: archives and XML, which are never opened, and npz, which is with bounds."""
+
+import io
+import zipfile
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from tests.bad_input.cases import Case, file_case
+
+GROUP = "archives"
+IMPORT = "dataset import FILE tetrahedron --friction 0.5 --out made"
+POSITIONS, NORMALS = np.zeros((1, 4, 3)), np.ones((1, 4, 3)) / np.sqrt(3.0)
+
+
+def zipped(*members: tuple[str, bytes]) -> bytes:
+    """An archive; names may come twice."""
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in members:
+            archive.writestr(zipfile.ZipInfo(name), data, zipfile.ZIP_DEFLATED)
+    return held.getvalue()
+
+
+def npy(array: np.ndarray) -> bytes:
+    """An array as numpy writes it."""
+    held = io.BytesIO()
+    np.lib.format.write_array(held, array, allow_pickle=True)
+    return held.getvalue()
+
+
+def header(shape: str, kind: str = "<f8") -> bytes:
+    """The head of an array that is not there."""
+    said = f"{{'descr': {kind!r}, 'fortran_order': False, 'shape': {shape}, }}".encode()
+    said = said.ljust(117) + b"\n"
+    return b"\x93NUMPY\x01\0" + len(said).to_bytes(2, "little") + said
+
+
+def arrays(**more: np.ndarray) -> bytes:
+    """An npz of contacts, with some arrays otherwise."""
+    held = {"positions": POSITIONS, "normals": NORMALS} | more
+    return zipped(*((f"{name}.npy", npy(array)) for name, array in held.items()))
+
+
+BOMB = zipped(
+    ("positions.npy", header("(100000000,)") + bytes(800_000_000)), ("normals.npy", npy(NORMALS))
+)
+ENTITIES = '<?xml version="1.0"?><!DOCTYPE l [<!ENTITY a "ha"><!ENTITY b "&a;&a;">]><l>&b;</l>'
+OUTSIDE = '<?xml version="1.0"?><!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><r>&x;</r>'
+MESHES = {
+    "a zip bomb called 3mf": ("part.3mf", zipped(("3D/3dmodel.model", bytes(50_000_000))), "ending"),
+    "a zip bomb called obj": ("part.obj", zipped(("part.obj", bytes(50_000_000))), "zip|unpack"),
+    "a zip in a zip": ("part.ply", zipped(("a.zip", zipped(("b", b"c")))), "zip|unpack"),
+    "a name that climbs": ("part.obj", zipped(("../../part.obj", b"v")), "zip|unpack"),
+    "an absolute name": ("part.obj", zipped(("/etc/part.obj", b"v")), "zip|unpack"),
+    "10^4 entries": ("part.obj", zipped(*((str(i), b"") for i in range(10_000))), "zip|unpack"),
+    "entities": ("part.dae", ENTITIES, "ending"),
+    "entities called off": ("part.off", ENTITIES, "XML|convert"),
+    "an entity outside": ("part.x3d", OUTSIDE, "ending"),
+    "an entity outside called ply": ("part.ply", OUTSIDE, "XML|convert"),
+    "10^5 deep XML": ("part.amf", "<a>" * 100_000, "ending"),
+    "a compressed OFF": ("part.off.gz", b"\x1f\x8b\x08", "ending"),
+    "a tar": ("part.tar", b"a" * 512, "ending"),
+}  # fmt: skip
+NPZS = {
+    "no archive": (b"PK nothing", "npz"),
+    "cut": (arrays()[:-30], "npz"),
+    "an array of 800 MB in 800 kB": (BOMB, "larger"),
+    "a claim of 10^12 numbers": (
+        zipped(("positions.npy", header("(1000000000000,)")), ("normals.npy", npy(NORMALS))), "positions"),
+    "a claim that overflows": (
+        zipped(("positions.npy", header(f"({2**62}, 4, 3)")), ("normals.npy", npy(NORMALS))),
+        "positions"),
+    "objects": (arrays(positions=np.array([print], dtype=object)), "npz|positions"),
+    "a claim of objects": (
+        zipped(("positions.npy", header("(1,)", "|O") + b"cos\nsystem\n(S'id'\ntR."),
+               ("normals.npy", npy(NORMALS))), "positions"),
+    "a name that climbs": (zipped(("../positions.npy", npy(POSITIONS))), "positions"),
+    "no array of numbers": (zipped(("positions.npy", b"text"), ("normals.npy", b"")), "positions"),
+    "words": (arrays(positions=np.full((1, 4, 3), "a")), "positions"),
+    "nan": (arrays(positions=np.full((1, 4, 3), np.nan)), "positions|finite"),
+    "two numbers a point": (arrays(positions=np.zeros((1, 4, 2))), "positions"),
+    "other counts": (arrays(normals=np.ones((2, 4, 3))), "normals"),
+    "normals of no length": (arrays(normals=np.zeros((1, 4, 3))), "normal"),
+    "no normals": (zipped(("positions.npy", npy(POSITIONS))), "normals"),
+    "complex numbers": (arrays(positions=np.ones((1, 4, 3)) * 1j), "positions"),
+}  # fmt: skip
+
+
+def _yaml(folder: Path) -> list[str]:
+    (folder / "grasps.yaml").write_text("a: !!python/object/apply:os.system ['touch owned']\n")
+    return ["dataset", "import", "grasps.yaml", "tetrahedron", "--friction", "0.5", "--out", "made"]
+
+
+def cases() -> list[Case]:
+    """All of the group."""
+    found = [file_case(GROUP, name, *said) for name, said in MESHES.items()]
+    found += [
+        file_case(GROUP, f"npz: {name}", "contacts.npz", data, says, command=IMPORT)
+        for name, (data, says) in NPZS.items()
+    ]
+    return [*found, Case(GROUP, "YAML that runs", partial(_yaml), 4, ("grasps.yaml",))]

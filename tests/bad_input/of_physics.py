@@ -1,0 +1,142 @@
+"""Group 6: numbers of physics that nothing in the world has, as flags and in files."""
+
+from functools import partial
+from pathlib import Path
+
+from tests.bad_input.cases import Case, file_case, flag_case
+from tests.bad_input.good_files import grasps_text, with_value
+
+GROUP = "physics"
+NUMBERS = ("nan", "inf", "-1", "wide")
+FLAGS = {
+    "plan box --friction": (*NUMBERS, "0", "1e9", "1e-300"),
+    "plan box --theta-deg": (*NUMBERS, "0"),
+    "plan box --edge-clearance-m": NUMBERS,
+    "plan box --finger-radius-m": (*NUMBERS, "0"),
+    "plan box --approach-m": (*NUMBERS, "0"),
+    "plan box --limit": ("0", "-1", "1.5", "many", "99999999999"),
+    "plan box --seed": ("-1", "18446744073709551616", "0.5"),
+    "plan box --patch-depth": (*NUMBERS, "0", "2"),
+    "run box --fingertip-radius-m": (*NUMBERS, "0", "1e-12"),
+    "run box --fingertip-mass-kg": (*NUMBERS, "0", "1e-12", "1e12"),
+    "run box --stiffness-n-per-m": (*NUMBERS, "0"),
+    "run box --max-normal-force": (*NUMBERS, "0", "1e12"),
+    "run box --timeout-s": (*NUMBERS, "0"),
+    "run box --random-wrenches": ("-1", "1.5", "99999999"),
+    "run box --trials": ("-1", "1e6", "99999999"),
+    "run box --trials 2 --noise-friction": (*NUMBERS, "9"),
+    "run box --weight-n": (*NUMBERS, "0"),
+    "run box --jobs": ("0", "-1", "1.5"),
+}
+"""Each value is to be refused, and the flag named."""
+VECTORS = {
+    "run box --approach 0 0 0": "--approach|zero",
+    "run box --approach nan 0 0": "--approach",
+    "run box --weight-n 1 --down 0 0 0": "--down",
+    "run box --down 0 0 1": "--weight-n",
+    "run box --center-of-mass-m 0 0 0": "built in",
+    "analyze contacts.json --wrench 0 0 0 0 0 0": "--wrench|zero",
+    "analyze contacts.json --wrench nan 0 0 0 0 0": "--wrench",
+    "analyze contacts.json --wrench 1e14 0 0 0 0 0": "--wrench",
+    "analyze contacts.json --wrench 1 0 0": "--wrench",
+    "analyze contacts.json --edges 2": "--edges",
+    "run box --noise-mass 0.1": "--trials",
+    "plan box --family spiral": "--family|concurrent",
+    "plan box --unit furlong": "--unit|mm",
+    "plan box --frictoin 0.5": "friction",
+    "fly box": "plan|validate",
+    "plan": "object",
+}
+SETUP = {
+    "[physics]\ntimestep_s = 0.0": "timestep_s",
+    "[physics]\ntimestep_s = nan": "timestep_s",
+    "[physics]\ntimestep_s = 1.0": "timestep_s",
+    "[physics]\ntimestep_s = -1e-3": "timestep_s",
+    "[physics]\ngravity = nan": "gravity",
+    "[fingers]\nradius_m = 0.0": "radius_m",
+    "[fingers]\nmass_kg = 1e-300": "mass_kg",
+    "[hold]\nhold_s = 0.0": "hold_s",
+    "[hold]\nhold_s = 86400.0": "hold_s",
+    "[hold]\nhold_s = inf": "hold_s",
+    "[hold]\nload_share = 2.0": "load_share",
+    "[hold]\nload_share = -1.0": "load_share",
+}
+WRENCHES = {
+    "nan": ('{"wrenches": [{"name": "a", "force_n": [NaN, 0, 0]}]}', "force_n"),
+    "1e999": ('{"wrenches": [{"name": "a", "force_n": [1e999, 0, 0]}]}', "force_n"),
+    "1e14": ('{"wrenches": [{"name": "a", "force_n": [1e14, 0, 0]}]}', "a"),
+    "nothing": ('{"wrenches": [{"name": "a", "force_n": [0, 0, 0]}]}', "a"),
+    "two numbers": ('{"wrenches": [{"name": "a", "force_n": [0, 0]}]}', "force_n"),
+    "no name": ('{"wrenches": [{"force_n": [0, 0, 1]}]}', "name"),
+    "no wrenches": ('{"wrenches": []}', "wrenches"),
+    "a name twice": (
+        '{"wrenches": [{"name": "a", "force_n": [0, 0, 1]}, {"name": "a", "force_n": [1, 0, 0]}]}',
+        "a"),
+}  # fmt: skip
+CONTACT = "grasps.0.contacts.0."
+GRASPS = {
+    "friction 0": ("friction", 0, "friction"),
+    "friction -1": ("friction", -1, "friction"),
+    "friction 1e9": ("friction", 1e9, "friction"),
+    "friction null": ("friction", None, "friction"),
+    "friction in words": ("friction", "0.5", "friction"),
+    "seed -1": ("seed", -1, "seed"),
+    "seed 2^64": ("seed", 2**64, "seed"),
+    "a contact off its face": (CONTACT + "position_m", [0.0, 0.0, 0.0], "contact"),
+    "a contact far away": (CONTACT + "position_m", [9.0, 0.0, 0.0], "contact"),
+    "a contact at 1e300": (CONTACT + "position_m", [1e300, 0.0, 0.0], "contact"),
+    "a contact of two numbers": (CONTACT + "position_m", [0.0, 0.0], "position_m"),
+    "a normal of no length": (CONTACT + "normal", [0.0, 0.0, 0.0], "normal"),
+    "a normal of length 2": (CONTACT + "normal", [0.0, 0.0, 2.0], "normal"),
+    "a normal that looks away": (CONTACT + "normal", [0.0, 0.0, -1.0], "normal"),
+    "a face that is not there": ("grasps.0.faces", [0, 1, 2, 99], "face"),
+    "a face twice": ("grasps.0.faces", [0, 0, 1, 2], "face"),
+    "three faces": ("grasps.0.faces", [0, 1, 2], "faces"),
+    "forces that do not balance": ("grasps.0.witness.forces.0", [9.0, 9.0, 9.0], "witness"),
+    "a radius of -1": ("grasps.0.radius_m", -1.0, "radius_m"),
+    "a mesh of one point": ("object.mesh.vertices_m", [[0, 0, 0]], "mesh"),
+    "a mesh with another corner": ("object.mesh.vertices_m.0", [0.05, 0.03, 0.06], "object"),
+    "a hash of another object": ("object.content_sha256", "0" * 64, "content_sha256"),
+    "a family that is none": ("grasps.0.family", "spiral", "family"),
+    "a finger of no size": ("finger", {"radius_m": 0, "approach_m": 0.1}, "radius_m"),
+}
+
+
+def _with_setup(text: str, folder: Path) -> list[str]:
+    (folder / "good.json").write_text(grasps_text())
+    (folder / "setup.toml").write_text(text)
+    return ["validate", "good.json", "--setup", "setup.toml"]
+
+
+def _with_wrenches(text: str, folder: Path) -> list[str]:
+    (folder / "good.json").write_text(grasps_text())
+    (folder / "task.json").write_text(text)
+    return ["validate", "good.json", "--wrenches", "task.json"]
+
+
+def cases() -> list[Case]:
+    """All of the group."""
+    found = [
+        flag_case(GROUP, f"{line} {value}", line.split()[-1])
+        for line, values in FLAGS.items()
+        for value in values
+    ]
+    found += [
+        flag_case(GROUP, line, says, 4 if "built in" in says else 2)
+        for line, says in VECTORS.items()
+    ]
+    found += [
+        Case(GROUP, f"setup: {text!r}", partial(_with_setup, text), 4, ("setup.toml", says))
+        for text, says in SETUP.items()
+    ]
+    found += [
+        Case(GROUP, f"wrenches: {name}", partial(_with_wrenches, text), 4, ("task.json", says))
+        for name, (text, says) in WRENCHES.items()
+    ]
+    return found + [
+        file_case(
+            GROUP, f"grasps: {name}", "grasps.json", with_value(grasps_text(), path, value), says,
+            command="validate",
+        )
+        for name, (path, value, says) in GRASPS.items()
+    ]  # fmt: skip
