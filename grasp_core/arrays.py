@@ -19,6 +19,8 @@ DIGITS = 9
 than solvers' noise reaches."""
 LARGEST_ENTRY = 1e50
 """The product of three such numbers has a finite square."""
+SMALLEST_SIZE = 1e-50
+"""What is smaller and not zero has a square that is lost beside others, or is zero."""
 REAL = "iuf"
 """Kinds of numpy's numbers that are real ones."""
 UNIT_SLACK = 1e-9

@@ -20,8 +20,8 @@ LARGEST_FRICTION = 1e3
 MOST_COUNT = 10**9
 """What is to be counted takes longer than anybody waits."""
 MOST_SEED = 2**64 - 1
-MOST_EDGES = 1000
-"""Of a pyramid in place of a friction cone: it is a circle to six digits."""
+MOST_EDGES = 10_000
+"""Of a pyramid in place of a friction cone: it is a circle to seven digits."""
 MOST_RANDOM_WRENCHES, MOST_TRIALS = 10_000, 100_000
 SHOWN = 60
 """Letters of a refused value in a message."""

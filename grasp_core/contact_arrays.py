@@ -5,13 +5,10 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, frozen_each, frozen_units
+from grasp_core.arrays import SMALLEST_SIZE, Array, frozen, frozen_each, frozen_units
 from grasp_core.checked import LARGEST_FRICTION, shown
 from grasp_core.errors import InputError
 from grasp_core.values import Contact, Grasp
-
-SMALLEST_SPREAD = 1e-50
-"""Contacts closer together than this are in one place, or their unit is wrong [m]."""
 
 
 def stacked(contacts: Iterable[Contact]) -> tuple[Array, Array]:
@@ -51,10 +48,10 @@ def check_spread(extents: Array, name: str = "positions") -> None:
         InputError: They are.
     """
     sizes: Array = extents.max(axis=-1)
-    tiny = (sizes > 0.0) & (sizes < SMALLEST_SPREAD)
+    tiny = (sizes > 0.0) & (sizes < SMALLEST_SIZE)
     if tiny.any():
         raise InputError(
-            f"{name} must spread over at least {SMALLEST_SPREAD:g} m, got "
+            f"{name} must spread over at least {SMALLEST_SIZE:g} m, got "
             f"{float(sizes[tiny].min()):.3g}; use other units"
         )
 

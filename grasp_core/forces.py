@@ -23,7 +23,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen
+from grasp_core.arrays import SMALLEST_SIZE, Array, frozen
 from grasp_core.balance import RESIDUAL, Balance, needed_friction
 from grasp_core.checked import LARGEST, SMALLEST, number, one_of, several, shown
 from grasp_core.contact_arrays import contact_arrays, contact_frictions
@@ -239,9 +239,9 @@ def _check_limits(normal_force: tuple[float, float]) -> None:
     limits = several(normal_force, each, "normal_force", "limits")
     if len(limits) != len(("least", "largest")) or not limits[0] < limits[1]:
         raise InputError(f"normal_force must be (least, largest), got {shown(normal_force)}")
-    if limits[0] > LARGEST or limits[1] < SMALLEST:
+    if not (SMALLEST <= limits[1] <= LARGEST or (limits[1] == math.inf and limits[0] <= LARGEST)):
         raise InputError(
-            f"normal_force: least must be up to {LARGEST:g} N and largest from {SMALLEST:g} N, got "
+            f"normal_force: largest must be from {SMALLEST:g} to {LARGEST:g} N, or infinite, got "
             f"{shown(normal_force)}"
         )
 
@@ -252,8 +252,14 @@ def _rows(wrench: ArrayLike) -> tuple[Array, bool]:
         single = np.ndim(wrench) != 2  # noqa: PLR2004 - rows and columns
     except ValueError:  # ragged, which `frozen` explains
         single = True
-    loads = frozen(wrench, (6,) if single else (None, 6), "wrench")
-    return np.atleast_2d(loads), single
+    loads = np.atleast_2d(frozen(wrench, (6,) if single else (None, 6), "wrench"))
+    sizes: Array = np.abs(loads).max(axis=1, initial=0.0)
+    if ((sizes > 0.0) & (sizes < SMALLEST_SIZE)).any():
+        raise InputError(
+            f"wrench: the largest part must be 0 or from {SMALLEST_SIZE:g} on, got "
+            f"{float(sizes[sizes > 0.0].min()):.3g}"
+        )
+    return loads, single
 
 
 def _text(friction: Array) -> str:

@@ -20,8 +20,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen
-from grasp_core.contact_arrays import SMALLEST_SPREAD, check_spread
+from grasp_core.arrays import SMALLEST_SIZE, Array, frozen
+from grasp_core.contact_arrays import check_spread
 from grasp_core.errors import InputError
 
 LineClass: TypeAlias = Literal["planar", "concurrent", "pencil", "regulus", "independent"]
@@ -56,9 +56,9 @@ def classify_lines(points: ArrayLike, directions: ArrayLike) -> LineClass:
     x = frozen(points, (4, 3), "points")
     d = frozen(directions, (4, 3), "directions")
     lengths = np.linalg.norm(d, axis=1, keepdims=True)
-    if lengths.min() < SMALLEST_SPREAD:
+    if lengths.min() < SMALLEST_SIZE:
         raise InputError(
-            f"directions must not be zero: a line needs a direction of length {SMALLEST_SPREAD:g} "
+            f"directions must not be zero: a line needs a direction of length {SMALLEST_SIZE:g} "
             f"at least, got {float(lengths.min()):.6g}"
         )
     check_spread(np.ptp(x, axis=0), "points")

@@ -37,7 +37,7 @@ def pyramid_wrenches(wrenches: WrenchSet, edges: int) -> Array:
     """Wrenches of the edges of pyramids inscribed in the friction cones, (k edges, 6).
 
     Raises:
-        InputError: Fewer than three edges, or more than a thousand.
+        InputError: Fewer than three edges, or more than ten thousand.
     """
     circle = _circle(edges)
     slopes = wrenches.friction
@@ -50,7 +50,7 @@ def _circle(edges: int) -> Array:
     """Edges of a pyramid of friction one, (normal, tangent, tangent), (edges, 3).
 
     Raises:
-        InputError: Fewer than three edges, or more than a thousand.
+        InputError: Fewer than three edges, or more than ten thousand.
     """
     whole(edges, "edges", least=FEWEST_EDGES, most=MOST_EDGES)
     turns = 2.0 * np.pi * np.arange(edges) / edges

@@ -30,6 +30,8 @@ from grasp_core.wrenches import contact_frames, grasp_map, in_frames
 Norm: TypeAlias = Literal["l1", "linf"]
 """How contact forces are bounded."""
 
+NO_SLIDE = 1e-290
+"""Less than this along the surface has no direction."""
 LARGEST_RATIO = 1e6
 """Between the torque scale and the contacts' extent: beyond it, rounding decides."""
 
@@ -41,8 +43,10 @@ def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
         InputError: The scale or the centre is so far from the contacts' own that rounding decides.
     """
     scale = positive(torque_scale, "torque_scale")
-    check_spread(np.ptp(points, axis=0))
-    extent = float(np.linalg.norm(points - points.mean(axis=0), axis=1).max()) or scale
+    spread = np.ptp(points, axis=0)
+    check_spread(spread)
+    apart = points - points.mean(axis=0)
+    extent = float(np.linalg.norm(apart, axis=1).max()) if spread.any() else scale
     if not 1.0 / LARGEST_RATIO <= scale / extent <= LARGEST_RATIO:
         raise InputError(
             f"torque_scale must be within a factor {LARGEST_RATIO:g} of the extent of the "
@@ -113,12 +117,12 @@ class WrenchSet:
         if self.norm == "l1":
             i = int(each.argmax())
             forces[i, 0] = 1.0
-            if across[i] > 0.0:
+            if across[i] > NO_SLIDE:
                 forces[i, 1:] = slopes[i, 1:] * (self.friction[i] / across[i])
             return float(each[i]), forces.ravel()
         pushing = each > 0.0
         forces[pushing, 0] = 1.0
-        sliding = pushing & (across > 0.0)
+        sliding = pushing & (across > NO_SLIDE)
         forces[sliding, 1:] = (
             slopes[sliding, 1:] * (self.friction[sliding] / across[sliding])[:, None]
         )

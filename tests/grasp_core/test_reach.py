@@ -133,8 +133,9 @@ def test_a_plan_for_fingers_holds_only_grasps_that_they_reach():
     )
     known = some.outcomes
     assert known.held + known.absent + known.open + known.out_of_reach == some.counts.quadruples
-    box = example_object("box")
-    nothing = gc.plan(box, 0.5, finger=Finger(box.radius, box.radius))
+    slim = example_object("random-5-2")
+    wide = Finger(slim.radius, slim.radius)
+    nothing = gc.plan(slim, 0.5, families="concurrent", finger=wide)
     assert not nothing.grasps
     assert "fingers reach" in nothing.absence
 

@@ -313,8 +313,8 @@ def test_a_file_that_is_missing_or_asks_too_much_is_refused(tmp_path, monkeypatc
     Path("contacts.json").write_text(json.dumps(TETRAHEDRON))
     assert main(["analyze", "contacts.json", "--edges", "2501"]) == Exit.INPUT
     assert "--edges 2500 or less" in capsys.readouterr().err
-    assert main(["analyze", "contacts.json", "--friction", "1001"]) == Exit.INPUT
-    assert "friction must be at most 1000" in capsys.readouterr().err
+    assert main(["analyze", "contacts.json", "--friction", "1001"]) == Exit.USAGE
+    assert "--friction must be at least 1e-09, at most 1000" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

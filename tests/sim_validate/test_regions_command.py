@@ -193,7 +193,7 @@ def test_regions_stay_clear_of_edges_that_contacts_are_near_to(folder, tmp_path)
         assert clearance_of(saved.body, grasp, found.regions) > 0.006 - 1e-9
         near += float(np.linalg.norm(found.centers - grasp.positions, axis=1).max()) > 1e-6
     assert near > 0
-    assert main([*asked, "--edge-clearance-m", "1", "-q"]) == Exit.NEGATIVE
+    assert main([*asked, "--edge-clearance-m", "0.05", "-q"]) == Exit.NEGATIVE
 
 
 def clearance_of(body, grasp, regions):

@@ -344,7 +344,7 @@ def test_a_dataset_is_loaded_as_arrays(dataset):
         assert family == row["family"]
     parts = [sim_validate.load_dataset(dataset, part) for part in ("train", "validation", "test")]
     assert sum(len(part["trials"]["trial"]) for part in parts) == len(tables["trials"]["trial"])
-    with pytest.raises(gc.InputError, match="expected one of"):
+    with pytest.raises(gc.InputError, match="split must be one of"):
         sim_validate.load_dataset(dataset, "training")
 
 

@@ -75,7 +75,7 @@ def test_marked_tests_run_with_each_grasp(blessed, tmp_path):
         ("'nowhere.json'", "nowhere.json"),
         ("object='wedg'", "did you mean wedge"),
         ("object='wedge', friction='0.5'", "friction must be a number, got '0.5'"),
-        ("object='wedge', limit='2'", "a setting is of the wrong kind"),
+        ("object='wedge', limit='2'", "limit must be a whole number from 1"),
         ("object='box', cones='normal', families=('pencil',)", "there is no grasp of box"),
     ],
 )
