@@ -1,6 +1,5 @@
 """Settings of a TOML file as flags on the command line."""
 
-import tomllib
 from pathlib import Path
 from typing import Any, cast
 
@@ -10,27 +9,42 @@ COMMAND_WORDS = {"dataset": 2, "baseline": 2}
 """Of how many words a command consists, where it is not one."""
 
 
+class NoFileNamedError(InputError):
+    """The flag stands alone."""
+
+
 def with_config(arguments: list[str]) -> list[str]:
     """Put the settings of `--config FILE.toml` before the flags, which then override them.
 
     Raises:
-        InputError: There is no such file, or it is not TOML.
+        NoFileNamedError: There is no file after the flag.
+        InputError: There is no such file, or it is not TOML, or holds tables.
     """
     words = [part for word in arguments for part in _split_config(word)]
     if "--config" not in words:
         return arguments
     place = words.index("--config")
     if place + 1 >= len(words):
-        raise InputError("--config needs the name of a TOML file")
-    path = Path(words[place + 1])
+        raise NoFileNamedError("--config needs the name of a TOML file")
     rest = words[:place] + words[place + 2 :]
-    try:
-        settings = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"--config {path}: {error}") from error
+    settings = _read(Path(words[place + 1]))
     flags = [word for name, value in settings.items() for word in _as_flags(name, value)]
     command = COMMAND_WORDS.get(rest[0], 1) if rest else 0
     return [*rest[:command], *flags, *rest[command:]]
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """Settings by flag: plain values, or lists of them."""
+    from sim_validate.toml_text import read_tables  # only where there is such a file
+
+    try:
+        settings = read_tables(path)
+    except InputError as error:
+        raise InputError(f"--config {error}") from error
+    for name, value in settings.items():
+        if any(isinstance(part, dict) for item in _items(value) for part in _items(item)):
+            raise InputError(f"--config {path}: {name!r}: expected a value or a list, got a table")
+    return settings
 
 
 def _split_config(word: str) -> list[str]:

@@ -25,6 +25,8 @@ NAME = re.compile(r"[\w+\- ]{1,100}")
 SMALLEST, LARGEST = 1e-9, 1e9
 """Smaller and larger forces and torques are mistakes [N, N m]."""
 WEAKEST = "weakest"
+MOST_RANDOM = 100_000
+"""Random wrenches that a grasp may have to hold."""
 RANDOM = "random_{}"
 
 
@@ -111,6 +113,10 @@ class Agenda:
             raise InputError(f"limits must be one of {get_args(LimitSearch)}, got {self.limits!r}")
         if min(self.random_wrenches, self.trials, self.seed) < 0:
             raise InputError("random_wrenches, trials and seed must not be negative")
+        if self.random_wrenches > MOST_RANDOM:
+            raise InputError(
+                f"random_wrenches must be up to {MOST_RANDOM}, got {self.random_wrenches}"
+            )
         rules_named(self.rules)
         drawn = (RANDOM.format(place) for place in range(self.random_wrenches))
         taken = {*AXIS_NAMES, WEAKEST, *drawn}
