@@ -80,13 +80,17 @@ def listed(folder: Path, path: Path) -> Listed:
 
 def write_manifest(folder: Path, manifest: Manifest) -> Path:
     """Make a folder a dataset."""
+    return write_text(folder / MANIFEST, manifest_to_json(manifest))
+
+
+def manifest_to_json(manifest: Manifest) -> str:
+    """The text of a manifest: the same for the same files."""
     record = asdict(manifest)
     record["files"] = [
         {name: value for name, value in asdict(each).items() if value is not None}
         for each in sorted(manifest.files, key=lambda each: each.path)
     ]
-    text = json.dumps(record, indent=1, sort_keys=True) + "\n"
-    return write_text(folder / MANIFEST, text)
+    return json.dumps(record, indent=1, sort_keys=True) + "\n"
 
 
 def read_manifest(folder: Path) -> Manifest:
