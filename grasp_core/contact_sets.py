@@ -5,17 +5,18 @@ A contacts file is JSON: `{"contacts": [...]}` for one grasp, or `{"grasps": [{"
 `"friction"`. Beside the list may stand `friction`, `center_m` and `torque_scale_m`, for all.
 """
 
-import json
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypeAlias, TypeVar
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from grasp_core.arrays import Array, frozen, frozen_units
 from grasp_core.checked import LARGEST_FRICTION, positive
+from grasp_core.complaints import record_of
 from grasp_core.contact_arrays import contact_frictions
 from grasp_core.errors import InputError
+from grasp_core.json_text import value_of
 from grasp_core.records import grasps_from_json
 
 FEWEST_CONTACTS = 2
@@ -32,10 +33,7 @@ ROUNDING = 1e-15
 SAME_POINT = 1e-9
 """Contacts closer than this to their mean, relative to the numbers in the file, are at one point:
 what rounding leaves of smaller differences tells nothing."""
-LONGEST_ECHO = 40
-"""Characters of a wrong value that a message repeats."""
 
-Model = TypeVar("Model", bound=BaseModel)
 CenterSource: TypeAlias = Literal["file", "mean contact", "center of mass"]
 ScaleSource: TypeAlias = Literal["flag", "file", "farthest contact", "object radius"]
 
@@ -77,19 +75,6 @@ class _ContactsFile(_Strict):
     friction: Friction | None = None
     center_m: Point | None = None
     torque_scale_m: Length | None = None
-
-
-LISTED: dict[str, type[BaseModel]] = {"contacts": _GivenContact, "grasps": _GivenGrasp}
-"""What the items of a list are."""
-
-BOUNDS = {"too_short": ("at least", "min_length"), "too_long": ("at most", "max_length")}
-"""How errors about the number of items say it."""
-
-
-class _Probe(BaseModel):
-    """Any JSON object, read for the one key that tells a `grasps.json` from a contacts file."""
-
-    schema_version: Any = Field(None, alias="schema")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,10 +126,10 @@ def contact_sets_from_json(text: str, overrides: Overrides = Overrides()) -> tup
     Raises:
         InputError: The text is neither, or no friction is given; the message names the field.
     """
-    probe = _parsed(_Probe, text)
-    if "schema_version" in probe.model_fields_set:
+    found = value_of(text)
+    if isinstance(found, dict) and "schema" in found and "contacts" not in found:
         return _planned(text, overrides)
-    file = _parsed(_ContactsFile, text)
+    file = record_of(_ContactsFile, text, "contacts file", nulls=False)
     if (file.contacts is None) == (file.grasps is None):
         raise InputError('expected one key of "contacts" (one grasp) and "grasps" (several)')
     if file.contacts is not None:
@@ -258,32 +243,3 @@ def _frictions(
 def _first(*given: tuple[float | None, ScaleSource]) -> tuple[float, ScaleSource]:
     """The first value that there is, and its source."""
     return next((value, source) for value, source in given if value is not None)
-
-
-def _parsed(model: type[Model], text: str) -> Model:
-    try:
-        return model.model_validate_json(text)
-    except ValidationError as error:
-        raise InputError(_complaint(error)) from error
-
-
-def _complaint(error: ValidationError) -> str:
-    """Field, what was expected, and what came, of the first thing that is wrong."""
-    first = error.errors(include_url=False)[0]
-    place = first["loc"]
-    where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in place)
-    where = where.lstrip(".") or "the document"
-    if first["type"] == "extra_forbidden":
-        kind = LISTED[str(place[-3])] if len(place) > 1 else _ContactsFile
-        return f"{where}: unknown key; expected are {', '.join(kind.model_fields)}"
-    if first["type"] == "missing":
-        return f"{where}: missing"
-    if first["type"] in BOUNDS:
-        side, key = BOUNDS[first["type"]]
-        limits = first.get("ctx", {})
-        return (
-            f"{where}: expected {side} {limits.get(key)} items, got {limits.get('actual_length')}"
-        )
-    came: Any = first["input"]
-    short = isinstance(came, bool | int | float | str) and len(str(came)) <= LONGEST_ECHO
-    return f"{where}: {first['msg']}" + (f", got {json.dumps(came)}" if short else "")

@@ -12,7 +12,7 @@ FourTriples = tuple[Triple, Triple, Triple, Triple]
 
 
 class _Record(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
 class MeshRecord(_Record):

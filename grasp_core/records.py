@@ -155,16 +155,10 @@ def grasps_from_json(text: str) -> SavedGrasps:
         InputError: The text is not such a file; the message names the field.
         MeshError: Its mesh is not a solid.
     """
-    from pydantic import ValidationError
-
+    from grasp_core.complaints import record_of
     from grasp_core.grasps_schema import GraspsRecord
 
-    try:
-        record = GraspsRecord.model_validate_json(text)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "the document"
-        raise InputError(f"grasps file: {where}: {first['msg']}") from error
+    record = record_of(GraspsRecord, text, "grasps.json", schema=SCHEMA)
     mesh, patches = record.object.mesh, record.object.patches
     body = polyhedron_from_mesh(
         mesh.vertices_m,
@@ -177,10 +171,10 @@ def grasps_from_json(text: str) -> SavedGrasps:
         limits=RECORDED,
     )
     if body.content_sha256 != record.object.content_sha256:
-        raise InputError("grasps file: object.content_sha256 does not match its mesh")
+        raise InputError("object.content_sha256: is not that of its mesh; plan again")
     grasps = tuple(_grasp_from_record(body, grasp, record.friction) for grasp in record.grasps)
     if len({grasp.id for grasp in grasps}) < len(grasps):
-        raise InputError("grasps file: two grasps have the same id")
+        raise InputError("grasps: two have the same id; ids must differ")
     finger = None if record.finger is None else Finger(**record.finger.model_dump())
     return SavedGrasps(body, record.friction, record.seed, grasps, finger)
 

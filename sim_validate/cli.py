@@ -25,7 +25,7 @@ from grasp_core.checked import MOST_COUNT
 from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError, UnfaithfulError
 from sim_validate.baseline_flags import Baseline
 from sim_validate.bounds import at_least, check
-from sim_validate.config_file import with_config
+from sim_validate.config_file import NoFileNamedError, with_config
 from sim_validate.dataset_flags import Dataset
 from sim_validate.engines import available_cores
 from sim_validate.examples import examples_for
@@ -259,6 +259,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
+        flags = with_config(arguments)
+    except InputError as error:
+        usage = isinstance(error, NoFileNamedError)
+        return _complain(str(error), Exit.USAGE if usage else Exit.INPUT)
+    try:
         command: Command = tyro.cli(
             FlagCreatePairsOff[Command],  # type: ignore[valid-type]
             prog="graspproof",
@@ -266,7 +271,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 "Four-finger force-closure grasps, proved and simulated. Every command also takes "
                 "--config FILE.toml, whose keys are flags; flags given override it."
             ),
-            args=with_config(arguments),
+            args=flags,
         )
         check(command)
     except SystemExit as stop:

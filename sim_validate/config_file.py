@@ -1,36 +1,62 @@
 """Settings of a TOML file as flags on the command line."""
 
-import tomllib
 from pathlib import Path
 from typing import Any, cast
 
 from grasp_core.errors import InputError
+from grasp_core.json_text import place
 
 COMMAND_WORDS = {"dataset": 2, "baseline": 2}
 """Of how many words a command consists, where it is not one."""
+
+
+class NoFileNamedError(InputError):
+    """The flag stands alone."""
 
 
 def with_config(arguments: list[str]) -> list[str]:
     """Put the settings of `--config FILE.toml` before the flags, which then override them.
 
     Raises:
-        InputError: There is no such file, or it is not TOML.
+        NoFileNamedError: There is no file after the flag.
+        InputError: There is no such file, or it is not TOML, or holds tables.
     """
     words = [part for word in arguments for part in _split_config(word)]
     if "--config" not in words:
         return arguments
-    place = words.index("--config")
-    if place + 1 >= len(words):
-        raise InputError("--config needs the name of a TOML file")
-    path = Path(words[place + 1])
-    rest = words[:place] + words[place + 2 :]
-    try:
-        settings = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"--config {path}: {error}") from error
-    flags = [word for name, value in settings.items() for word in _as_flags(name, value)]
+    at = words.index("--config")
+    if at + 1 >= len(words):
+        raise NoFileNamedError("--config needs the name of a TOML file")
+    rest = words[:at] + words[at + 2 :]
+    flags = _read(Path(words[at + 1]))
     command = COMMAND_WORDS.get(rest[0], 1) if rest else 0
     return [*rest[:command], *flags, *rest[command:]]
+
+
+def flags_from(settings: dict[str, Any]) -> list[str]:
+    """Words of a command line that say the same as settings by name.
+
+    Raises:
+        InputError: One is a table.
+    """
+    for name, value in settings.items():
+        if any(isinstance(part, dict) for item in _items(value) for part in _items(item)):
+            raise InputError(f"{place([name])}: expected a value or a list, got a table")
+    return [word for name, value in settings.items() for word in _as_flags(name, value)]
+
+
+def _read(path: Path) -> list[str]:
+    """Words of a command line from a file of settings."""
+    from sim_validate.toml_text import read_tables  # only where there is such a file
+
+    try:
+        settings = read_tables(path)
+    except InputError as error:
+        raise InputError(f"--config {error}") from error
+    try:
+        return flags_from(settings)
+    except InputError as error:
+        raise InputError(f"--config {path}: {error}") from error
 
 
 def _split_config(word: str) -> list[str]:

@@ -1,7 +1,9 @@
 """Files in and out: whole or not at all."""
 
 import io
+import os
 import shutil
+import stat
 import tempfile
 import zipfile
 from collections.abc import Generator, Iterable, Mapping
@@ -16,22 +18,66 @@ from grasp_core.errors import InputError
 from scenes.whole_files import write_parts
 
 MAX_TEXT_BYTES = 256 * 2**20
+O_BINARY = getattr(os, "O_BINARY", 0)
+"""Where systems tell text from bytes."""
+MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
+"""Byte order marks, of UTF-8 and of UTF-16."""
 
 
-def read_text(path: Path) -> str:
+class NotTextError(InputError):
+    """Bytes are not UTF-8 text."""
+
+
+def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
+    """The bytes of a regular file: never of a pipe or a device, which may have no end.
+
+    Raises:
+        InputError: It cannot be read, is no regular file, or is larger than `most` bytes.
+    """
+    try:
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | O_BINARY)
+        with open(handle, "rb") as stream:  # noqa: PTH123 - a handle has no path
+            if not stat.S_ISREG(os.fstat(handle).st_mode):
+                raise InputError(f"{path}: is a pipe or a device; give a file")
+            data = stream.read(most + 1)
+    except IsADirectoryError as error:
+        raise InputError(f"{path}: is a folder; give a file in it") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+    except ValueError as error:  # a NUL in its name
+        raise InputError(f"{str(path)!r}: is no path of a file") from error
+    if len(data) > most:
+        raise InputError(f"{path}: larger than {most} bytes; give a smaller file")
+    return data
+
+
+def read_text(path: Path, most: int = MAX_TEXT_BYTES) -> str:
     """The text of a file.
 
     Raises:
         InputError: It cannot be read, is too large, or is not UTF-8.
     """
     try:
-        if path.stat().st_size > MAX_TEXT_BYTES:
-            raise InputError(f"{path}: larger than {MAX_TEXT_BYTES} bytes")
-        return path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+        return text_of(read_bytes(path, most))
+    except NotTextError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def text_of(data: bytes) -> str:
+    """The text that a file's bytes are; line breaks of any system are those of ours.
+
+    Raises:
+        NotTextError: They are not UTF-8.
+    """
+    if data.startswith(MARKS):
+        raise NotTextError("begins with a byte order mark; save it as UTF-8 without one")
+    try:
+        text = data.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not UTF-8 text ({error.reason})") from error
+        raise NotTextError(
+            f"not UTF-8 text ({error.reason} at byte {error.start}); save it as UTF-8"
+        ) from error
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def write_text(path: Path, text: str) -> Path:
@@ -60,23 +106,6 @@ def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
             with archive.open(member, "w") as stream:
                 np.lib.format.write_array(stream, array, allow_pickle=False)
     return write_parts(path, [held.getvalue()])
-
-
-def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
-    """Arrays of an npz file, those that are there; nothing in it is run.
-
-    Raises:
-        InputError: It cannot be read, is too large, or holds Python objects.
-    """
-    try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(member.file_size for member in archive.infolist())
-        if size > MAX_TEXT_BYTES:
-            raise InputError(f"{path}: larger than {MAX_TEXT_BYTES} bytes")
-        with np.load(path, allow_pickle=False) as arrays:
-            return {name: arrays[name] for name in names if name in arrays}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: cannot be read as npz ({error})") from error
 
 
 @contextmanager

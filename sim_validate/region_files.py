@@ -9,20 +9,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, frozen, frozen_indices, frozen_units
 from grasp_core.certified_regions import CertifiedRegions
 from grasp_core.checked import path_of
 from grasp_core.contact_hash import contacts_sha256
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, SolverError
 from grasp_core.face_pieces import inscribed_disc_radius_of
 from grasp_core.twist_covers import TwistCover
-from grasp_core.values import ContactRegion, Grasp, Polyhedron, four
+from grasp_core.values import FINGERS, ContactRegion, Grasp, Polyhedron, four
 from grasp_core.versions import versions
 from sim_validate.certifying import Asked, Found
 from sim_validate.files import write_arrays, write_text
+from sim_validate.npz import read_arrays
 
 SCHEMA = 3
 REGIONS, PROOFS = "regions.json", "proofs"
+POLYGONS = tuple(f"region{i}_m" for i in range(FINGERS))
+SHAPES: Mapping[str, tuple[int | None, ...]] = {
+    "axes": (6, 6), "codes": (None,), "forces": (None, FINGERS, 3), "normals": (FINGERS, 3),
+    "friction": (FINGERS,), "origin_m": (3,), "depths_m": (FINGERS,), "centers_m": (FINGERS, 3),
+    "open_choice_m": (None, 3), "scale_m": (), "disc_radius_m": (), "open_radius_m": (),
+    **dict.fromkeys(POLYGONS, (None, 3)),
+}  # fmt: skip
+"""Of the arrays of a proof."""
+FEWEST_CORNERS, MOST_CORNERS = 3, 1000
+SMALLEST_SCALE, LARGEST = 1e-6, 1e6
+"""Of proofs: of what lengths are relative to, and of any length [m]."""
 
 
 def write_regions(
@@ -140,30 +152,55 @@ def read_regions(path: str | Path) -> CertifiedRegions:
     """
     path = path_of(path, "path")
     try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as held:
-            kept = {name: held[name] for name in held.files}
-        polygons = [kept[f"region{i}_m"] for i in range(4)]
-        choice, scale = kept["open_choice_m"], float(kept["scale_m"])
-        return CertifiedRegions(
-            regions=four(
-                ContactRegion("certified", polygon, _inscribed(polygon, normal, scale))
-                for polygon, normal in zip(polygons, kept["normals"], strict=True)
-            ),
-            radius=float(kept["disc_radius_m"]),
-            centers=kept["centers_m"],
-            limit=float(kept["open_radius_m"]),
-            open_choice=choice if len(choice) else None,
-            friction=kept["friction"],
-            origin=kept["origin_m"],
-            normals=kept["normals"],
-            depths=kept["depths_m"],
-            cover=TwistCover(kept["axes"], kept["codes"], kept["forces"]),
-            scale=scale,
+        return regions_of(read_arrays(path, SHAPES))
+    except InputError as error:
+        raise InputError(f"{path}: not the proof of a grasp's regions: {error}") from error
+
+
+def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
+    """The same from arrays by name.
+
+    Raises:
+        InputError: One is missing, or of another shape.
+    """
+    if missing := [name for name in SHAPES if name not in kept]:
+        raise InputError(f"no array {missing[0]}; `graspproof regions` writes it")
+    limit = kept["open_radius_m"]  # infinite where nothing was found
+    finite = {**kept, "open_radius_m": np.nan_to_num(limit) if limit.dtype.kind == "f" else limit}
+    numbers = {name: frozen(finite[name], shape, name) for name, shape in SHAPES.items()}
+    scale = numbers["scale_m"].item()
+    if not SMALLEST_SCALE <= scale <= LARGEST:
+        raise InputError(f"scale_m: expected {SMALLEST_SCALE:g} to {LARGEST:g}, got {scale:g}")
+    normals = frozen_units(numbers["normals"], (FINGERS, 3), "normals")
+    choice = numbers["open_choice_m"]
+    return CertifiedRegions(
+        regions=four(
+            _region(name, numbers[name], normal, scale)
+            for name, normal in zip(POLYGONS, normals, strict=True)
+        ),
+        radius=numbers["disc_radius_m"].item(),
+        centers=numbers["centers_m"],
+        limit=limit.item(),
+        open_choice=choice if len(choice) else None,
+        friction=numbers["friction"],
+        origin=numbers["origin_m"],
+        normals=normals,
+        depths=numbers["depths_m"],
+        cover=TwistCover(numbers["axes"], frozen_indices(kept["codes"], (None,), "codes"),
+                         numbers["forces"]),
+        scale=scale,
+    )  # fmt: skip
+
+
+def _region(name: str, polygon: Array, normal: Array, scale: float) -> ContactRegion:
+    if not FEWEST_CORNERS <= len(polygon) <= MOST_CORNERS or np.abs(polygon).max() > LARGEST:
+        raise InputError(
+            f"{name}: expected {FEWEST_CORNERS} to {MOST_CORNERS} corners within {LARGEST:g} m"
         )
-    except InputError:
-        raise
-    except Exception as error:  # whatever a foreign file makes numpy raise
-        raise InputError(f"{path}: not the proof of a grasp's regions ({error})") from error
+    try:
+        return ContactRegion("certified", polygon, _inscribed(polygon, normal, scale))
+    except SolverError as error:
+        raise InputError(f"{name}: its corners are those of no convex polygon") from error
 
 
 def _inscribed(polygon: Array, normal: Array, scale: float) -> float:

@@ -1,6 +1,5 @@
 """A setup in TOML: tables `physics`, `fingers`, `hold`, `limit`, `friction`, any part of each."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -8,12 +7,14 @@ from typing import Any, cast
 
 from pydantic import TypeAdapter, ValidationError
 
+from grasp_core.complaints import complaint
 from grasp_core.errors import InputError
+from grasp_core.json_text import shown
 from scenes.fingertips import FingerSettings
 from scenes.physics import PhysicsSettings
-from sim_validate.files import read_text
 from sim_validate.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.setup import Setup
+from sim_validate.toml_text import read_tables
 
 OURS = ("drive", "indentation")
 """Fields of the fingers that trials set themselves."""
@@ -40,11 +41,7 @@ def setup_from_file(path: Path, setup: Setup) -> Setup:
     Raises:
         InputError: It is not such a file; the message names the field.
     """
-    try:
-        tables = tomllib.loads(read_text(path))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not TOML ({error})") from error
-    return setup_from_tables(tables, setup, str(path))
+    return setup_from_tables(read_tables(path), setup, str(path))
 
 
 def setup_from_tables(tables: Mapping[str, Any], setup: Setup, path: str) -> Setup:
@@ -60,7 +57,7 @@ def setup_from_tables(tables: Mapping[str, Any], setup: Setup, path: str) -> Set
     """
     for name, given in tables.items():
         if name not in OF_USERS or not isinstance(given, dict):
-            raise InputError(f"{path}: tables are {', '.join(OF_USERS)}; got {name!r}")
+            raise InputError(f"{path}: tables are {', '.join(OF_USERS)}; got {shown(name)}")
         table = cast("dict[str, Any]", given)
         setup = replace(setup, **{name: _filled(path, name, getattr(setup, name), table)})
     return setup
@@ -78,14 +75,16 @@ def _filled(path: str, table: str, values: Any, given: dict[str, Any]) -> Any:
     """A frozen value with some of its fields replaced, each checked against its type."""
     for name in given:
         if name not in OF_USERS[table]:
-            raise InputError(f"{path}: [{table}] has {', '.join(OF_USERS[table])}; got {name!r}")
+            raise InputError(
+                f"{path}: [{table}] has {', '.join(OF_USERS[table])}; got {shown(name)}"
+            )
     kind = cast("type[Any]", type(values))
     try:
         checked: Any = TypeAdapter(kind).validate_python({**_as_dict(values), **given})
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{path}: [{table}] {where}: {first['msg']}") from error
+        raise InputError(f"{path}: [{table}] {complaint(error, kind)}") from error
+    except InputError as error:  # of the value's own checks
+        raise InputError(f"{path}: [{table}] {error}") from error
     return checked
 
 

@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
+from grasp_core.complaints import record_of
 from grasp_core.errors import InputError
+from grasp_core.json_text import place
 from sim_validate.files import read_text
 from sim_validate.setup import NamedWrench
 
@@ -41,18 +43,28 @@ def wrenches_from_file(path: Path) -> tuple[NamedWrench, ...]:
     Raises:
         InputError: It is not such a file, or a wrench is refused.
     """
+    text = read_text(path)
     try:
-        given = _WrenchFile.model_validate_json(read_text(path)).wrenches
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{path}: {where}: {first['msg']}") from error
-    try:
-        return tuple(
-            NamedWrench(each.name, np.array([*each.force_n, *each.torque_n_m])) for each in given
-        )
+        return wrenches_from_json(text)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
+
+
+def wrenches_from_json(text: str) -> tuple[NamedWrench, ...]:
+    """The wrenches of the text of a file.
+
+    Raises:
+        InputError: It is not such a text, or a wrench is refused; the message names the field.
+    """
+    given = record_of(_WrenchFile, text, "wrench file", nulls=False).wrenches
+    return tuple(_named(each, i) for i, each in enumerate(given))
+
+
+def _named(given: _Given, number: int) -> NamedWrench:
+    try:
+        return NamedWrench(given.name, np.array([*given.force_n, *given.torque_n_m]))
+    except InputError as error:
+        raise InputError(f"{place(['wrenches', number])}: {error}") from error
 
 
 def weights(

@@ -2,12 +2,13 @@
 
 import json
 from dataclasses import asdict, fields
-from pathlib import Path
-from typing import Any, cast
+from pathlib import Path, PurePath
 
 from pydantic import TypeAdapter, ValidationError
 
+from grasp_core.complaints import complaint
 from grasp_core.errors import InputError
+from grasp_core.json_text import check_schema, object_of, shown
 from sim_validate.baselines.values import Baseline
 from sim_validate.files import read_text, write_text
 
@@ -39,21 +40,30 @@ def baseline_from_json(text: str, path: str) -> Baseline:
         InputError: It is no baseline of this version; the message names the field.
     """
     try:
-        found: object = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise InputError(f"{path}: not JSON ({error})") from error
-    if not isinstance(found, dict) or "grasps_file" not in found:
-        raise InputError(f"{path}: is no baseline, which `graspproof baseline record` writes")
-    record = cast("dict[str, Any]", found)
-    if record.pop("schema", None) != SCHEMA:
-        raise InputError(f"{path}: schema: expected {SCHEMA}")
+        return _from_text(text)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _from_text(text: str) -> Baseline:
+    record = object_of(text, "baseline")
+    if "grasps_file" not in record:
+        raise InputError("is no baseline, which `graspproof baseline record` writes")
+    check_schema(record, SCHEMA)
+    del record["schema"]
     record["entries"] = record.pop("grasps", None) or None  # a file with none checks nothing
     try:
-        return TypeAdapter(Baseline).validate_json(json.dumps(record))
+        found = TypeAdapter(Baseline).validate_json(json.dumps(record))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]).replace("entries", "grasps", 1)
-        raise InputError(f"{path}: {where}: {first['msg']}") from error
+        said = complaint(error, Baseline)
+        raise InputError("grasps" + said.removeprefix("entries")
+                         if said.startswith("entries") else said) from error  # fmt: skip
+    if PurePath(found.grasps_file).is_absolute() or not found.grasps_file.isprintable():
+        raise InputError(
+            "grasps_file: expected a path from this file's folder, got "
+            f"{shown(found.grasps_file)}; name the file with --grasps"
+        )
+    return found
 
 
 def read_baseline(path: Path) -> Baseline:

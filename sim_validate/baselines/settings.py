@@ -4,11 +4,14 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from grasp_core.checked import MOST_RANDOM_WRENCHES
+from grasp_core.complaints import complaint
 from grasp_core.errors import InputError
+from grasp_core.json_text import shown
 from grasp_core.records import SavedGrasps
 from scenes.mjcf import Surface
 from sim_validate.asked_fingers import finger_settings, planned_fingers
@@ -16,6 +19,8 @@ from sim_validate.flags import Fingers
 from sim_validate.noise.draws import Noise
 from sim_validate.setup import Agenda, LimitSearch, NamedWrench, Setup
 from sim_validate.setup_file import setup_from_file, setup_from_tables, tables_of
+
+Count = Annotated[int, Field(ge=0)]
 
 
 class _Settings(BaseModel):
@@ -25,12 +30,12 @@ class _Settings(BaseModel):
 
     setup: dict[str, Any]
     surface: Surface
-    random_wrenches: int
+    random_wrenches: Annotated[int, Field(ge=0, le=MOST_RANDOM_WRENCHES)]
     wrenches: dict[str, tuple[float, float, float, float, float, float]]
     limits: LimitSearch
-    trials: int
+    trials: Count
     noise: dict[str, float]
-    seed: int
+    seed: Count
 
 
 def settings_of(setup: Setup, agenda: Agenda) -> dict[str, Any]:
@@ -61,11 +66,9 @@ def of_settings(settings: Mapping[str, Any], path: str) -> tuple[Setup, Agenda]:
     try:
         given = _Settings.model_validate_json(json.dumps(settings))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{path}: settings.{where}: {first['msg']}") from error
+        raise InputError(f"{path}: {complaint(error, _Settings, ['settings'])}") from error
     try:
-        setup = setup_from_tables(given.setup, Setup(surface=given.surface), path)
+        setup = setup_from_tables(given.setup, Setup(surface=given.surface), "setup")
         agenda = Agenda(
             random_wrenches=given.random_wrenches,
             wrenches=tuple(NamedWrench(name, w) for name, w in given.wrenches.items()),  # pyright: ignore[reportArgumentType] - an array is made of it
@@ -88,9 +91,9 @@ def noise_from_table(given: Mapping[str, Any]) -> Noise:
     known = [each.name for each in fields(Noise)]
     for name, value in given.items():
         if name not in known:
-            raise InputError(f"noise has {', '.join(known)}; got {name!r}")
+            raise InputError(f"noise has {', '.join(known)}; got {shown(name)}")
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise InputError(f"noise.{name}: expected a number, got {value!r}")
+            raise InputError(f"noise.{name}: expected a number, got {shown(value)}")
     return Noise(**given)
 
 

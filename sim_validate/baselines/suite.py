@@ -1,6 +1,5 @@
 """A TOML file that says which grasps must stay as they were: grasps, baseline, settings."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -8,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError
+from grasp_core.json_text import place, shown
 from grasp_core.records import SavedGrasps
 from sim_validate.baselines.baseline_file import check_writable, read_baseline, write_baseline
 from sim_validate.baselines.checking import Checked, check_one, silent
@@ -19,10 +19,10 @@ from sim_validate.baselines.measuring import (
 )
 from sim_validate.baselines.settings import noise_from_table, of_settings, setup_for
 from sim_validate.baselines.values import Baseline
-from sim_validate.files import read_text
 from sim_validate.grasps_file import read_grasps
 from sim_validate.noise.draws import Noise
 from sim_validate.setup import Agenda, Setup
+from sim_validate.toml_text import read_tables
 from sim_validate.wrench_file import wrenches_from_file
 
 ENDING = ".grasps.toml"
@@ -31,6 +31,7 @@ KINDS: Mapping[str, type] = {
     "random_wrenches": int, "trials": int, "noise": dict, "seed": int,
 }  # fmt: skip
 """Settings of the file, and what they are."""
+WORDS = {str: "text", bool: "true or false", int: "a whole number", dict: "a table"}
 PATHS = ("grasps", "baseline", "setup", "wrenches")
 DIRECT = ("limits", "random_wrenches", "trials", "seed")
 """Fields of an agenda as the file has them."""
@@ -157,10 +158,15 @@ def suite_from_toml(path: Path) -> Suite:
     Raises:
         InputError: It is not such a file; the message names the setting.
     """
-    try:
-        given = tomllib.loads(read_text(path))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not TOML: {error}") from error
+    return suite_from_tables(read_tables(path), path)
+
+
+def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
+    """The same from what the file says.
+
+    Raises:
+        InputError: A setting is unknown, missing or refused.
+    """
     _check(given, path)
     usual = path.name.removesuffix(ENDING) + ".baseline.json"
     settings: dict[str, Any] = {"baseline": usual, **given}
@@ -179,8 +185,14 @@ def _check(given: Mapping[str, Any], path: Path) -> None:
     for name, value in given.items():
         kind = KINDS.get(name)
         if kind is None:
-            raise InputError(f"{path}: {name}: no such setting; there are {', '.join(KINDS)}")
+            raise InputError(
+                f"{path}: {place([name])}: no such setting; there are {', '.join(KINDS)}"
+            )
         if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-            raise InputError(f"{path}: {name}: expected {kind.__name__}, got {value!r}")
+            raise InputError(f"{path}: {name}: expected {WORDS[kind]}, got {shown(value)}")
+        if name in PATHS and not str(value).isprintable():
+            raise InputError(f"{path}: {name}: expected the path of a file, got {shown(value)}")
+        if kind is int and value < 0:
+            raise InputError(f"{path}: {name}: expected 0 or more, got {value}")
     if "grasps" not in given:
         raise InputError(f"{path}: grasps: expected the path of a grasps.json")

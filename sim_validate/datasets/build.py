@@ -23,6 +23,7 @@ from sim_validate.datasets.tasks import Limits
 from sim_validate.datasets.units import WorkUnit, units_of, units_sha256
 from sim_validate.files import read_text, write_text
 from sim_validate.gate import require_faithful
+from sim_validate.inside import path_inside
 from sim_validate.setup import Setup
 
 LOCK = ".lock"
@@ -148,7 +149,7 @@ def _as_built(folder: Path, units: Sequence[WorkUnit], made: int = 0) -> Built:
             "versions of packages; give another --out to make it again"
         )
     for each in manifest.files:
-        path = folder / each.path
+        path = path_inside(folder, each.path)
         if not path.is_file() or path.stat().st_size != each.bytes:
             raise InputError(
                 f"{path}: is missing or damaged, though the dataset was finished (see `dataset "

@@ -5,19 +5,20 @@ meshes and the versions, names what a dataset can hold.
 """
 
 import hashlib
-import tomllib
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from datetime import date
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, cast, get_args
 
-from grasp_core.checked import LARGEST_FRICTION
+from grasp_core.checked import LARGEST_FRICTION, MOST_RANDOM_WRENCHES
 from grasp_core.errors import InputError
+from grasp_core.json_text import place, shown
 from grasp_core.polyhedra import UNITS_M
 from grasp_core.requests import METHODS, ConeKind
 from grasp_core.values import FaceKind, Method
-from sim_validate.files import read_text
+from sim_validate.toml_text import read_tables
 
 LimitsKind: TypeAlias = Literal["none", "ramp", "bisection"]
 KINDS: dict[str, tuple[str, ...]] = {
@@ -29,7 +30,8 @@ KINDS: dict[str, tuple[str, ...]] = {
 """Settings that are one of some words."""
 LEAST = {"limit": 1, "random_wrenches": 0, "seed": 0}
 """Settings that are whole numbers, and from where on."""
-MOST_SEED = 2**63 - 1
+MOST = {"limit": 10**9, "random_wrenches": MOST_RANDOM_WRENCHES, "seed": 2**63 - 1}
+"""And up to where."""
 SWITCHES = ("scenes", "outward")
 """Settings that are true or false."""
 CREDITS = ("title", "license", "creator", "url", "published")
@@ -87,14 +89,18 @@ class DatasetConfig:
         object.__setattr__(self, "frictions", tuple(map(float, self.frictions)))
         for name in ("objects", "frictions", "families"):
             values: tuple[object, ...] = getattr(self, name)
-            if not values or len(set(values)) < len(values):
-                raise InputError(f"{name}: expected one or more, each once, got {list(values)}")
+            twice = [value for value, count in Counter(values).items() if count > 1]
+            if not values or twice:
+                got = f"{shown(twice[0])} twice" if twice else "none"
+                raise InputError(f"{name}: expected one or more, each once, got {got}")
         wrong = [friction for friction in self.frictions if not 0.0 < friction <= LARGEST_FRICTION]
         if wrong:
             most = f"{LARGEST_FRICTION:g}"
             raise InputError(f"frictions: expected numbers above 0, up to {most}, got {wrong[0]}")
         if unknown := [family for family in self.families if family not in METHODS]:
-            raise InputError(f"families: expected some of {', '.join(METHODS)}, got {unknown[0]}")
+            raise InputError(
+                f"families: expected some of {', '.join(METHODS)}, got {shown(unknown[0])}"
+            )
         if self.contacts and len(self.objects) > 1:
             raise InputError("objects: expected the one that the contacts are on")
         self._check_words_and_counts()
@@ -103,14 +109,15 @@ class DatasetConfig:
         for name, kinds in KINDS.items():
             if getattr(self, name) not in kinds:
                 raise InputError(
-                    f"{name}: expected one of {', '.join(kinds)}, got {getattr(self, name)!r}"
+                    f"{name}: expected one of {', '.join(kinds)}, got {shown(getattr(self, name))}"
                 )
         for name, least in LEAST.items():
-            if not least <= getattr(self, name) <= MOST_SEED:
-                raise InputError(f"{name}: expected {least} or more, got {getattr(self, name)}")
+            if not least <= getattr(self, name) <= MOST[name]:
+                span, got = f"{least} or more, up to {MOST[name]}", getattr(self, name)
+                raise InputError(f"{name}: expected {span}, got {got}")
         if self.published and not _is_date(self.published):
             raise InputError(
-                f"published: expected a day such as 2026-11-22, got {self.published!r}"
+                f"published: expected a day such as 2026-11-22, got {shown(self.published)}"
             )
 
     @property
@@ -125,10 +132,7 @@ def config_from_toml(path: Path) -> DatasetConfig:
     Raises:
         InputError: The file cannot be read, is not TOML, or a setting is unknown or refused.
     """
-    try:
-        given = tomllib.loads(read_text(path))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not TOML: {error}") from error
+    given = read_tables(path)
     try:
         return config_from_settings(given)
     except InputError as error:
@@ -143,7 +147,7 @@ def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
     """
     known = [each.name for each in fields(DatasetConfig)]
     if unknown := [name for name in given if name not in known]:
-        raise InputError(f"{unknown[0]}: no such setting; there are {', '.join(known)}")
+        raise InputError(f"{place(unknown[:1])}: no such setting; there are {', '.join(known)}")
     if "objects" not in given:
         raise InputError("objects: expected a list of mesh files or built-in objects")
     return DatasetConfig(**{name: _typed(name, value) for name, value in given.items()})
@@ -155,13 +159,13 @@ def _typed(name: str, value: Any) -> Any:
     wanted = kinds.get(name, str)
     if name not in LISTS:
         if not _is(value, wanted):
-            raise InputError(f"{name}: expected {WORDS[wanted]}, got {value!r}")
+            raise InputError(f"{name}: expected {WORDS[wanted]}, got {shown(value)}")
         return value
     if not isinstance(value, list):
-        raise InputError(f"{name}: expected a list of {WORDS[wanted]}, got {value!r}")
+        raise InputError(f"{name}: expected a list of {WORDS[wanted]}, got {shown(value)}")
     listed = cast("list[object]", value)
     if not all(_is(one, wanted) for one in listed):
-        raise InputError(f"{name}: expected a list of {WORDS[wanted]}, got {value!r}")
+        raise InputError(f"{name}: expected a list of {WORDS[wanted]}, got {shown(value)}")
     return tuple(float(cast("float", one)) if wanted is float else one for one in listed)
 
 

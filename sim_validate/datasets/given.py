@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from grasp_core.contact_sets import Overrides, contact_sets_from_json
 from grasp_core.errors import InputError
+from grasp_core.json_text import value_of
 from grasp_core.values import FINGERS
-from sim_validate.files import read_arrays, read_text
+from sim_validate.files import read_bytes, text_of
+from sim_validate.npz import arrays_of
 
 POINTS, NORMALS, NAMES = "contact_points_m", "contact_normals", "grasp_id"
 """Arrays of an npz file: (n, 4, 3) [m], (n, 4, 3), and perhaps names, (n,)."""
@@ -48,8 +50,9 @@ def read_given(path: Path, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
         InputError: The file cannot be read, or is not of this form; the message names the field.
     """
     try:
-        text = _text_of_npz(path) if path.suffix == ".npz" else read_text(path)
-        return _from_json(text, outward)
+        data = read_bytes(path)
+        text = contacts_text(data) if path.suffix == ".npz" else text_of(data)
+        return given_from_json(text, outward=outward)
     except InputError as error:
         raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
 
@@ -74,9 +77,14 @@ def given_sha256(given: Sequence[GivenGrasp]) -> str:
     return hashlib.sha256(json.dumps([astuple(grasp) for grasp in given]).encode()).hexdigest()
 
 
-def _from_json(text: str, outward: bool) -> tuple[GivenGrasp, ...]:
+def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
+    """Contacts to judge, from the text of a contacts file.
+
+    Raises:
+        InputError: It is none of four contacts each without friction; the message names the field.
+    """
     sets = contact_sets_from_json(text, Overrides(NO_FRICTION, outward=outward))
-    stated = json.loads(text)
+    stated = value_of(text)
     planned = "schema" in stated  # by us, and judged at any friction
     own = any((each.friction != NO_FRICTION).any() for each in sets)
     if not planned and ("friction" in stated or own):
@@ -90,14 +98,18 @@ def _from_json(text: str, outward: bool) -> tuple[GivenGrasp, ...]:
     )
 
 
-def _text_of_npz(path: Path) -> str:
-    """A contacts file with the arrays of an npz file."""
-    arrays = read_arrays(path, (POINTS, NORMALS, NAMES))
+def contacts_text(data: bytes) -> str:
+    """A contacts file with the arrays of the bytes of an npz file.
+
+    Raises:
+        InputError: They are none, or not of such arrays.
+    """
+    arrays = arrays_of(data, (POINTS, NORMALS, NAMES))
     for name in (POINTS, NORMALS):
         if name not in arrays:
             raise InputError(f"no array {name}; expected {POINTS} and {NORMALS}, (n, 4, 3) each")
         array = arrays[name]
-        if array.dtype.kind not in "fiu" or array.shape[1:] != (FINGERS, 3):
+        if array.dtype.kind not in "fiu" or not (array.ndim and array.shape[1:] == (FINGERS, 3)):
             raise InputError(
                 f"{name}: expected numbers, (n, 4, 3), got {array.dtype} {array.shape}"
             )

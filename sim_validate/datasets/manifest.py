@@ -6,34 +6,42 @@ made: the same configuration, meshes and versions give the same bytes.
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated
 
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
+
+from grasp_core.complaints import complaint
 from grasp_core.errors import InputError
+from grasp_core.json_text import object_of, place
 from sim_validate.datasets.columns import TABLES, Name
 from sim_validate.files import read_text, write_text
+from sim_validate.inside import require_inside
 
 SCHEMA = 1
 MANIFEST = "manifest.json"
+STRICT = ConfigDict(strict=True, extra="forbid")
+Count = Annotated[int, Field(ge=0)]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, config=STRICT)
 class Listed:
     """One file of a dataset."""
 
     path: str
     """In the dataset's folder."""
-    bytes: int
+    bytes: Count
     sha256: str
     table: Name | None = None
     """That it is a part of, if of any."""
     split: str | None = None
     """That its rows are of."""
-    rows: int | None = None
+    rows: Count | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, config=STRICT)
 class Manifest:
     """What a dataset consists of."""
 
@@ -42,11 +50,11 @@ class Manifest:
     """Of packages, of the interpreter, and the hash of our own code."""
     arithmetic: str
     """A hash of how the driver's processor rounds."""
-    units: int
+    units: Count
     """Objects at frictions that were asked for; given grasps in parts."""
     units_sha256: str
     """Of the names of all units, which depend on all that decides rows."""
-    quarantined: int
+    quarantined: Count
     """Of them, those that were left out."""
     files: tuple[Listed, ...]
     schema: int = SCHEMA
@@ -72,13 +80,17 @@ def listed(folder: Path, path: Path) -> Listed:
 
 def write_manifest(folder: Path, manifest: Manifest) -> Path:
     """Make a folder a dataset."""
+    return write_text(folder / MANIFEST, manifest_to_json(manifest))
+
+
+def manifest_to_json(manifest: Manifest) -> str:
+    """The text of a manifest: the same for the same files."""
     record = asdict(manifest)
     record["files"] = [
         {name: value for name, value in asdict(each).items() if value is not None}
         for each in sorted(manifest.files, key=lambda each: each.path)
     ]
-    text = json.dumps(record, indent=1, sort_keys=True) + "\n"
-    return write_text(folder / MANIFEST, text)
+    return json.dumps(record, indent=1, sort_keys=True) + "\n"
 
 
 def read_manifest(folder: Path) -> Manifest:
@@ -90,17 +102,26 @@ def read_manifest(folder: Path) -> Manifest:
     path = folder / MANIFEST
     if not path.is_file():
         raise InputError(f"{folder}: no dataset, or one that is not finished: no {MANIFEST}")
+    text = read_text(path)
     try:
-        found: object = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
-        raise InputError(f"{path}: not JSON ({error})") from error
-    if not isinstance(found, dict):
-        raise InputError(f"{path}: expected an object")
-    record = cast("dict[str, Any]", found)
-    if record.get("schema") != SCHEMA or not isinstance(record.get("files"), list):
-        raise InputError(f"{path}: expected schema {SCHEMA}, got {record.get('schema')!r}")
+        return manifest_from_json(text)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def manifest_from_json(text: str) -> Manifest:
+    """The manifest that a text is.
+
+    Raises:
+        InputError: It is not as this version writes them; the message names the field.
+    """
+    object_of(text, MANIFEST, schema=SCHEMA)
     try:
-        files = tuple(Listed(**each) for each in record["files"])
-        return Manifest(**cast("dict[str, Any]", {**record, "files": files}))
-    except TypeError as error:
-        raise InputError(f"{path}: not a manifest of schema {SCHEMA} ({error})") from error
+        found = TypeAdapter(Manifest).validate_json(text)
+    except ValidationError as error:
+        raise InputError(complaint(error, Manifest)) from error
+    for i, each in enumerate(found.files):
+        require_inside(each.path, place(["files", i, "path"]))
+    if len({each.path for each in found.files}) < len(found.files):
+        raise InputError("files: a path is there twice")
+    return found

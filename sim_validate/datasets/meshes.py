@@ -8,6 +8,7 @@ from grasp_core.errors import InputError
 from grasp_core.mesh_child import read_triangles
 from grasp_core.polyhedra import DEFAULT_LIMITS, content_hash, load_polyhedron
 from grasp_core.values import FaceKind, Polyhedron
+from sim_validate.inside import path_inside
 
 FOLDER = "meshes"
 
@@ -20,8 +21,12 @@ def mesh_text(body: Polyhedron) -> str:
 
 
 def mesh_path(folder: Path, object_id: str) -> Path:
-    """Where a dataset keeps the mesh of an object."""
-    return folder / FOLDER / f"{object_id}.obj"
+    """Where a dataset keeps the mesh of an object.
+
+    Raises:
+        InputError: The object has no name that a file may have.
+    """
+    return path_inside(folder, f"{FOLDER}/{object_id}.obj")
 
 
 def stored_surface(folder: Path, object_id: str) -> tuple[Array, Indices]:

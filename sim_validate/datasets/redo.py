@@ -6,7 +6,6 @@ have the same verdict and critical friction.
 """
 
 import hashlib
-import json
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence, Set
@@ -25,6 +24,7 @@ from sim_validate.datasets.given import read_given
 from sim_validate.datasets.making import made_of
 from sim_validate.datasets.manifest import Manifest
 from sim_validate.datasets.meshes import stored_body
+from sim_validate.datasets.quarantine import read_left_out
 from sim_validate.datasets.rows import id_beginning
 from sim_validate.datasets.selection import Selection
 from sim_validate.datasets.tables import as_read
@@ -134,10 +134,9 @@ class _Redoing:
 def _left_out(folder: Path) -> dict[tuple[str, float], set[str]]:
     """Units that have no rows, with the given grasps that are missing if they are some."""
     found: dict[tuple[str, float], set[str]] = {}
-    for line in read_text(folder / QUARANTINE).splitlines():
-        each = json.loads(line)
-        if not each["reason"].startswith(TWIN):
-            found.setdefault((each["source_sha256"], each["friction"]), set()).update(each["given"])
+    for each in read_left_out(folder / QUARANTINE):
+        if not each.reason.startswith(TWIN):
+            found.setdefault((each.source_sha256, each.friction), set()).update(each.given)
     return found
 
 

@@ -12,6 +12,7 @@ from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_tom
 from sim_validate.datasets.manifest import Listed, Manifest, read_manifest
 from sim_validate.datasets.rows import SPLITS
 from sim_validate.datasets.tables import each_row
+from sim_validate.inside import path_inside
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +25,7 @@ class Selection:
 
     def paths(self, name: Name) -> list[Path]:
         """The files of a table."""
-        return [self.folder / each.path for each in self._listed(name)]
+        return [path_inside(self.folder, each.path) for each in self._listed(name)]
 
     def counts(self) -> dict[Name, int]:
         """How many rows each table has."""
@@ -38,7 +39,7 @@ class Selection:
         """
         for each in self._listed(name):
             found = 0
-            for row in each_row(self.folder / each.path):
+            for row in each_row(path_inside(self.folder, each.path), name):
                 found += 1
                 yield row
             if found != each.rows:

@@ -12,18 +12,42 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Literal
 
+from pydantic import BaseModel, ConfigDict, Field
+
+from grasp_core.complaints import record_of
+from grasp_core.errors import InputError
 from sim_validate.datasets.columns import TABLES, Name
 from sim_validate.datasets.making import Made
 from sim_validate.datasets.tables import parquet_bytes
 from sim_validate.datasets.units import WorkUnit
+from sim_validate.files import read_bytes, read_text
+from sim_validate.inside import path_inside
 
 RECORD = "unit.json"
 OTHERS = "others"
 """Folder of what is no table."""
 UNFINISHED = "."
 """First letter of the names of temporary folders."""
+
+
+MOST_BYTES = 2**31
+"""Of one file of a unit."""
+
+
+class UnitRecord(BaseModel):
+    """What is noted of a unit: where its rows belong, or why it has none."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    object: str
+    friction: float
+    files: dict[str, str]
+    """Hashes, by path in the unit's folder."""
+    object_id: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = None
+    split: Literal["train", "validation", "test"] | None = None
+    reason: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,21 +88,28 @@ class Staging:
         self._put(unit, {}, {"reason": reason})
 
     def result(self, unit: WorkUnit) -> Finished | str:
-        """What a unit came to, or why it cannot be done."""
+        """What a unit came to, or why it cannot be done.
+
+        Raises:
+            InputError: Its record is damaged.
+        """
         record = self._record(unit)
-        if "reason" in record:
-            return str(record["reason"])
-        return Finished(unit, str(record["object_id"]), str(record["split"]))
+        if record.reason is not None:
+            return record.reason
+        if record.object_id is None or record.split is None:
+            raise InputError(f"{self._of(unit) / RECORD}: neither rows nor a reason; build again")
+        return Finished(unit, record.object_id, record.split)
 
     def done(self, unit: WorkUnit) -> bool:
         """Whether a unit is finished or quarantined, and all its files are as they were written."""
         try:
             record = self._record(unit)
+            self.result(unit)  # or it says nothing
             return all(
-                _sha256(self._of(unit).joinpath(name).read_bytes()) == sha256
-                for name, sha256 in record["files"].items()
+                _sha256(read_bytes(path_inside(self._of(unit), name), MOST_BYTES)) == sha256
+                for name, sha256 in record.files.items()
             )
-        except (OSError, ValueError, KeyError):
+        except (OSError, InputError):
             return False
 
     def finished(self, unit: WorkUnit) -> bool:
@@ -100,11 +131,13 @@ class Staging:
     def _of(self, unit: WorkUnit) -> Path:
         return self.folder / unit.id
 
-    def _record(self, unit: WorkUnit) -> dict[str, Any]:
-        found: object = json.loads((self._of(unit) / RECORD).read_text(encoding="utf-8"))
-        if not isinstance(found, dict):
-            raise ValueError(f"{unit.id}: its record is no object")
-        return cast("dict[str, Any]", found)
+    def _record(self, unit: WorkUnit) -> "UnitRecord":
+        path = self._of(unit) / RECORD
+        text = read_text(path)
+        try:
+            return record_of(UnitRecord, text, RECORD)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
 
     def _put(self, unit: WorkUnit, files: Mapping[str, bytes], more: Mapping[str, str]) -> None:
         record = {

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
+from grasp_core.json_text import shown
 from sim_validate.datasets.columns import KEYS, TABLES, Column, Name
 
 Columns: TypeAlias = dict[str, NDArray[Any]]
@@ -29,6 +30,8 @@ GROUP_ROWS = 20_000
 """Rows that are written at a time, some tens of megabytes in memory."""
 FILE_ROWS = 500_000
 """A file has at least so many rows before the next one is begun, about 100 MB of grasps."""
+MOST_ROWS, MOST_GROUP_BYTES = 10_000_000, 2**30
+"""What is read of one file, and at a time: twenty times what is written."""
 PAGES: Mapping[str, Any] = {
     "compression": "zstd",
     "write_page_checksum": True,
@@ -80,33 +83,37 @@ def as_read(name: Name, rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any
     return _parquet().ParquetFile(held).read().to_pylist()
 
 
-def read_rows(path: Path) -> list[dict[str, Any]]:
+def read_rows(path: Path, name: Name | None = None) -> list[dict[str, Any]]:
     """The rows of a file, all checksums checked.
 
     Raises:
         InputError: It is no file of a table, or damaged.
     """
-    return _read(path).to_pylist()
+    return _read(path, name).to_pylist()
 
 
-def each_row(path: Path) -> Iterator[dict[str, Any]]:
+def each_row(path: Path, name: Name | None = None) -> Iterator[dict[str, Any]]:
     """The rows of a file one by one, not all in memory; otherwise as `read_rows`.
+
+    Args:
+        path: Of the file.
+        name: Of its table; any if not given.
 
     Raises:
         InputError: It is no file of a table, or damaged.
     """
-    with _opened(path) as file:
+    with _opened(path, name) as file:
         for part in file.iter_batches(GROUP_ROWS):
             yield from part.to_pylist()
 
 
-def _read(path: Path) -> Any:
-    with _opened(path) as file:
+def _read(path: Path, name: Name | None = None) -> Any:
+    with _opened(path, name) as file:
         return file.read()
 
 
 @contextmanager
-def _opened(path: Path) -> Generator[Any]:
+def _opened(path: Path, name: Name | None = None) -> Generator[Any]:
     """A file of one of the tables, whose damage is an error of ours.
 
     Raises:
@@ -115,12 +122,34 @@ def _opened(path: Path) -> Generator[Any]:
     arrow, parquet = _pyarrow(), _parquet()
     try:
         with parquet.ParquetFile(path, page_checksum_verification=True) as file:
-            names = file.schema_arrow.names
-            if all(names != [column.name for column in table] for table in TABLES.values()):
-                raise InputError(f"{path}: has other columns than the tables of this version")
+            _check_columns(path, file.schema_arrow, list(TABLES) if name is None else [name])
+            _check_size(path, file.metadata)
             yield file
     except (OSError, arrow.ArrowException) as error:
-        raise InputError(f"{path}: cannot be read, or is damaged ({error})") from error
+        said = shown(" ".join(str(error).split()))
+        raise InputError(f"{path}: cannot be read, or is damaged ({said})") from error
+
+
+def _check_columns(path: Path, came: Any, names: Sequence[Name]) -> None:
+    known = [[column.name for column in TABLES[name]] for name in names]
+    if any(
+        came.names == columns and came.types == _schema(name).types
+        for name, columns in zip(names, known, strict=True)
+    ):
+        return
+    what = "columns of other types" if came.names in known else "other columns"
+    raise InputError(f"{path}: has {what} than {' or '.join(names)} of this version")
+
+
+def _check_size(path: Path, claimed: Any) -> None:
+    """Refuse what would not fit into memory, before anything is read."""
+    groups = [claimed.row_group(i) for i in range(claimed.num_row_groups)]
+    rows, largest = claimed.num_rows, max((each.total_byte_size for each in groups), default=0)
+    if not 0 <= rows <= MOST_ROWS or not 0 <= largest <= MOST_GROUP_BYTES:
+        raise InputError(
+            f"{path}: claims {rows} rows, and {largest} bytes in one group of them; the limits are "
+            f"{MOST_ROWS} and {MOST_GROUP_BYTES}"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,7 +271,7 @@ def read_columns(paths: Sequence[Path], name: Name) -> Columns:
     Raises:
         InputError: A file is damaged.
     """
-    rows = [row for path in paths for row in read_rows(path)]
+    rows = [row for path in paths for row in read_rows(path, name)]
     return {column.name: _as_array(column, rows) for column in TABLES[name]}
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.closure import force_closure
 from grasp_core.errors import GraspError, InputError, UndecidedError
+from grasp_core.json_text import shown
 from grasp_core.on_mesh import Surface
 from grasp_core.values import FINGERS
 from sim_validate.datasets.columns import KEYS, TABLES
@@ -16,12 +17,13 @@ from sim_validate.datasets.config import config_from_toml
 from sim_validate.datasets.finish import CONFIG, QUARANTINE
 from sim_validate.datasets.manifest import MANIFEST, Listed, Manifest, listed, read_manifest
 from sim_validate.datasets.meshes import stored_surface
+from sim_validate.datasets.quarantine import read_left_out
 from sim_validate.datasets.redo import Sample, sample_faults
 from sim_validate.datasets.rows import GIVEN, NOT_TRIED
 from sim_validate.datasets.selection import Selection
 from sim_validate.datasets.tables import require_pyarrow
 from sim_validate.datasets.walking import ObjectRows, by_object
-from sim_validate.files import read_text
+from sim_validate.inside import path_inside
 
 SAME_MARGIN = 1e-6
 """How far a closure margin may be from that of the contacts, relative to the friction."""
@@ -50,13 +52,16 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
     manifest = read_manifest(folder)
     if faults := list(_file_faults(folder, manifest.files)):
         return faults
-    faults = list(_manifest_faults(folder, manifest))
+    faults: list[str] = []
     try:
+        faults += _manifest_faults(folder, manifest)
         faults += _content_faults(folder, manifest)
         if sample is not None and not faults:
             faults += sample_faults(folder, manifest, sample)
     except InputError as error:
         faults.append(str(error))
+    except (TypeError, KeyError, ValueError) as error:  # of cells that are null and must not be
+        faults.append(f"data: a row is not such as are written ({shown(str(error))})")
     return faults
 
 
@@ -90,7 +95,11 @@ def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
         if each.path not in there:
             yield f"{each.path}: missing"
             continue
-        found = listed(folder, folder / each.path)
+        try:
+            found = listed(folder, path_inside(folder, each.path))
+        except InputError as error:
+            yield str(error)
+            continue
         if found.bytes != each.bytes:
             yield f"{each.path}: {found.bytes} bytes, listed are {each.bytes}"
         elif found.sha256 != each.sha256:
@@ -109,7 +118,7 @@ def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
     config = config_from_toml(folder / CONFIG)
     if config.sha256 != manifest.config_sha256:
         yield f"{CONFIG}: is not the configuration that the manifest names"
-    lines = len(read_text(folder / QUARANTINE).splitlines())
+    lines = len(read_left_out(folder / QUARANTINE))
     if lines != manifest.quarantined:
         yield f"{QUARANTINE}: {lines} lines, the manifest says {manifest.quarantined}"
 

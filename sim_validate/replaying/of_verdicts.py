@@ -5,8 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from grasp_core.complaints import record_of
 from grasp_core.errors import InputError
 from grasp_core.records import SavedGrasps
+from sim_validate.baselines.settings import noise_from_table
 from sim_validate.grasps_file import grasp_with_id, some
 from sim_validate.noise.draws import Noise
 from sim_validate.replaying.of_grasps import (
@@ -16,35 +18,37 @@ from sim_validate.replaying.of_grasps import (
     require_repeat,
 )
 from sim_validate.replaying.values import Recorded, Wanted
+from sim_validate.replaying.verdicts_schema import VerdictsToReplay
 from sim_validate.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, NamedWrench, Setup
 from sim_validate.setup_file import OF_USERS, setup_from_tables
 from sim_validate.verdict import Outcome
+from sim_validate.verdict_records import SCHEMA
 
 GRASPS = "grasps.json"
 
 
-def from_verdicts(path: Path, record: Mapping[str, Any], wanted: Wanted) -> Recorded:
+def from_verdicts(path: Path, text: str, wanted: Wanted) -> Recorded:
     """What verdicts say about a grasp, a control or a repeat.
 
     Args:
         path: Of the file, for messages; the grasps are beside it unless others are wanted.
-        record: What the file holds.
+        text: What the file holds.
         wanted: Which contact set.
 
     Raises:
         InputError: It is not what `validate` writes, or does not hold what is wanted.
     """
     try:
-        grasps = wanted.grasps or path.parent / GRASPS
-        content, friction = record["object"]["content_sha256"], record["friction"]
-        saved = grasps_behind(grasps, str(content), float(friction))
-        verdicts = {str(each["id"]): each for each in record["verdicts"]}
-        grasp = grasp_with_id(path, saved, wanted.grasp)
-        if grasp.id not in verdicts:
-            raise InputError(f"{path}: no verdict on {grasp.id}; there is {some(verdicts)}")
-        return of_verdict(path, saved, verdicts[grasp.id], replace(wanted, grasp=grasp.id))
-    except (KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{path}: is not what `graspproof validate` writes ({error!r})") from error
+        record = record_of(VerdictsToReplay, text, "verdicts.json", schema=SCHEMA).model_dump()
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    grasps = wanted.grasps or path.parent / GRASPS
+    saved = grasps_behind(grasps, record["object"]["content_sha256"], record["friction"])
+    verdicts = {each["id"]: each for each in record["verdicts"]}
+    grasp = grasp_with_id(path, saved, wanted.grasp)
+    if grasp.id not in verdicts:
+        raise InputError(f"{path}: no verdict on {grasp.id}; there is {some(verdicts)}")
+    return of_verdict(path, saved, verdicts[grasp.id], replace(wanted, grasp=grasp.id))
 
 
 def of_verdict(
@@ -60,7 +64,6 @@ def of_verdict(
 
     Raises:
         InputError: It is about other contacts, or does not hold what is wanted.
-        KeyError: It is not what `validate` writes.
     """
     grasp = grasp_with_id(path, saved, wanted.grasp)
     require_contacts(path, grasp, verdict["contacts_sha256"])
@@ -84,7 +87,7 @@ def _asked(path: Path, verdict: Mapping[str, Any]) -> tuple[Setup, Agenda]:
             for each in verdict["wrenches"]
             if each["name"] not in ours
         ),
-        noise=Noise() if repeats is None else Noise(**repeats["noise"]),
+        noise=Noise() if repeats is None else noise_from_table(repeats["noise"]),
         seed=settings["seed"],
     )
     return setup, agenda

@@ -4,12 +4,12 @@ It may be a grasps.json (nothing is recorded then), a verdicts.json, the folder 
 baseline, or a dataset.
 """
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
 from grasp_core.errors import InputError
+from grasp_core.json_text import value_of
 from sim_validate.baselines.baseline_file import read_baseline
 from sim_validate.baselines.settings import of_settings, setup_for
 from sim_validate.datasets.manifest import MANIFEST
@@ -50,12 +50,12 @@ def recorded_in(source: Path, wanted: Wanted) -> Recorded:
     path = source / VERDICTS if source.is_dir() else source
     text = read_text(path)
     try:
-        found: object = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise InputError(f"{path}: not JSON ({error})") from error
+        found = value_of(text)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
     record = cast("dict[str, Any]", found) if isinstance(found, dict) else {}
     if "verdicts" in record:
-        return from_verdicts(path, record, wanted)
+        return from_verdicts(path, text, wanted)
     if "grasps_file" in record:
         return _from_baseline(path, wanted)
     if "object" in record and "grasps" in record:

@@ -14,7 +14,7 @@ Count = Annotated[int, Field(ge=0)]
 class _Record(BaseModel):
     """Fields that are not spoken of are kept as they are."""
 
-    model_config = ConfigDict(frozen=True, extra="allow")
+    model_config = ConfigDict(frozen=True, extra="allow", strict=True)
 
 
 class _Object(_Record):
@@ -111,7 +111,8 @@ class _Region(_Record):
 
 
 class _Proof(_Record):
-    file: str
+    file: Annotated[str, Field(pattern=r"^proofs/[A-Za-z0-9][A-Za-z0-9_-]{0,99}\.npz$")]
+    """In the same folder."""
 
 
 class _GraspRegions(_Record):
@@ -126,7 +127,7 @@ class _GraspRegions(_Record):
 class RegionsFile(_Record):
     """What `regions` writes."""
 
-    schema_: Annotated[int, Field(alias="schema")]
+    schema_: Literal[3] = Field(alias="schema")
     object: _Object
     friction: Positive
     grasps: list[_GraspRegions]

@@ -4,18 +4,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
+from grasp_core.complaints import record_of
 from grasp_core.contact_hash import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.records import SavedGrasps
 from sim_validate.files import read_text
 from sim_validate.grasps_file import read_grasps
 from sim_validate.region_files import REGIONS
+from sim_validate.region_files import SCHEMA as REGIONS_SCHEMA
 from sim_validate.reports.files_schema import RegionsFile, VerdictsFile
 from sim_validate.reports.news import BAD, Record, said_of
+from sim_validate.verdict_records import SCHEMA as VERDICTS_SCHEMA
 
 GRASPS, VERDICTS = "grasps.json", "verdicts.json"
+SCHEMAS = {VERDICTS: VERDICTS_SCHEMA, REGIONS: REGIONS_SCHEMA}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,12 +121,12 @@ def _read(path: Path, kind: type[BaseModel], saved: SavedGrasps) -> Record | Non
     """What a file about the same object holds; None where there is no file."""
     if not path.is_file():
         return None
+    schema = SCHEMAS[path.name]
     try:
-        found = kind.model_validate_json(read_text(path)).model_dump()
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "the document"
-        raise InputError(f"{path}: {where}: {first['msg']}") from error
+        text = read_text(path)
+        found = record_of(kind, text, path.name, schema=schema).model_dump()
+    except InputError as error:
+        raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
     if found["object"]["content_sha256"] != saved.body.content_sha256:
         raise InputError(f"{path}: is about another object than {GRASPS} beside it")
     return found

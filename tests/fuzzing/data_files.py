@@ -1,26 +1,41 @@
-"""Readers of data files as targets, each with another reading of the same bytes."""
+"""Readers of JSON and TOML files as targets, each with another reading of the same bytes."""
 
 import json
+import tomllib
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import grasp_core as gc
+from grasp_core.complaints import record_of
 from grasp_core.contact_sets import Overrides, contact_sets_from_json
 from grasp_core.records import SavedGrasps, grasps_from_json, plan_to_json
 from scenes.objects import example_object
+from sim_validate.baselines.baseline_file import baseline_from_json, baseline_to_json
+from sim_validate.baselines.settings import of_settings
+from sim_validate.baselines.suite import suite_from_tables
+from sim_validate.config_file import flags_from
+from sim_validate.datasets.config import DatasetConfig, config_from_settings, config_to_toml
+from sim_validate.datasets.given import given_from_json
+from sim_validate.datasets.manifest import Listed, Manifest, manifest_from_json, manifest_to_json
+from sim_validate.datasets.quarantine import left_out_from
+from sim_validate.datasets.staging import UnitRecord
+from sim_validate.files import text_of
+from sim_validate.replaying.verdicts_schema import VerdictsToReplay
+from sim_validate.reports.files_schema import RegionsFile, VerdictsFile
+from sim_validate.setup import Setup
+from sim_validate.setup_file import setup_from_tables, tables_of
+from sim_validate.toml_text import tables_of_toml
+from sim_validate.wrench_file import wrenches_from_json
 from tests.fuzzing.targets import Target
 
-
-def text_of(data: bytes) -> str:
-    """What `read_text` makes of a file's bytes."""
-    try:
-        return data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise gc.InputError("not UTF-8 text") from error
+STABILITY = Path(__file__).parents[1] / "stability" / "box"
+HASH = "0" * 64
 
 
 @cache
-def _grasps() -> bytes:
+def grasps_seed() -> bytes:
+    """A small `grasps.json`."""
     body = example_object("tetrahedron")
     return plan_to_json(body, gc.plan(body, 0.5, limit=1)).encode()
 
@@ -30,25 +45,27 @@ def _same_grasps(data: bytes, found: SavedGrasps) -> None:
     assert stated["friction"] == found.friction
     assert stated["seed"] == found.seed
     assert stated["object"]["name"] == found.body.name
+    assert len(stated["object"]["mesh"]["triangles"]) == len(found.body.triangles)
     for one, other in zip(stated["grasps"], found.grasps, strict=True):
         assert one["id"] == other.id
         assert one["faces"] == list(other.faces)
         assert [each["position_m"] for each in one["contacts"]] == other.positions.tolist()
+        assert [each["normal"] for each in one["contacts"]] == other.normals.tolist()
+        assert one["critical_friction"] == other.critical_friction
+        assert one["witness"]["forces"] == other.witness.forces.tolist()
 
 
+THREE = [
+    {"position_m": [1.0, 0, 0], "normal": [-1.0, 0, 0]},
+    {"position_m": [-1.0, 0, 0], "normal": [1.0, 0, 0]},
+    {"position_m": [0, 1.0, 0], "normal": [0, -1.0, 0]},
+]
+FOUR = [*THREE, {"position_m": [0, -1.0, 0.5], "normal": [0, 1.0, 0]}]
 CONTACTS = {
-    "contacts": [
-        {"position_m": [1.0, 0, 0], "normal": [-1.0, 0, 0], "friction": 0.5},
-        {"position_m": [-1.0, 0, 0], "normal": [1.0, 0, 0]},
-        {"position_m": [0, 1.0, 0], "normal": [0, -1.0, 0]},
-    ],
+    "contacts": [THREE[0] | {"friction": 0.5}, *THREE[1:]],
     "friction": 0.4, "center_m": [0, 0, 0.1], "torque_scale_m": 1.0,
 }  # fmt: skip
-
-
-def _contacts_seeds() -> list[bytes]:
-    several = {"grasps": [{"id": "a", "contacts": CONTACTS["contacts"]}], "friction": 0.3}
-    return [json.dumps(each).encode() for each in (CONTACTS, several)]
+GIVEN = {"grasps": [{"id": "a", "contacts": FOUR}, {"contacts": FOUR}]}
 
 
 def _same_contacts(data: bytes, found: Any) -> None:
@@ -56,26 +73,253 @@ def _same_contacts(data: bytes, found: Any) -> None:
     if "schema" in stated:
         return
     listed = stated.get("grasps", [stated])
-    assert len(listed) == len(found)
+    common = stated.get("friction")
     for one, other in zip(listed, found, strict=True):
         assert [each["position_m"] for each in one["contacts"]] == other.positions.tolist()
-        common = stated.get("friction")
         assert [each.get("friction", common) for each in one["contacts"]] == other.friction.tolist()
+    assert stated.get("torque_scale_m", found[0].torque_scale) == found[0].torque_scale
+
+
+def _same_given(data: bytes, found: Any) -> None:
+    stated = json.loads(data)
+    for one, other in zip(stated.get("grasps", [stated]), found, strict=True):
+        assert [each["position_m"] for each in one["contacts"]] == [list(p) for p in other.points]
+
+
+def _trial(**more: Any) -> dict[str, Any]:
+    return {"name": "+force_x", "wrench": [1.0, 0, 0, 0, 0, 0], "outcome": "held"} | more
+
+
+VERDICTS = {
+    "schema": 1, "object": {"name": "box", "content_sha256": HASH}, "friction": 0.5,
+    "complete": True,
+    "gate": {"passed": True, "checks": [{"name": "a", "value": 1.0, "least": 0.9, "largest": 1.1}]},
+    "summary": {"grasps": 1, "grasps_held": 1, "controls": 1, "controls_let_go": 1,
+                "mismatches": 0},
+    "verdicts": [{
+        "id": "c-0-1-2-3", "contacts_sha256": HASH, "outcome": "held", "held": True,
+        "mismatches": [], "critical_friction": {"predicted": 0.3, "simulated": None},
+        "wrenches": [_trial(predicted_limit=2.0, simulated_limit=None, required_friction=0.2,
+                            displacement_m=1e-6)],
+        "controls": {"low_friction": {"held": False, "friction": 0.1, "wrenches": [_trial()]}},
+        "robustness": {"trials": 3, "held": 2, "pass_rate_interval": [0.1, 0.9],
+                       "noise": {"shift": 0.01},
+                       "not_held": [{"trial": 1, "wrench": "a", "outcome": "slipped"}]},
+        "settings": tables_of(Setup()) | {"surface": "pads", "random_wrenches": 0, "seed": 0,
+                                          "grasp_size_m": 0.1},
+        "versions": {"numpy": "2.2"},
+    }],
+}  # fmt: skip
+POLYGON = [[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]]
+REGIONS = {
+    "schema": 3, "object": {"name": "box", "content_sha256": HASH}, "friction": 0.5,
+    "edge_clearance_m": 0.0,
+    "grasps": [{"id": "c-0-1-2-3", "contacts_sha256": HASH, "disc_radius_m": 0.1,
+                "regions": [{"polygon_m": POLYGON, "inscribed_radius_m": 0.01}] * 4,
+                "proof": {"file": "proofs/c-0-1-2-3.npz", "sha256": HASH}},
+               {"id": "p-0-1-2-3", "contacts_sha256": HASH, "disc_radius_m": None,
+                "regions": None, "reason": "open"}],
+}  # fmt: skip
+
+
+def _same_record(data: bytes, found: Any) -> None:
+    """Every field that is spoken of is as it is written."""
+    _compare(json.loads(data), found.model_dump(by_alias=True, mode="json"))
+
+
+def _compare(stated: Any, found: Any) -> None:
+    if isinstance(found, dict):
+        assert isinstance(stated, dict)
+        for key, value in found.items():
+            if key in stated:
+                _compare(stated[key], value)
+            else:
+                assert value in (None, "")
+    elif isinstance(found, list):
+        assert isinstance(stated, list)
+        for one, other in zip(stated, found, strict=True):
+            _compare(one, other)
+    else:
+        assert (type(stated) is bool) == (type(found) is bool)
+        assert stated == found
+
+
+def _baseline_seed() -> list[bytes]:
+    stated = json.loads((STABILITY / "box.baseline.json").read_text())
+    stated["grasps"] = stated["grasps"][:2]
+    return [json.dumps(stated).encode()]
+
+
+def _baseline(data: bytes) -> Any:
+    found = baseline_from_json(text_of(data), "b.json")
+    return found, of_settings(found.settings, "b.json")
+
+
+def _same_baseline(data: bytes, found: Any) -> None:
+    again = json.loads(baseline_to_json(found[0]))
+    stated = json.loads(data)
+    assert again == stated
+    setup, agenda = found[1]
+    assert agenda.seed == stated["settings"]["seed"]
+    given = stated["settings"]["setup"].get("hold", {})
+    assert {name: getattr(setup.hold, name) for name in given} == given
+
+
+WRENCHES = {"wrenches": [{"name": "lift", "force_n": [0, 0, -3.5]},
+                         {"name": "turn", "force_n": [0, 1.5, 0],
+                          "torque_n_m": [0.1, 0, 0]}]}  # fmt: skip
+
+
+def _same_wrenches(data: bytes, found: Any) -> None:
+    for one, other in zip(json.loads(data)["wrenches"], found, strict=True):
+        wanted = [*one["force_n"], *one.get("torque_n_m", [0, 0, 0])]
+        largest = max(map(abs, wanted))
+        assert one["name"] == other.name
+        assert all(abs(a - b) <= 1e-8 * largest for a, b in zip(wanted, other.wrench, strict=True))
+
+
+MANIFEST = Manifest(
+    config_sha256=HASH, versions={"numpy": "2"}, arithmetic=HASH, units=3, units_sha256=HASH,
+    quarantined=1,
+    files=(Listed("config.toml", 5, HASH),
+           Listed("data/grasps/train-00000-of-00001.parquet", 9, HASH, "grasps", "train", 2)),
+)  # fmt: skip
+
+
+def _same_manifest(data: bytes, found: Manifest) -> None:
+    stated, again = json.loads(data), json.loads(manifest_to_json(found))
+    for each in stated["files"]:
+        for key in [key for key, value in each.items() if value is None]:
+            del each[key]
+    stated["files"].sort(key=lambda each: each["path"])
+    assert stated == again
+    assert not any(Path("/a/b", each.path).resolve() == Path("/a/b") for each in found.files)
+    assert all(Path("/a/b", e.path).resolve().is_relative_to("/a/b") for e in found.files)
+
+
+LEFT_OUT = {"object": "a.obj", "source_sha256": HASH, "friction": 0.5, "given": ["given-000001"],
+            "reason": "no solid"}  # fmt: skip
+UNIT = {"object": "a.obj", "friction": 0.5, "files": {"grasps.parquet": HASH}, "object_id": HASH,
+        "split": "train"}  # fmt: skip
+
+
+def _same_lines(data: bytes, found: Any) -> None:
+    for line, other in zip(data.decode().splitlines(), found, strict=True):
+        assert json.loads(line) == other.model_dump()
+
+
+def _setup(data: bytes) -> Any:
+    return setup_from_tables(tables_of_toml(text_of(data)), Setup(), "s.toml")
+
+
+def _same_setup(data: bytes, found: Setup) -> None:
+    for table, given in tomllib.loads(data.decode()).items():
+        for name, value in given.items():
+            came = getattr(getattr(found, table), name)
+            assert came == (tuple(value) if isinstance(value, list) else value)
+
+
+SETUP = b"""[physics]
+timestep = 0.001
+gravity = [0.0, 0.0, -9.81]
+cone = "elliptic"
+autoreset = true
+[fingers]
+radius_m = 0.004
+approach = [0, 0, 1.0]
+[hold]
+hold_s = 0.5
+[limit]
+spans = [0.01, 0.2]
+rounds = 3
+[friction]
+threshold = 1e-5
+"""
+SUITE = b"""grasps = "box.json"
+baseline = "sub/box.baseline.json"
+strict = true
+limits = "ramp"
+random_wrenches = 3
+trials = 2
+seed = 7
+[noise]
+shift = 0.02
+"""
+
+
+def _suite(data: bytes) -> Any:
+    return suite_from_tables(tables_of_toml(text_of(data)), Path("s.grasps.toml"))
+
+
+def _same_suite(data: bytes, found: Any) -> None:
+    for name, value in tomllib.loads(data.decode()).items():
+        came = getattr(found, name)
+        if name == "noise":
+            assert {key: getattr(came, key) for key in value} == value
+        else:
+            assert (str(came) if isinstance(came, Path) else came) == (
+                str(Path(value)) if isinstance(came, Path) else value
+            )
+
+
+def _same_config(data: bytes, found: DatasetConfig) -> None:
+    stated = tomllib.loads(data.decode())
+    for name, value in stated.items():
+        came = getattr(found, name)
+        assert (list(came) if isinstance(came, tuple) else came) == value
+    again = tomllib.loads(config_to_toml(found))
+    assert config_from_settings(again) == found
+
+
+FLAGS = b"""friction = 0.4
+families = ["pencil", "regulus"]
+json = true
+quiet = false
+weights = [[0, 0, 1.5], [1, 0, 0]]
+mesh_unit = "mm"
+"""
+
+
+def _same_flags(data: bytes, found: list[str]) -> None:
+    stated = tomllib.loads(data.decode())
+    on = [name for name, value in stated.items() if value is not False]
+    assert all("--" + name.replace("_", "-") in found for name in on if stated[name] != [])
+
+
+def _json(value: Any) -> bytes:
+    return json.dumps(value).encode()
 
 
 TARGETS = (
-    Target(
-        "grasps",
-        lambda data: grasps_from_json(text_of(data)),
-        lambda: [_grasps()],
-        _same_grasps,
-        "json",
-    ),
-    Target(
-        "contacts",
-        lambda data: contact_sets_from_json(text_of(data), Overrides()),
-        _contacts_seeds,
-        _same_contacts,
-        "json",
-    ),
-)
+    Target("grasps", lambda data: grasps_from_json(text_of(data)), lambda: [grasps_seed()],
+           _same_grasps, "json"),
+    Target("contacts", lambda data: contact_sets_from_json(text_of(data), Overrides()),
+           lambda: [_json(CONTACTS), _json(GIVEN | {"friction": 0.3})], _same_contacts, "json"),
+    Target("given", lambda data: given_from_json(text_of(data)), lambda: [_json(GIVEN)],
+           _same_given, "json"),
+    Target("verdicts",
+           lambda data: record_of(VerdictsFile, text_of(data), "verdicts.json", schema=1),
+           lambda: [_json(VERDICTS)], _same_record, "json"),
+    Target("replayed",
+           lambda data: record_of(VerdictsToReplay, text_of(data), "verdicts.json", schema=1),
+           lambda: [_json(VERDICTS)], _same_record, "json"),
+    Target("regions", lambda data: record_of(RegionsFile, text_of(data), "regions.json", schema=3),
+           lambda: [_json(REGIONS)], _same_record, "json"),
+    Target("baseline", _baseline, _baseline_seed, _same_baseline, "json"),
+    Target("wrenches", lambda data: wrenches_from_json(text_of(data)), lambda: [_json(WRENCHES)],
+           _same_wrenches, "json"),
+    Target("manifest", lambda data: manifest_from_json(text_of(data)),
+           lambda: [manifest_to_json(MANIFEST).encode()], _same_manifest, "json"),
+    Target("quarantine", lambda data: left_out_from(text_of(data)),
+           lambda: [_json(LEFT_OUT) + b"\n" + _json(LEFT_OUT) + b"\n"], _same_lines, "json"),
+    Target("staged", lambda data: record_of(UnitRecord, text_of(data), "unit.json"),
+           lambda: [_json(UNIT)], _same_record, "json"),
+    Target("setup", _setup, lambda: [SETUP], _same_setup, "toml"),
+    Target("suite", _suite, lambda: [SUITE], _same_suite, "toml"),
+    Target("dataset-config",
+           lambda data: config_from_settings(tables_of_toml(text_of(data))),
+           lambda: [config_to_toml(DatasetConfig(objects=("wedge",))).encode()], _same_config,
+           "toml"),
+    Target("flags", lambda data: flags_from(tables_of_toml(text_of(data))), lambda: [FLAGS],
+           _same_flags, "toml"),
+)  # fmt: skip

@@ -68,7 +68,7 @@ def _check_message(text: str) -> None:
 
 def targets() -> dict[str, Target]:
     """All readers, by name."""
-    from tests.fuzzing import data_files, mesh_files
+    from tests.fuzzing import array_files, data_files, mesh_files
 
-    listed = [*data_files.TARGETS, *mesh_files.TARGETS]
+    listed = [*data_files.TARGETS, *array_files.TARGETS, *mesh_files.TARGETS]
     return {target.name: target for target in listed}

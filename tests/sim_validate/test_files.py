@@ -24,9 +24,14 @@ def test_a_failed_write_leaves_the_old_file_and_no_rest(tmp_path):
 def test_unreadable_files_are_refused(tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
         read_text(tmp_path / "none")
-    (tmp_path / "binary").write_bytes(b"\xff\xfe\xff")
-    with pytest.raises(InputError, match="not UTF-8"):
-        read_text(tmp_path / "binary")
+    for data, words in (
+        (b"a\xff", "not UTF-8 text .* at byte 1"),
+        (b"\xff\xfea\0", "byte order mark"),
+        (b"\xef\xbb\xbf{}", "save it as UTF-8 without one"),
+    ):
+        (tmp_path / "binary").write_bytes(data)
+        with pytest.raises(InputError, match=words):
+            read_text(tmp_path / "binary")
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

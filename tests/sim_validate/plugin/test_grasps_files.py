@@ -109,7 +109,7 @@ def test_without_a_baseline_it_is_said_how_to_make_one(blessed, tmp_path):
     [
         ("", "grasps: expected the path"),
         ("grasp = 1", "no such setting"),
-        ('grasps = "g.json"\nstrict = 1', "strict: expected bool"),
+        ('grasps = "g.json"\nstrict = 1', "strict: expected true or false"),
         ('grasps = "nowhere.json"', "nowhere.json"),
         ("grasps = ", "not TOML"),
     ],

@@ -6,7 +6,7 @@ import pytest
 
 from sim_validate.cli import Exit, main
 
-BEHIND = '{"verdicts": [], "object": {"content_sha256": ""}, "friction": 1}'
+BEHIND = '{"schema": 1, "verdicts": [], "object": {"content_sha256": ""}, "friction": 1}'
 NOISE = ("--noise-shift", ".02", "--noise-turn-deg", "3", "--noise-friction", ".3")
 
 
@@ -153,10 +153,10 @@ def test_dataset_rows(tmp_path, replay, capsys):
         ("x.json", "", "not JSON"),
         ("x.json", "[]", "expected a baseline, verdicts or grasps"),
         ("x.json", "{}", "expected a baseline, verdicts or grasps"),
-        ("x.json", '{"verdicts": []}', "is not what `graspproof validate` writes"),
+        ("x.json", '{"verdicts": []}', "schema: missing; expected 1"),
         (
             "x.json",
-            '{"verdicts": [], "object": {"content_sha256": ""}, "friction": 1}',
+            '{"schema": 1, "verdicts": [], "object": {"content_sha256": ""}, "friction": 1}',
             "not there",
         ),
     ],

@@ -1,0 +1,218 @@
+"""The text of a JSON file -> one object of plain values that any of our readers may rely on.
+
+What JSON leaves open is refused: keys that are there twice, numbers that are none or too large,
+nesting without end, text that no encoding has. So is another kind of our own files, by its name.
+"""
+
+import json
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any, cast
+
+from grasp_core.errors import InputError
+
+DEEPEST = 64
+"""Objects and lists inside each other; ours are less than ten deep."""
+LARGEST_WHOLE = 2**64
+"""Larger whole numbers are no seeds, counts or indices, and may not be floats."""
+LONGEST_ECHO = 40
+"""Characters of a wrong value, or of a key, that a message repeats."""
+KINDS: Mapping[str, Collection[str]] = {
+    "baseline": {"grasps_file"},
+    "verdicts.json": {"verdicts"},
+    "regions.json": {"edge_clearance_m", "grasps"},
+    "manifest.json": {"units_sha256", "files"},
+    "grasps.json": {"object", "grasps"},
+    "wrench file": {"wrenches"},
+    "contacts file": {"contacts"},
+}
+"""Our JSON files, and the keys that tell each from those after it."""
+BESIDE = ("verdicts.json", "regions.json")
+"""Files that lie beside the grasps.json they are about."""
+
+
+def object_of(
+    text: str, wanted: str, *, schema: int | None = None, nulls: bool = True
+) -> dict[str, Any]:
+    """The object that a JSON text holds.
+
+    Args:
+        text: Of a file.
+        wanted: What it should be, one of `KINDS` or something else.
+        schema: The version that it must have; None for files that have none.
+        nulls: Whether a value may be null.
+
+    Raises:
+        InputError: It is no such object; the message names the field.
+    """
+    found = value_of(text, nulls=nulls)
+    if not isinstance(found, dict):
+        raise InputError(f"expected an object, as a {wanted} is, got {shown(found)}")
+    record = cast("dict[str, Any]", found)
+    check_kind(record, wanted)
+    if schema is not None:
+        check_schema(record, schema)
+    return record
+
+
+def value_of(text: str, *, nulls: bool = True) -> Any:
+    """The value that a JSON text holds.
+
+    Raises:
+        InputError: It is not JSON, or holds what a file of ours must not.
+    """
+    try:
+        found = json.loads(text, object_pairs_hook=_without_twins)
+    except RecursionError as error:
+        raise InputError(_too_deep()) from error
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        said = error.msg if error.msg.isprintable() else "unexpected text"
+        raise InputError(
+            f"not JSON, or not all of it ({said}: {where}); write the file again"
+        ) from error
+    except ValueError as error:  # Python reads no whole number of more than 4300 digits
+        raise InputError("a whole number has thousands of digits; shorten it") from error
+    check_values(found, nulls=nulls)
+    return found
+
+
+def check_values(document: object, *, nulls: bool = True) -> None:
+    """Refuse plain values that no file of ours holds, whatever its format.
+
+    Raises:
+        InputError: A number is not finite or too large, a text has no encoding, a value is null
+            that must not be, or nesting is too deep; the message names the field.
+    """
+    level: list[tuple[tuple[Any, ...], Any]] = [((), [document])]
+    for _ in range(DEEPEST + 1):
+        deeper: list[tuple[tuple[Any, ...], Any]] = []
+        for trail, holder in level:
+            for key, value in _items(holder):
+                if isinstance(value, dict | list):
+                    deeper.append(((trail, key), cast("Any", value)))
+                elif fault := _fault(value, nulls=nulls):
+                    raise InputError(f"{place(_parts((trail, key)))}: {fault}")
+        if not deeper:
+            return
+        level = deeper
+    raise InputError(_too_deep())
+
+
+def check_kind(found: Mapping[str, Any], wanted: str) -> None:
+    """Refuse another file of ours.
+
+    Raises:
+        InputError: It is one; the message says which.
+    """
+    if wanted in KINDS and set(KINDS[wanted]) <= found.keys():
+        return
+    for kind, keys in KINDS.items():
+        if kind != wanted and set(keys) <= found.keys():
+            beside = " beside it" if wanted == "grasps.json" and kind in BESIDE else ""
+            raise InputError(f"this is a {kind}; give the {wanted}{beside}")
+
+
+def check_schema(found: Mapping[str, Any], schema: int) -> None:
+    """Refuse another version than this package reads.
+
+    Raises:
+        InputError: The key `schema` is another number, or none.
+    """
+    came = found.get("schema")
+    if came is None:
+        raise InputError(f"schema: missing; expected {schema}")
+    if isinstance(came, bool) or not isinstance(came, int) or came < 1:
+        raise InputError(f"schema: expected {schema}, got {shown(came)}")
+    if came > schema:
+        raise InputError(
+            f"schema: expected {schema}, got {shown(came)}: written by a newer graspproof; "
+            "upgrade this one"
+        )
+    if came < schema:
+        raise InputError(
+            f"schema: expected {schema}, got {came}: written by an older graspproof; make it anew"
+        )
+
+
+def place(parts: Sequence[object]) -> str:
+    """Where a value is in a document, as messages say it: `grasps[0].contacts[2].normal`."""
+    said = "".join(
+        f"[{part}]" if isinstance(part, int) else f".{_key(str(part))}" for part in parts
+    )
+    return said.lstrip(".") or "the document"
+
+
+def shown(value: object) -> str:
+    """A value that came, as messages say it: short, and in letters that can be printed."""
+    if isinstance(value, dict):
+        return "an object"
+    if isinstance(value, list | tuple):
+        return "a list"
+    if isinstance(value, str):
+        return json.dumps(value) if len(value) <= LONGEST_ECHO else f"text of {len(value)} letters"
+    if value is None or isinstance(value, bool):
+        return json.dumps(value)
+    if isinstance(value, int) and abs(value) > LARGEST_WHOLE:
+        return f"a whole number of {value.bit_length()} bits"
+    return _cut(ascii(value))
+
+
+def _key(key: str) -> str:
+    return _cut(key if key.isidentifier() else ascii(key))
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LONGEST_ECHO else f"{text[:LONGEST_ECHO]}..."
+
+
+def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        keys = [key for key, _ in pairs]
+        twin = next(key for i, key in enumerate(keys) if key in keys[:i])
+        raise InputError(f"{_key(twin)}: the key is there twice in one object; leave one out")
+    return found
+
+
+def _items(holder: Any) -> Iterator[tuple[Any, Any]]:
+    if isinstance(holder, dict):
+        for key, value in cast("dict[str, Any]", holder).items():
+            if not key.isascii() and _has_no_encoding(key):
+                raise InputError(f"{_key(key)}: half of a letter (a lone surrogate) in a key")
+            yield key, value
+    else:
+        yield from enumerate(holder)
+
+
+def _fault(value: object, *, nulls: bool) -> str | None:
+    """What is wrong with a value that holds no others."""
+    if isinstance(value, float):
+        return None if math.isfinite(value) else f"expected a finite number, got {value}"
+    if isinstance(value, int):
+        return None if abs(value) <= LARGEST_WHOLE else f"{shown(value)} is too large"
+    if isinstance(value, str):
+        wrong = not value.isascii() and _has_no_encoding(value)
+        return "half of a letter (a lone surrogate) in the text" if wrong else None
+    return "null; give a value, or leave the key out" if value is None and not nulls else None
+
+
+def _has_no_encoding(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return True
+    return False
+
+
+def _parts(trail: tuple[Any, ...]) -> list[object]:
+    """The keys of a trail, but for the first, which is of the list that holds the document."""
+    parts: list[object] = []
+    while trail:
+        trail, key = trail
+        parts.append(key)
+    return parts[-2::-1]
+
+
+def _too_deep() -> str:
+    return f"objects and lists are more than {DEEPEST} deep inside each other"

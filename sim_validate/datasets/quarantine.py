@@ -1,0 +1,51 @@
+"""The lines of a dataset's `quarantine.jsonl`: which units have no rows, and why."""
+
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict
+
+from grasp_core.complaints import record_of
+from grasp_core.errors import InputError
+from sim_validate.files import read_text
+
+
+class LeftOut(BaseModel):
+    """A unit without rows."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    object: str
+    source_sha256: str
+    friction: float
+    given: list[str]
+    """Ids of the given grasps that are missing, if it is of some."""
+    reason: str
+
+
+def read_left_out(path: Path) -> list[LeftOut]:
+    """The units of a file.
+
+    Raises:
+        InputError: It cannot be read, or a line is not such a one; the message names line and key.
+    """
+    text = read_text(path)
+    try:
+        return left_out_from(text)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def left_out_from(text: str) -> list[LeftOut]:
+    """The units of a text.
+
+    Raises:
+        InputError: A line is not such a one.
+    """
+    return [_read(line, number) for number, line in enumerate(text.split("\n")[:-1], start=1)]
+
+
+def _read(line: str, number: int) -> LeftOut:
+    try:
+        return record_of(LeftOut, line, "line of quarantine.jsonl")
+    except InputError as error:
+        raise InputError(f"line {number}: {error}") from error

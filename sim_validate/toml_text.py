@@ -1,0 +1,49 @@
+"""The text of a TOML file -> its tables, checked as the values of JSON files are."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from grasp_core.errors import InputError
+from grasp_core.json_text import check_values
+from sim_validate.files import read_text
+
+MOST_LETTERS = 2**20
+"""Settings are short, and dotted keys take time that grows with the square of their length."""
+DEEPEST_KEY = 1000
+"""Letters of a line before its value."""
+
+
+def read_tables(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file.
+
+    Raises:
+        InputError: It cannot be read, or is not TOML; the message names the file and the line.
+    """
+    text = read_text(path, MOST_LETTERS)
+    try:
+        return tables_of_toml(text)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def tables_of_toml(text: str) -> dict[str, Any]:
+    """The tables of a TOML text.
+
+    Raises:
+        InputError: It is not TOML, or holds what no setting is.
+    """
+    try:
+        found = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"not TOML: {_printable(str(error))}") from error
+    except RecursionError as error:
+        raise InputError("not TOML that is read here: values are too deep inside others") from error
+    except ValueError as error:  # numbers of thousands of digits, days that there are not
+        raise InputError(f"not TOML: {_printable(str(error))}") from error
+    check_values(found)
+    return found
+
+
+def _printable(text: str) -> str:
+    return "".join(letter if letter.isprintable() else " " for letter in text[:200])
