@@ -1,9 +1,7 @@
 """Files in and out: whole or not at all."""
 
 import io
-import os
 import shutil
-import stat
 import tempfile
 import zipfile
 from collections.abc import Generator, Iterable, Mapping
@@ -15,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
+from grasp_core.regular_files import bounded_bytes
 from scenes.whole_files import write_parts
 
 MAX_TEXT_BYTES = 256 * 2**20
-O_BINARY = getattr(os, "O_BINARY", 0)
-"""Where systems tell text from bytes."""
 MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
 """Byte order marks, of UTF-8 and of UTF-16."""
 
@@ -35,17 +32,9 @@ def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
         InputError: It cannot be read, is no regular file, or is larger than `most` bytes.
     """
     try:
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | O_BINARY)
-        with open(handle, "rb") as stream:  # noqa: PTH123 - a handle has no path
-            if not stat.S_ISREG(os.fstat(handle).st_mode):
-                raise InputError(f"{path}: is a pipe or a device; give a file")
-            data = stream.read(most + 1)
-    except IsADirectoryError as error:
-        raise InputError(f"{path}: is a folder; give a file in it") from error
+        data = bounded_bytes(path, most)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:  # a NUL in its name
-        raise InputError(f"{str(path)!r}: is no path of a file") from error
+        raise InputError(f"{path}: cannot be read ({error.strerror}); give a file") from error
     if len(data) > most:
         raise InputError(f"{path}: larger than {most} bytes; give a smaller file")
     return data

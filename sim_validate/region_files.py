@@ -166,7 +166,12 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
     if missing := [name for name in SHAPES if name not in kept]:
         raise InputError(f"no array {missing[0]}; `graspproof regions` writes it")
     limit = kept["open_radius_m"]  # infinite where nothing was found
-    finite = {**kept, "open_radius_m": np.nan_to_num(limit) if limit.dtype.kind == "f" else limit}
+    finite = {
+        **kept,
+        "open_radius_m": np.where(np.isposinf(limit), 0.0, limit)
+        if limit.dtype.kind == "f"
+        else limit,
+    }
     numbers = {name: frozen(finite[name], shape, name) for name, shape in SHAPES.items()}
     scale = numbers["scale_m"].item()
     if not SMALLEST_SCALE <= scale <= LARGEST:
