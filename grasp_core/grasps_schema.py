@@ -4,6 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from grasp_core.checked import LARGEST_FRICTION, MOST_SEED, SMALLEST
 from grasp_core.values import Family, RegionKind
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -115,9 +116,9 @@ class GraspsRecord(_Record):
 
     schema_version: Literal[1] = Field(alias="schema")
     object: ObjectRecord
-    friction: Finite
+    friction: Annotated[Finite, Field(ge=SMALLEST, le=LARGEST_FRICTION)]
     theta_deg: Finite
-    seed: int
+    seed: Annotated[int, Field(ge=0, le=MOST_SEED)]
     finger: FingerRecord | None = None
     """None if any fingers would do."""
     versions: dict[str, str]

@@ -172,11 +172,21 @@ def grasps_from_json(text: str) -> SavedGrasps:
     )
     if body.content_sha256 != record.object.content_sha256:
         raise InputError("object.content_sha256: is not that of its mesh; plan again")
-    grasps = tuple(_grasp_from_record(body, grasp, record.friction) for grasp in record.grasps)
+    grasps = tuple(
+        _grasp_at(number, body, grasp, record.friction)
+        for number, grasp in enumerate(record.grasps)
+    )
     if len({grasp.id for grasp in grasps}) < len(grasps):
         raise InputError("grasps: two have the same id; ids must differ")
     finger = None if record.finger is None else Finger(**record.finger.model_dump())
     return SavedGrasps(body, record.friction, record.seed, grasps, finger)
+
+
+def _grasp_at(number: int, body: Polyhedron, record: "GraspRecord", friction: float) -> Grasp:
+    try:
+        return _grasp_from_record(body, record, friction)
+    except InputError as error:
+        raise InputError(f"grasps[{number}]: {error}") from error
 
 
 def _grasp_from_record(body: Polyhedron, record: "GraspRecord", friction: float) -> Grasp:

@@ -12,7 +12,9 @@ def bounded_bytes(path: Path, most: int) -> bytes:
         OSError: It cannot be read, or is a folder, a pipe or a device.
     """
     try:
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        handle = os.open(
+            path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+        )
     except ValueError as error:
         raise OSError(None, f"no name of a file ({error})", str(path)) from error
     try:

@@ -9,6 +9,10 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 from grasp_core.errors import InputError
 
 
+class FlagsError(InputError):
+    """Flags contradict each other."""
+
+
 @dataclass(frozen=True, slots=True)
 class Bound:
     """What a value must be; to be put into a type: `Annotated[int, at_least(1)]`."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import tyro
 from tyro.conf import (
@@ -24,7 +24,7 @@ from tyro.conf import (
 from grasp_core.checked import MOST_COUNT
 from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError, UnfaithfulError
 from sim_validate.baseline_flags import Baseline
-from sim_validate.bounds import at_least, check
+from sim_validate.bounds import FlagsError, at_least, check
 from sim_validate.config_file import NoFileNamedError, with_config
 from sim_validate.dataset_flags import Dataset
 from sim_validate.engines import available_cores
@@ -248,6 +248,10 @@ Command = (
 )
 
 
+COMMANDS = {kind.__name__.lower(): kind for kind in get_args(Command)}
+"""Classes of flags, by the names of commands."""
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command.
 
@@ -259,7 +263,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
-        flags = with_config(arguments)
+        flags = with_config(arguments, COMMANDS)
     except InputError as error:
         usage = isinstance(error, NoFileNamedError)
         return _complain(str(error), Exit.USAGE if usage else Exit.INPUT)
@@ -306,6 +310,8 @@ def reason_of(error: GraspError | OSError) -> str:
 
 
 def _code(error: GraspError | OSError) -> Exit:
+    if isinstance(error, FlagsError):
+        return Exit.USAGE
     ours = (SolverError, UndecidedError, UnfaithfulError)
     return Exit.INTERNAL if isinstance(error, ours) else Exit.INPUT
 

@@ -1,7 +1,9 @@
 """Settings of a TOML file as flags on the command line."""
 
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, cast, get_args, get_type_hints
 
 from grasp_core.errors import InputError
 from grasp_core.json_text import place
@@ -14,12 +16,16 @@ class NoFileNamedError(InputError):
     """The flag stands alone."""
 
 
-def with_config(arguments: list[str]) -> list[str]:
+def with_config(arguments: list[str], commands: Mapping[str, type]) -> list[str]:
     """Put the settings of `--config FILE.toml` before the flags, which then override them.
+
+    Args:
+        arguments: Words of a command line.
+        commands: Classes of flags, by the names of commands.
 
     Raises:
         NoFileNamedError: There is no file after the flag.
-        InputError: There is no such file, or it is not TOML, or holds tables.
+        InputError: There is no such file, or it is not TOML, or names no flags.
     """
     words = [part for word in arguments for part in _split_config(word)]
     if "--config" not in words:
@@ -28,7 +34,7 @@ def with_config(arguments: list[str]) -> list[str]:
     if at + 1 >= len(words):
         raise NoFileNamedError("--config needs the name of a TOML file")
     rest = words[:at] + words[at + 2 :]
-    flags = _read(Path(words[at + 1]))
+    flags = _read(Path(words[at + 1]), flag_names(commands.get(rest[0])) if rest else set())
     command = COMMAND_WORDS.get(rest[0], 1) if rest else 0
     return [*rest[:command], *flags, *rest[command:]]
 
@@ -45,7 +51,15 @@ def flags_from(settings: dict[str, Any]) -> list[str]:
     return [word for name, value in settings.items() for word in _as_flags(name, value)]
 
 
-def _read(path: Path) -> list[str]:
+def flag_names(kind: Any) -> set[str]:
+    """What a command's flags are called in files: all fields of its class and of those inside."""
+    if not is_dataclass(kind):
+        return set[str]().union(*(flag_names(part) for part in get_args(kind)))
+    names = {field.name for field in fields(kind)}
+    return names.union(*(flag_names(inner) for inner in get_type_hints(kind).values()))
+
+
+def _read(path: Path, known: set[str]) -> list[str]:
     """Words of a command line from a file of settings."""
     from sim_validate.toml_text import read_tables  # only where there is such a file
 
@@ -54,6 +68,9 @@ def _read(path: Path) -> list[str]:
     except InputError as error:
         raise InputError(f"--config {error}") from error
     try:
+        for name in settings:
+            if name.replace("-", "_") not in known:
+                raise InputError(f"{place([name])}: there is no such flag; keys are long flags")
         return flags_from(settings)
     except InputError as error:
         raise InputError(f"--config {path}: {error}") from error

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from grasp_core.errors import InputError
 from grasp_core.reach import Finger
 from grasp_core.records import SavedGrasps
 from grasp_core.values import Grasp
 from sim_validate import cli, flags
 from sim_validate.asked_fingers import finger_settings, planned_fingers
+from sim_validate.bounds import FlagsError
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.files import write_arrays, write_text
 from sim_validate.gate import require_faithful
@@ -61,7 +61,7 @@ def noise_of(given: flags.Repeats) -> Noise:
     """
     plain = flags.Repeats()
     if not given.trials and given != plain:
-        raise InputError("--noise-... is for repeats: give --trials, too")
+        raise FlagsError("--noise-... is for repeats: give --trials, too")
     return Noise(
         shift=given.noise_shift,
         turn_deg=given.noise_turn_deg,
@@ -93,9 +93,9 @@ def _setup(testing: flags.Testing) -> Setup:
 def _agenda(testing: flags.Testing, seed: int, folder: Path | None) -> Agenda:
     """Which trials the flags ask for."""
     if testing.down and testing.weight_n is None:
-        raise InputError("--down is a direction of the weight: give --weight-n too")
+        raise FlagsError("--down is a direction of the weight: give --weight-n too")
     if testing.traces and folder is None:
-        raise InputError("--traces are written to files: give --out DIR too")
+        raise FlagsError("--traces are written to files: give --out DIR too")
     own = () if testing.wrenches is None else wrenches_from_file(testing.wrenches)
     weight = () if testing.weight_n is None else weights(testing.weight_n, testing.down)
     return Agenda(

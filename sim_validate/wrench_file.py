@@ -57,6 +57,12 @@ def wrenches_from_json(text: str) -> tuple[NamedWrench, ...]:
         InputError: It is not such a text, or a wrench is refused; the message names the field.
     """
     given = record_of(_WrenchFile, text, "wrench file", nulls=False).wrenches
+    names = set[str]()
+    for number, each in enumerate(given):
+        if each.name in names:
+            where = place(["wrenches", number, "name"])
+            raise InputError(f"{where}: another wrench has the name {each.name!r}; rename one")
+        names.add(each.name)
     return tuple(_named(each, i) for i, each in enumerate(given))
 
 

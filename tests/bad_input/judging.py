@@ -25,7 +25,7 @@ def complaints(case: Case, tried: Tried) -> list[str]:
             "no message": not said,
             "more than a screen": len(tried.err.splitlines()) > LINES or len(tried.err) > LETTERS,
             "results beside a refusal": bool(tried.out) and case.code != USAGE,
-            "no name of the program": case.code != USAGE and not said.startswith("graspproof: "),
+            "no name of the program": case.code != USAGE and "graspproof: " not in said,
         }
     missing = [word for word in case.says if word.lower() not in said.lower()]
     return [name for name, holds in wrong.items() if holds] + [

@@ -10,6 +10,7 @@ import numpy as np
 from tests.bad_input.cases import Case, file_case
 
 GROUP = "archives"
+POSITIONS_NPY, NORMALS_NPY = "contact_points_m.npy", "contact_normals.npy"
 IMPORT = "dataset import FILE tetrahedron --friction 0.5 --out made"
 POSITIONS, NORMALS = np.zeros((1, 4, 3)), np.ones((1, 4, 3)) / np.sqrt(3.0)
 
@@ -39,17 +40,17 @@ def header(shape: str, kind: str = "<f8") -> bytes:
 
 def arrays(**more: np.ndarray) -> bytes:
     """An npz of contacts, with some arrays otherwise."""
-    held = {"positions": POSITIONS, "normals": NORMALS} | more
+    held = {"contact_points_m": POSITIONS, "contact_normals": NORMALS} | more
     return zipped(*((f"{name}.npy", npy(array)) for name, array in held.items()))
 
 
 BOMB = zipped(
-    ("positions.npy", header("(100000000,)") + bytes(800_000_000)), ("normals.npy", npy(NORMALS))
+    (POSITIONS_NPY, header("(100000000,)") + bytes(800_000_000)), (NORMALS_NPY, npy(NORMALS))
 )
 ENTITIES = '<?xml version="1.0"?><!DOCTYPE l [<!ENTITY a "ha"><!ENTITY b "&a;&a;">]><l>&b;</l>'
 OUTSIDE = '<?xml version="1.0"?><!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><r>&x;</r>'
 MESHES = {
-    "a zip bomb called 3mf": ("part.3mf", zipped(("3D/3dmodel.model", bytes(50_000_000))), "ending"),
+    "a bomb called 3mf": ("part.3mf", zipped(("3dmodel.model", bytes(50_000_000))), "ending"),
     "a zip bomb called obj": ("part.obj", zipped(("part.obj", bytes(50_000_000))), "zip|unpack"),
     "a zip in a zip": ("part.ply", zipped(("a.zip", zipped(("b", b"c")))), "zip|unpack"),
     "a name that climbs": ("part.obj", zipped(("../../part.obj", b"v")), "zip|unpack"),
@@ -66,25 +67,26 @@ MESHES = {
 NPZS = {
     "no archive": (b"PK nothing", "npz"),
     "cut": (arrays()[:-30], "npz"),
-    "an array of 800 MB in 800 kB": (BOMB, "larger"),
+    "an array of 800 MB in 800 kB": (BOMB, "over the limit"),
     "a claim of 10^12 numbers": (
-        zipped(("positions.npy", header("(1000000000000,)")), ("normals.npy", npy(NORMALS))), "positions"),
+        zipped((POSITIONS_NPY, header("(1000000000000,)")), (NORMALS_NPY, npy(NORMALS))),
+        "contact_points_m"),
     "a claim that overflows": (
-        zipped(("positions.npy", header(f"({2**62}, 4, 3)")), ("normals.npy", npy(NORMALS))),
-        "positions"),
-    "objects": (arrays(positions=np.array([print], dtype=object)), "npz|positions"),
+        zipped((POSITIONS_NPY, header(f"({2**62}, 4, 3)")), (NORMALS_NPY, npy(NORMALS))),
+        "contact_points_m"),
+    "objects": (arrays(contact_points_m=np.array([print], dtype=object)), "contact_points_m"),
     "a claim of objects": (
-        zipped(("positions.npy", header("(1,)", "|O") + b"cos\nsystem\n(S'id'\ntR."),
-               ("normals.npy", npy(NORMALS))), "positions"),
-    "a name that climbs": (zipped(("../positions.npy", npy(POSITIONS))), "positions"),
-    "no array of numbers": (zipped(("positions.npy", b"text"), ("normals.npy", b"")), "positions"),
-    "words": (arrays(positions=np.full((1, 4, 3), "a")), "positions"),
-    "nan": (arrays(positions=np.full((1, 4, 3), np.nan)), "positions|finite"),
-    "two numbers a point": (arrays(positions=np.zeros((1, 4, 2))), "positions"),
-    "other counts": (arrays(normals=np.ones((2, 4, 3))), "normals"),
-    "normals of no length": (arrays(normals=np.zeros((1, 4, 3))), "normal"),
-    "no normals": (zipped(("positions.npy", npy(POSITIONS))), "normals"),
-    "complex numbers": (arrays(positions=np.ones((1, 4, 3)) * 1j), "positions"),
+        zipped((POSITIONS_NPY, header("(1,)", "|O") + b"cos\nsystem\n(S'id'\ntR."),
+               (NORMALS_NPY, npy(NORMALS))), "contact_points_m"),
+    "a climbing name": (zipped(("../" + POSITIONS_NPY, npy(POSITIONS))), "contact_points_m"),
+    "no array of numbers": (zipped((POSITIONS_NPY, b"text"), (NORMALS_NPY, b"")), "npz"),
+    "words": (arrays(contact_points_m=np.full((1, 4, 3), "a")), "contact_points_m"),
+    "nan": (arrays(contact_points_m=np.full((1, 4, 3), np.nan)), "contact_points_m|finite"),
+    "two numbers a point": (arrays(contact_points_m=np.zeros((1, 4, 2))), "contact_points_m"),
+    "other counts": (arrays(contact_normals=np.ones((2, 4, 3))), "one length"),
+    "normals of no length": (arrays(contact_normals=np.zeros((1, 4, 3))), "contacts"),
+    "no normals": (zipped((POSITIONS_NPY, npy(POSITIONS))), "contact_normals"),
+    "complex numbers": (arrays(contact_points_m=np.ones((1, 4, 3)) * 1j), "contact_points_m"),
 }  # fmt: skip
 
 

@@ -41,29 +41,31 @@ TOML_TEXTS = {
     "a date": ("friction = 1979-05-27\n", "friction"),
     "a control code": ("friction = '\\u001b[2J'\n", "friction"),
 }
+VALUES_OF_FLAGS = {"friction"}
+"""What is wrong with a flag is refused as if it stood on the command line."""
+GRASPS, BASELINE = good("grasps.json"), good("a.baseline.json")
 SPOILT = {
     "grasps.json": {
-        "of the future": with_value(good("grasps.json"), "schema", 99) + "|newer",
-        "of schema 0": with_value(good("grasps.json"), "schema", 0) + "|schema",
-        "with nan": with_value(good("grasps.json"), "friction", "raw:NaN") + "|friction",
-        "with 1e999": with_value(good("grasps.json"), "friction", "raw:1e999") + "|friction",
-        "without friction": without(good("grasps.json"), "friction") + "|friction",
-        "without a mesh": without(good("grasps.json"), "object.mesh") + "|mesh",
-        "with more": with_value(good("grasps.json"), "colour", 1) + "|colour",
-        "with an id of a path": with_value(good("grasps.json"), "grasps.0.id", "../../x") + "|id",
-        "with an id of codes": with_value(good("grasps.json"), "grasps.0.id", "\x1b[2J") + "|id",
-        "with an id of nothing": with_value(good("grasps.json"), "grasps.0.id", "") + "|id",
-        "with an id of 10^5 letters": with_value(good("grasps.json"), "grasps.0.id", "x" * 10**5) + "|id",
-        "with null contacts": with_value(good("grasps.json"), "grasps.0.contacts", None) + "|contacts",
+        "of the future": with_value(GRASPS, "schema", 99) + "|newer",
+        "of schema 0": with_value(GRASPS, "schema", 0) + "|schema",
+        "with nan": with_value(GRASPS, "friction", "raw:NaN") + "|friction",
+        "with 1e999": with_value(GRASPS, "friction", "raw:1e999") + "|friction",
+        "without friction": without(GRASPS, "friction") + "|friction",
+        "without a mesh": without(GRASPS, "object.mesh") + "|mesh",
+        "with more": with_value(GRASPS, "colour", 1) + "|colour",
+        "with an id of a path": with_value(GRASPS, "grasps.0.id", "../../x") + "|id",
+        "with an id of codes": with_value(GRASPS, "grasps.0.id", "\x1b[2J") + "|id",
+        "with an id of nothing": with_value(GRASPS, "grasps.0.id", "") + "|id",
+        "with a long id": with_value(GRASPS, "grasps.0.id", "x" * 10**5) + "|id",
+        "with null contacts": with_value(GRASPS, "grasps.0.contacts", None) + "|contacts",
         "with a grasp twice": json.dumps(
-            (lambda d: {**d, "grasps": d["grasps"] * 2})(json.loads(good("grasps.json")))
+            (lambda d: {**d, "grasps": d["grasps"] * 2})(json.loads(GRASPS))
         ) + "|same id",
     },
     "a.baseline.json": {
-        "of the future": with_value(good("a.baseline.json"), "schema", 99) + "|newer",
-        "with no grasps": without(good("a.baseline.json"), "grasps") + "|grasps",
-        "with a path that climbs": with_value(good("a.baseline.json"), "grasps_file", "../../etc/passwd")
-        + "|",
+        "of the future": with_value(BASELINE, "schema", 99) + "|newer",
+        "with no grasps": without(BASELINE, "grasps") + "|grasps",
+        "with a path that climbs": with_value(BASELINE, "grasps", "../../etc/passwd") + "|grasps",
     },
     "contacts.json": {
         "null": '{"contacts": null}|contacts',
@@ -90,17 +92,11 @@ SPOILT = {
 
 def _text(said: str, file: str) -> str | bytes:
     """What a name stands for, of a file."""
-    whole = (
-        "a.baseline.json"
-        if "baseline" in file
-        else "verdicts.json"
-        if "verd" in file
-        else "grasps.json"
-    )
+    whole = file if file in {"a.baseline.json", "verdicts.json"} else "grasps.json"
     if said == "CUT":
         return good(whole)[:-50]
     if said == "OTHER":
-        return good("grasps.json" if whole != "grasps.json" else "verdicts.json")
+        return good("regions.json")
     if said == "TWICE":
         return '{"schema": 1, ' + good(whole).decode().lstrip()[1:]
     return said
@@ -112,40 +108,32 @@ def _make(file: str, command: str, text: str | bytes, folder: Path) -> list[str]
     if "{grasps}" in words:
         (folder / "good.json").write_bytes(good("grasps.json"))
         words[words.index("{grasps}")] = "good.json"
-    return [
-        file if word == "FILE" else word
-        for word in (words if "FILE" in words else [*words, "FILE"])
-    ]
+    words = words if "FILE" in words else [*words, "FILE"]
+    return [file if word == "FILE" else word for word in words]
+
+
+def _of_text(file: str, command: str, name: str, text: str | bytes, says: str) -> Case:
+    words = () if says in VALUES_OF_FLAGS and file == "flags.toml" else (file,)
+    code = 4 if words else 2
+    make = partial(_make, file, command, text)
+    return Case(GROUP, f"{file}: {name}", make, code, (*words, *filter(None, [says])))
 
 
 def cases() -> list[Case]:
     """All of the group."""
     found = [
-        Case(
-            GROUP,
-            f"{file}: {name}",
-            partial(_make, file, command, _text(text, file)),
-            4,
-            (file, *filter(None, [says])),
-        )
+        _of_text(file, command, name, _text(text, file), says)
         for file, command in READERS.items()
         for name, (text, says) in TEXTS.items()
     ]
     found += [
-        Case(
-            GROUP,
-            f"{file}: {name}",
-            partial(_make, file, command, text),
-            2 if file == "flags.toml" else 4,
-            tuple(filter(None, [says])) if file == "flags.toml" else (file, *filter(None, [says])),
-        )
+        _of_text(file, command, name, text, says)
         for file, command in TOMLS.items()
         for name, (text, says) in TOML_TEXTS.items()
     ]
     for file, table in SPOILT.items():
         for name, both in table.items():
             text, _, says = both.rpartition("|")
-            found.append(
-                file_case(GROUP, f"{file} {name}", file, text, says, command=READERS[file])
-            )
+            name = f"{file} {name}"
+            found.append(file_case(GROUP, name, file, text, says, command=READERS[file]))
     return found
