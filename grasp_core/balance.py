@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.wrenches import contact_frames, grasp_map, in_frames
@@ -19,6 +20,8 @@ RESIDUAL = 1e-6
 """Largest imbalance and cone violation accepted, in units of the largest normal force: a
 hundred times the accuracy asked of ProxQP."""
 
+CLEARLY = 1.01
+"""By how much a wrench is beyond all forces, so that rounding and `RESIDUAL` do not matter."""
 NO_FORCE = 1e-100
 """Stands in where a contact without force would lead to a division by zero."""
 
@@ -83,6 +86,19 @@ class Balance:
             self, scales=self.scales[[i]], W=W, F0=-W @ self.inverse.T,
             least=self.least[[i]], largest=self.largest[[i]],
         )  # fmt: skip
+
+    def beyond(self, friction: Array) -> NDArray[np.bool_]:
+        """Which wrenches are larger than all forces within limits and cones together, (n,).
+
+        No arm is longer than one, so this bounds forces and torques alike. What is far beyond
+        would keep solvers busy for seconds.
+
+        Args:
+            friction: Of each contact, (k,).
+        """
+        sizes = np.linalg.norm(self.W.reshape(-1, 2, 3), axis=2).max(axis=1)
+        most = CLEARLY * np.sqrt(1.0 + friction**2).sum()
+        return sizes > most * self.largest
 
     def pyramids(self, friction: Array) -> Array:
         """Rows R with R @ f <= 0 inside pyramids inscribed in the friction cones, (16 k, 3 k).

@@ -158,10 +158,10 @@ def _least_norm(balance: Balance, friction: Array) -> Array:
     rows = balance.pyramids(friction)
     Z = least_distance(*balance.polyhedra(rows))
     F = balance.checked(balance.F0 + Z @ balance.null.T)
-    P = np.eye(F.shape[1])
+    P, hopeless = np.eye(F.shape[1]), balance.beyond(friction)
     for i in np.flatnonzero(np.isnan(F[:, 0])):
         one = balance.one(int(i))
-        f = _solve(P, 0.0 * P[0], rows, one, balanced=True)
+        f = None if hopeless[i] else _solve(P, 0.0 * P[0], rows, one, balanced=True)
         if f is not None:
             F[i] = one.checked(f[None])[0]
         if np.isnan(F[i, 0]):
@@ -174,8 +174,9 @@ def _least_friction_each(balance: Balance, friction: Array) -> Array:
     largest = float(friction.max())
     weights = friction / largest if largest > 0.0 else np.ones(len(friction))
     F = np.full(balance.F0.shape, np.nan)
+    hopeless = balance.beyond(friction)
     for i in range(len(F)):
-        f = _least_friction(balance.one(i), largest, weights)
+        f = None if hopeless[i] else _least_friction(balance.one(i), largest, weights)
         if f is None:
             break
         F[i] = f

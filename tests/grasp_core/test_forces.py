@@ -429,3 +429,16 @@ def test_loads_far_below_the_limit_are_balanced_all_the_same():
         gc.contact_forces(pair, -pair, 0.5, [0, 0, 0, 9e-6, 0, 0], normal_force=(0.0, 10.0))
     with pytest.raises(gc.NoForcesError):
         gc.contact_forces(TETRA_CENTERS, TETRA_NORMALS, 0.0, [0, 0, 0, 9e-6, 0, 0])
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("objective", ["least_norm", "least_friction"])
+@pytest.mark.parametrize("part", [0, 5])
+def test_loads_far_beyond_the_limits_are_refused_without_a_search(objective, part):
+    """A solver was busy for seven seconds with each of these."""
+    loads = np.zeros((20, 6))
+    loads[:, part] = 1.0
+    with pytest.raises(gc.NoForcesError, match="wrench 0, counting from 0"):
+        gc.contact_forces(
+            TETRA_CENTERS, TETRA_NORMALS, 0.5, loads, normal_force=(0.0, 1e-9), objective=objective
+        )

@@ -81,7 +81,7 @@ def test_closure_of_a_tetrahedron_is_answered_at_any_size(size, friction):
     assert gc.classify_lines(size * TETRA_CENTERS, TETRA_NORMALS) == "concurrent"
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(wrench=arrays(np.float64, 6, elements=ANY), center=arrays(np.float64, 3, elements=ANY),
        most=ANY)  # fmt: skip
 def test_any_wrench_center_and_limit_is_answered_or_refused(wrench, center, most):
