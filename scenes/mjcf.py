@@ -26,6 +26,7 @@ from grasp_core.values import Contact, Grasp, Polyhedron
 from scenes.fingertips import FingerSettings
 from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
 from scenes.physics import PhysicsSettings
+from scenes.whole_files import write_parts
 
 Surface = Literal["pads", "mesh"]
 """What fingertips touch: a pad each, or the convex hull of the object's mesh."""
@@ -84,9 +85,7 @@ def _is_convex(body: Polyhedron) -> bool:
 
 def write_scene(scene: Scene, path: str | Path) -> Path:
     """Write the scene's text to a file and return its path."""
-    path = Path(path)
-    path.write_text(scene.xml, encoding="utf-8")
-    return path
+    return write_parts(Path(path), [scene.xml.encode()])
 
 
 def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads") -> str:

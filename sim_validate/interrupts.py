@@ -1,7 +1,7 @@
 """Interrupts that are not lost: what a library swallows is raised again at the next step.
 
 Python raises `KeyboardInterrupt` wherever the program is. Some compiled libraries clear errors that
-are not theirs there, and the program would run on.
+are not theirs there, and the program would run on. A request to end (SIGTERM) is such an interrupt.
 """
 
 import signal
@@ -9,6 +9,8 @@ import threading
 from collections.abc import Generator
 from contextlib import contextmanager
 from types import FrameType
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 _noted = threading.Event()
 
@@ -20,11 +22,12 @@ def noted() -> Generator[None, None, None]:
         yield  # Python handles signals in its main thread only
         return
     _noted.clear()
-    before = signal.signal(signal.SIGINT, _note)
+    before = {number: signal.signal(number, _note) for number in SIGNALS}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _note(_: int, __: FrameType | None) -> None:
