@@ -15,7 +15,11 @@ from sim_validate.improving import show_gains
 from sim_validate.old_results import REPORT, remove_results, require_report_folder
 from sim_validate.own_folder import alone_in
 from sim_validate.plan_command import (
-    asked_finger, object_to_plan, plan_object, say_counts, with_regions,
+    asked_finger,
+    object_to_plan,
+    plan_object,
+    say_counts,
+    with_regions,
 )  # fmt: skip
 from sim_validate.report_command import shown_report
 from sim_validate.showing_flags import Report

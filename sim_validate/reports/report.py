@@ -8,7 +8,14 @@ from scenes.canvas import write_figure
 from sim_validate.engines import available_cores, each
 from sim_validate.files import write_text
 from sim_validate.old_results import (
-    FIDELITY, GRASPS, INDEX, MARK, REPORT, STATIC, remove_pages, remove_report,
+    FIDELITY,
+    GRASPS,
+    INDEX,
+    MARK,
+    REPORT,
+    STATIC,
+    remove_pages,
+    remove_report,
     require_report_folder,
 )  # fmt: skip
 from sim_validate.reports.drawn_grasps import Drawn, draw, tasks_of

@@ -1,0 +1,72 @@
+"""A command, again and again, in processes that are struck at one step on files after another.
+
+    python -m tests.faults.everywhere kill|full|broken FOLDER WORD...
+
+`OUT` among the words is a folder of its own each time: `FOLDER/whole` undisturbed, `FOLDER/0` and
+so on struck, with what was there then in `FOLDER/0.struck`, before the same command ran once more.
+Exit codes and messages are printed as JSON.
+"""
+
+import errno
+import json
+import os
+import shutil
+import signal
+import sys
+from pathlib import Path
+
+from sim_validate.cli import main
+
+NUMBERS = {"full": errno.ENOSPC, "broken": errno.EIO}
+STEPS = {"os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.chmod", "os.truncate"}
+WRITING = os.O_WRONLY | os.O_RDWR
+
+
+def strike_at(step, kind, folder):
+    """End this process, or fail, at a step on files below a folder; removals do not fail."""
+    counted = iter(range(10**6))
+
+    def strike(event, details):
+        opens = event == "open" and isinstance(details[2], int) and details[2] & WRITING
+        if not (opens or event in STEPS) or not str(details[0]).startswith(str(folder)):
+            return
+        if kind != "kill" and event in {"os.remove", "os.rmdir"}:
+            return
+        if next(counted) == step:
+            if kind == "kill":
+                os.kill(os.getpid(), signal.SIGKILL)
+            raise OSError(NUMBERS[kind], os.strerror(NUMBERS[kind]))
+
+    sys.addaudithook(strike)
+    sync = os.fsync
+    os.fsync = lambda handle: (strike("os.truncate", [folder]), sync(handle))[1]
+
+
+def forked(words, said, prepare):
+    """Exit code of a command in a process of its own, negative where a signal ended it."""
+    if (child := os.fork()) == 0:
+        os.dup2(os.open(said, os.O_WRONLY | os.O_CREAT), 2)
+        prepare()
+        os._exit(main(words))
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def strikes(kind, folder, words):
+    assert main([word.replace("OUT", str(folder / "whole")) for word in words]) == 0
+    for step in range(1000):
+        out, said = folder / str(step), folder / f"{step}.txt"
+        own = [word.replace("OUT", str(out)) for word in words]
+        if (given := folder / "given").is_dir():
+            shutil.copytree(given, out)
+        code = forked(own, said, lambda: strike_at(step, kind, out))  # noqa: B023 - called at once
+        if out.is_dir():
+            shutil.copytree(out, folder / f"{step}.struck")
+        yield code, said.read_text()
+        if code == 0 and not said.read_text():
+            return
+        again = forked(own, folder / "again.txt", lambda: None)
+        assert again == 0, (step, (folder / "again.txt").read_text())
+
+
+if __name__ == "__main__":
+    print(json.dumps(list(strikes(sys.argv[1], Path(sys.argv[2]), sys.argv[3:]))))
