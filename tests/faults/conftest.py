@@ -28,8 +28,16 @@ def graspproof():
 def everywhere():
     """Exit codes and messages of a command that is struck at one step after another."""
 
-    def run(kind, folder, *words):
-        command = [sys.executable, "-m", "tests.faults.everywhere", kind, str(folder), *words]
+    def run(kind, folder, *words, every=1):
+        command = [
+            sys.executable,
+            "-m",
+            "tests.faults.everywhere",
+            kind,
+            str(every),
+            str(folder),
+            *words,
+        ]
         done = subprocess.run(
             command, cwd=ROOT, capture_output=True, text=True, timeout=280, check=False
         )

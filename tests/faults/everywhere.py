@@ -1,10 +1,10 @@
 """A command, again and again, in processes that are struck at one step on files after another.
 
-    python -m tests.faults.everywhere kill|full|broken FOLDER WORD...
+    python -m tests.faults.everywhere kill|full|broken EVERY FOLDER WORD...
 
 `OUT` among the words is a folder of its own each time: `FOLDER/whole` undisturbed, `FOLDER/0` and
-so on struck, with what was there then in `FOLDER/0.struck`, before the same command ran once more.
-Exit codes and messages are printed as JSON.
+so on struck, each EVERY steps later than the one before. After a kill the same command runs once
+more there, and what was there before that is in `FOLDER/0.struck`. Exit codes and messages are printed as JSON.
 """
 
 import errno
@@ -51,22 +51,24 @@ def forked(words, said, prepare):
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
-def strikes(kind, folder, words):
+def strikes(kind, every, folder, words):
     assert main([word.replace("OUT", str(folder / "whole")) for word in words]) == 0
-    for step in range(1000):
+    for step in range(0, 1000, every):
         out, said = folder / str(step), folder / f"{step}.txt"
         own = [word.replace("OUT", str(out)) for word in words]
         if (given := folder / "given").is_dir():
             shutil.copytree(given, out)
         code = forked(own, said, lambda: strike_at(step, kind, out))  # noqa: B023 - called at once
-        if out.is_dir():
+        if kind == "kill" and out.is_dir():
             shutil.copytree(out, folder / f"{step}.struck")
         yield code, said.read_text()
         if code == 0 and not said.read_text():
             return
+        if kind != "kill":
+            continue
         again = forked(own, folder / "again.txt", lambda: None)
         assert again == 0, (step, (folder / "again.txt").read_text())
 
 
 if __name__ == "__main__":
-    print(json.dumps(list(strikes(sys.argv[1], Path(sys.argv[2]), sys.argv[3:]))))
+    print(json.dumps(list(strikes(sys.argv[1], int(sys.argv[2]), Path(sys.argv[3]), sys.argv[4:]))))

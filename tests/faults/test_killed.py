@@ -13,7 +13,6 @@ import pytest
 
 from scenes.whole_files import UNFINISHED
 from sim_validate.cli import main
-
 from tests.faults.conftest import CLI, ROOT, contents
 
 RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q"]
@@ -29,25 +28,30 @@ def planned(tmp_path_factory):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("words", "least"),
+    ("words", "least", "every"),
     [
-        ([*RUN, "--out", "OUT"], 40),
-        ([*RUN, "--no-report", "--traces", "--out", "OUT"], 20),
-        ([*PLAN, "--regions", "--out", "OUT"], 14),
-        (["validate", "GRASPS", "--traces", "--jobs", "1", "-q", "--out", "OUT"], 10),
-        (["scene", "GRASPS", "-q", "--out", "OUT"], 6),
-        (["regions", "GRASPS", "--cones", "64", "-q", "--out", "OUT"], 10),
-        (["baseline", "record", "GRASPS", "--jobs", "1", "-q", "--out", "OUT/a.baseline.json"], 5),
+        ([*RUN, "--out", "OUT"], 8, 6),
+        ([*RUN, "--no-report", "--traces", "--out", "OUT"], 20, 1),
+        ([*PLAN, "--regions", "--out", "OUT"], 6, 2),
+        (["validate", "GRASPS", "--traces", "--jobs", "1", "-q", "--out", "OUT"], 5, 2),
+        (["scene", "GRASPS", "-q", "--out", "OUT"], 6, 1),
+        (["regions", "GRASPS", "--cones", "64", "-q", "--out", "OUT"], 5, 2),
+        (
+            ["baseline", "record", "GRASPS", "--jobs", "1", "-q", "--out", "OUT/a.baseline.json"],
+            5,
+            1,
+        ),
     ],
 )
 def test_what_is_there_is_whole_and_the_next_run_is_as_undisturbed(
-    words, least, planned, everywhere, tmp_path
+    words, least, every, planned, everywhere, tmp_path
 ):
-    codes = everywhere("kill", tmp_path, *(word.replace("GRASPS", str(planned)) for word in words))
+    words = [word.replace("GRASPS", str(planned)) for word in words]
+    codes = everywhere("kill", tmp_path, *words, every=every)
     assert [code for code, _ in codes] == [-signal.SIGKILL] * (len(codes) - 1) + [0]
     assert len(codes) > least
     whole = contents(tmp_path / "whole")
-    for step in range(len(codes)):
+    for step in range(0, every * len(codes), every):
         struck = tmp_path / f"{step}.struck"
         for name, data in contents(struck).items() if struck.is_dir() else ():
             assert UNFINISHED in name or data == whole[name], (step, name)
@@ -63,9 +67,9 @@ def test_nothing_of_an_earlier_run_is_mixed_with_a_new_one(everywhere, tmp_path)
     other = ["--friction", "0.4", "--traces", "--no-report", "-q"]
     assert main(["run", "tetrahedron", "--limit", "1", *other, "--out", str(given)]) == 0
     before = contents(given)
-    codes = everywhere("kill", tmp_path, *RUN, "--no-report", "--traces", "--out", "OUT")
+    codes = everywhere("kill", tmp_path, *RUN, "--no-report", "--traces", "--out", "OUT", every=2)
     whole = contents(tmp_path / "whole")
-    for step in range(len(codes)):
+    for step in range(0, 2 * len(codes), 2):
         names = contents(tmp_path / f"{step}.struck")
         found = {name: data for name, data in names.items() if UNFINISHED not in name}
         assert found.items() <= before.items() or found.items() <= whole.items(), step
@@ -83,6 +87,7 @@ def test_what_a_killed_writer_left_goes_with_the_next_command(planned, tmp_path)
     assert left == {"grasps.json", "c-0-1-2-3.xml", ".mine.json"}
 
 
+@pytest.mark.slow
 def test_a_report_of_what_a_kill_has_left_says_what_is_missing(planned, tmp_path, capsys):
     shutil.copy(planned, tmp_path)
     assert main(["validate", str(planned), "--out", str(tmp_path), "-q"]) == 0
