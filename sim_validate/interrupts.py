@@ -5,10 +5,12 @@ are not theirs there, and the program would run on. A request to end (SIGTERM) i
 """
 
 import signal
+import sys
 import threading
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -23,11 +25,18 @@ def noted() -> Generator[None, None, None]:
         return
     _noted.clear()
     before = {number: signal.signal(number, _note) for number in SIGNALS}
+    told, sys.unraisablehook = sys.unraisablehook, _but_interrupts(sys.unraisablehook)
     try:
         yield
     finally:
+        sys.unraisablehook = told
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _but_interrupts(tell: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Tell of errors that cannot be raised where they are, but not of interrupts: they are noted."""
+    return lambda error: None if error.exc_type is KeyboardInterrupt else tell(error)
 
 
 def _note(_: int, __: FrameType | None) -> None:

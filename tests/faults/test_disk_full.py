@@ -40,7 +40,10 @@ def test_a_step_that_fails_is_said_with_its_file_and_earlier_files_are_whole(
     codes = everywhere(kind, tmp_path, *RUN, "--traces", "--out", "OUT")
     whole = contents(tmp_path / "whole")
     assert len(codes) > 12
+    assert codes[-1] == [0, ""]
     for step, (code, message) in enumerate(codes[:-1]):
+        if contents(tmp_path / str(step)) == whole and code == 0:
+            continue  # there was another way: of two to a nameless file, or of one over a rest
         assert code == 4, (step, message)
         assert said in message
         assert f"{tmp_path / str(step)}" in message

@@ -30,16 +30,16 @@ def planned(tmp_path_factory):
 @pytest.mark.parametrize(
     ("words", "least", "every"),
     [
-        ([*RUN, "--out", "OUT"], 8, 6),
-        ([*RUN, "--no-report", "--traces", "--out", "OUT"], 20, 1),
-        ([*PLAN, "--regions", "--out", "OUT"], 6, 2),
+        ([*RUN, "--out", "OUT"], 3, 16),
+        ([*RUN, "--no-report", "--traces", "--out", "OUT"], 10, 2),
+        ([*PLAN, "--regions", "--out", "OUT"], 3, 5),
         (["validate", "GRASPS", "--traces", "--jobs", "1", "-q", "--out", "OUT"], 5, 2),
         (["scene", "GRASPS", "-q", "--out", "OUT"], 6, 1),
         (["regions", "GRASPS", "--cones", "64", "-q", "--out", "OUT"], 5, 2),
         (
             ["baseline", "record", "GRASPS", "--jobs", "1", "-q", "--out", "OUT/a.baseline.json"],
-            5,
-            1,
+            2,
+            2,
         ),
     ],
 )
@@ -67,9 +67,9 @@ def test_nothing_of_an_earlier_run_is_mixed_with_a_new_one(everywhere, tmp_path)
     other = ["--friction", "0.4", "--traces", "--no-report", "-q"]
     assert main(["run", "tetrahedron", "--limit", "1", *other, "--out", str(given)]) == 0
     before = contents(given)
-    codes = everywhere("kill", tmp_path, *RUN, "--no-report", "--traces", "--out", "OUT", every=2)
+    codes = everywhere("kill", tmp_path, *RUN, "--no-report", "--traces", "--out", "OUT", every=3)
     whole = contents(tmp_path / "whole")
-    for step in range(0, 2 * len(codes), 2):
+    for step in range(0, 3 * len(codes), 3):
         names = contents(tmp_path / f"{step}.struck")
         found = {name: data for name, data in names.items() if UNFINISHED not in name}
         assert found.items() <= before.items() or found.items() <= whole.items(), step

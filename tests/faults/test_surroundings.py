@@ -18,20 +18,34 @@ SURROUNDINGS = {
     "no home": {"HOME": NOWHERE, "XDG_CONFIG_HOME": NOWHERE, "XDG_CACHE_HOME": NOWHERE},
     "no folder for matplotlib": {"MPLCONFIGDIR": NOWHERE, "MPLBACKEND": "nonsense"},
     "no folder for kernels": {"NUMBA_CACHE_DIR": NOWHERE},
-    "no threads": {"OMP_NUM_THREADS": "many", "NUMBA_NUM_THREADS": "0"},
+    "no threads": {"OMP_NUM_THREADS": "many"},
     "no temporary folder": {"TMPDIR": NOWHERE},
     "no locale": {"LC_ALL": "xx_XX", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"},
     "no terminal": {"TERM": "dumb", "COLUMNS": "1"},
 }
 
 
+@pytest.fixture(scope="module")
+def usual(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("usual")
+    assert main([*RUN, "--out", str(folder)]) == 0
+    return contents(folder)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("named", SURROUNDINGS)
-def test_surroundings_change_no_byte(named, graspproof, tmp_path):
-    assert main([*RUN, "--out", str(tmp_path / "a")]) == 0
+def test_surroundings_change_no_byte(named, usual, graspproof, tmp_path):
     done = graspproof(*RUN, "--out", str(tmp_path / "b"), env=SURROUNDINGS[named])
     assert (done.returncode, done.stderr) == (0, "")
-    assert contents(tmp_path / "a") == contents(tmp_path / "b")
+    assert contents(tmp_path / "b") == usual
+
+
+@pytest.mark.slow
+def test_settings_that_kernels_refuse_leave_the_work_to_the_reference(graspproof, tmp_path):
+    words = [*RUN, "--no-report", "--out", str(tmp_path)]
+    done = graspproof(*words, env={"NUMBA_NUM_THREADS": "0"})
+    assert (done.returncode, done.stderr) == (0, "")
+    assert set(contents(tmp_path)) == {"grasps.json", "verdicts.json", "scenes/c-0-1-2-3.xml"}
 
 
 @pytest.mark.slow
