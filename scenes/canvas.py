@@ -8,6 +8,8 @@ Figures are made without `pyplot`, so that none outlives its use and no display 
 
 import importlib
 import io
+import logging
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import wraps
@@ -44,12 +46,29 @@ OPTIONS: dict[str, dict[str, Any]] = {
 """How pictures are packed: lines keep their colours, files stay small."""
 
 
+def _part(name: str) -> Any:
+    """A module of matplotlib.
+
+    No display is looked for, so that a user's choice of one is none of its business; nor is where
+    it keeps its notes on fonts, for which it finds another place by itself.
+    """
+    backend, logger = os.environ.pop("MPLBACKEND", None), logging.getLogger("matplotlib")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        return importlib.import_module(f"matplotlib.{name}")
+    finally:
+        logger.setLevel(level)
+        if backend is not None:
+            os.environ["MPLBACKEND"] = backend
+
+
 def in_style(make: Callable[Given, Made]) -> Callable[Given, Made]:
     """A function that makes figures, in the style of all figures here, whatever users have set."""
 
     @wraps(make)
     def styled(*args: Given.args, **kwargs: Given.kwargs) -> Made:
-        style: Any = importlib.import_module("matplotlib.style")
+        style: Any = _part("style")
         with style.context(["default", STYLE]):
             return make(*args, **kwargs)
 
@@ -69,7 +88,7 @@ class Around:
 
 def new_figure(width_in: float, height_in: float) -> Any:
     """An empty figure of a size in inches."""
-    figure: Any = importlib.import_module("matplotlib.figure")
+    figure: Any = _part("figure")
     return figure.Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout=None)
 
 
@@ -93,7 +112,7 @@ def add_polygons(
     smooth: Sequence[bool],
 ) -> None:  # fmt: skip
     """Filled polygons, in the order given."""
-    collections: Any = importlib.import_module("matplotlib.collections")
+    collections: Any = _part("collections")
     axes.add_collection(
         collections.PolyCollection(
             polygons, facecolors=colours, linewidths=0.0, antialiaseds=np.array(smooth)
@@ -104,13 +123,13 @@ def add_polygons(
 
 def legend_patch(colour: str, label: str, opacity: float = 1.0) -> Any:
     """A coloured box for a legend."""
-    patches: Any = importlib.import_module("matplotlib.patches")
+    patches: Any = _part("patches")
     return patches.Patch(facecolor=colour, alpha=opacity, edgecolor="none", label=label)
 
 
 def legend_line(colour: str, label: str, *, style: str = "-", marker: str = "") -> Any:
     """A line or a marker for a legend."""
-    lines: Any = importlib.import_module("matplotlib.lines")
+    lines: Any = _part("lines")
     return lines.Line2D([], [], color=colour, linestyle=style, marker=marker, label=label)
 
 
@@ -141,7 +160,7 @@ def write_frames(
         rate: Frames per second.
         path: Of the file, gif or webp.
     """
-    animation: Any = importlib.import_module("matplotlib.animation")
+    animation: Any = _part("animation")
     writer = animation.PillowWriter(fps=rate)
     with replacing(path) as temporary, writer.saving(figure, str(temporary), dpi=DOTS_PER_INCH):
         for frame in range(count):

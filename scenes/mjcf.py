@@ -29,6 +29,7 @@ from grasp_core.values import Contact, Grasp, Polyhedron
 from scenes.fingertips import FingerSettings
 from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
 from scenes.physics import PhysicsSettings
+from scenes.whole_files import write_parts
 
 Surface = Literal["pads", "mesh"]
 """What fingertips touch: a pad each, or the convex hull of the object's mesh."""
@@ -108,9 +109,7 @@ def write_scene(scene: Scene, path: str | Path) -> Path:
         InputError: There is no scene, or no path.
     """
     instance(scene, Scene, "scene", "build_scene makes one")
-    path = path_of(path, "path")
-    path.write_text(scene.xml, encoding="utf-8")
-    return path
+    return write_parts(path_of(path, "path"), [scene.xml.encode()])
 
 
 def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads") -> str:

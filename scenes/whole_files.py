@@ -6,9 +6,18 @@ from collections.abc import Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path
 
+UNFINISHED = ".unfinished-"
+"""In the names of files that are being written, or were when their writer was killed."""
+SHOWN = 40
+"""Characters of a file's name in that of its unfinished one, which must not get too long."""
+
 
 def write_parts(path: Path, parts: Iterable[bytes]) -> Path:
-    """Write a file; folders are made as needed."""
+    """Write a file; folders are made as needed.
+
+    Raises:
+        OSError: It cannot be written; the error names the file.
+    """
     with replacing(path) as temporary, temporary.open("wb") as stream:
         stream.writelines(parts)
         stream.flush()
@@ -18,15 +27,34 @@ def write_parts(path: Path, parts: Iterable[bytes]) -> Path:
 
 @contextmanager
 def replacing(path: Path) -> Generator[Path]:
-    """Another path of the same ending to write to, which is put in the place of the file."""
+    """Another path of the same ending to write to, which is put in the place of the file.
+
+    Raises:
+        OSError: It cannot be written; the error names the file, not the other path.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
-    os.close(handle)
-    temporary = Path(name)
     try:
-        yield temporary
-        temporary.chmod(0o644)
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+        with _beside(path) as temporary:
+            yield temporary
+            temporary.chmod(0o644)
+            temporary.replace(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+
+
+@contextmanager
+def _beside(path: Path) -> Generator[Path]:
+    """An empty file in the same folder, which is not there afterwards."""
+    prefix = f".{path.name[:SHOWN]}{UNFINISHED}"
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=path.suffix)
+    try:
+        os.close(handle)
+        yield Path(name)
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Remove what killed writers have left in a folder that nobody writes to."""
+    for path in folder.glob(f".*{UNFINISHED}*"):
+        path.unlink(missing_ok=True)

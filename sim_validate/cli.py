@@ -283,6 +283,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return stop.code if isinstance(stop.code, int) else Exit.USAGE
     except InputError as error:
         return _complain(str(error), Exit.USAGE)
+    except KeyboardInterrupt:
+        return _complain("interrupted", Exit.INTERRUPTED)
     return _dispatch(command)
 
 
@@ -291,7 +293,10 @@ def _dispatch(command: Command) -> int:
         from sim_validate import commands, interrupts
 
         with interrupts.noted():
-            return commands.execute(command)
+            code = commands.execute(command)
+            if sys.stdout is not None:  # pyright: ignore[reportUnnecessaryComparison] - may be closed
+                sys.stdout.flush()
+            return code
     except KeyboardInterrupt:
         return _complain("interrupted", Exit.INTERRUPTED)
     except (GraspError, OSError) as error:
@@ -305,7 +310,7 @@ def _dispatch(command: Command) -> int:
 def reason_of(error: GraspError | OSError) -> str:
     """What an error says to people, with the file it is about."""
     if isinstance(error, OSError):
-        return f"{error.filename or 'output'}: {error.strerror}"
+        return f"{error.filename or 'output'}: {error.strerror or error}"
     return str(error)
 
 
@@ -319,10 +324,16 @@ def _code(error: GraspError | OSError) -> Exit:
 def _complain(message: str, code: Exit) -> int:
     from sim_validate.console import printable
 
-    sys.stderr.write(f"graspproof: {printable(message)}\n")
+    if sys.stderr is not None:  # pyright: ignore[reportUnnecessaryComparison] - may be closed
+        sys.stderr.write(f"graspproof: {printable(message)}\n")
     return int(code)
 
 
 def run_and_exit() -> None:
     """Entry point of the `graspproof` command."""
-    sys.exit(main())
+    from sim_validate import streams
+
+    streams.steady()
+    code = main()
+    streams.end()
+    sys.exit(code)

@@ -8,19 +8,27 @@ import os
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TypeVar
 
 Unit = TypeVar("Unit")
 Result = TypeVar("Result")
 
+SHARE = Path("/sys/fs/cgroup/cpu.max")
+"""Where Linux says how much of its processors a container may use: microseconds, of how many."""
 UNITS_PER_PROCESS = 8
 """A process takes about a second to start, as long as eight validations: with fewer units for
 each, starting it does not pay."""
 
 
 def available_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """Cores that this process may use; of a container that is given a share, that share."""
+    own = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    try:
+        share, period = SHARE.read_text().split()
+        return max(1, min(own or 1, int(share) // int(period)))
+    except (OSError, ValueError):  # no container, or one without a limit
+        return own or 1
 
 
 def processes(units: int, jobs: int) -> int:

@@ -116,12 +116,3 @@ def whole_folder(folder: Path) -> Generator[Path]:
     except BaseException:
         shutil.rmtree(temporary, ignore_errors=True)
         raise
-
-
-def remove_results(folder: Path) -> None:
-    """Remove what an earlier run has told of its grasps, which would contradict the new ones."""
-    old = [folder / "verdicts.json", folder / "regions.json",
-           *folder.glob("scenes/*[cprf]-*-*-*-*.xml"), *folder.glob("traces/*[cprf]-*-*-*-*.npz"),
-           *folder.glob("proofs/*[cprf]-*-*-*-*.npz")]  # fmt: skip
-    for path in old:
-        path.unlink(missing_ok=True)

@@ -22,6 +22,8 @@ from sim_validate.certifying import Asked, Found, certified, wider
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.files import write_text
 from sim_validate.improving import improved, show_gains
+from sim_validate.old_results import remove_results
+from sim_validate.own_folder import alone_in
 from sim_validate.region_files import write_regions
 
 
@@ -55,10 +57,8 @@ def load_object(name: str, mesh: flags.Mesh) -> Polyhedron:
     return example_object(name)
 
 
-def plan_object(
-    name: str, planning: flags.Planning, jobs: int, reporter: Reporter
-) -> tuple[Polyhedron, Plan, tuple[Moved, ...]]:
-    """The object, its grasps, moved if that is asked for, and how they were moved.
+def object_to_plan(name: str, planning: flags.Planning, reporter: Reporter) -> Polyhedron:
+    """The object, once all that is asked for fits it.
 
     Raises:
         InputError: The object or a setting is refused.
@@ -78,6 +78,17 @@ def plan_object(
     for note in body.notes:
         reporter.warn(f"{body.name}: {note}")
     reporter.detail(f"{body.name}: mesh {body.content_sha256}, {len(body.triangles)} triangles")
+    return body
+
+
+def plan_object(
+    body: Polyhedron, planning: flags.Planning, jobs: int, reporter: Reporter
+) -> tuple[Plan, tuple[Moved, ...]]:
+    """The grasps of an object, moved if that is asked for, and how they were moved.
+
+    Raises:
+        InputError: A setting is refused.
+    """
     with reporter.progress("planning") as steps:
         found = plan(
             body,
@@ -101,7 +112,7 @@ def plan_object(
             body, found, finger_radius=planning.finger_radius_m, parts=planning.ceiling, jobs=jobs,
             reporter=reporter,
         )  # fmt: skip
-    return body, found, moves
+    return found, moves
 
 
 def with_regions(
@@ -150,12 +161,16 @@ def asked_finger(planning: flags.Planning) -> Finger | None:
 
 def plan_file(command: cli.Plan, reporter: Reporter) -> int:
     """Plan, write the grasps, and show the best."""
-    body, found, moves = plan_object(command.object, command.planning, command.jobs, reporter)
-    found = with_regions(body, found, command.planning, command.out, command.jobs, reporter)
-    text = plan_to_json(body, found, moves)
-    if command.out:
-        path = write_text(command.out / "grasps.json", text)
-        reporter.say(f"wrote {path}")
+    body = object_to_plan(command.object, command.planning, reporter)
+    with alone_in(command.out):
+        found, moves = plan_object(body, command.planning, command.jobs, reporter)
+        if command.out:
+            remove_results(command.out)
+        found = with_regions(body, found, command.planning, command.out, command.jobs, reporter)
+        text = plan_to_json(body, found, moves)
+        if command.out:
+            path = write_text(command.out / "grasps.json", text)
+            reporter.say(f"wrote {path}")
     if reporter.json_only:
         print(text, end="")  # noqa: T201 - the document itself
     say_counts(body, found, reporter)

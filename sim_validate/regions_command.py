@@ -9,6 +9,8 @@ from sim_validate import cli
 from sim_validate.certifying import Asked, certified
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.grasps_file import read_grasps
+from sim_validate.old_results import remove_regions
+from sim_validate.own_folder import alone_in
 from sim_validate.plan_command import say_cut
 from sim_validate.region_files import REGIONS, write_regions
 
@@ -25,8 +27,11 @@ def certify_file(command: cli.Regions, reporter: Reporter) -> int:
         saved.friction if command.friction is None else command.friction,
         command.reserve, command.balance, command.recenter, command.edge_clearance_m, command.cones,
     )  # fmt: skip
-    found = certified(saved.body, chosen, asked, jobs=command.jobs, reporter=reporter)
-    document = write_regions(command.out, saved.body, asked, found)
+    with alone_in(command.out):
+        if command.out is not None:
+            remove_regions(command.out)
+        found = certified(saved.body, chosen, asked, jobs=command.jobs, reporter=reporter)
+        document = write_regions(command.out, saved.body, asked, found)
     _show(document, reporter)
     if command.out is not None:
         reporter.say(f"wrote {command.out / REGIONS}")

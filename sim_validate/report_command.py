@@ -2,12 +2,16 @@
 
 from sim_validate import cli, showing_flags
 from sim_validate.console import Reporter
+from sim_validate.own_folder import alone_in
 from sim_validate.reports.report import Report, write_report
+from sim_validate.reports.run_folder import folder_of
 
 
 def report_folder(command: showing_flags.Report, reporter: Reporter) -> int:
     """Write the pages of a run."""
-    report = shown_report(command, reporter)
+    at = command.out or folder_of(command.folder)
+    with alone_in(at if command.out or at.is_dir() else None):
+        report = shown_report(command, reporter)
     reporter.document({"report": str(report.index), "grasps": report.grasps})
     return cli.Exit.GOOD
 

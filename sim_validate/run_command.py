@@ -8,12 +8,20 @@ from grasp_core.records import SavedGrasps, plan_to_json
 from grasp_core.values import Polyhedron
 from sim_validate import cli
 from sim_validate.console import Reporter
-from sim_validate.files import remove_results, write_text
+from sim_validate.files import write_text
+from sim_validate.flags import Testing
 from sim_validate.gate import require_faithful
 from sim_validate.improving import show_gains
-from sim_validate.plan_command import asked_finger, plan_object, say_counts, with_regions
+from sim_validate.old_results import REPORT, remove_results, require_report_folder
+from sim_validate.own_folder import alone_in
+from sim_validate.plan_command import (
+    asked_finger,
+    object_to_plan,
+    plan_object,
+    say_counts,
+    with_regions,
+)  # fmt: skip
 from sim_validate.report_command import shown_report
-from sim_validate.reports.report import REPORT, remove_report, require_report_folder
 from sim_validate.showing_flags import Report
 from sim_validate.validate_command import prepared, simulate_grasps, with_planned_fingers
 
@@ -21,6 +29,8 @@ RESULTS = Path("graspproof-out")
 """Where results go, a folder for each object, if not told otherwise."""
 HASHED = 8
 """Digits of a hash that tell objects apart whose names look alike."""
+NAMED = 60
+"""Characters of a name that its folder has: with four bytes each, as many as file systems take."""
 REPORTED = 200
 """Most grasps that a run draws by itself, in a minute; `report` draws all."""
 
@@ -30,14 +40,22 @@ def run_object(command: cli.Run, reporter: Reporter) -> int:
     planning = command.planning
     testing = with_planned_fingers(command.testing, asked_finger(planning))
     setup, _ = prepared(testing, planning.seed, command.out or RESULTS)
-    body, found, moves = plan_object(command.object, planning, testing.jobs, reporter)
+    body = object_to_plan(command.object, planning, reporter)
     folder = command.out or RESULTS / _folder_name(body)
-    require_faithful(setup, found.friction, body.radius)
-    if not command.no_report:
-        require_report_folder(folder / REPORT)
+    with alone_in(folder):
+        if not command.no_report:
+            require_report_folder(folder / REPORT)
+        require_faithful(setup, planning.friction, body.radius)
+        return _run_in(folder, body, command, testing, reporter)
+
+
+def _run_in(
+    folder: Path, body: Polyhedron, command: cli.Run, testing: Testing, reporter: Reporter
+) -> int:
+    setup, _ = prepared(testing, command.planning.seed, folder)
+    found, moves = plan_object(body, command.planning, testing.jobs, reporter)
     remove_results(folder)
-    remove_report(folder / REPORT)
-    found = with_regions(body, found, planning, folder, testing.jobs, reporter)
+    found = with_regions(body, found, command.planning, folder, testing.jobs, reporter)
     write_text(folder / "grasps.json", plan_to_json(body, found, moves))
     say_counts(body, found, reporter)
     if found.absence:
@@ -67,5 +85,5 @@ def _report(folder: Path, jobs: int, reporter: Reporter) -> None:
 
 def _folder_name(body: Polyhedron) -> str:
     """A file name that is one plain part of a path; of names that are not, with a hash."""
-    plain = re.sub(r"[^\w-]+", "_", body.name) or "object"
+    plain = re.sub(r"[^\w-]+", "_", body.name)[:NAMED] or "object"
     return plain if plain == body.name else f"{plain}-{body.content_sha256[:HASHED]}"

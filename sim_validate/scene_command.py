@@ -7,6 +7,7 @@ from sim_validate.asked_fingers import finger_settings, planned_fingers
 from sim_validate.console import Reporter
 from sim_validate.files import write_text
 from sim_validate.grasps_file import grasp_with_id, read_grasps
+from sim_validate.own_folder import alone_in
 
 
 def write_scenes(command: cli.Scene, reporter: Reporter) -> int:
@@ -20,15 +21,18 @@ def write_scenes(command: cli.Scene, reporter: Reporter) -> int:
     friction = saved.friction if command.friction is None else command.friction
     fingers = finger_settings(planned_fingers(command.fingers, saved.finger))
     written: list[str] = []
-    for grasp in chosen:
-        scene = build_scene(saved.body, grasp, friction, fingers=fingers, surface=command.surface)
-        if command.out is not None:
-            written.append(str(write_text(command.out / f"{grasp.id}.xml", scene.xml)))
-            reporter.say(f"wrote {written[-1]}")
-        elif reporter.json_only:
-            reporter.document({"id": grasp.id, "xml": scene.xml})
-        else:
-            print(scene.xml, end="")  # noqa: T201 - the document itself
+    with alone_in(command.out):
+        for grasp in chosen:
+            scene = build_scene(
+                saved.body, grasp, friction, fingers=fingers, surface=command.surface
+            )
+            if command.out is not None:
+                written.append(str(write_text(command.out / f"{grasp.id}.xml", scene.xml)))
+                reporter.say(f"wrote {written[-1]}")
+            elif reporter.json_only:
+                reporter.document({"id": grasp.id, "xml": scene.xml})
+            else:
+                print(scene.xml, end="")  # noqa: T201 - the document itself
     if command.out is not None:
         reporter.document({"scenes": written})
     return cli.Exit.GOOD

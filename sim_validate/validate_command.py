@@ -19,6 +19,8 @@ from sim_validate.grasp_verdict import Verdict
 from sim_validate.grasps_file import read_grasps
 from sim_validate.jobs import Job, validated
 from sim_validate.noise.draws import Noise
+from sim_validate.old_results import remove_verdicts
+from sim_validate.own_folder import alone_in
 from sim_validate.plan_command import say_cut
 from sim_validate.rules import RULES
 from sim_validate.setup import Agenda, Setup
@@ -45,7 +47,8 @@ def validate_file(command: cli.Validate, reporter: Reporter) -> int:
         saved.finger,
     )
     testing = with_planned_fingers(command.testing, saved.finger)
-    return simulate_grasps(chosen, testing, command.out, reporter)
+    with alone_in(command.out):
+        return simulate_grasps(chosen, testing, command.out, reporter)
 
 
 def with_planned_fingers(testing: flags.Testing, planned: Finger | None) -> flags.Testing:
@@ -124,6 +127,8 @@ def simulate_grasps(
     gate = require_faithful(setup, saved.friction, saved.body.radius)
     for check in gate.checks:
         reporter.detail(str(check))
+    if folder:
+        remove_verdicts(folder)
     tasks = [Job(saved.body, g, saved.friction, agenda, setup) for g in saved.grasps]
     verdicts: list[Verdict] = []
     try:

@@ -42,7 +42,7 @@ def compiled(name: str) -> Any:
     try:
         failures: Any = importlib.import_module("numba.core.errors")
         kernel: Any = importlib.import_module(f"grasp_core.kernels.{name}")
-    except (ImportError, RuntimeError, OSError):
+    except (ImportError, RuntimeError, OSError, ValueError):  # the last of its own settings
         return None
     try:
         kernel.try_out()

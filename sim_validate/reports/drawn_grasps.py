@@ -18,6 +18,7 @@ from scenes.clips import GraphicsError, magnified, write_clip
 from scenes.fingertips import FingerSettings
 from scenes.pictures import grasp_figure
 from scenes.views import best_view
+from sim_validate.old_results import CHARTS, CLIPS, PICTURES
 from sim_validate.replaying.bench import Replayed, replayed
 from sim_validate.replaying.of_verdicts import of_verdict
 from sim_validate.replaying.values import Wanted
@@ -26,8 +27,6 @@ from sim_validate.reports.motion_charts import motion_figure
 from sim_validate.reports.news import Record
 from sim_validate.reports.run_folder import RunFolder
 from sim_validate.reports.wrench_charts import wrench_figure
-
-PICTURES, CHARTS, CLIPS = "pictures", "charts", "clips"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

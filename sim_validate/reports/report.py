@@ -2,29 +2,32 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 
 from grasp_core.checked import function, path_of, whole
-from grasp_core.errors import InputError
 from scenes.canvas import write_figure
 from sim_validate.engines import available_cores, each
 from sim_validate.files import write_text
-from sim_validate.reports.drawn_grasps import CHARTS, CLIPS, PICTURES, Drawn, draw, tasks_of
+from sim_validate.old_results import (
+    FIDELITY,
+    GRASPS,
+    INDEX,
+    MARK,
+    REPORT,
+    STATIC,
+    remove_pages,
+    remove_report,
+    require_report_folder,
+)  # fmt: skip
+from sim_validate.reports.drawn_grasps import Drawn, draw, tasks_of
 from sim_validate.reports.fidelity_charts import fidelity_figure
 from sim_validate.reports.grasp_page import Neighbours, grasp_page
 from sim_validate.reports.index_page import Shown, agreements, all_verdicts, index_page
 from sim_validate.reports.pages import asset
-from sim_validate.reports.run_folder import RunFolder, runs_in
+from sim_validate.reports.run_folder import RunFolder, folder_of, runs_in
 from sim_validate.reports.turntable import as_text, object_data
 
-REPORT, INDEX, GRASPS = "report", "index.html", "grasps"
-STATIC = ("style.css", "gallery.js", "turntable.js")
-FIDELITY = "fidelity.svg"
-MARK, MARKED = (
-    ".graspproof-report",
-    "The pages here were written by graspproof, which may replace them.\n",
-)
+MARKED = "The pages here were written by graspproof, which may replace them.\n"
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +68,7 @@ def write_report(
         InputError: The folder holds no run, a file in it is not what it should be, or the pages'
             folder holds other things.
     """
-    folder = path_of(folder, "folder")
+    folder = folder_of(path_of(folder, "folder"))
     out = folder / REPORT if out is None else path_of(out, "out")
     for name, value in (("jobs", jobs), ("limit", limit)):
         if value is not None:
@@ -74,43 +77,13 @@ def write_report(
     function(progress, "progress")
     runs = tuple(run.first(limit) for run in runs_in(folder))
     require_report_folder(out)
-    remove_report(out)
+    remove_pages(out)
     write_text(out / MARK, MARKED)
-    return _written(runs, out, jobs or available_cores(), clips, progress)
-
-
-def require_report_folder(folder: Path) -> None:
-    """That pages may be written into a folder: there is nothing in it, or a report.
-
-    Raises:
-        InputError: It holds other things.
-    """
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():
-        raise InputError(f"{folder}: is there, and holds no report; give another --out")
-
-
-def remove_report(folder: Path) -> None:
-    """Remove the pages of an earlier report, if there is one, and nothing else."""
-    if not (folder / MARK).is_file():
-        return
-    old = chain(
-        (folder / name for name in (INDEX, FIDELITY, *STATIC)),
-        folder.glob("object-*.js"),
-        folder.glob(f"{GRASPS}/*.html"),
-        *(folder.glob(f"{kind}/*.webp") for kind in (PICTURES, CHARTS, CLIPS)),
-    )
-    for path in old:
-        path.unlink(missing_ok=True)
-    for kind in (GRASPS, PICTURES, CHARTS, CLIPS):
-        _remove_if_empty(folder / kind)
-    if [path.name for path in folder.iterdir()] == [MARK]:
-        (folder / MARK).unlink()
-        folder.rmdir()
-
-
-def _remove_if_empty(folder: Path) -> None:
-    if folder.is_dir() and not any(folder.iterdir()):
-        folder.rmdir()
+    try:
+        return _written(runs, out, jobs or available_cores(), clips, progress)
+    except BaseException:
+        remove_report(out)
+        raise
 
 
 def _written(

@@ -68,13 +68,18 @@ class RunFolder:
         return self.path / VERDICTS
 
 
+def folder_of(path: Path) -> Path:
+    """The folder that is meant by its own path, or by that of its grasps.json."""
+    return path.parent if path.name == GRASPS else path
+
+
 def runs_in(folder: Path) -> tuple[RunFolder, ...]:
     """The run in a folder, or those in the folders in it.
 
     Raises:
         InputError: There is none, or a file is not what it should be.
     """
-    folder = folder.parent if folder.name == GRASPS else folder
+    folder = folder_of(folder)
     if not folder.is_dir():
         raise InputError(f"{folder}: not a folder; give one that `graspproof run` has written")
     inside = [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]

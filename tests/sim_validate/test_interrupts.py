@@ -1,5 +1,6 @@
 import os
 import signal
+import sys
 
 import pytest
 
@@ -33,3 +34,19 @@ def test_interrupts_from_before_do_not_count():
         swallow()
     with interrupts.noted():
         interrupts.check()
+
+
+class Swallowing:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+        signal.sigtimedwait([], 1.0)
+
+
+def test_a_request_to_end_is_an_interrupt_and_where_it_is_swallowed_says_nothing(capsys):
+    before = signal.getsignal(signal.SIGTERM), sys.unraisablehook
+    with interrupts.noted():
+        Swallowing()
+        with pytest.raises(KeyboardInterrupt):
+            interrupts.check()
+    assert capsys.readouterr().err == ""
+    assert (signal.getsignal(signal.SIGTERM), sys.unraisablehook) == before

@@ -1,0 +1,56 @@
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent.parent
+CLI = [sys.executable, "-c", "from sim_validate.cli import run_and_exit; run_and_exit()"]
+
+
+@pytest.fixture(scope="session")
+def graspproof():
+    """The command line in a process of its own; its words, then what `subprocess.run` takes."""
+
+    def run(*words, env=None, **given):
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), **(env or {})}
+        given = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **given}
+        return subprocess.run(
+            [*CLI, *words], env=environment, text=True, timeout=120, check=False, **given
+        )
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def everywhere():
+    """Exit codes and messages of a command that is struck at one step after another."""
+
+    def run(kind, folder, *words, every=1):
+        command = [
+            sys.executable,
+            "-m",
+            "tests.faults.everywhere",
+            kind,
+            str(every),
+            str(folder),
+            *words,
+        ]
+        done = subprocess.run(
+            command, cwd=ROOT, capture_output=True, text=True, timeout=280, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    return run
+
+
+def contents(folder):
+    """Bytes of all files of a folder, by name."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }

@@ -1,0 +1,121 @@
+"""No space, or a disk that fails, at any step: one line that names a file, and whole files."""
+
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from scenes.whole_files import UNFINISHED, write_parts
+from sim_validate.cli import main
+from tests.faults.conftest import CLI, ROOT, contents
+
+RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q", "--no-report"]
+SMALL = "mount -t tmpfs -o size={size}k none {folder} && exec "
+
+
+def unshared(script):
+    command = ["unshare", "-rm", "sh", "-c", script]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def quoted(words):
+    return " ".join(f"'{word}'" for word in words)
+
+
+@pytest.fixture
+def _can_mount(tmp_path):
+    if (
+        not shutil.which("unshare")
+        or unshared(SMALL.format(size=4, folder=tmp_path) + "true").returncode
+    ):
+        pytest.skip("no file systems of our own here")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "said"), [("full", "No space left"), ("broken", "output error")])
+def test_a_step_that_fails_is_said_with_its_file_and_earlier_files_are_whole(
+    kind, said, everywhere, tmp_path
+):
+    codes = everywhere(kind, tmp_path, *RUN, "--traces", "--out", "OUT")
+    whole = contents(tmp_path / "whole")
+    assert len(codes) > 12
+    assert codes[-1] == [0, ""]
+    for step, (code, message) in enumerate(codes[:-1]):
+        if contents(tmp_path / str(step)) == whole and code == 0:
+            continue  # there was another way: of two to a nameless file, or of one over a rest
+        assert code == 4, (step, message)
+        assert said in message
+        assert f"{tmp_path / str(step)}" in message
+        assert len(message.splitlines()) == 1
+        assert UNFINISHED not in message
+        found = tmp_path / str(step)
+        kept = contents(found) if found.is_dir() else {}
+        # what verdicts say when their traces fail is that they are not complete
+        assert all(data == whole[name] for name, data in kept.items() if name != "verdicts.json")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("_can_mount")
+@pytest.mark.parametrize("size", [4, 8, 12, 20, 40])
+def test_a_small_disk_keeps_what_fits(size, tmp_path):
+    at = tmp_path / "disk"
+    at.mkdir()
+    listed = f"; code=$?; cp -a {at} {tmp_path}/seen; exit $code"
+    script = SMALL.format(size=size, folder=at).removesuffix("exec ")
+    command = quoted([*CLI, *RUN, "--out", str(at / "out")])
+    done = unshared(f"{script} {command}{listed}")
+    assert done.returncode == 4
+    assert "No space left on device" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert not any(UNFINISHED in name for name in contents(tmp_path / "seen"))
+
+
+@pytest.mark.parametrize("failing", ["os.fsync", "pathlib.Path.replace", "pathlib.Path.chmod"])
+def test_a_file_that_cannot_be_written_is_named_and_the_old_one_stays(
+    failing, tmp_path, monkeypatch
+):
+    path = write_parts(tmp_path / "a.json", [b"old"])
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(failing, full)
+    with pytest.raises(OSError, match="No space left on device") as caught:
+        write_parts(path, [b"new"])
+    assert caught.value.filename == str(path)
+    assert contents(tmp_path) == {"a.json": b"old"}
+
+
+@pytest.mark.usefixtures("_can_mount")
+def test_a_folder_that_takes_no_files_is_refused_before_the_work(tmp_path):
+    script = f"mount -t tmpfs -o ro none {tmp_path} && exec "
+    done = unshared(script + quoted([*CLI, *RUN, "--out", str(tmp_path)]))
+    assert done.returncode == 4
+    assert done.stderr == (
+        f"graspproof: {tmp_path}: no file can be written there (Read-only file system); "
+        "give another --out\n"
+    )
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/dev/full is Linux's")
+@pytest.mark.parametrize("stream", ["stdout", "stderr"])
+def test_a_full_standard_output_is_an_error_and_a_full_standard_error_is_none(stream, graspproof):
+    with open("/dev/full", "w") as full:  # noqa: PTH123 - no file
+        done = graspproof("objects", "--json", **{stream: full})
+    assert done.returncode == (4 if stream == "stdout" else 0)
+    if stream == "stdout":
+        assert done.stderr == "graspproof: output: No space left on device\n"
+
+
+@pytest.mark.slow
+def test_a_report_that_fails_leaves_no_half_of_it(tmp_path, monkeypatch, capsys):
+    def full(*_):
+        raise OSError(28, "No space left on device", "index.html")
+
+    monkeypatch.setattr("sim_validate.reports.report.index_page", full)
+    assert main([*RUN[:-1], "--out", str(tmp_path / "a")]) == 0
+    assert "no report: index.html: No space left on device" in capsys.readouterr().err
+    assert sorted(path.name for path in (tmp_path / "a").iterdir()) == [
+        "grasps.json", "scenes", "verdicts.json",
+    ]  # fmt: skip

@@ -1,0 +1,103 @@
+"""Folders that are none, are taken, have strange names, or hold results of something else."""
+
+import fcntl
+import os
+import shutil
+import time
+
+import pytest
+
+from sim_validate.cli import main
+from sim_validate.own_folder import alone_in
+from tests.faults.conftest import contents
+
+PLAN = ["plan", "tetrahedron", "--family", "concurrent", "-q"]
+
+
+@pytest.mark.parametrize("below", ["", "out"])
+@pytest.mark.parametrize("command", ["run", "plan"])
+def test_a_file_in_place_of_a_folder_is_refused(command, below, tmp_path, capsys):
+    (tmp_path / "file").write_text("mine")
+    assert main([command, "tetrahedron", "-q", "--out", str(tmp_path / "file" / below)]) == 4
+    assert "is there, and no folder; give another --out" in capsys.readouterr().err
+    assert contents(tmp_path) == {"file": b"mine"}
+
+
+def test_a_name_that_is_too_long_is_refused(tmp_path, capsys):
+    assert main([*PLAN, "--out", str(tmp_path / ("a" * 256))]) == 4
+    assert "File name too long" in capsys.readouterr().err
+
+
+NAMES = ["a" * 255, "a\nb", os.fsdecode(b"\xff\xfe")]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_strange_names_are_names(name, tmp_path, capsys):
+    assert main([*PLAN[:-1], "--out", str(tmp_path / name)]) == 0
+    assert (tmp_path / name / "grasps.json").is_file()
+    assert all(line.isprintable() for line in capsys.readouterr().out.splitlines())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_strange_names_are_names_of_reports_too(name, tmp_path, capsys):
+    folder = tmp_path / name
+    assert main(["run", "tetrahedron", "--limit", "1", "--out", str(folder)]) == 0
+    assert (folder / "report" / "index.html").is_file()
+    assert all(line.isprintable() for line in capsys.readouterr().out.splitlines())
+
+
+def test_a_folder_that_another_command_is_at_work_in_is_refused(tmp_path, capsys):
+    handle = os.open(tmp_path, os.O_RDONLY)
+    fcntl.flock(handle, fcntl.LOCK_EX)
+    try:
+        for command in ([*PLAN], ["run", "tetrahedron", "-q"], ["report", str(tmp_path)]):
+            asked = command if command[0] == "report" else [*command, "--out", str(tmp_path)]
+            assert main(asked) == 4
+            assert "another command is at work in it" in capsys.readouterr().err
+    finally:
+        os.close(handle)
+    assert main([*PLAN, "--out", str(tmp_path)]) == 0
+
+
+def test_only_folders_that_were_made_for_nothing_go_again(tmp_path):
+    with alone_in(tmp_path / "new" / "deep"):
+        assert (tmp_path / "new" / "deep").is_dir()
+    assert tmp_path.is_dir()
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_new_plan_removes_what_was_told_of_another(tmp_path):
+    out = str(tmp_path)
+    assert main(["run", "tetrahedron", "--limit", "1", "--traces", "-q", "--out", out]) == 0
+    (tmp_path / "notes.txt").write_text("mine")
+    assert main([*PLAN, "--friction", "0.4", "--out", out]) == 0
+    assert set(contents(tmp_path)) == {"grasps.json", "notes.txt"}
+
+
+def test_new_verdicts_remove_old_traces_and_pages(tmp_path):
+    out = str(tmp_path)
+    assert main(["run", "tetrahedron", "--limit", "1", "--traces", "-q", "--out", out]) == 0
+    assert main(["validate", str(tmp_path / "grasps.json"), "-q", "--out", out]) == 0
+    left = {"grasps.json", "verdicts.json", "scenes/c-0-1-2-3.xml"}
+    assert set(contents(tmp_path)) == left
+
+
+def test_verdicts_of_other_grasps_are_noticed(tmp_path, capsys):
+    for name in ("tetrahedron", "wedge"):
+        out = str(tmp_path / name)
+        assert main(["run", name, "--limit", "1", "--no-report", "-q", "--out", out]) == 0
+    shutil.copy(tmp_path / "wedge" / "verdicts.json", tmp_path / "tetrahedron")
+    capsys.readouterr()
+    assert main(["report", str(tmp_path / "tetrahedron"), "-q"]) == 4
+    assert "is about another object" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_clock_that_jumps_changes_nothing(tmp_path, monkeypatch):
+    run = ["run", "tetrahedron", "--limit", "1", "-q", "--out"]
+    assert main([*run, str(tmp_path / "a")]) == 0
+    times = iter(range(10**9, 0, -(10**6)))
+    monkeypatch.setattr(time, "time", lambda: float(next(times, -1.0)))
+    assert main([*run, str(tmp_path / "b")]) == 0
+    assert contents(tmp_path / "a") == contents(tmp_path / "b")

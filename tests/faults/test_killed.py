@@ -1,0 +1,128 @@
+"""Killed at any step: files are whole, and the same command again ends as if nothing had been."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from scenes.whole_files import UNFINISHED
+from sim_validate.cli import main
+from tests.faults.conftest import CLI, ROOT, contents
+
+RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q"]
+PLAN = ["plan", "tetrahedron", "--family", "concurrent", "--jobs", "1", "-q"]
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("planned")
+    assert main([*PLAN, "--out", str(folder)]) == 0
+    return folder / "grasps.json"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "least", "every"),
+    [
+        ([*RUN, "--out", "OUT"], 3, 16),
+        ([*RUN, "--no-report", "--traces", "--out", "OUT"], 10, 2),
+        ([*PLAN, "--regions", "--out", "OUT"], 3, 5),
+        (["validate", "GRASPS", "--traces", "--jobs", "1", "-q", "--out", "OUT"], 5, 2),
+        (["scene", "GRASPS", "-q", "--out", "OUT"], 6, 1),
+        (["regions", "GRASPS", "--cones", "64", "-q", "--out", "OUT"], 5, 2),
+        (
+            ["baseline", "record", "GRASPS", "--jobs", "1", "-q", "--out", "OUT/a.baseline.json"],
+            2,
+            2,
+        ),
+    ],
+)
+def test_what_is_there_is_whole_and_the_next_run_is_as_undisturbed(
+    words, least, every, planned, everywhere, tmp_path
+):
+    words = [word.replace("GRASPS", str(planned)) for word in words]
+    codes = everywhere("kill", tmp_path, *words, every=every)
+    assert [code for code, _ in codes] == [-signal.SIGKILL] * (len(codes) - 1) + [0]
+    assert len(codes) > least
+    whole = contents(tmp_path / "whole")
+    for step in range(0, every * len(codes), every):
+        struck = tmp_path / f"{step}.struck"
+        for name, data in contents(struck).items() if struck.is_dir() else ():
+            assert UNFINISHED in name or data == whole[name], (step, name)
+        after = contents(tmp_path / str(step))
+        if words[0] == "baseline":  # it may stand in anybody's folder, where nothing is cleaned
+            after = {name: data for name, data in after.items() if UNFINISHED not in name}
+        assert after == whole, step
+
+
+@pytest.mark.slow
+def test_nothing_of_an_earlier_run_is_mixed_with_a_new_one(everywhere, tmp_path):
+    given = tmp_path / "given"
+    other = ["--friction", "0.4", "--traces", "--no-report", "-q"]
+    assert main(["run", "tetrahedron", "--limit", "1", *other, "--out", str(given)]) == 0
+    before = contents(given)
+    codes = everywhere("kill", tmp_path, *RUN, "--no-report", "--traces", "--out", "OUT", every=3)
+    whole = contents(tmp_path / "whole")
+    for step in range(0, 3 * len(codes), 3):
+        names = contents(tmp_path / f"{step}.struck")
+        found = {name: data for name, data in names.items() if UNFINISHED not in name}
+        assert found.items() <= before.items() or found.items() <= whole.items(), step
+        assert contents(tmp_path / str(step)) == whole
+
+
+def test_what_a_killed_writer_left_goes_with_the_next_command(planned, tmp_path):
+    for part in ("", "scenes", "report", "report/grasps"):
+        (tmp_path / part).mkdir(exist_ok=True)
+        (tmp_path / part / f".a.json{UNFINISHED}x7y.json").write_text("{")
+    shutil.copy(planned, tmp_path)
+    (tmp_path / ".mine.json").write_text("{}")
+    assert main(["scene", str(planned), "--out", str(tmp_path), "-q"]) == 0
+    left = {path.name for path in tmp_path.rglob("*") if path.is_file()}
+    assert left == {"grasps.json", "c-0-1-2-3.xml", ".mine.json"}
+
+
+@pytest.mark.slow
+def test_a_report_of_what_a_kill_has_left_says_what_is_missing(planned, tmp_path, capsys):
+    shutil.copy(planned, tmp_path)
+    assert main(["validate", str(planned), "--out", str(tmp_path), "-q"]) == 0
+    verdicts = json.loads((tmp_path / "verdicts.json").read_text())
+    (tmp_path / "verdicts.json").write_text(json.dumps(verdicts | {"complete": False}))
+    assert main(["report", str(tmp_path), "-q"]) == 0
+    assert "the run was interrupted" in (tmp_path / "report" / "index.html").read_text()
+    (tmp_path / "grasps.json").unlink()
+    assert main(["report", str(tmp_path), "-q"]) == 4
+    assert "has no grasps.json" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="children are found in /proc")
+def test_processes_end_with_the_command_that_is_killed(tmp_path):
+    words = ["run", "icosahedron", "--limit", "40", "--jobs", "2", "--out", str(tmp_path), "-q"]
+    process = subprocess.Popen([*CLI, *words], env=os.environ | {"PYTHONPATH": str(ROOT)})
+    workers = set()
+    deadline = time.monotonic() + 120.0
+    while len(workers) < 2 and time.monotonic() < deadline:
+        time.sleep(0.2)
+        workers = children(process.pid)
+    time.sleep(3.0)
+    workers = children(process.pid)
+    process.kill()
+    process.wait()
+    assert len(workers) >= 2
+    deadline = time.monotonic() + 60.0
+    while any(Path(f"/proc/{worker}").exists() for worker in workers):
+        assert time.monotonic() < deadline, "a process outlived the command"
+        time.sleep(0.2)
+
+
+def children(parent):
+    found = set()
+    for task in Path(f"/proc/{parent}/task").glob("*/children"):
+        found |= {int(word) for word in task.read_text().split()}
+    return found

@@ -1,0 +1,139 @@
+"""Environments that lack things, or hold nonsense, change no result."""
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from sim_validate import engines
+from sim_validate.cli import Exit, main
+from tests.faults.conftest import CLI, ROOT, contents
+
+RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q"]
+NOWHERE = "/proc/nowhere"
+SURROUNDINGS = {
+    "no home": {"HOME": NOWHERE, "XDG_CONFIG_HOME": NOWHERE, "XDG_CACHE_HOME": NOWHERE},
+    "no folder for matplotlib": {"MPLCONFIGDIR": NOWHERE, "MPLBACKEND": "nonsense"},
+    "no folder for kernels": {"NUMBA_CACHE_DIR": NOWHERE},
+    "no threads": {"OMP_NUM_THREADS": "many"},
+    "no temporary folder": {"TMPDIR": NOWHERE},
+    "no locale": {"LC_ALL": "xx_XX", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"},
+    "no terminal": {"TERM": "dumb", "COLUMNS": "1"},
+}
+
+
+@pytest.fixture(scope="module")
+def usual(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("usual")
+    assert main([*RUN, "--out", str(folder)]) == 0
+    return contents(folder)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("named", SURROUNDINGS)
+def test_surroundings_change_no_byte(named, usual, graspproof, tmp_path):
+    done = graspproof(*RUN, "--out", str(tmp_path / "b"), env=SURROUNDINGS[named])
+    assert (done.returncode, done.stderr) == (0, "")
+    assert contents(tmp_path / "b") == usual
+
+
+@pytest.mark.slow
+def test_settings_that_kernels_refuse_leave_the_work_to_the_reference(graspproof, tmp_path):
+    words = [*RUN, "--no-report", "--out", str(tmp_path)]
+    done = graspproof(*words, env={"NUMBA_NUM_THREADS": "0"})
+    assert (done.returncode, done.stderr) == (0, "")
+    assert set(contents(tmp_path)) == {"grasps.json", "verdicts.json", "scenes/c-0-1-2-3.xml"}
+
+
+@pytest.mark.slow
+def test_an_empty_environment_will_do(tmp_path):
+    command = [*CLI, *RUN, "--no-report", "--out", str(tmp_path / "a")]
+    done = subprocess.run(command, cwd=ROOT, env={}, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_letters_that_a_terminal_does_not_have_are_spelled_out(graspproof, tmp_path):
+    name = tmp_path / "Schlüssel.off"
+    name.write_text(
+        "OFF\n4 4 0\n0 0 0\n.1 0 0\n0 .1 0\n0 0 .1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"
+    )
+    ascii_only = {"PYTHONIOENCODING": "ascii"}
+    done = graspproof("inspect", str(name), env=ascii_only)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Schl\\xfcssel" in done.stdout
+
+
+@pytest.mark.parametrize(
+    "redirected",
+    ["| true", *(pytest.param(end, marks=pytest.mark.slow) for end in (">&-", "2>&-", "<&-"))],
+)
+def test_a_stream_that_is_closed_does_not_stop_the_work(redirected, tmp_path):
+    words = ["plan", "tetrahedron", "--family", "concurrent", "--json", "--out", "out"]
+    quoted = " ".join(f"'{word}'" for word in [*CLI, *words])
+    done = subprocess.run(
+        ["/bin/bash", "-c", f"set -o pipefail; {quoted} {redirected}"], cwd=tmp_path, check=False,
+        env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0
+    assert "Error" not in done.stderr
+    assert (tmp_path / "out" / "grasps.json").is_file()
+
+
+def test_a_working_folder_that_is_gone_matters_only_to_paths_in_it(tmp_path, monkeypatch, capsys):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    plan = ["plan", "tetrahedron", "--family", "concurrent", "-q"]
+    assert main([*plan, "--out", str(tmp_path / "a")]) == 0
+    assert main([*plan, "--out", "b"]) == 4
+    assert "b: no file can be written there (No such file or directory)" in capsys.readouterr().err
+
+
+def test_cores_are_those_that_the_process_may_use(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(64)), raising=False)
+    monkeypatch.setattr(engines, "SHARE", tmp_path / "cpu.max")
+    counted = {"": 64, "max 100000\n": 64, "250000 100000\n": 2, "20000 100000\n": 1}
+    for text, cores in counted.items():
+        if text:
+            (tmp_path / "cpu.max").write_text(text)
+        assert engines.available_cores() == cores
+
+
+@pytest.mark.slow
+def test_results_depend_on_neither_processes_nor_cores(tmp_path):
+    words = ["run", "box", "--limit", "16", "--no-report", "-q", "--out"]
+    assert main([*words, str(tmp_path / "one"), "--jobs", "1"]) == 0
+    assert main([*words, str(tmp_path / "many"), "--jobs", "64"]) == 0
+    own = os.sched_getaffinity(0)
+    try:
+        os.sched_setaffinity(0, {min(own)})
+        assert main([*words, str(tmp_path / "core")]) == 0
+    finally:
+        os.sched_setaffinity(0, own)
+    assert contents(tmp_path / "one") == contents(tmp_path / "many") == contents(tmp_path / "core")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("more", [[], ["--optimize"], ["--regions"]])
+def test_an_interrupt_while_planning_leaves_nothing_half(number, more, tmp_path):
+    words = ["run", "icosahedron", "--limit", "400", *more, "--jobs", "1", "--out", "out"]
+    process = subprocess.Popen(
+        [*CLI, *words], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
+    )  # fmt: skip
+    deadline = time.monotonic() + 60.0
+    while not Path(tmp_path / "out").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(1.0)
+    process.send_signal(number)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == Exit.INTERRUPTED
+    assert said.splitlines()[-1] == "graspproof: interrupted"
+    assert "Traceback" not in said
+    assert all("proofs" in name for name in contents(tmp_path))
