@@ -12,6 +12,8 @@ PASSED_OVER = frozenset(
     b"l p".split()
 )
 """They change looks, names or curves, not the surface."""
+CORNER = re.compile(rb"[+-]?\d+(/([+-]?\d+)?){0,2}")
+"""A vertex, perhaps of a texture and a normal."""
 CONTINUED = re.compile(rb"\\\r?\n")
 WIDTHS = (3, 4, 6, 7)
 """Numbers of a vertex: a point, perhaps its weight, perhaps a colour."""
@@ -50,6 +52,9 @@ def _vertex(words: list[bytes], where: str) -> list[float]:
 
 def _corners(words: list[bytes], vertices: int, where: str) -> list[int]:
     """Numbers of vertices from 0 on; those in the file count from 1, or back from the last."""
+    for word in words:
+        if not CORNER.fullmatch(word):
+            broken(where, f"a corner must be whole numbers parted by `/`, got {shown(word)!r}")
     corners = [whole(word.partition(b"/")[0], where) for word in words]
     for corner in corners:
         if not 1 <= abs(corner) <= vertices:

@@ -9,15 +9,20 @@ Point = tuple[float, float, float]
 Triangle = tuple[Point, Point, Point]
 
 
+def text_of(data):
+    """Text of which only ASCII means anything."""
+    return "".join(chr(byte) if byte < 128 else "?" for byte in data)
+
+
 def fan(corners):
     return [(corners[0], corners[i], corners[i + 1]) for i in range(1, len(corners) - 1)]
 
 
 def of_obj(data: bytes) -> list[Triangle]:
-    text = data.decode("latin-1").replace("\\\r\n", "").replace("\\\n", "")
+    text = text_of(data).replace("\\\r\n", "").replace("\\\n", "")
     points, triangles = [], []
     for line in text.split("\n"):
-        words = line.split("#")[0].lstrip("ï»¿").split()
+        words = line.split("#")[0].removeprefix("???").split()
         if words[:1] == ["v"]:
             points.append(tuple(map(float, words[1:4])))
         elif words[:1] == ["f"]:
@@ -32,14 +37,14 @@ def of_stl(data: bytes) -> list[Triangle]:
     if len(data) == 84 + 50 * count:
         rows = [struct.unpack_from("<12f", data, 84 + 50 * i)[3:] for i in range(count)]
         return [(row[:3], row[3:6], row[6:]) for row in rows]
-    lines = [line.split("#")[0].split() for line in data.decode("latin-1").split("\n")]
+    lines = [line.split("#")[0].split() for line in text_of(data).split("\n")]
     points = [tuple(map(float, w[1:])) for w in lines if w[:1] and w[0].lower() == "vertex"]
     assert len(points) % 3 == 0
     return [tuple(points[i : i + 3]) for i in range(0, len(points), 3)]
 
 
 def of_off(data: bytes) -> list[Triangle]:
-    text = data.decode("latin-1").lstrip("ï»¿")
+    text = text_of(data).removeprefix("???")
     lines = [line for line in (line.split("#")[0].split() for line in text.split("\n")) if line]
     head = lines[0][1:] or lines[1]
     rows = lines[1:] if lines[0][1:] else lines[2:]

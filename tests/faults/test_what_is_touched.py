@@ -1,0 +1,129 @@
+"""Which files are opened, which processes begun, and that nothing is sent anywhere."""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from tests.bad_input.mesh_texts import obj
+
+AUDITING = Path(__file__).with_name("auditing")
+ROOT = Path(__file__).parents[2]
+LIBRARIES = tuple(
+    {os.path.realpath(each) for each in (sys.prefix, sys.base_prefix, ROOT, AUDITING, *sys.path)}
+)
+SYSTEM = ("/sys/", "/proc/", "/dev/null", "/dev/urandom", "/usr/", "/lib", "/etc/", "/dev/shm/")
+"""What the interpreter and libraries read about the machine; fonts, time zones."""
+CACHES = ("__pycache__", ".pytest_cache")
+WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+CHANGING = (
+    "os.remove", "os.rename", "os.mkdir", "os.rmdir", "os.link", "os.symlink", "os.chmod",
+    "os.chown", "os.truncate", "os.utime", "shutil.rmtree", "shutil.move", "shutil.copyfile",
+)  # fmt: skip
+OURS = ("grasp_core.mesh_reader", "multiprocessing", "frames.py")
+LIBRARIES_ASK = ("def get_version(library_handle)", "fc-list")
+"""GLFW's Python package for its version, matplotlib for fonts, the first time."""
+
+
+class Witness:
+    """Runs commands and keeps what they touch."""
+
+    def __init__(self, folder):
+        self.folder, self.events = folder, []
+        for name in ("home", "scratch"):
+            (folder / name).mkdir()
+        (folder / "part.obj").write_text(obj())
+        self.pipe = folder / "pipe"
+        os.mkfifo(self.pipe)
+
+    def run(self, line):
+        handle = os.open(self.pipe, os.O_RDWR)
+        reader = threading.Thread(target=self._read, args=(handle,))
+        reader.start()
+        environment = {
+            **os.environ, "AUDITED_BY": str(self.pipe), "HOME": str(self.folder / "home"),
+            "TMPDIR": str(self.folder / "scratch"), "PYTHONPATH": f"{AUDITING}:{ROOT}",
+        }  # fmt: skip
+        command = [
+            sys.executable,
+            "-P",
+            "-c",
+            "from sim_validate.cli import run_and_exit as r; r()",
+        ]
+        ended = subprocess.run(
+            [*command, *line.split()], cwd=self.folder, env=environment, capture_output=True,
+            timeout=200, check=False,
+        )  # fmt: skip
+        os.write(handle, b'["end"]\n')
+        reader.join()
+        os.close(handle)
+        assert ended.returncode == 0, ended.stderr
+
+    def _read(self, handle):
+        with open(handle, "rb", closefd=False) as stream:
+            for said in stream:
+                event = json.loads(said) if said.endswith(b"]\n") else [said[:60].decode()]
+                if event == ["end"]:
+                    return
+                self.events.append(event)
+
+    def path(self, given):
+        return (self.folder / given).resolve() if isinstance(given, str) else None
+
+
+@pytest.fixture(scope="module")
+def witness(tmp_path_factory):
+    found = Witness(tmp_path_factory.mktemp("touched"))
+    found.run("run part.obj --limit 1 --random-wrenches 0 --out out -q --jobs 2")
+    found.run("report out --out pages -q --jobs 2")
+    found.run("dataset build part.obj --friction 0.5 --limit 1 --out ds -q --jobs 2")
+    return found
+
+
+def _is_of(path, *roots):
+    return str(path).startswith(tuple(map(str, roots)))
+
+
+@pytest.mark.slow
+def test_only_what_is_named_is_read(witness):
+    own = [witness.folder / name for name in ("part.obj", "out", "pages", "ds", "home", "scratch")]
+    named = {name for event, name, *_ in witness.events if event == "open"}
+    opened = {witness.path(name) for name in named if "/" in str(name)} - {None}
+    assert "part.obj" in named
+    assert witness.folder / "out" / "grasps.json" in opened
+    others = [path for path in opened if not _is_of(path, *LIBRARIES, *SYSTEM, *own)]
+    assert not others
+
+
+@pytest.mark.slow
+def test_only_folders_for_results_and_caches_are_written_to(witness):
+    roots = [witness.folder / name for name in ("out", "pages", "ds", "home", "scratch")]
+    written = set()
+    for event, *given in witness.events:
+        if (event == "open" and isinstance(given[2], int) and given[2] & WRITING) or (
+            event in CHANGING and os.path.isabs(str(given[0]))
+        ):
+            written.add(witness.path(given[0]))
+    written -= {None, Path("/dev/null")}
+    assert any(path.is_relative_to(roots[0]) for path in written)
+    strange = [p for p in written if not _is_of(p, *roots) and not set(p.parts) & set(CACHES)]
+    assert not strange
+
+
+@pytest.mark.slow
+def test_there_are_no_sockets_and_no_other_programs(witness):
+    kinds = {event for event, *_ in witness.events}
+    assert not [
+        each for each in kinds if each.startswith(("socket.", "urllib.", "http.", "os.exec"))
+    ]
+    assert "os.system" not in kinds
+    begun = [each for each in witness.events if each[0] == "subprocess.Popen"]
+    assert any("grasp_core.mesh_reader" in str(each) for each in begun)
+    strange = [
+        each for each in begun if not any(name in str(each) for name in (*OURS, *LIBRARIES_ASK))
+    ]
+    assert not strange
