@@ -167,11 +167,21 @@ def grasps_from_json(text: str) -> SavedGrasps:
     )
     if body.content_sha256 != record.object.content_sha256:
         raise InputError("object.content_sha256: is not that of its mesh; plan again")
-    grasps = tuple(_grasp_from_record(body, grasp, record.friction) for grasp in record.grasps)
+    grasps = tuple(
+        _named_grasp(body, grasp, record.friction, i) for i, grasp in enumerate(record.grasps)
+    )
     if len({grasp.id for grasp in grasps}) < len(grasps):
         raise InputError("grasps: two have the same id; ids must differ")
     finger = None if record.finger is None else Finger(**record.finger.model_dump())
     return SavedGrasps(body, record.friction, record.seed, grasps, finger)
+
+
+def _named_grasp(body: Polyhedron, record: "GraspRecord", friction: float, number: int) -> Grasp:
+    """A grasp, whose refusal says where in the file it is."""
+    try:
+        return _grasp_from_record(body, record, friction)
+    except InputError as error:
+        raise InputError(f"grasps[{number}]: {error}") from error
 
 
 def _grasp_from_record(body: Polyhedron, record: "GraspRecord", friction: float) -> Grasp:

@@ -10,6 +10,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, frozen, to_digits
 from grasp_core.errors import InputError
+from grasp_core.json_text import shown
 from grasp_core.values import Contact, Grasp, Polyhedron
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, Surface, build_scene
@@ -71,13 +72,13 @@ class NamedWrench:
         size = float(np.abs(self.wrench).max())
         if not SMALLEST <= size <= LARGEST:
             raise InputError(
-                f"wrench {self.name!r}: the largest part must be from {SMALLEST:g} to {LARGEST:g} "
-                f"(N or N m), got {size:g}"
+                f"wrench {shown(self.name)}: the largest part must be from {SMALLEST:g} to "
+                f"{LARGEST:g} (N or N m), got {size:g}"
             )
         if not NAME.fullmatch(self.name):
             raise InputError(
                 f"a wrench's name has up to 100 letters, digits, '_', '+', '-' and spaces; "
-                f"got {self.name!r}"
+                f"got {shown(self.name)}"
             )
 
 
@@ -110,7 +111,8 @@ class Agenda:
     def __post_init__(self) -> None:
         """Refuse what no trial can be made of, and names that two would share."""
         if self.limits not in get_args(LimitSearch):
-            raise InputError(f"limits must be one of {get_args(LimitSearch)}, got {self.limits!r}")
+            known = ", ".join(get_args(LimitSearch))
+            raise InputError(f"limits must be one of {known}, got {shown(self.limits)}")
         if min(self.random_wrenches, self.trials, self.seed) < 0:
             raise InputError("random_wrenches, trials and seed must not be negative")
         if self.random_wrenches > MOST_RANDOM:

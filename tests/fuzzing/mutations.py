@@ -26,6 +26,10 @@ TOML_RAW = (
 )  # fmt: skip
 MOST_CHANGED = 1e300
 """Larger numbers are left as they are."""
+BY_KIND = 0.85
+"""How often a change is one of values, not of bytes."""
+MOST_BYTES = 2**18
+"""Longer inputs are left to the tests of limits."""
 HOLE = "\u2603hole\u2603"
 """Stands in a document where raw text is to be put."""
 
@@ -138,15 +142,14 @@ def npz_changed(data: bytes, rng: random.Random, mutate: Mutate) -> bytes | None
     return made.getvalue()
 
 
-def changed(written: str, data: bytes, seed: int, mutate: Mutate, most: int) -> bytes:
-    """An input changed in the way of its kind, or bytewise."""
-    rng = random.Random(seed)  # noqa: S311 - nothing is secret
+def changed(written: str, data: bytes, rng: random.Random, mutate: Mutate) -> bytes:
+    """An input changed in the way of its kind, or bytewise where it is not of that kind."""
     made: bytes | None = None
-    if rng.random() < 0.85:
+    if rng.random() < BY_KIND:
         if written == "json":
             made = json_changed(data, rng)
         elif written == "toml":
             made = toml_changed(data, rng)
         elif written == "npz":
             made = npz_changed(data, rng, mutate)
-    return mutate(data, most) if made is None or len(made) > most else made
+    return mutate(data, MOST_BYTES) if made is None or len(made) > MOST_BYTES else made
