@@ -13,8 +13,8 @@ from grasp_core.errors import InputError
 
 DEEPEST = 64
 """Objects and lists inside each other; ours are less than ten deep."""
-LARGEST_WHOLE = 2**64
-"""Larger whole numbers are no seeds, counts or indices, and may not be floats."""
+LARGEST_WHOLE = 2**64 - 1
+"""Larger whole numbers are no seeds, counts or indices, and arrays do not hold them."""
 LONGEST_ECHO = 40
 """Characters of a wrong value, or of a key, that a message repeats."""
 KINDS: Mapping[str, Collection[str]] = {

@@ -173,8 +173,7 @@ def grasps_from_json(text: str) -> SavedGrasps:
     if body.content_sha256 != record.object.content_sha256:
         raise InputError("object.content_sha256: is not that of its mesh; plan again")
     grasps = tuple(
-        _grasp_at(number, body, grasp, record.friction)
-        for number, grasp in enumerate(record.grasps)
+        _named_grasp(body, grasp, record.friction, i) for i, grasp in enumerate(record.grasps)
     )
     if len({grasp.id for grasp in grasps}) < len(grasps):
         raise InputError("grasps: two have the same id; ids must differ")
@@ -182,7 +181,8 @@ def grasps_from_json(text: str) -> SavedGrasps:
     return SavedGrasps(body, record.friction, record.seed, grasps, finger)
 
 
-def _grasp_at(number: int, body: Polyhedron, record: "GraspRecord", friction: float) -> Grasp:
+def _named_grasp(body: Polyhedron, record: "GraspRecord", friction: float, number: int) -> Grasp:
+    """A grasp, whose refusal says where in the file it is."""
     try:
         return _grasp_from_record(body, record, friction)
     except InputError as error:

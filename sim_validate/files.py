@@ -53,7 +53,7 @@ def read_text(path: Path, most: int = MAX_TEXT_BYTES) -> str:
 
 
 def text_of(data: bytes) -> str:
-    """The text that a file's bytes are; line breaks of any system are those of ours.
+    """The text that a file's bytes are; pairs of line breaks are one.
 
     Raises:
         NotTextError: They are not UTF-8.
@@ -66,7 +66,7 @@ def text_of(data: bytes) -> str:
         raise NotTextError(
             f"not UTF-8 text ({error.reason} at byte {error.start}); save it as UTF-8"
         ) from error
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+    return text.replace("\r\n", "\n")
 
 
 def write_text(path: Path, text: str) -> Path:

@@ -25,7 +25,8 @@ MOST_HEADER = 10_000
 """Letters of an array's header, as numpy takes them."""
 KINDS = "biufU"
 """Of what arrays may be: truth values, numbers, text."""
-ENDING = ".npy"
+BEGINNING, ENDING = b"PK\x03\x04", ".npy"
+"""Of an archive, and of the names in it."""
 LARGEST_LETTER, FIRST_HALF, LAST_HALF = 0x10FFFF, 0xD800, 0xDFFF
 """Codes of letters, and of halves of letters, which are none."""
 
@@ -49,6 +50,8 @@ def arrays_of(data: bytes, names: Collection[str]) -> dict[str, NDArray[Any]]:
     Raises:
         InputError: It is too large, or holds anything but plain arrays.
     """
+    if not data.startswith(BEGINNING):
+        raise InputError("cannot be read as npz (it does not begin as archives do)")
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = _checked(archive.infolist())

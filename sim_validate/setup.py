@@ -25,6 +25,7 @@ from grasp_core.checked import (
     whole,
 )
 from grasp_core.errors import InputError
+from grasp_core.json_text import shown
 from grasp_core.values import Contact, Grasp, Polyhedron
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, Surface, build_scene
@@ -102,13 +103,13 @@ class NamedWrench:
         size = float(np.abs(self.wrench).max())
         if not SMALLEST <= size <= LARGEST:
             raise InputError(
-                f"wrench {self.name!r}: the largest part must be from {SMALLEST:g} to {LARGEST:g} "
-                f"(N or N m), got {size:g}"
+                f"wrench {shown(self.name)}: the largest part must be from {SMALLEST:g} to "
+                f"{LARGEST:g} (N or N m), got {size:g}"
             )
         if not NAME.fullmatch(self.name):
             raise InputError(
                 f"a wrench's name has up to 100 letters, digits, '_', '+', '-' and spaces; "
-                f"got {self.name!r}"
+                f"got {shown(self.name)}"
             )
 
 

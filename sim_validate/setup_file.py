@@ -1,5 +1,6 @@
 """A setup in TOML: tables `physics`, `fingers`, `hold`, `limit`, `friction`, any part of each."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -80,7 +81,8 @@ def _filled(path: str, table: str, values: Any, given: dict[str, Any]) -> Any:
             )
     kind = cast("type[Any]", type(values))
     try:
-        checked: Any = TypeAdapter(kind).validate_python({**_as_dict(values), **given})
+        text = json.dumps({**_as_dict(values), **given}, default=str)  # days and times of TOML
+        checked: Any = TypeAdapter(kind).validate_json(text, strict=True)
     except ValidationError as error:
         raise InputError(f"{path}: [{table}] {complaint(error, kind)}") from error
     except InputError as error:  # of the value's own checks

@@ -161,9 +161,12 @@ def _typed(name: str, value: Any) -> Any:
         if not _is(value, wanted):
             raise InputError(f"{name}: expected {WORDS[wanted]}, got {shown(value)}")
         return value
-    listed = cast("list[object]", value if isinstance(value, list) else [None])
-    if not all(_is(one, wanted) for one in listed):
-        raise InputError(f"{name}: expected a list of {WORDS[wanted]}, got {shown(listed)}")
+    if not isinstance(value, list):
+        raise InputError(f"{name}: expected a list of {WORDS[wanted]}, got {shown(value)}")
+    listed = cast("list[object]", value)
+    odd = [one for one in listed if not _is(one, wanted)]
+    if odd:
+        raise InputError(f"{name}: expected a list of {WORDS[wanted]}, got {shown(odd[0])} in it")
     return tuple(float(cast("float", one)) if wanted is float else one for one in listed)
 
 

@@ -41,7 +41,8 @@ def left_out_from(text: str) -> list[LeftOut]:
     Raises:
         InputError: A line is not such a one.
     """
-    return [_read(line, number) for number, line in enumerate(text.split("\n")[:-1], start=1)]
+    lines = text.removesuffix("\n").split("\n") if text else []
+    return [_read(line, number) for number, line in enumerate(lines, start=1)]
 
 
 def _read(line: str, number: int) -> LeftOut:

@@ -9,7 +9,7 @@ from grasp_core.checked import one_of
 from grasp_core.errors import InputError
 from sim_validate.datasets.columns import TABLES, Name
 from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_toml
-from sim_validate.datasets.manifest import Listed, Manifest, read_manifest
+from sim_validate.datasets.manifest import Listed, Manifest, listed, read_manifest
 from sim_validate.datasets.rows import SPLITS
 from sim_validate.datasets.tables import each_row
 from sim_validate.inside import path_inside
@@ -24,8 +24,12 @@ class Selection:
     split: str | None
 
     def paths(self, name: Name) -> list[Path]:
-        """The files of a table."""
-        return [path_inside(self.folder, each.path) for each in self._listed(name)]
+        """The files of a table, each whole.
+
+        Raises:
+            InputError: One is missing, or not what was written.
+        """
+        return [self._whole(each) for each in self._listed(name)]
 
     def counts(self) -> dict[Name, int]:
         """How many rows each table has."""
@@ -44,6 +48,18 @@ class Selection:
                 yield row
             if found != each.rows:
                 raise InputError(f"{each.path}: {found} rows, listed are {each.rows}")
+
+    def _whole(self, each: Listed) -> Path:
+        """A file with the manifest's hash: page checksums do not cover all of it."""
+        path = path_inside(self.folder, each.path)
+        if not path.is_file():
+            raise InputError(f"{path}: missing; see `graspproof dataset verify`")
+        found = listed(self.folder, path)
+        if (found.bytes, found.sha256) != (each.bytes, each.sha256):
+            raise InputError(
+                f"{path}: damaged, it is not what was written; see `graspproof dataset verify`"
+            )
+        return path
 
     def _listed(self, name: Name) -> list[Listed]:
         return [each for each in self.manifest.of_table(name) if self.split in (None, each.split)]

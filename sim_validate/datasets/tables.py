@@ -125,7 +125,7 @@ def _opened(path: Path, name: Name | None = None) -> Generator[Any]:
             _check_columns(path, file.schema_arrow, list(TABLES) if name is None else [name])
             _check_size(path, file.metadata)
             yield file
-    except (OSError, arrow.ArrowException) as error:
+    except (OSError, ValueError, arrow.ArrowException) as error:  # names that are no text, too
         said = shown(" ".join(str(error).split()))
         raise InputError(f"{path}: cannot be read, or is damaged ({said})") from error
 

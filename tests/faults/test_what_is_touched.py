@@ -105,7 +105,7 @@ def test_only_folders_for_results_and_caches_are_written_to(witness):
     written = set()
     for event, *given in witness.events:
         if (event == "open" and isinstance(given[2], int) and given[2] & WRITING) or (
-            event in CHANGING and os.path.isabs(str(given[0]))
+            event in CHANGING and Path(str(given[0])).is_absolute()
         ):
             written.add(witness.path(given[0]))
     written -= {None, Path("/dev/null")}

@@ -49,10 +49,7 @@ def with_entry(**changed):
         ("", "not JSON"),
         ("[]", "expected an object, as a baseline is, got a list"),
         ("{}", "is no baseline"),
-        (
-            spoiled(lambda r: r.update(schema=2)),
-            "schema: expected 1, got 2: written by a newer graspproof",
-        ),
+        (spoiled(lambda r: r.update(schema=2)), "schema: .* by a newer graspproof"),
         (spoiled(lambda r: r.pop("friction")), "friction: missing"),
         (spoiled(lambda r: r.update(friction="x")), "friction: expected a number, got"),
         (spoiled(lambda r: r.update(grasps_file=3)), "grasps_file: expected text, got 3"),

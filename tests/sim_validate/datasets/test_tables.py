@@ -145,3 +145,25 @@ def test_objects_are_split_by_their_hash_in_stated_shares():
     assert splits.count("train") == pytest.approx(3200, abs=120)
     assert splits.count("validation") == pytest.approx(400, abs=80)
     assert [split_of(f"object {number}", 1) for number in range(4000)] != splits
+
+
+def test_columns_of_other_types_and_another_table_are_refused(written, tmp_path):
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    table = parquet.read_table(written["objects"])
+    place = table.schema.get_field_index("vertices")
+    other = table.set_column(place, "vertices", table["vertices"].cast(arrow.float64()))
+    parquet.write_table(other, tmp_path / "t.parquet")
+    with pytest.raises(gc.InputError, match="columns of other types than objects"):
+        read_rows(tmp_path / "t.parquet", "objects")
+    turned = table.select(list(reversed(table.column_names)))
+    parquet.write_table(turned, tmp_path / "t.parquet")
+    with pytest.raises(gc.InputError, match="other columns than objects"):
+        read_rows(tmp_path / "t.parquet", "objects")
+    with pytest.raises(gc.InputError, match="other columns than objects"):
+        read_rows(written["grasps"], "objects")
+
+
+def test_files_that_claim_too_much_are_refused_before_they_are_read(written, monkeypatch):
+    monkeypatch.setattr(tables, "MOST_ROWS", 1)
+    with pytest.raises(gc.InputError, match=r"claims [0-9]+ rows, .* limits are 1 and"):
+        read_rows(written["trials"])

@@ -11,6 +11,7 @@ import trimesh
 
 import grasp_core as gc
 from sim_validate.datasets.build import build
+from sim_validate.datasets.loading import load_dataset
 from sim_validate.datasets.manifest import listed, read_manifest, write_manifest
 from sim_validate.datasets.redo import Sample, drawn
 from sim_validate.datasets.tables import parquet_bytes, read_rows
@@ -202,3 +203,75 @@ def test_a_larger_sample_holds_a_smaller_one():
     assert more[:10] == some
     assert drawn(units, Sample(0.1, seed=4)) != some
     assert len(drawn(units, Sample(0.001))) == 1
+
+
+def rewritten(folder, change):
+    """The manifest's text with a change."""
+    path = folder / "manifest.json"
+    record = json.loads(path.read_text())
+    change(record)
+    path.write_text(json.dumps(record))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda r: r["files"][0].update(path="../x"), r"files\[0\].path: expected a path inside"),
+        (lambda r: r["files"][0].update(path="/etc/passwd"), r"files\[0\].path: expected a path"),
+        (lambda r: r["files"][0].update(rows=-1), r"files\[0\].rows: expected at least 0, got -1"),
+        (lambda r: r.update(schema=2), "schema: expected 1, got 2: written by a newer graspproof"),
+        (lambda r: r["files"].append(r["files"][0]), "a path is there twice"),
+        (lambda r: r.update(units="4"), 'units: expected a whole number, got "4"'),
+        (lambda r: r.update(taste=1), "taste: unknown key; expected are config_sha256"),
+        (lambda r: r.pop("files"), "files: missing"),
+    ],
+)
+def test_a_manifest_that_is_none_is_refused_by_field(copy, change, words):
+    rewritten(copy, change)
+    with pytest.raises(gc.InputError, match=rf"manifest\.json: .*{words}"):
+        verify(copy)
+    with pytest.raises(gc.InputError, match=words):
+        load_dataset(copy)
+
+
+def test_links_out_of_a_dataset_are_not_followed(copy, tmp_path):
+    path = next(copy.glob("data/grasps/*.parquet"))
+    path.rename(tmp_path / "elsewhere")
+    path.symlink_to(tmp_path / "elsewhere")
+    assert any("leads out of" in fault for fault in verify(copy))
+    with pytest.raises(gc.InputError, match="leads out of"):
+        load_dataset(copy)
+
+
+def test_nothing_is_loaded_where_any_byte_is_another(copy):
+    path = next(copy.glob("data/trials/*.parquet"))
+    whole = path.read_bytes()
+    spoiled = [whole[:-1], whole[: len(whole) // 2], b"", whole + b"x"]
+    spoiled += [whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :]
+                for at in range(4, len(whole), len(whole) // 9)]  # fmt: skip
+    for data in spoiled:
+        path.write_bytes(data)
+        with pytest.raises(gc.InputError, match=rf"{path.name}: damaged"):
+            load_dataset(copy)
+    path.unlink()
+    with pytest.raises(gc.InputError, match=rf"{path.name}: missing"):
+        load_dataset(copy)
+
+
+def test_a_line_of_the_quarantine_that_is_none_is_named(copy):
+    path = copy / "quarantine.jsonl"
+    path.write_text('{"object": 3}\n')
+    data = path.read_bytes()
+    rewritten(copy, lambda r: next(each for each in r["files"] if each["path"] == path.name).update(
+        bytes=len(data), sha256=hashlib.sha256(data).hexdigest()))  # fmt: skip
+    (fault,) = verify(copy)
+    assert "quarantine.jsonl: line 1: object: expected text, got 3" in fault
+
+
+def empty_cells(rows):
+    rows[0].update(friction=None, contacts=None, outcome=None)
+
+
+def test_cells_that_must_not_be_null_are_a_fault_not_a_crash(copy):
+    forged(copy, "grasps", empty_cells)
+    assert any("grasps" in fault or "a row is not" in fault for fault in verify(copy))

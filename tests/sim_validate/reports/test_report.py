@@ -314,7 +314,7 @@ def test_a_control_that_says_nothing_is_bad_news(small_run):
         ("verdicts.json", lambda each: each["verdicts"][0].update(id="c-9-9-9-9"), "is not there"),
         ("regions.json", lambda each: each["grasps"][0].update(contacts_sha256="0"), "contacts"),
         ("regions.json", lambda each: each["grasps"][0]["regions"].pop(), "at least 4 items"),
-        ("regions.json", lambda each: each["grasps"].append(3), r"regions\.json: grasps\[3\]: expected an object"),
+        ("regions.json", lambda each: each["grasps"].append(3), r"grasps\[3\]: expected an object"),
     ],
 )  # fmt: skip
 def test_files_that_are_not_ours_are_refused(copy, file, change, says):
