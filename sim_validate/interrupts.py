@@ -35,7 +35,7 @@ def noted() -> Generator[None, None, None]:
 
 
 def _but_interrupts(tell: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Tell of errors that cannot be raised where they are, but not of interrupts: they are noted."""
+    """Tell of errors that cannot be raised where they are, but of no interrupts: they are noted."""
     return lambda error: None if error.exc_type is KeyboardInterrupt else tell(error)
 
 

@@ -75,6 +75,7 @@ def test_a_new_plan_removes_what_was_told_of_another(tmp_path):
     assert set(contents(tmp_path)) == {"grasps.json", "notes.txt"}
 
 
+@pytest.mark.slow
 def test_new_verdicts_remove_old_traces_and_pages(tmp_path):
     out = str(tmp_path)
     assert main(["run", "tetrahedron", "--limit", "1", "--traces", "-q", "--out", out]) == 0
@@ -83,6 +84,7 @@ def test_new_verdicts_remove_old_traces_and_pages(tmp_path):
     assert set(contents(tmp_path)) == left
 
 
+@pytest.mark.slow
 def test_verdicts_of_other_grasps_are_noticed(tmp_path, capsys):
     for name in ("tetrahedron", "wedge"):
         out = str(tmp_path / name)
