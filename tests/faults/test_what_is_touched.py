@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 LIBRARIES = tuple(
     {os.path.realpath(each) for each in (sys.prefix, sys.base_prefix, ROOT, AUDITING, *sys.path)}
 )
-SYSTEM = ("/sys/", "/proc/", "/dev/null", "/dev/urandom", "/usr/", "/lib", "/etc/", "/dev/shm/")
+SYSTEM = ("/sys/", "/proc/", "/dev/null", "/dev/urandom", "/usr/", "/lib", "/etc/", "/dev/shm/")  # noqa: S108 - shared memory of processes
 """What the interpreter and libraries read about the machine; fonts, time zones."""
 CACHES = ("__pycache__", ".pytest_cache")
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
