@@ -25,7 +25,7 @@ from grasp_core.checked import MOST_COUNT
 from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError, UnfaithfulError
 from sim_validate.baseline_flags import Baseline
 from sim_validate.bounds import FlagsError, at_least, check
-from sim_validate.config_file import NoFileNamedError, with_config
+from sim_validate.config_file import with_config
 from sim_validate.dataset_flags import Dataset
 from sim_validate.engines import available_cores
 from sim_validate.examples import examples_for
@@ -265,8 +265,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         flags = with_config(arguments, COMMANDS)
     except InputError as error:
-        usage = isinstance(error, NoFileNamedError)
-        return _complain(str(error), Exit.USAGE if usage else Exit.INPUT)
+        return _complain(str(error), _code(error))
     try:
         command: Command = tyro.cli(
             FlagCreatePairsOff[Command],  # type: ignore[valid-type]

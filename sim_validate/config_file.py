@@ -7,13 +7,10 @@ from typing import Any, cast, get_args, get_type_hints
 
 from grasp_core.errors import InputError
 from grasp_core.json_text import place
+from sim_validate.bounds import FlagsError
 
 COMMAND_WORDS = {"dataset": 2, "baseline": 2}
 """Of how many words a command consists, where it is not one."""
-
-
-class NoFileNamedError(InputError):
-    """The flag stands alone."""
 
 
 def with_config(arguments: list[str], commands: Mapping[str, type]) -> list[str]:
@@ -24,15 +21,15 @@ def with_config(arguments: list[str], commands: Mapping[str, type]) -> list[str]
         commands: Classes of flags, by the names of commands.
 
     Raises:
-        NoFileNamedError: There is no file after the flag.
-        InputError: There is no such file, or it is not TOML, or names no flags.
+        FlagsError: There is no file after the flag, or the file names a flag that there is not.
+        InputError: There is no such file, or it is not TOML.
     """
     words = [part for word in arguments for part in _split_config(word)]
     if "--config" not in words:
         return arguments
     at = words.index("--config")
     if at + 1 >= len(words):
-        raise NoFileNamedError("--config needs the name of a TOML file")
+        raise FlagsError("--config needs the name of a TOML file")
     rest = words[:at] + words[at + 2 :]
     flags = _read(Path(words[at + 1]), flag_names(commands.get(rest[0])) if rest else set())
     command = COMMAND_WORDS.get(rest[0], 1) if rest else 0
@@ -67,10 +64,11 @@ def _read(path: Path, known: set[str]) -> list[str]:
         settings = read_tables(path)
     except InputError as error:
         raise InputError(f"--config {error}") from error
+    for name in settings:
+        if name.replace("-", "_") not in known:
+            said = f"--config {path}: {place([name])}: there is no such flag; keys are long flags"
+            raise FlagsError(said)
     try:
-        for name in settings:
-            if name.replace("-", "_") not in known:
-                raise InputError(f"{place([name])}: there is no such flag; keys are long flags")
         return flags_from(settings)
     except InputError as error:
         raise InputError(f"--config {path}: {error}") from error

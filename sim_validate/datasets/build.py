@@ -3,9 +3,7 @@
 The manifest is written last; once it is there, the staging folder goes.
 """
 
-import fcntl
-from collections.abc import Callable, Generator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,12 +22,10 @@ from sim_validate.datasets.units import WorkUnit, units_of, units_sha256
 from sim_validate.files import read_text, write_text
 from sim_validate.gate import require_faithful
 from sim_validate.inside import path_inside
+from sim_validate.own_folder import alone_in
 from sim_validate.setup import Setup
 
-LOCK = ".lock"
-OWN = (
-    "staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, CROISSANT, MANIFEST, LOCK,
-)  # fmt: skip
+OWN = ("staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, CROISSANT, MANIFEST)
 """What a dataset's folder holds, and nothing else."""
 
 
@@ -61,15 +57,15 @@ def build(
         limits: What each unit may take; only for engines with processes of their own.
 
     Raises:
-        InputError: An object is nowhere, the folder holds something else, or another build is at
-            work in it.
+        InputError: An object is nowhere, the folder holds something else, or another command is
+            at work in it.
         UnfaithfulError: The simulator fails the gate.
         WorkerError: A worker cannot do units for this driver.
     """
     require_pyarrow()
     units = units_of(config)
     _refuse_sources_inside(units, config, folder)
-    with _alone(folder):
+    with alone_in(folder):
         _refuse_others(folder, config)
         staging = Staging(folder.resolve() / "staging")
         if (folder / MANIFEST).is_file():
@@ -85,25 +81,6 @@ def build(
         drive(left, staging, engine, report, limits)
         finish(config, units, staging, folder)
         return _as_built(folder, units, len(left))
-
-
-@contextmanager
-def _alone(folder: Path) -> Generator[None]:
-    """Keep other builds out of a folder.
-
-    Raises:
-        InputError: There cannot be such a folder, or another build is at work.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--out {folder}: no folder can be made there ({error})") from error
-    with (folder / LOCK).open("a") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise InputError(f"{folder}: another build is at work in it") from error
-        yield
 
 
 def _refuse_sources_inside(units: Sequence[WorkUnit], config: DatasetConfig, folder: Path) -> None:
@@ -122,7 +99,7 @@ def _refuse_others(folder: Path, config: DatasetConfig) -> None:
         InputError: It holds other files, or a dataset of another configuration.
     """
     stated = folder / CONFIG
-    own = OWN if stated.is_file() else (LOCK,)
+    own = OWN if stated.is_file() else ()
     half_written = tuple(f".{name}." for name in OWN)
     for path in sorted(folder.iterdir()):
         if path.name.startswith(half_written):

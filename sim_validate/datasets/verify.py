@@ -87,7 +87,7 @@ def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
     there = {
         path.relative_to(folder).as_posix()
         for path in folder.rglob("*")
-        if path.is_file() and path.name not in (MANIFEST, ".lock")
+        if path.is_file() and path.name != MANIFEST
     }
     there = {name for name in there if not name.startswith("staging/")}  # of no more use
     yield from (f"{path}: not in the manifest" for path in sorted(there - names))

@@ -41,7 +41,7 @@ TOML_TEXTS = {
     "a date": ("friction = 1979-05-27\n", "friction"),
     "a control code": ("friction = '\\u001b[2J'\n", "friction"),
 }
-VALUES_OF_FLAGS = {"friction"}
+VALUES_OF_FLAGS = {"friction", "colour"}
 """What is wrong with a flag is refused as if it stood on the command line."""
 GRASPS, BASELINE = good("grasps.json"), good("a.baseline.json")
 SPOILT = {

@@ -168,7 +168,7 @@ def test_an_unfaithful_simulator_ends_a_build_before_it_begins(tmp_path, monkeyp
 
 def test_two_builds_do_not_work_in_one_folder(tmp_path):
     def another(_):
-        with pytest.raises(gc.InputError, match="another build"):
+        with pytest.raises(gc.InputError, match="another command is at work"):
             build(CONFIG, tmp_path / "ds", Here(), silent)
         tried.append(1)
 
@@ -231,7 +231,7 @@ def test_a_finished_dataset_that_is_damaged_is_not_taken_for_one(copy):
 
 def test_a_folder_that_cannot_be_made_is_said(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(gc.InputError, match=r"--out .* no folder can be made"):
+    with pytest.raises(gc.InputError, match=r"file: is there, and no folder"):
         build(CONFIG, tmp_path / "file", Here(), silent)
 
 
