@@ -88,6 +88,8 @@ def check_values(document: object, *, nulls: bool = True) -> None:
     for _ in range(DEEPEST + 1):
         deeper: list[tuple[tuple[Any, ...], Any]] = []
         for trail, holder in level:
+            if _all_plain(holder):
+                continue
             for key, value in _items(holder):
                 if isinstance(value, dict | list):
                     deeper.append(((trail, key), cast("Any", value)))
@@ -173,6 +175,17 @@ def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         twin = next(key for i, key in enumerate(keys) if key in keys[:i])
         raise InputError(f"{_key(twin)}: the key is there twice in one object; leave one out")
     return found
+
+
+def _all_plain(holder: Any) -> bool:
+    """Whether a list is one of finite floats or of indices: most are, and large."""
+    if not isinstance(holder, list):
+        return False
+    values = cast("list[Any]", holder)
+    kinds = set(map(type, values))
+    if kinds == {float}:
+        return all(map(math.isfinite, values))
+    return kinds == {int} and max(values) <= LARGEST_WHOLE and min(values) >= -LARGEST_WHOLE
 
 
 def _items(holder: Any) -> Iterator[tuple[Any, Any]]:
