@@ -217,7 +217,9 @@ def _fault(value: object, *, nulls: bool) -> str | None:
     if isinstance(value, str):
         wrong = not value.isascii() and _has_no_encoding(value)
         return "half of a letter (a lone surrogate) in the text" if wrong else None
-    return "null; give a value, or leave the key out" if value is None and not nulls else None
+    if value is None:
+        return None if nulls else "null; give a value, or leave the key out"
+    return f"expected a number or text, got {value}; put it in quotes"  # a day or time of TOML
 
 
 def _has_no_encoding(text: str) -> bool:
