@@ -205,7 +205,8 @@ UNIT = {"object": "a.obj", "friction": 0.5, "files": {"grasps.parquet": HASH}, "
 
 
 def _same_lines(data: bytes, found: Any) -> None:
-    for line, other in zip(data.decode().removesuffix("\n").split("\n"), found, strict=True):
+    lines = data.decode().removesuffix("\n").split("\n") if data else []
+    for line, other in zip(lines, found, strict=True):
         assert json.loads(line) == other.model_dump()
 
 
