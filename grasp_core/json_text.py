@@ -6,7 +6,7 @@ nesting without end, text that no encoding has. So is another kind of our own fi
 
 import json
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, cast
 
 from grasp_core.errors import InputError
@@ -84,19 +84,34 @@ def check_values(document: object, *, nulls: bool = True) -> None:
         InputError: A number is not finite or too large, a text has no encoding, a value is null
             that must not be, or nesting is too deep; the message names the field.
     """
-    level: list[tuple[tuple[Any, ...], Any]] = [((), [document])]
-    for _ in range(DEEPEST + 1):
-        deeper: list[tuple[tuple[Any, ...], Any]] = []
-        for trail, holder in level:
-            for key, value in _items(holder):
-                if isinstance(value, dict | list):
-                    deeper.append(((trail, key), cast("Any", value)))
-                elif fault := _fault(value, nulls=nulls):
-                    raise InputError(f"{place(_parts((trail, key)))}: {fault}")
-        if not deeper:
-            return
-        level = deeper
-    raise InputError(_too_deep())
+    try:
+        _check([document], nulls, DEEPEST)
+    except _FaultError as found:
+        raise InputError(f"{place(found.trail[-2::-1])}: {found}") from None
+
+
+class _FaultError(Exception):
+    """What is wrong with a value; where it is comes together on the way out."""
+
+    def __init__(self, fault: str) -> None:
+        super().__init__(fault)
+        self.trail: list[object] = []
+        """Keys from the value outwards; the last is of the list that holds the document."""
+
+
+def _check(holder: Any, nulls: bool, deeper: int) -> None:
+    if deeper < 0:
+        raise InputError(_too_deep())
+    for key, value in _items(holder):
+        try:
+            if isinstance(value, dict | list):
+                if not _all_plain(value):
+                    _check(value, nulls, deeper - 1)
+            elif fault := _fault(value, nulls=nulls):
+                raise _FaultError(fault)
+        except _FaultError as found:
+            found.trail.append(key)
+            raise
 
 
 def check_kind(found: Mapping[str, Any], wanted: str) -> None:
@@ -175,14 +190,22 @@ def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _items(holder: Any) -> Iterator[tuple[Any, Any]]:
-    if isinstance(holder, dict):
-        for key, value in cast("dict[str, Any]", holder).items():
-            if not key.isascii() and _has_no_encoding(key):
-                raise InputError(f"{_key(key)}: half of a letter (a lone surrogate) in a key")
-            yield key, value
-    else:
-        yield from enumerate(holder)
+def _all_plain(holder: Any) -> bool:
+    """Whether a list is one of finite floats: most are."""
+    if not isinstance(holder, list):
+        return False
+    values = cast("list[Any]", holder)
+    return set(map(type, values)) == {float} and all(map(math.isfinite, values))
+
+
+def _items(holder: Any) -> Iterable[tuple[Any, Any]]:
+    if not isinstance(holder, dict):
+        return enumerate(cast("list[Any]", holder))
+    record = cast("dict[str, Any]", holder)
+    if not "".join(record).isascii():
+        for key in filter(_has_no_encoding, record):
+            raise InputError(f"{_key(key)}: half of a letter (a lone surrogate) in a key")
+    return record.items()
 
 
 def _fault(value: object, *, nulls: bool) -> str | None:
@@ -194,7 +217,9 @@ def _fault(value: object, *, nulls: bool) -> str | None:
     if isinstance(value, str):
         wrong = not value.isascii() and _has_no_encoding(value)
         return "half of a letter (a lone surrogate) in the text" if wrong else None
-    return "null; give a value, or leave the key out" if value is None and not nulls else None
+    if value is None:
+        return None if nulls else "null; give a value, or leave the key out"
+    return f"expected a number or text, got {value}; put it in quotes"  # a day or time of TOML
 
 
 def _has_no_encoding(text: str) -> bool:
@@ -203,15 +228,6 @@ def _has_no_encoding(text: str) -> bool:
     except UnicodeEncodeError:
         return True
     return False
-
-
-def _parts(trail: tuple[Any, ...]) -> list[object]:
-    """The keys of a trail, but for the first, which is of the list that holds the document."""
-    parts: list[object] = []
-    while trail:
-        trail, key = trail
-        parts.append(key)
-    return parts[-2::-1]
 
 
 def _too_deep() -> str:

@@ -38,6 +38,12 @@ def at_least(least: float, *, up_to: float = math.inf) -> Bound:
     return Bound(f"must be at least {least:g}{_end(up_to)}", lambda value: least <= value <= up_to)
 
 
+def ends_in(*endings: str) -> Bound:
+    """Paths of files whose names end in one of these, in whatever case."""
+    says = f"must end in {', '.join(endings[:-1])} or {endings[-1]}"
+    return Bound(says, lambda path: path.suffix.lower() in endings)
+
+
 def not_zero(least: float, most: float) -> Bound:
     """Vectors, by the size of their largest part."""
     says = f"must not be zero: the largest part is from {least:g} to {most:g}"

@@ -81,7 +81,7 @@ def _filled(path: str, table: str, values: Any, given: dict[str, Any]) -> Any:
             )
     kind = cast("type[Any]", type(values))
     try:
-        text = json.dumps({**_as_dict(values), **given}, default=str)  # days and times of TOML
+        text = json.dumps({**_as_dict(values), **given})
         checked: Any = TypeAdapter(kind).validate_json(text, strict=True)
     except ValidationError as error:
         raise InputError(f"{path}: [{table}] {complaint(error, kind)}") from error

@@ -9,9 +9,12 @@ from typing import Annotated
 
 from tyro.conf import OmitArgPrefixes, Positional
 
-from sim_validate.bounds import at_least
+from sim_validate.bounds import at_least, ends_in
 from sim_validate.engines import available_cores
 from sim_validate.flags import Count, Friction, Speech
+
+PICTURES, CLIPS = (".png", ".svg", ".pdf", ".webp", ".jpg", ".jpeg"), (".gif", ".webp")
+PAGES = (".html", ".htm")
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,11 +27,11 @@ class View:
     """Id of the grasp; the first one if not given."""
     friction: Friction | None = None
     """Coulomb coefficient; the one planned for if not given."""
-    picture: Path | None = None
+    picture: Annotated[Path, ends_in(*PICTURES)] | None = None
     """Write the picture as in the paper (png, svg, pdf, webp, jpg)."""
-    page: Path | None = None
+    page: Annotated[Path, ends_in(*PAGES)] | None = None
     """Write a page on which the grasp can be turned (html)."""
-    clip: Path | None = None
+    clip: Annotated[Path, ends_in(*CLIPS)] | None = None
     """Write a clip (webp, gif): fingers closing, rendered by MuJoCo; without graphics, the picture
     turning."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)

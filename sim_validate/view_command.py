@@ -12,8 +12,7 @@ from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.records import SavedGrasps
 from grasp_core.values import Grasp
-from scenes.canvas import format_of
-from scenes.clips import GraphicsError, has_display, require_clip, write_clip
+from scenes.clips import GraphicsError, has_display, write_clip
 from scenes.mjcf import Scene, build_scene
 from scenes.pictures import write_picture
 from scenes.turning_clips import write_turning_clip
@@ -26,7 +25,6 @@ from sim_validate.grasps_file import grasp_with_id, read_grasps
 from sim_validate.reports.run_folder import GRASPS
 from sim_validate.reports.turntable import turntable_page
 
-PAGES = (".html", ".htm")
 COMING, RESTING = 60, 20
 """Frames in which fingers come in, and stay."""
 SWING_DEG, ELEVATION_DEG = 120.0, 25.0
@@ -50,24 +48,9 @@ def view_grasp(command: showing_flags.View, reporter: Reporter) -> int:
         _in_viewer(_scene(saved, grasp, friction), grasp, reporter)
         reporter.document({"id": grasp.id, "files": []})
         return cli.Exit.GOOD
-    _check_endings(command)
     files = [str(path) for path in _written(command, saved, grasp, friction, reporter)]
     reporter.document({"id": grasp.id, "files": files})
     return cli.Exit.GOOD
-
-
-def _check_endings(command: showing_flags.View) -> None:
-    """Before anything is written.
-
-    Raises:
-        InputError: A file's name does not end as it must.
-    """
-    if command.picture is not None:
-        format_of(command.picture)
-    if command.page is not None and command.page.suffix.lower() not in PAGES:
-        raise InputError(f"{command.page}: pages end in {' or '.join(PAGES)}")
-    if command.clip is not None:
-        require_clip(command.clip)
 
 
 def _scene(saved: SavedGrasps, grasp: Grasp, friction: float) -> Scene:

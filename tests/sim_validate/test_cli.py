@@ -167,7 +167,7 @@ def test_a_mesh_file_and_its_unit(here, capsys):
         (["plan"], Exit.USAGE, "Required options"),
         (["bake"], Exit.USAGE, "inspect"),
         (["plan", "wedge", "--config"], Exit.USAGE, "--config"),
-        (["plan", "wedge", "--config", "none.toml"], Exit.USAGE, "none.toml"),
+        (["plan", "wedge", "--config", "none.toml"], Exit.INPUT, "none.toml"),
     ],
 )  # fmt: skip
 def test_errors_have_their_exit_code_and_name_the_cause(here, capsys, arguments, code, words):

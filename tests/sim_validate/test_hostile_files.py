@@ -56,6 +56,7 @@ def test_a_configuration_of_flags_is_a_file_of_values(tmp_path, capsys):
         ("a = 1\na = 2", "not TOML: "),
         ("[plan]\nlimit = 1", "--config {}: plan: expected a value or a list, got a table"),
         ("limit = [{a = 1}]", "limit: expected a value or a list"),
+        ("friction = 07:32:00", "friction: expected a number or text, got 07:32:00"),
         ("friction = nan", "friction: expected a finite number"),
         ("limit = " + "9" * 5000, "not TOML: "),
         ("x = " + "[" * 5000, "too deep"),

@@ -3,15 +3,18 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
 import scenes
-from scenes import clips
+from scenes import canvas, clips
+from scenes.canvas import format_of
 from sim_validate import view_command
 from sim_validate.cli import Exit, main
+from sim_validate.showing_flags import CLIPS, PICTURES
 from sim_validate.view_command import COMING, closing
 from tests.sim_validate.rigs import grasps
 
@@ -71,18 +74,24 @@ def test_with_a_display_the_viewer_is_opened(planned, monkeypatch):
 @pytest.mark.parametrize(
     ("flags", "says"),
     [
-        (["--grasp", "c-9"], "no grasp c-9; there is"),
-        (["--picture", "a.bmp"], "pictures end in"),
-        (["--clip", "a.mp4"], "clips end in"),
-        (["--picture", "a.png", "--clip", "a.mp4"], "clips end in"),
-        (["--picture", "a.png", "--page", "a.png"], "pages end in"),
+        (["--picture", "a.bmp"], "--picture must end in .png, .svg"),
+        (["--clip", "a.mp4"], "--clip must end in .gif or .webp, got a.mp4"),
+        (["--picture", "a.png", "--clip", "a.mp4"], "--clip must end in"),
+        (["--picture", "a.png", "--page", "a.png"], "--page must end in .html or .htm"),
     ],
 )
 def test_what_cannot_be_shown_is_refused(planned, tmp_path, monkeypatch, capsys, flags, says):
     monkeypatch.chdir(tmp_path)
-    assert main(["view", str(planned), *flags]) == Exit.INPUT
+    assert main(["view", str(planned), *flags]) == Exit.USAGE
     assert says in capsys.readouterr().err
+    assert main(["view", str(planned), "--picture", "a.png", "--grasp", "c-9"]) == Exit.INPUT
+    assert "no grasp c-9; there is" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_endings_of_flags_are_those_that_can_be_written():
+    assert {format_of(Path("a" + ending)) for ending in PICTURES} == set(canvas.FORMATS)
+    assert set(CLIPS) == set(clips.FORMATS)
 
 
 def test_friction_that_is_too_low_is_said(planned, tmp_path, capsys):
