@@ -1,0 +1,155 @@
+"""The process that reads meshes: its limits, its end, and that nothing else suffers."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+
+import pytest
+
+import grasp_core as gc
+from grasp_core import mesh_child, mesh_reader
+from grasp_core.errors import MeshRefusal
+from grasp_core.mesh_child import read_triangles
+from grasp_core.mesh_files import MeshLimits
+from tests.bad_input.mesh_texts import CORNERS, TRIANGLES, obj, off
+
+USUAL = MeshLimits()
+
+
+def child():
+    return mesh_child._child(USUAL.max_memory_mib).process
+
+
+@pytest.fixture
+def part(tmp_path):
+    path = tmp_path / "part.obj"
+    path.write_text(obj())
+    return path
+
+
+def refusal(path, limits):
+    with pytest.raises(gc.MeshError) as caught:
+        read_triangles(path, limits)
+    assert path.name in str(caught.value)
+    return caught.value.reason
+
+
+def test_one_process_reads_all_files(part, tmp_path):
+    read_triangles(part, USUAL)
+    first = child().pid
+    (tmp_path / "other.off").write_text(off())
+    points, corners, data = read_triangles(tmp_path / "other.off", USUAL)
+    assert child().pid == first != os.getpid()
+    assert points.tolist() == [list(each) for each in CORNERS]
+    assert corners.tolist() == [list(each) for each in TRIANGLES]
+    assert data == off().encode()
+
+
+def test_a_reader_that_was_killed_is_begun_anew(part):
+    read_triangles(part, USUAL)
+    os.kill(child().pid, signal.SIGKILL)
+    child().wait()
+    assert len(read_triangles(part, USUAL)[1]) == 4
+
+
+def test_too_much_time_ends_the_reader_and_is_refused(tmp_path):
+    path = tmp_path / "large.obj"
+    path.write_text(obj(CORNERS, TRIANGLES * 50_000))
+    limits = MeshLimits(max_seconds=1e-3, max_memory_mib=2047)  # so that it has a reader of its own
+    assert refusal(path, limits) is MeshRefusal.LIMIT
+    path.write_text(obj())
+    assert len(read_triangles(path, limits)[1]) == 4  # the next file has a new one
+
+
+def test_too_little_memory_is_refused(part):
+    assert refusal(part, MeshLimits(max_memory_mib=1)) is MeshRefusal.LIMIT
+
+
+def test_answers_belong_to_their_files_in_many_threads(tmp_path):
+    files, found = [tmp_path / f"{count}.off" for count in range(1, 17)], {}
+    for count, path in enumerate(files, 1):
+        path.write_text(off(f"4 {4 * count} 0", faces=TRIANGLES * count))
+
+    def read(path):
+        found[path] = len(read_triangles(path, USUAL)[1])
+
+    threads = [threading.Thread(target=read, args=(path,)) for path in files]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == {path: 4 * count for count, path in enumerate(files, 1)}
+
+
+def test_an_interrupt_leaves_no_answer_for_the_next_file(part, monkeypatch):
+    def interrupted(_):
+        raise KeyboardInterrupt
+
+    read_triangles(part, USUAL)
+    with monkeypatch.context() as patched:
+        patched.setattr(mesh_child, "_answer", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            read_triangles(part, USUAL)
+    part.write_text(obj(faces=TRIANGLES * 2))
+    assert len(read_triangles(part, USUAL)[1]) == 8
+
+
+def test_the_reader_ends_with_the_program_that_asked(part):
+    program = (
+        "import sys, os, signal; from pathlib import Path\n"
+        "from grasp_core import mesh_child, mesh_files\n"
+        "mesh_child.read_triangles(Path(sys.argv[1]), mesh_files.MeshLimits())\n"
+        "print(mesh_child._child(2048).process.pid, flush=True)\n"
+        "os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program, str(part)], capture_output=True, check=False, timeout=60
+    )
+    assert ended.returncode == -signal.SIGKILL
+    number = int(ended.stdout)
+    for _ in range(100):
+        try:
+            os.kill(number, 0)
+        except ProcessLookupError:
+            return
+        threading.Event().wait(0.1)
+    pytest.fail("the reader is still there")
+
+
+@pytest.mark.parametrize(
+    ("event", "given"),
+    [
+        ("open", ("/etc/passwd", "r", os.O_RDONLY)),
+        ("open", ("/tmp/new", "w", os.O_WRONLY | os.O_CREAT)),  # noqa: S108 - never opened
+        ("open", (b"/etc/passwd", "r", os.O_RDONLY)),
+        ("socket.__new__", (None, socket.AF_INET)),
+        ("subprocess.Popen", ("sh", [], None, None)),
+        ("os.system", ("true",)),
+        ("os.exec", ("sh", [], None)),
+        ("os.fork", ()),
+    ],
+)
+def test_the_reader_has_no_other_files_and_no_network(event, given):
+    with pytest.raises(PermissionError):
+        mesh_reader._guard(event, given)
+    mesh_reader._guard("open", (os.__file__, "r", os.O_RDONLY))
+
+
+def test_the_guard_is_up_where_files_are_read():
+    """A library that opened a file in the reader would be refused, and the mesh with it."""
+    program = (
+        "import sys; sys.addaudithook(lambda e, g: print(e, file=sys.stderr))\n"
+        "from grasp_core import mesh_reader\n"
+        "mesh_reader.parsed_by_trimesh = lambda *_: open('/etc/hostname')\n"
+        "mesh_reader.main('2048')\n"
+    )
+    asked = b'{"kind": "obj", "bytes": %d, "max_seconds": 9, "max_triangles": 9}\n' % len(obj())
+    ended = subprocess.run(
+        [sys.executable, "-c", program], input=asked + obj().encode(), capture_output=True,
+        check=False, timeout=60,
+    )  # fmt: skip
+    assert b"GP-MESH-AMBIGUOUS" in ended.stdout
+    assert b"PermissionError" in ended.stdout
