@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from grasp_core.complaints import record_of
 from grasp_core.errors import InputError
-from grasp_core.json_text import place
+from grasp_core.json_text import place, shown
 from sim_validate.files import read_text
 from sim_validate.setup import NamedWrench
 
@@ -61,7 +61,7 @@ def wrenches_from_json(text: str) -> tuple[NamedWrench, ...]:
     for number, each in enumerate(given):
         if each.name in names:
             where = place(["wrenches", number, "name"])
-            raise InputError(f"{where}: another wrench has the name {each.name!r}; rename one")
+            raise InputError(f"{where}: another wrench has the name {shown(each.name)}; rename one")
         names.add(each.name)
     return tuple(_named(each, i) for i, each in enumerate(given))
 

@@ -14,6 +14,7 @@ UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 CONTROL = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 OTHER_ALPHABETS = bytes(range(128)) + b"?" * 128
 COMMENT = re.compile(rb"#[^\n]*")
+CONTINUED_COMMENT = re.compile(rb"#[^\n]*\\\r?\n")
 NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,9})?")
 WHOLE = re.compile(rb"[+-]?\d{1,18}")
 NOT_FINITE = re.compile(rb"[+-]?(nan|inf(inity)?)", re.IGNORECASE)
@@ -38,7 +39,14 @@ def plain_text(data: bytes) -> bytes:
 
 
 def without_comments(text: bytes) -> bytes:
-    """Text without what follows a `#` in its line."""
+    """Text without what follows a `#` in its line.
+
+    Raises:
+        MeshError: A comment ends in a backslash: whether it goes on is for each reader to guess.
+    """
+    if found := CONTINUED_COMMENT.search(text):
+        line = text.count(b"\n", 0, found.start()) + 1
+        broken(f"line {line}", "a comment ends in a backslash")
     return COMMENT.sub(b"", text)
 
 

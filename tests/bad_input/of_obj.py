@@ -50,6 +50,7 @@ BAD = {
         obj(CORNERS, [tuple(i % 4 for i in range(5000))]), "line 5|dent"),
     "a curved surface": (GOOD + "cstype bezier\nsurf 0 1 0 1 1 2 3\n", "cstype|polygons"),
     "an unknown word": (GOOD + "extrude 1\n", "line 9|extrude"),
+    "a comment that may go on": ("# in C:\\\n" + GOOD, "line 1|comment"),
     "a zero byte": (GOOD + "# \0\n", "control character"),
     "a form feed": (GOOD + "# \f\n", "control character"),
     "a line of two megabytes": (GOOD + "#" + "x" * 2**21 + "\n", "line 9|longer"),
