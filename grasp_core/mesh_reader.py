@@ -21,7 +21,7 @@ from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.mesh import parsed_by_trimesh
 from grasp_core.mesh_formats import glb, obj, off, ply, stl
 from grasp_core.mesh_formats.agreement import same_triangles
-from grasp_core.mesh_formats.words import plain_text, without_comments
+from grasp_core.mesh_formats.words import plain_text, tidied
 
 STRICT = {"obj": obj.read, "stl": stl.read, "ply": ply.read, "off": off.read, "glb": glb.read}
 ROUNDING = {"glb": 1e-9}
@@ -68,7 +68,7 @@ def _ambiguous(kind: str, said: str) -> MeshError:
 def _text_of(kind: str, data: bytes) -> bytes:
     """Text as both readers see it alike; binary data as it is."""
     if kind in {"obj", "off"}:
-        return without_comments(plain_text(data))
+        return tidied(plain_text(data))
     text = (kind == "stl" and not stl.is_binary(data)) or (kind == "ply" and ply.is_text(data))
     return plain_text(data) if text else data
 

@@ -38,8 +38,8 @@ def plain_text(data: bytes) -> bytes:
     return text
 
 
-def without_comments(text: bytes) -> bytes:
-    """Text without what follows a `#` in its line.
+def tidied(text: bytes) -> bytes:
+    """The words of each line with one space between them, without what follows a `#`.
 
     Raises:
         MeshError: A comment ends in a backslash: whether it goes on is for each reader to guess.
@@ -47,7 +47,8 @@ def without_comments(text: bytes) -> bytes:
     if found := CONTINUED_COMMENT.search(text):
         line = text.count(b"\n", 0, found.start()) + 1
         broken(f"line {line}", "a comment ends in a backslash")
-    return COMMENT.sub(b"", text)
+    lines = COMMENT.sub(b"", text).split(b"\n")
+    return b"\n".join(b" ".join(line.split()) for line in lines)
 
 
 def worded_lines(text: bytes) -> Iterator[tuple[int, list[bytes]]]:
