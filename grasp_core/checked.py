@@ -23,6 +23,8 @@ MOST_SEED = 2**64 - 1
 MOST_EDGES = 10_000
 """Of a pyramid in place of a friction cone: it is a circle to seven digits."""
 MOST_RANDOM_WRENCHES, MOST_TRIALS = 10_000, 100_000
+HUGE = 10**100
+"""Whole numbers above are told by their size: Python does not write the largest."""
 SHOWN = 60
 """Letters of a refused value in a message."""
 
@@ -195,7 +197,14 @@ def several(value: Any, each: Callable[[Any], Value], name: str, kind: str) -> t
 
 def shown(value: Any) -> str:
     """A value in a message: short, on one line, and for what is long its kind."""
-    if isinstance(value, Real | str | type(None)) or type(value) in {tuple, list}:
+    if isinstance(value, int) and abs(value) > HUGE:
+        return f"a whole number of {value.bit_length()} bits"
+    listed = cast("Iterable[Any]", value) if type(value) in {tuple, list} else None
+    plain = listed is not None and all(
+        isinstance(each, float | str | None) or (isinstance(each, int) and abs(each) <= HUGE)
+        for each in listed
+    )
+    if plain or isinstance(value, Real | str | type(None)):
         said = repr(value)
         if len(said) <= SHOWN:
             return said

@@ -6,6 +6,7 @@ nesting without end, text that no encoding has. So is another kind of our own fi
 
 import json
 import math
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, cast
 
@@ -184,8 +185,8 @@ def _cut(text: str) -> str:
 def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found = dict(pairs)
     if len(found) < len(pairs):
-        keys = [key for key, _ in pairs]
-        twin = next(key for i, key in enumerate(keys) if key in keys[:i])
+        counts = Counter(key for key, _ in pairs)
+        twin = next(key for key, _ in pairs if counts[key] > 1)
         raise InputError(f"{_key(twin)}: the key is there twice in one object; leave one out")
     return found
 

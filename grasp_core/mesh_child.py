@@ -7,6 +7,7 @@ import atexit
 import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -34,21 +35,34 @@ class _Child:
     """A running reader, and the two ends of what is said."""
 
     process: "subprocess.Popen[bytes]"
-    requests: IO[bytes]
+    requests: int
+    """Not buffered: a fork must not send twice what was half sent."""
     answers: IO[bytes]
+    memory_mib: int
 
-    def end(self) -> None:
-        """Stop it, whatever it is doing."""
+    def end(self) -> int:
+        """Stop it, whatever it is doing; how it ended."""
         self.process.kill()
-        with contextlib.suppress(OSError):  # what was not sent yet has no reader now
-            self.requests.close()
         self.answers.close()
-        self.process.wait()
+        if self.process.stdin is not None:
+            self.process.stdin.close()
+        return self.process.wait()
 
 
-_lock = threading.Lock()
-_children: dict[tuple[int, int], _Child] = {}
-"""By process, as a fork must not share its parent's, and allowed memory."""
+class _State:
+    """The reader of this process, if there is one, and who is talking to it."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.child: _Child | None = None
+
+
+_state = _State()
+os.register_at_fork(after_in_child=_state.__init__)
+
+
+class _EndedError(Exception):
+    """The reader ended without an answer."""
 
 
 def read_triangles(path: Path, limits: MeshLimits) -> tuple[Array, Indices, bytes]:
@@ -65,37 +79,68 @@ def read_triangles(path: Path, limits: MeshLimits) -> tuple[Array, Indices, byte
         "max_triangles": limits.max_triangles,
     }
     try:
-        with _lock:
-            points, corners = _asked(json.dumps(asked).encode() + b"\n" + data, limits)
+        with _state.lock:
+            points, corners = _read(json.dumps(asked).encode() + b"\n" + data, limits)
     except MeshError as error:
-        raise MeshError(error.reason, f"{path.name}: {error.message}") from error
+        raise MeshError(error.reason, f"{path}: {error.message}") from error
     return points, corners, data
 
 
-def _asked(request: bytes, limits: MeshLimits) -> tuple[Array, Indices]:
-    """What a child answers; it is ended when it does not, and then the answer is a refusal."""
-    child = _child(limits.max_memory_mib)
-    alarm = threading.Timer(limits.max_seconds + GRACE_S, child.process.kill)
-    alarm.start()
+def _read(request: bytes, limits: MeshLimits) -> tuple[Array, Indices]:
+    """What a reader answers; one that is ended by others is tried once more.
+
+    Raises:
+        MeshError: That is the answer, or it took too long, or no reader survives it.
+    """
     try:
-        child.requests.write(request)
-        child.requests.flush()
+        return _asked(request, limits)
+    except _EndedError:
+        pass
+    try:
+        return _asked(request, limits)
+    except _EndedError as error:
+        message = f"no reader survives it ({error}); export it again"
+        raise MeshError(MeshRefusal.LIMIT, message) from error
+
+
+def _asked(request: bytes, limits: MeshLimits) -> tuple[Array, Indices]:
+    child = _child(limits.max_memory_mib)
+    late = threading.Event()
+
+    def end() -> None:
+        late.set()
+        child.process.kill()
+
+    alarm = threading.Timer(limits.max_seconds + GRACE_S, end)
+    try:
+        alarm.start()
+        _send(child.requests, request)
         return _answer(child.answers)
     except MeshError:
         raise
     except (OSError, ValueError, KeyError, TypeError) as error:
+        with contextlib.suppress(subprocess.TimeoutExpired):  # it may still be on its way out
+            child.process.wait(1.0)
+        code = child.process.poll()
         child.end()
-        message = (
-            f"reading it took more than {limits.max_seconds:g} s or "
-            f"{limits.max_memory_mib} MiB, or broke the reader; simplify the mesh, "
-            "or export it again"
-        )
-        raise MeshError(MeshRefusal.LIMIT, message) from error
+        if late.is_set() or code == -signal.SIGXCPU:
+            message = (
+                f"reading it took more than {limits.max_seconds:g} s; simplify the mesh, or raise "
+                "--max-mesh-seconds"
+            )
+            raise MeshError(MeshRefusal.LIMIT, message) from error
+        raise _EndedError(f"exit code {code}") from error
     except BaseException:  # an interrupt: what the child says next would answer another request
         child.end()
         raise
     finally:
         alarm.cancel()
+
+
+def _send(pipe: int, request: bytes) -> None:
+    left = memoryview(request)
+    while left:
+        left = left[os.write(pipe, left) :]
 
 
 def _answer(answers: IO[bytes]) -> tuple[Array, Indices]:
@@ -114,32 +159,41 @@ def _answer(answers: IO[bytes]) -> tuple[Array, Indices]:
     return points, corners
 
 
-def _child(memory: int) -> _Child:
-    key = (os.getpid(), memory)
-    found = _children.get(key)
-    if found is None or found.process.poll() is not None:
+def _child(memory_mib: int) -> _Child:
+    """The reader, begun anew where it has ended, or has another limit."""
+    found = _state.child
+    if found is None or found.memory_mib != memory_mib or found.process.poll() is not None:
         if found is not None:
             found.end()
-        found = _children[key] = _begun(memory)
+        found = _state.child = _begun(memory_mib)
     return found
 
 
-def _begun(memory: int) -> _Child:
+def _begun(memory_mib: int) -> _Child:
     root = str(Path(__file__).parents[1])
     paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
-    process = subprocess.Popen(  # noqa: S603 - this program of ours, with no words of users
-        [sys.executable, "-P", "-m", "grasp_core.mesh_reader", str(memory)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        cwd="/",
-        env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(paths)},
-    )
-    return _Child(process, cast("IO[bytes]", process.stdin), cast("IO[bytes]", process.stdout))
+    ours, theirs = os.pipe()
+    try:
+        process = subprocess.Popen(  # noqa: S603 - this program of ours, with no words of users
+            [sys.executable, "-P", "-m", "grasp_core.mesh_reader", str(memory_mib), str(theirs)],
+            bufsize=0,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            pass_fds=[theirs],
+            cwd="/",
+            env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(paths)},
+        )
+    except BaseException:
+        os.close(ours)
+        raise
+    finally:
+        os.close(theirs)
+    requests = cast("IO[bytes]", process.stdin).fileno()
+    return _Child(process, requests, os.fdopen(ours, "rb"), memory_mib)
 
 
 @atexit.register
-def _end_all() -> None:
-    for (process, _), child in _children.items():
-        if process == os.getpid():
-            child.end()
+def _end() -> None:
+    if _state.child is not None:
+        _state.child.end()

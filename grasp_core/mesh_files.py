@@ -16,6 +16,7 @@ OTHER_FILES = {
     b"%PDF": "a PDF file", b"\x89PNG": "a picture", b"DRACO": "a Draco file",
 }  # fmt: skip
 """How files begin that are none of ours."""
+MAGIC = {"ply": b"ply", "glb": b"glTF"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,7 @@ def mesh_kind(path: Path) -> str:
     """
     kind = path.suffix.lower().lstrip(".")
     if kind not in FORMATS:
-        message = f"{path.name}: the ending must be one of {', '.join(FORMATS)}, got {kind!r}"
+        message = f"{path}: the ending must be one of {', '.join(FORMATS)}, got {kind!r}"
         raise MeshError(MeshRefusal.FORMAT, message)
     return kind
 
@@ -64,14 +65,14 @@ def mesh_bytes(path: Path, limits: MeshLimits) -> bytes:
         message = f"{path}: cannot be read ({error.strerror}); check the path and its rights"
         raise MeshError(MeshRefusal.UNREADABLE, message) from error
     if len(data) > limits.max_bytes:
-        message = f"{path.name}: over {limits.max_bytes} bytes, the limit; simplify the mesh"
+        message = f"{path}: over {limits.max_bytes} bytes, the limit; simplify the mesh"
         raise MeshError(MeshRefusal.TOO_MANY, message)
     if not data:
-        raise MeshError(MeshRefusal.EMPTY, f"{path.name}: the file is empty; export it again")
+        raise MeshError(MeshRefusal.EMPTY, f"{path}: the file is empty; export it again")
     try:
         check_beginning(kind, data)
     except MeshError as error:
-        raise MeshError(error.reason, f"{path.name}: {error.message}") from error
+        raise MeshError(error.reason, f"{path}: {error.message}") from error
     return data
 
 
@@ -85,11 +86,17 @@ def check_beginning(kind: str, data: bytes) -> None:
         if data.startswith(beginning):
             message = f"is {other}, expected {kind.upper()}; unpack or convert it first"
             raise MeshError(MeshRefusal.FORMAT, message)
-    begins = {
-        "ply": data.startswith((b"ply\n", b"ply\r")),
-        "glb": data.startswith(b"glTF"),
-        "stl": stl.is_text(data) or stl.is_binary(data),
-    }
-    if not begins.get(kind, True):
+    for other, beginning in MAGIC.items():
+        if other != kind and data.startswith(beginning):
+            message = f"is a {other.upper()} file, as it begins; rename it to .{other}"
+            raise MeshError(MeshRefusal.FORMAT, message)
+    if kind == "stl" and not stl.is_text(data) and not stl.is_binary(data):
+        counted = int.from_bytes(data[stl.HEADER : stl.HEADER + 4], "little")
+        message = (
+            f"is neither a text nor a binary STL file: it says {counted} triangles, which is "
+            f"{stl.HEADER + 4 + stl.TRIANGLE * counted} bytes, and has {len(data)}; export it again"
+        )
+        raise MeshError(MeshRefusal.UNREADABLE, message)
+    if not data.startswith(MAGIC.get(kind, b"")):
         message = f"does not begin as a {kind.upper()} file does; export it again"
         raise MeshError(MeshRefusal.UNREADABLE, message)

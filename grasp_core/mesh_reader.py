@@ -26,7 +26,9 @@ from grasp_core.mesh_formats.words import plain_text, tidied
 STRICT = {"obj": obj.read, "stl": stl.read, "ply": ply.read, "off": off.read, "glb": glb.read}
 ROUNDING = {"glb": 1e-9}
 """Of matrices multiplied in another order; other formats write numbers as they are."""
-FORBIDDEN = ("socket.", "subprocess.", "os.exec", "os.fork", "os.posix_spawn", "os.system", "pty.")
+FORBIDDEN = ("socket.", "subprocess.", "os.", "shutil.", "pty.", "tempfile.", "urllib.", "http.")
+LOOKING = ("os.listdir", "os.scandir", "os.putenv", "os.unsetenv")
+"""What imports need."""
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
@@ -55,7 +57,7 @@ def triangles_of(kind: str, data: bytes, most: int) -> tuple[Array, Indices]:
         raise _ambiguous(kind, f"trimesh cannot read it ({type(error).__name__})") from error
     if not same_triangles(strict, found, ROUNDING.get(kind, 0.0)):
         raise _ambiguous(kind, f"trimesh finds others than the {len(strict[1])} that are written")
-    return found
+    return strict if kind in ROUNDING else found
 
 
 def _ambiguous(kind: str, said: str) -> MeshError:
@@ -68,13 +70,13 @@ def _ambiguous(kind: str, said: str) -> MeshError:
 def _text_of(kind: str, data: bytes) -> bytes:
     """Text as both readers see it alike; binary data as it is."""
     if kind in {"obj", "off"}:
-        return tidied(plain_text(data))
+        return tidied(plain_text(data), continued=kind == "obj")
     text = (kind == "stl" and not stl.is_binary(data)) or (kind == "ply" and ply.is_text(data))
     return plain_text(data) if text else data
 
 
 def answer(requests: BinaryIO, answers: BinaryIO) -> bool:
-    """Answer one request; False where there are no more.
+    """Answer one request; False where there are to be no more.
 
     A request is a line of JSON and the bytes of a file; an answer a line of JSON and the bytes of
     vertices and triangles, or the reason why there are none.
@@ -84,6 +86,7 @@ def answer(requests: BinaryIO, answers: BinaryIO) -> bool:
         return False
     asked = json.loads(line)
     data = requests.read(asked["bytes"])
+    goes_on = True
     _limit_processor(asked["max_seconds"])
     try:
         points, corners = triangles_of(asked["kind"], data, asked["max_triangles"])
@@ -92,31 +95,39 @@ def answer(requests: BinaryIO, answers: BinaryIO) -> bool:
     except MeshError as error:
         said, arrays = {"reason": error.reason, "message": error.message}, []
     except (MemoryError, RecursionError) as error:
-        message = f"it needs more memory than is allowed ({type(error).__name__}); simplify it"
+        message = (
+            f"reading it needs more memory than is allowed ({type(error).__name__}); simplify it, "
+            "or raise --max-mesh-memory-mib"
+        )
         said, arrays = {"reason": MeshRefusal.LIMIT, "message": message}, []
+        goes_on = False  # with half of a library, perhaps
     answers.write(json.dumps(said).encode() + b"\n" + b"".join(each.tobytes() for each in arrays))
     answers.flush()
-    return True
+    return goes_on
 
 
 def _limit_processor(seconds: float) -> None:
     import resource
 
+    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
     soft = int(time.process_time() + seconds) + 1
-    resource.setrlimit(resource.RLIMIT_CPU, (soft, resource.getrlimit(resource.RLIMIT_CPU)[1]))
+    allowed = soft if hard == resource.RLIM_INFINITY else min(soft, hard)
+    resource.setrlimit(resource.RLIMIT_CPU, (allowed, hard))
 
 
 def _limit_memory(size: int) -> None:
     import resource
 
-    resource.setrlimit(resource.RLIMIT_AS, (size, size))
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    allowed = size if hard == resource.RLIM_INFINITY else min(size, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (allowed, allowed))
     resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def _guard(event: str, given: tuple[object, ...]) -> None:
     """Refuse what no reader of bytes needs; the import of libraries goes on."""
-    if event.startswith(FORBIDDEN):
+    if event.startswith(FORBIDDEN) and event not in LOOKING:
         raise PermissionError(f"a reader of meshes has no need of {event}")
     if event == "open" and isinstance(given[2], int) and given[2] & WRITING:
         raise PermissionError("a reader of meshes writes no files")
@@ -125,21 +136,31 @@ def _guard(event: str, given: tuple[object, ...]) -> None:
 
 
 def _is_library(name: str | bytes) -> bool:
-    path = os.path.realpath(os.fsdecode(name))
-    return path.startswith(tuple(os.path.realpath(root) for root in ROOTS))
+    return os.path.realpath(os.fsdecode(name)).startswith(ROOTS)
 
 
-ROOTS = tuple({sys.prefix, sys.base_prefix, *filter(None, sys.path)})
+ROOTS = tuple(
+    os.path.realpath(root) + os.sep
+    for root in {sys.prefix, sys.base_prefix, *sys.path}
+    if root.startswith(os.sep)
+)
+"""Folders of libraries."""
 
 
-def main(memory_mib: str) -> None:
-    """Answer requests on standard input until it ends."""
+def main(memory_mib: str, pipe: str) -> None:
+    """Answer requests on standard input until it ends.
+
+    Args:
+        memory_mib: How much memory may be used.
+        pipe: The number of an open file for answers; standard output is for what libraries print.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # that is for the program that asks
     sys.dont_write_bytecode = True
     _limit_memory(2**20 * int(memory_mib))
-    sys.addaudithook(_guard)
-    while answer(sys.stdin.buffer, sys.stdout.buffer):
-        pass
+    with os.fdopen(int(pipe), "wb") as answers:
+        sys.addaudithook(_guard)
+        while answer(sys.stdin.buffer, answers):
+            pass
 
 
 if __name__ == "__main__":

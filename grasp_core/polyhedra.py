@@ -85,9 +85,9 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
             limits=limits,
         )
     except MeshError as error:
-        raise MeshError(error.reason, f"{path.name}: {error.message}") from error
+        raise MeshError(error.reason, f"{path}: {error.message}") from error
     except InputError as error:
-        raise InputError(f"{path.name}: {error}") from error
+        raise InputError(f"{path}: {error}") from error
 
 
 def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
@@ -258,9 +258,12 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tup
     with np.errstate(over="ignore"):
         extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
     if not SMALLEST_EXTENT_M <= extent <= LARGEST_EXTENT_M:
+        wrong = (
+            "small (without --unit it is metres)" if extent < 1.0 else "large (--unit mm, perhaps)"
+        )
         message = (
             f"the object is {extent:.3g} m across, expected {SMALLEST_EXTENT_M} to "
-            f"{LARGEST_EXTENT_M} m; is the unit right (--unit mm)?"
+            f"{LARGEST_EXTENT_M} m; its unit makes it too {wrong}"
         )
         raise MeshError(MeshRefusal.SIZE, message)
     return points, corners.astype(np.int64)

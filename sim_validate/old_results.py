@@ -4,6 +4,7 @@ What contradicts new results goes before they come, so that whatever ends a comm
 no mixture; files of other names are left alone.
 """
 
+import re
 from collections.abc import Iterable
 from itertools import chain
 from pathlib import Path
@@ -15,27 +16,32 @@ STATIC = ("style.css", "gallery.js", "turntable.js")
 FIDELITY = "fidelity.svg"
 PICTURES, CHARTS, CLIPS = "pictures", "charts", "clips"
 MARK = ".graspproof-report"
-ID = "*[cprf]-*-*-*-*"
-"""Of a grasp."""
+ID = re.compile(r"[cprf](-\d+){4}[\w-]*", re.ASCII)
+"""Of a grasp, as plans call them."""
 
 
 def remove_results(folder: Path) -> None:
     """Remove grasps and all that was told of them."""
     remove_verdicts(folder)
     remove_regions(folder)
-    _remove([*folder.glob(f"scenes/{ID}.xml"), folder / "grasps.json"])
+    _remove([*_of_grasps(folder / "scenes", ".xml"), folder / "grasps.json"])
 
 
 def remove_verdicts(folder: Path) -> None:
     """Remove verdicts, their traces, and pages that show them."""
     remove_report(folder / REPORT)
-    _remove([folder / "verdicts.json", *folder.glob(f"traces/{ID}.npz")])
+    _remove([folder / "verdicts.json", *_of_grasps(folder / "traces", ".npz")])
 
 
 def remove_regions(folder: Path) -> None:
     """Remove certified regions, their proofs, and pages that show them."""
     remove_report(folder / REPORT)
-    _remove([folder / "regions.json", *folder.glob(f"proofs/{ID}.npz")])
+    _remove([folder / "regions.json", *_of_grasps(folder / "proofs", ".npz")])
+
+
+def _of_grasps(folder: Path, suffix: str) -> list[Path]:
+    """Files in a folder that are called after grasps."""
+    return [path for path in folder.glob(f"*{suffix}") if ID.fullmatch(path.stem)]
 
 
 def _remove(paths: Iterable[Path]) -> None:

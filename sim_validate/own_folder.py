@@ -34,8 +34,7 @@ def alone_in(folder: Path | None) -> Generator[None]:
     if folder is None:
         yield
         return
-    made = _make(folder)
-    with _locked(folder):
+    with _locked(folder) as made:
         for part in PARTS:
             remove_unfinished(folder / part)
         try:
@@ -65,12 +64,31 @@ def _make(folder: Path) -> list[Path]:
 
 
 @contextmanager
-def _locked(folder: Path) -> Generator[None]:
-    handle = os.open(folder, os.O_RDONLY)
+def _locked(folder: Path) -> Generator[list[Path]]:
+    """Make the folder and lock it; the folders that are new."""
+    handle, made = _taken(folder)
     try:
-        _lock(handle, folder)
-        yield
+        yield made
     finally:
+        os.close(handle)
+
+
+def _taken(folder: Path) -> tuple[int, list[Path]]:
+    """An open, locked folder, which is the one of that name, and the folders that are new."""
+    made = list[Path]()
+    while True:
+        made += _make(folder)
+        try:
+            handle = os.open(folder, os.O_RDONLY)
+        except FileNotFoundError:  # who had made it has just taken it away
+            continue
+        try:
+            _lock(handle, folder)
+            if folder.exists() and os.path.samestat(os.fstat(handle), folder.stat()):
+                return handle, made
+        except BaseException:
+            os.close(handle)
+            raise
         os.close(handle)
 
 

@@ -28,9 +28,9 @@ def certify_file(command: cli.Regions, reporter: Reporter) -> int:
         command.reserve, command.balance, command.recenter, command.edge_clearance_m, command.cones,
     )  # fmt: skip
     with alone_in(command.out):
+        found = certified(saved.body, chosen, asked, jobs=command.jobs, reporter=reporter)
         if command.out is not None:
             remove_regions(command.out)
-        found = certified(saved.body, chosen, asked, jobs=command.jobs, reporter=reporter)
         document = write_regions(command.out, saved.body, asked, found)
     _show(document, reporter)
     if command.out is not None:

@@ -11,10 +11,13 @@ from sim_validate.files import read_text
 
 MOST_LETTERS = 2**20
 """Settings are short."""
-LONG_KEY = re.compile(
-    r"""(?:(?:"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+'|(?<![\w-])[\w-]++)[ \t]*+\.[ \t]*+)"""
-    f"{{{DEEPEST}}}"
+ASIDE = re.compile(
+    r'''"""(?:[^\\]|\\.)*?(?:"""|\Z)|"(?:[^"\\\n]|\\.)*(?:"|\n|\Z)|'''
+    r"""'''.*?(?:'''|\Z)|'[^'\n]*(?:'|\n|\Z)|\#[^\n]*""",
+    re.DOTALL,
 )
+"""Text in quotes, and comments, each up to its end or that of the line or file."""
+LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
 """`a.b.c` of many parts, for which tomllib takes time that grows with the cube of their number: two
 minutes for a hundred kilobytes."""
 
@@ -38,7 +41,7 @@ def tables_of_toml(text: str) -> dict[str, Any]:
     Raises:
         InputError: It is not TOML, or holds what no setting is.
     """
-    if LONG_KEY.search(text):
+    if LONG_KEY.search(ASIDE.sub(lambda found: "q" if found[0][0] != "#" else "", text)):
         raise InputError(f"not TOML that is read here: a key of more than {DEEPEST} parts")
     try:
         found = tomllib.loads(text)

@@ -14,7 +14,6 @@ PASSED_OVER = frozenset(
 """They change looks, names or curves, not the surface."""
 CORNER = re.compile(rb"[+-]?\d+(/([+-]?\d+)?){0,2}")
 """A vertex, perhaps of a texture and a normal."""
-CONTINUED = re.compile(rb"\\\r?\n")
 WIDTHS = (3, 4, 6, 7)
 """Numbers of a vertex: a point, perhaps its weight, perhaps a colour."""
 WEIGHTED = (4, 7)
@@ -28,7 +27,7 @@ def read(text: bytes, most: int) -> tuple[Array, Indices]:
         MeshError: It breaks a rule, with the line, or has more than `most` triangles.
     """
     surface = Surface(most)
-    for number, (keyword, *words) in worded_lines(CONTINUED.sub(b"", text)):
+    for number, (keyword, *words) in worded_lines(text):
         where = f"line {number}"
         if keyword == b"v":
             surface.points.append(_vertex(words, where))

@@ -88,8 +88,9 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
 
 
 def is_text(data: bytes) -> bool:
-    """Whether the header says that text follows."""
-    return b"\nformat ascii" in data[:LONGEST_HEADER]
+    """Whether the header says that text follows; what comes after it means nothing here."""
+    ended = END.search(data[:LONGEST_HEADER])
+    return ended is not None and b"\nformat ascii" in data[: ended.start()]
 
 
 def _check_properties(vertex: Element, face: Element) -> None:

@@ -41,7 +41,7 @@ class Surface:
         if len(self.triangles) + len(corners) - 2 > self.most:
             too_many(len(self.triangles) + len(corners) - 2, self.most)
         first, second, *others = corners
-        if len(corners) == QUAD:
+        if len(corners) == QUAD:  # in the order of trimesh, as readings are compared by corners
             third, last = others
             self.triangles += [(first, second, third), (third, last, first)]
         else:

@@ -14,6 +14,7 @@ UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 CONTROL = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 OTHER_ALPHABETS = bytes(range(128)) + b"?" * 128
 COMMENT = re.compile(rb"#[^\n]*")
+CONTINUED = re.compile(rb"\\\r?\n")
 CONTINUED_COMMENT = re.compile(rb"#[^\n]*\\\r?\n")
 NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,9})?")
 WHOLE = re.compile(rb"[+-]?\d{1,18}")
@@ -38,8 +39,12 @@ def plain_text(data: bytes) -> bytes:
     return text
 
 
-def tidied(text: bytes) -> bytes:
+def tidied(text: bytes, *, continued: bool) -> bytes:
     """The words of each line with one space between them, without what follows a `#`.
+
+    Args:
+        text: Lines.
+        continued: Whether a backslash at the end of a line goes on with the next.
 
     Raises:
         MeshError: A comment ends in a backslash: whether it goes on is for each reader to guess.
@@ -47,7 +52,8 @@ def tidied(text: bytes) -> bytes:
     if found := CONTINUED_COMMENT.search(text):
         line = text.count(b"\n", 0, found.start()) + 1
         broken(f"line {line}", "a comment ends in a backslash")
-    lines = COMMENT.sub(b"", text).split(b"\n")
+    whole = CONTINUED.sub(b"", text) if continued else text
+    lines = COMMENT.sub(b"", whole).split(b"\n")
     return b"\n".join(b" ".join(line.split()) for line in lines)
 
 

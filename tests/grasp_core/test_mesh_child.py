@@ -58,14 +58,60 @@ def test_a_reader_that_was_killed_is_begun_anew(part):
 def test_too_much_time_ends_the_reader_and_is_refused(tmp_path):
     path = tmp_path / "large.obj"
     path.write_text(obj(CORNERS, TRIANGLES * 50_000))
-    limits = MeshLimits(max_seconds=1e-3, max_memory_mib=2047)  # so that it has a reader of its own
-    assert refusal(path, limits) is MeshRefusal.LIMIT
+    limits = MeshLimits(max_seconds=1e-3)
+    with pytest.raises(gc.MeshError, match=r"more than 0.001 s; .* --max-mesh-seconds") as caught:
+        read_triangles(path, limits)
+    assert caught.value.reason is MeshRefusal.LIMIT
     path.write_text(obj())
-    assert len(read_triangles(path, limits)[1]) == 4  # the next file has a new one
+    assert len(read_triangles(path, limits)[1]) == 4  # the next file has a new reader
 
 
 def test_too_little_memory_is_refused(part):
     assert refusal(part, MeshLimits(max_memory_mib=1)) is MeshRefusal.LIMIT
+
+
+def test_a_reader_that_others_end_is_tried_once_more(tmp_path):
+    path = tmp_path / "large.obj"
+    path.write_text(obj(CORNERS, TRIANGLES * 40_000))
+    read_triangles(path, USUAL)
+    threading.Timer(0.2, child().kill).start()
+    assert len(read_triangles(path, USUAL)[1]) == 160_000
+
+
+def test_what_libraries_print_is_no_answer(part, tmp_path, monkeypatch):
+    (tmp_path / "sitecustomize.py").write_text("print('hello')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    child().kill()
+    child().wait()
+    assert len(read_triangles(part, USUAL)[1]) == 4
+
+
+@pytest.mark.parametrize("limit", ["-t 20", "-v 1900000"])
+def test_limits_of_the_shell_are_kept(part, limit):
+    program = "from sim_validate.cli import run_and_exit as r; r()"
+    line = f"ulimit {limit}; exec {sys.executable} -c '{program}' inspect {part}"
+    ended = subprocess.run(["bash", "-c", line], capture_output=True, check=False, timeout=60)  # noqa: S607 - the shell
+    assert ended.returncode == 0, ended.stderr
+
+
+def test_a_fork_amid_a_reading_has_a_reader_of_its_own(tmp_path):
+    """In a program of its own, as forks of many threads warn."""
+    path = tmp_path / "large.obj"
+    path.write_text(obj(CORNERS, TRIANGLES * 40_000))
+    program = (
+        "import os, sys, threading, time; from pathlib import Path\n"
+        "from grasp_core import mesh_child, mesh_files\n"
+        "def read(): return mesh_child.read_triangles(Path(sys.argv[1]), mesh_files.MeshLimits())\n"
+        "read(); thread = threading.Thread(target=read); thread.start(); time.sleep(0.1)\n"
+        "child = os.fork()\n"
+        "if not child: os._exit(0 if len(read()[1]) == 160_000 else 1)\n"
+        "_, status = os.waitpid(child, 0); thread.join()\n"
+        "sys.exit(os.waitstatus_to_exitcode(status))\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program, str(path)], capture_output=True, check=False, timeout=60
+    )
+    assert ended.returncode == 0, ended.stderr
 
 
 def test_answers_belong_to_their_files_in_many_threads(tmp_path):
@@ -144,7 +190,7 @@ def test_the_guard_is_up_where_files_are_read():
         "import sys; sys.addaudithook(lambda e, g: print(e, file=sys.stderr))\n"
         "from grasp_core import mesh_reader\n"
         "mesh_reader.parsed_by_trimesh = lambda *_: open('/etc/hostname')\n"
-        "mesh_reader.main('2048')\n"
+        "mesh_reader.main('2048', '1')\n"
     )
     asked = b'{"kind": "obj", "bytes": %d, "max_seconds": 9, "max_triangles": 9}\n' % len(obj())
     ended = subprocess.run(

@@ -24,12 +24,12 @@ def test_only_regular_files_are_read(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     for path, words in (
-        (tmp_path / "pipe", "is a pipe or a device"),
-        ("/dev/zero", "is a pipe or a device"),
-        (tmp_path, "is a folder"),
+        (tmp_path / "pipe", "a folder, a pipe or a device"),
+        ("/dev/zero", "a folder, a pipe or a device"),
+        (tmp_path, "a folder, a pipe or a device"),
         (tmp_path / "loop", "cannot be read"),
         (tmp_path / ("x" * 300), "cannot be read"),
-        (f"{tmp_path}/a\0b", "no path of a file"),
+        (f"{tmp_path}/a\0b", "no name of a file"),
     ):
         with pytest.raises(gc.InputError, match=words):
             read_text(type(tmp_path)(path))
@@ -47,19 +47,19 @@ def test_no_more_is_read_than_the_limit(tmp_path):
 def test_commands_end_with_code_4_at_a_pipe(tmp_path, capsys, command):
     os.mkfifo(tmp_path / "pipe")
     assert main([*command, str(tmp_path / "pipe")]) == Exit.INPUT
-    assert "pipe: is a pipe or a device" in capsys.readouterr().err
+    assert "pipe: cannot be read (a folder, a pipe or a device)" in capsys.readouterr().err
 
 
 def test_a_configuration_of_flags_is_a_file_of_values(tmp_path, capsys):
     path = tmp_path / "c.toml"
     for text, words in (
         ("a = 1\na = 2", "not TOML: "),
-        ("[plan]\nlimit = 1", "--config {}: plan: expected a value or a list, got a table"),
+        ("[friction]\nlimit = 1", "--config {}: friction: expected a value or a list, got a table"),
         ("limit = [{a = 1}]", "limit: expected a value or a list"),
         ("friction = 07:32:00", "friction: expected a number or text, got 07:32:00"),
         ("friction = nan", "friction: expected a finite number"),
         ("limit = " + "9" * 5000, "not TOML: "),
-        ("x = " + "[" * 5000, "too deep"),
+        ("friction = " + "[" * 5000, "too deep"),
     ):
         path.write_text(text)
         assert main(["plan", "wedge", "--config", str(path)]) == Exit.INPUT

@@ -123,8 +123,8 @@ def test_settings_of_a_file_are_in_force_and_in_the_record(planned, verdict):
 @pytest.mark.parametrize(
     ("flags", "code", "words"),
     [
-        (["--down", "0", "0", "-1"], Exit.INPUT, "give --weight-n too"),
-        (["--traces"], Exit.INPUT, "give --out DIR too"),
+        (["--down", "0", "0", "-1"], Exit.USAGE, "give --weight-n too"),
+        (["--traces"], Exit.USAGE, "give --out DIR too"),
         (["--wrenches", "none.json"], Exit.INPUT, "none.json"),
         (["--setup", "none.toml"], Exit.INPUT, "none.toml"),
         (["--also-judge-by", "1cm"], Exit.USAGE, "six-forces"),
@@ -144,7 +144,7 @@ def test_a_run_that_is_refused_leaves_earlier_results(planned, flags):
     assert main(["run", "tetrahedron", "--out", "r", "-q", "--no-report"]) == Exit.GOOD
     before = (planned / "r" / "verdicts.json").read_text()
     assert main(["run", "tetrahedron", "--out", "r", "-q", "--no-report", *flags]) in {
-        Exit.INPUT,
+        Exit.USAGE,
         Exit.INTERNAL,
     }
     assert (planned / "r" / "verdicts.json").read_text() == before
