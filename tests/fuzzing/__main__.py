@@ -14,8 +14,8 @@ from tests.fuzzing.running import fuzz, keep_finds
 from tests.fuzzing.targets import targets
 
 MEMORY = Path("/dev/shm")  # noqa: S108 - a folder in memory, where there is one
-GRACE_S = 120
-"""For imports and the last input."""
+GRACE_S = 900
+"""For imports and the last input, on a busy machine."""
 
 
 def main() -> int:
