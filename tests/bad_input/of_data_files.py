@@ -38,7 +38,7 @@ TOML_TEXTS = {
     "10^5 deep": ("a = " + DEEP, ""),
     "a key that is none": ("colour = 'red'\n", "colour"),
     "a table that is none": ("[colour]\nred = 1\n", "colour"),
-    "a date": ("friction = 1979-05-27\n", "friction"),
+    "a date": ("friction = 1979-05-27\n", "friction: "),
     "a control code": ("friction = '\\u001b[2J'\n", "friction"),
 }
 VALUES_OF_FLAGS = {"friction", "colour"}

@@ -26,7 +26,6 @@ ON_GRASPS = {
     "report taken": "taken",
     "report nowhere": "nowhere",
     "view grasps.json --grasp nobody --picture a.png": "nobody",
-    "view grasps.json --picture a.docx": "a.docx",
     "replay grasps.json --grasp nobody --out made": "nobody",
     "replay full --out made": "full",
     "dataset verify full": "full",
@@ -52,6 +51,8 @@ def cases() -> list[Case]:
     found = [
         Case(GROUP, line, partial(_grasps, line), 4, (says,)) for line, says in ON_GRASPS.items()
     ]
+    line = "view grasps.json --picture a.docx"
+    found.append(Case(GROUP, line, partial(_grasps, line), 2, ("--picture", "a.docx")))
     for said, (line, says) in WORDS.items():
         name, value = said.split("=")
         case = flag_case(GROUP, line, says, 4)
