@@ -31,6 +31,7 @@ def test_a_name_that_is_too_long_is_refused(tmp_path, capsys):
 NAMES = ["a" * 255, "a\nb", os.fsdecode(b"\xff\xfe")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_strange_names_are_names(name, tmp_path, capsys):
     assert main([*PLAN[:-1], "--out", str(tmp_path / name)]) == 0

@@ -320,6 +320,7 @@ def halves(absence):
     return replace(absence, leaves=tuple(leaves))
 
 
+@pytest.mark.slow
 def test_halves_prove_what_the_whole_proves():
     absent = of_kind(Absence)[:40]
     assert all(halves(absence).verify() for _, _, absence in absent)

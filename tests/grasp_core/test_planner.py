@@ -66,6 +66,7 @@ TILTED = [(name, "tilted") for name in ("wedge", "chamfered-box", "random-10-1",
 NORMAL = [(name, "normal") for name in ("icosahedron", "random-20-7", "random-30-2", "screwdriver")]
 
 
+@pytest.mark.slow
 def test_no_returned_grasp_fails_an_independent_pyramid_of_64_sides():
     """Inner pyramids accept each grasp, so outer ones must as well; critical friction agrees."""
     tested = 0
