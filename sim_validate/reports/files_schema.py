@@ -4,6 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from sim_validate.verdict import Outcome
+
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Triple = tuple[Finite, Finite, Finite]
 Wrench = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
@@ -48,7 +50,7 @@ class _CriticalFriction(_Record):
 class _ControlTrial(_Record):
     name: str
     wrench: Wrench
-    outcome: str
+    outcome: Outcome
 
 
 class _Trial(_ControlTrial):
@@ -82,7 +84,7 @@ class _Robustness(_Record):
 class _Verdict(_Record):
     id: str
     contacts_sha256: str
-    outcome: str
+    outcome: Outcome
     held: bool
     mismatches: list[str]
     critical_friction: _CriticalFriction

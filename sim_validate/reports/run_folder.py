@@ -16,6 +16,7 @@ from sim_validate.region_files import REGIONS
 from sim_validate.region_files import SCHEMA as REGIONS_SCHEMA
 from sim_validate.reports.files_schema import RegionsFile, VerdictsFile
 from sim_validate.reports.news import BAD, Record, said_of
+from sim_validate.verdict import Outcome
 from sim_validate.verdict_records import SCHEMA as VERDICTS_SCHEMA
 
 GRASPS, VERDICTS = "grasps.json", "verdicts.json"
@@ -98,6 +99,8 @@ def _run(path: Path) -> RunFolder:
     tried = _read(path / VERDICTS, VerdictsFile, saved)
     certified = _read(path / REGIONS, RegionsFile, saved)
     verdicts: Sequence[Record] = [] if tried is None else tried["verdicts"]
+    if tried is not None:
+        _check_summary(path / VERDICTS, tried["summary"], verdicts)
     regions: Sequence[Record] = [] if certified is None else certified["grasps"]
     return RunFolder(
         path=path,
@@ -119,7 +122,36 @@ def _by_id(path: Path, records: Sequence[Record], saved: SavedGrasps) -> Mapping
                 f"{path}: {each['id']} has other contacts than in {GRASPS} beside it, or is not "
                 "there: make the file anew, or remove it"
             )
-    return {each["id"]: each for each in records}
+    found = {each["id"]: each for each in records}
+    if len(found) < len(records):
+        raise InputError(f"{path}: a grasp is there twice; make the file anew, or remove it")
+    return found
+
+
+def _check_summary(path: Path, summary: Record, verdicts: Sequence[Record]) -> None:
+    """Refuse verdicts that say one thing in one place and another elsewhere.
+
+    Raises:
+        InputError: They do.
+    """
+    for number, each in enumerate(verdicts):
+        if each["held"] != (each["outcome"] == Outcome.HELD):
+            raise InputError(
+                f"{path}: verdicts[{number}]: held is {each['held']} and outcome "
+                f"{each['outcome'].value}; make the file anew, or remove it"
+            )
+    counted = {
+        "grasps": len(verdicts),
+        "grasps_held": sum(each["held"] for each in verdicts),
+        "controls": sum(len(each["controls"]) for each in verdicts),
+        "mismatches": sum(len(each["mismatches"]) for each in verdicts),
+    }
+    for name, count in counted.items():
+        if summary[name] != count:
+            raise InputError(
+                f"{path}: summary.{name}: says {summary[name]}, the verdicts below {count}; make "
+                "the file anew, or remove it"
+            )
 
 
 def _read(path: Path, kind: type[BaseModel], saved: SavedGrasps) -> Record | None:

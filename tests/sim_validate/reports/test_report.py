@@ -162,6 +162,17 @@ def changed(path, change):
     path.write_text(json.dumps(document))
 
 
+def counted(document, _=None):
+    """Make the summary that of the verdicts."""
+    verdicts = document["verdicts"]
+    document["summary"].update(
+        grasps=len(verdicts),
+        grasps_held=sum(each["held"] for each in verdicts),
+        controls=sum(len(each["controls"]) for each in verdicts),
+        mismatches=sum(len(each["mismatches"]) for each in verdicts),
+    )
+
+
 def without_proofs(document):
     document["grasps"][0].update(regions=None, reason=EVIL)
 
@@ -175,7 +186,7 @@ def spoiled(document):
 
 def test_names_are_escaped(copy, tmp_path):
     changed(copy / "grasps.json", lambda each: each["object"].update(name=EVIL))
-    changed(copy / "verdicts.json", spoiled)
+    changed(copy / "verdicts.json", lambda each: counted(each, spoiled(each)))
     changed(copy / "regions.json", without_proofs)
     index = write_report(copy, tmp_path / "out", jobs=1).index
     pages = pages_of(index.parent)
@@ -204,6 +215,7 @@ def test_an_interrupted_run_is_called_that(copy, tmp_path):
     def interrupted(document):
         document["complete"] = False
         del document["verdicts"][1:]
+        counted(document)
 
     changed(copy / "verdicts.json", interrupted)
     said = " ".join(Page(write_report(copy, tmp_path / "out", jobs=1).index.read_text()).said)
@@ -213,7 +225,10 @@ def test_an_interrupted_run_is_called_that(copy, tmp_path):
 
 def test_of_many_grasps_those_with_bad_news_are_shown(copy, tmp_path):
     last = json.loads((copy / "verdicts.json").read_text())["verdicts"][-1]["id"]
-    changed(copy / "verdicts.json", lambda each: each["verdicts"][-1].update(held=False))
+    slipped = {"held": False, "outcome": "slipped"}
+    changed(
+        copy / "verdicts.json", lambda each: counted(each, each["verdicts"][-1].update(slipped))
+    )
     report = write_report(copy, tmp_path / "out", jobs=1, limit=1)
     assert report.grasps == 1
     assert [path.stem for path in (tmp_path / "out" / "grasps").iterdir()] == [last]
@@ -312,6 +327,14 @@ def test_a_control_that_says_nothing_is_bad_news(small_run):
         ("verdicts.json", lambda each: each["object"].update(content_sha256="0"), "another object"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(contacts_sha256="0"), "contacts"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(id="c-9-9-9-9"), "is not there"),
+        ("verdicts.json", lambda each: each["verdicts"][0].update(held=False),
+         r"verdicts\[0\]: held is False and outcome held"),
+        ("verdicts.json", lambda each: each["verdicts"][0].update(outcome="splendid"),
+         r"verdicts\[0\]\.outcome: expected"),
+        ("verdicts.json", lambda each: each["summary"].update(grasps_held=99),
+         r"summary\.grasps_held: says 99"),
+        ("verdicts.json", lambda each: each["verdicts"].clear(), r"summary\.grasps: says"),
+        ("verdicts.json", lambda each: each["verdicts"].append(each["verdicts"][0]), "twice|says"),
         ("regions.json", lambda each: each["grasps"][0].update(contacts_sha256="0"), "contacts"),
         ("regions.json", lambda each: each["grasps"][0]["regions"].pop(), "at least 4 items"),
         ("regions.json", lambda each: each["grasps"].append(3), r"grasps\[3\]: expected an object"),
