@@ -68,6 +68,7 @@ def test_with_a_larger_least_radius_bounds_above_it_stay_and_others_stay_below()
         assert (few[~larger] <= least + 2e-6).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "friction"), [("tetrahedron", 0.4), ("wedge", 0.3)])
 def test_without_compiled_code_a_plan_is_the_same(without_kernels, name, friction):
     body = example_object(name)

@@ -36,6 +36,7 @@ def radii(body, options, family, limit):
     return [grasp.radius / body.radius for grasp in plan.grasps]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", ["concurrent", "pencil"])
 @pytest.mark.parametrize("name", CASES)
 def test_a_limit_keeps_the_largest_discs_of_all(name, family):
