@@ -16,7 +16,7 @@ from grasp_core.errors import UndecidedError as UndecidedError
 from grasp_core.errors import UnfaithfulError as UnfaithfulError
 from grasp_core.forces import contact_forces as contact_forces
 from grasp_core.lines import classify_lines as classify_lines
-from grasp_core.mesh_files import MeshLimits as MeshLimits
+from grasp_core.mesh_limits import MeshLimits as MeshLimits
 from grasp_core.metrics import hull_volume as hull_volume
 from grasp_core.metrics import min_weight as min_weight
 from grasp_core.metrics import min_weights as min_weights

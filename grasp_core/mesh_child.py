@@ -19,7 +19,8 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.mesh_files import MeshLimits, mesh_bytes, mesh_kind
+from grasp_core.mesh_files import mesh_bytes, mesh_kind
+from grasp_core.mesh_limits import MeshLimits
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 LONGEST_ANSWER = 2**16

@@ -21,7 +21,7 @@ from grasp_core.curved_patches import flat_patches
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.mass import mass_properties
 from grasp_core.mesh_child import read_triangles
-from grasp_core.mesh_files import MeshLimits
+from grasp_core.mesh_limits import MeshLimits
 from grasp_core.planar_faces import MAX_FACES, FlatnessLimits, coplanar_groups, planar_faces
 from grasp_core.solid_checks import check_volume, largest_part, oriented, surface_fault, welded
 from grasp_core.solids import Solid, hull, triangulate

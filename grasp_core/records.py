@@ -14,7 +14,7 @@ import numpy as np
 
 from grasp_core.certified import check_witness
 from grasp_core.errors import InputError
-from grasp_core.mesh_files import MeshLimits
+from grasp_core.mesh_limits import MeshLimits
 from grasp_core.on_faces import check_on_faces
 from grasp_core.plans import Plan
 from grasp_core.polyhedra import polyhedron_from_mesh

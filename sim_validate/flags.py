@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 
+from grasp_core import mesh_limits
 from grasp_core.checked import (
     LARGEST,
     LARGEST_FRICTION,
@@ -22,6 +23,7 @@ from grasp_core.checked import (
 from sim_validate.bounds import FINITE, at_least, more_than, not_zero
 from sim_validate.engines import available_cores
 
+USUAL_MESH = mesh_limits.MeshLimits()
 Finite = Annotated[float, FINITE]
 Positive = Annotated[float, FINITE, more_than(0.0)]
 NotNegative = Annotated[float, FINITE, at_least(0.0)]
@@ -54,17 +56,17 @@ class Speech:
 class MeshLimits:
     """How large a mesh may be, and what reading its file may cost."""
 
-    max_mesh_bytes: Count = 64 * 2**20
+    max_mesh_bytes: Count = USUAL_MESH.max_bytes
     """Larger mesh files are refused."""
-    max_triangles: Count = 200_000
+    max_triangles: Count = USUAL_MESH.max_triangles
     """Meshes of more are refused."""
-    max_faces: Count = 5_000
+    max_faces: Count = USUAL_MESH.max_faces
     """Objects of more planar faces are refused."""
-    max_parts: Count = 64
+    max_parts: Count = USUAL_MESH.max_parts
     """Surfaces of more separate parts are refused."""
-    max_mesh_seconds: Positive = 30.0
+    max_mesh_seconds: Positive = USUAL_MESH.max_seconds
     """Of a processor, for reading a mesh file."""
-    max_mesh_memory_mib: Count = 2048
+    max_mesh_memory_mib: Count = USUAL_MESH.max_memory_mib
     """For reading a mesh file."""
 
 

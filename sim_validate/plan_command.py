@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from grasp_core.errors import InputError
-from grasp_core.mesh_files import FORMATS, MeshLimits
+from grasp_core.mesh_files import FORMATS
+from grasp_core.mesh_limits import MeshLimits
 from grasp_core.planner import plan
 from grasp_core.plans import Plan
 from grasp_core.polyhedra import load_polyhedron

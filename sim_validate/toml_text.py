@@ -12,7 +12,7 @@ from sim_validate.files import read_text
 MOST_LETTERS = 2**20
 """Settings are short."""
 ASIDE = re.compile(
-    r'''"""(?:[^\\]|\\.)*?(?:"""|\Z)|"(?:[^"\\\n]|\\.)*(?:"|\n|\Z)|'''
+    r'''"""(?:[^\\]|\\.)*?(?:"""|\\?\Z)|"(?:[^"\\\n]|\\.)*(?:"|\n|\\?\Z)|'''
     r"""'''.*?(?:'''|\Z)|'[^'\n]*(?:'|\n|\Z)|\#[^\n]*""",
     re.DOTALL,
 )

@@ -13,7 +13,7 @@ import grasp_core as gc
 from grasp_core import mesh_child, mesh_reader
 from grasp_core.errors import MeshRefusal
 from grasp_core.mesh_child import read_triangles
-from grasp_core.mesh_files import MeshLimits
+from grasp_core.mesh_limits import MeshLimits
 from tests.bad_input.mesh_texts import CORNERS, TRIANGLES, obj, off
 
 USUAL = MeshLimits()

@@ -35,6 +35,17 @@ def test_only_regular_files_are_read(tmp_path):
             read_text(type(tmp_path)(path))
 
 
+@pytest.mark.parametrize(
+    "text",
+    ['"' + '\\"' * 400_000 + "\\", '"""' + '\\"' * 400_000 + "\\", "a." * 400_000, "a" * 900_000],
+    ids=["escapes", "long text", "a long key", "a long word"],
+)
+@pytest.mark.timeout(20)
+def test_settings_that_never_end_are_refused_at_once(text):
+    with pytest.raises(gc.InputError, match="not TOML"):
+        tables_of_toml(text)
+
+
 def test_no_more_is_read_than_the_limit(tmp_path):
     path = tmp_path / "a"
     path.write_bytes(b"12345")
