@@ -30,6 +30,7 @@ from grasp_core.patch import of_general_type
 from grasp_core.placements import Placement
 from grasp_core.quality import FerrariCanny, ferrari_canny
 from grasp_core.quality_ascent import ContactFaces
+from grasp_core.ties import largest_first, surpassing
 from grasp_core.values import FINGERS, ForceCone, Grasp, Polyhedron
 
 FINGER_RADIUS = 0.05
@@ -105,9 +106,10 @@ def optimize_contacts(
     here = [_clear_of_edges(*on) for on in zip(rooms, _unit_points(body, grasp), strict=True)]
     rng = np.random.default_rng([seed, *grasp.faces])
     starts = [np.array(here), *_random_starts(faces, rooms, rng)]
-    ends = sorted((faces.climbed(y) for y in starts), key=lambda end: -end[1].lower)
-    for y, found in ends:
-        if found.lower <= before.lower:
+    ends = [faces.climbed(y) for y in starts]
+    for place in largest_first([found.lower for _, found in ends]):
+        y, found = ends[place]
+        if found.lower <= surpassing(before.lower):
             break
         moved = _certified(body, grasp, faces, y, rng)
         if moved is not None and (after := _quality(body, moved, friction)).lower > before.lower:
@@ -170,9 +172,9 @@ def _random_starts(
         np.array([rng.dirichlet(np.ones(len(room.corners))) @ room.corners for room in rooms])
         for _ in range(RANDOM_TRIALS)
     ]
-    rated = [(faces.quality(y, ROUGH).lower, i) for i, y in enumerate(trials)]
-    best = sorted((rating for rating in rated if rating[0] > 0.0), reverse=True)
-    return (trials[i] for _, i in best[:RANDOM_STARTS])
+    rated = np.array([faces.quality(y, ROUGH).lower for y in trials])
+    best = largest_first(rated)
+    return (trials[i] for i in best[:RANDOM_STARTS] if rated[i] > 0.0)
 
 
 def _certified(

@@ -1,6 +1,6 @@
 """Which of the grasps found are kept, and in which order."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import chain, zip_longest
 
 import numpy as np
@@ -10,6 +10,7 @@ from grasp_core.critical import critical_friction
 from grasp_core.errors import UndecidedError
 from grasp_core.quality import ferrari_canny
 from grasp_core.requests import FAMILIES, PlanRequest
+from grasp_core.ties import first_best, smallest_first
 
 
 def chosen(lists: Sequence[Sequence[Certified]], request: PlanRequest) -> list[Certified]:
@@ -23,19 +24,29 @@ def chosen(lists: Sequence[Sequence[Certified]], request: PlanRequest) -> list[C
         lists: What each method found, best first.
         request: How many are wanted, and what makes one better.
     """
-    every = sorted(chain.from_iterable(lists), key=_largest_first)
+    every = _largest_first(chain.from_iterable(lists))
     if request.rank_by == "radius":
         families = [[one for one in every if one.family == family] for family in FAMILIES]
         turns = [one for one in chain.from_iterable(zip_longest(*families)) if one is not None]
-        return sorted(turns[: request.limit], key=_largest_first)
+        return _largest_first(turns[: request.limit])
     if request.rank_by == "diverse":
         return _far_apart(every, request.limit)
     measure = _critical if request.rank_by == "friction-margin" else _weakness(request.friction)
-    return sorted(every, key=lambda found: float(f"{measure(found):.6g}"))[: request.limit]
+    return _in_order(every, [measure(found) for found in every])[: request.limit]
 
 
-def _largest_first(found: Certified) -> float:
-    return -float(f"{found.placement.radii.min():.6g}")
+def _largest_first(found: Iterable[Certified]) -> list[Certified]:
+    """Grasps by their smallest discs; those without discs come last."""
+    listed = list(found)
+    # the merit of a grasp with discs is that radius, as reproducible as a program's optimum
+    return _in_order(
+        listed, [-one.placement.merit if one.placement.radii.min() > 0.0 else 0.0 for one in listed]
+    )
+
+
+def _in_order(found: Sequence[Certified], figures: Sequence[float]) -> list[Certified]:
+    """Smallest figure first; equal ones stay in the order in which they come."""
+    return [found[place] for place in smallest_first(figures)]
 
 
 def _critical(found: Certified) -> float:
@@ -71,5 +82,5 @@ def _far_apart(every: Sequence[Certified], limit: int | None) -> list[Certified]
         there = np.maximum(gaps.min(axis=1).max(axis=1), gaps.min(axis=2).max(axis=1))
         nearest = np.minimum(nearest, there)
         nearest[kept] = -np.inf
-        kept.append(int(np.round(nearest, 9).argmax()))
+        kept.append(first_best(nearest))
     return [every[place] for place in kept]

@@ -43,6 +43,7 @@ from grasp_core.largest_discs import largest_discs
 from grasp_core.placements import NoPlacement, Placement, balanced_forces
 from grasp_core.polygons import clip
 from grasp_core.spanning import balancing_weights
+from grasp_core.ties import surpassing
 from grasp_core.values import FINGERS, ForceCone, four
 
 PYRAMID_SIDES = 16
@@ -102,7 +103,7 @@ def _best(
             continue
         found = place_on_sides(pieces, cones, sides, least=least)
         if isinstance(found, Placement):
-            best, least = found, found.merit
+            best, least = found, surpassing(found.merit)
         else:
             bound = max(bound, found.bound)
     return best or NoPlacement(bound)
@@ -136,14 +137,15 @@ def place_on_sides(
         SolverError: A program's answer failed its check.
     """
     A, b = _rows(pieces, cones, sides)
-    x = largest_discs(A, b, RADII, SMALLEST, least)
-    if isinstance(x, NoPlacement):
-        return x
+    discs = largest_discs(A, b, RADII, SMALLEST, least)
+    if isinstance(discs, NoPlacement):
+        return discs
+    x = discs.x
     y = x[3:11].reshape(FINGERS, 2)
     positions = np.array([piece.point(at) for piece, at in zip(pieces, y, strict=True)])
     focus, radii = x[:3], x[RADII]
     forces = balanced_forces(pieces, np.array(sides)[:, None] * (focus - positions))
-    return Placement(positions, forces, focus[None], radii, float(radii.min()))
+    return Placement(positions, forces, focus[None], radii, discs.merit)
 
 
 def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array, contact: Array) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.polygons import area_and_centroid, clip, signed_area
+from grasp_core.ties import first_best, surpassing
 
 ROUNDS = 5
 CANDIDATES = 400
@@ -27,7 +28,7 @@ def clearest_point(points: Array, segments: Array) -> tuple[Array, float]:
     """
     tried = points[:: 1 + len(points) // CANDIDATES]
     room = np.array([_nearest(point, segments)[1].min() for point in tried])
-    best = int(room.argmax())
+    best = first_best(room)
     return tried[best], float(room[best])
 
 
@@ -44,7 +45,8 @@ def clearing(start: Array, segments: Array, gap: float) -> Array | None:
     best, middle, stretch = None, start, np.eye(2)
     for _ in range(ROUNDS):
         polygon = _cut(box, middle, segments, stretch, gap)
-        if len(polygon) < 3 or (best is not None and signed_area(polygon) <= signed_area(best)):  # noqa: PLR2004
+        least = 0.0 if best is None else surpassing(signed_area(best))
+        if len(polygon) < 3 or signed_area(polygon) <= least:  # noqa: PLR2004
             break
         best = polygon
         middle, stretch = _ellipse(polygon)
@@ -57,7 +59,7 @@ def _cut(box: Array, middle: Array, segments: Array, stretch: Array, gap: float)
     polygon = box
     while len(left):
         points, distances = _nearest(np.zeros(2), left)
-        nearest = int(distances.argmin())
+        nearest = first_best(-distances)
         if distances[nearest] <= 0.0:
             return np.empty((0, 2))
         away = points[nearest] / distances[nearest]

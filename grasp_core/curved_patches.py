@@ -26,12 +26,16 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.convex_clearings import clearest_point, clearing
 from grasp_core.planar_faces import triangle_neighbours
 from grasp_core.polygons import area_and_centroid, edge_rows, plane_frame
+from grasp_core.spanning import angles_between
+from grasp_core.ties import graded, largest_first
 from grasp_core.values import Face, PatchLimits
 
 SMOOTHING = 10
 """Rounds in which normals are averaged with those of neighbours, to find where it is flat."""
 FITS = 3
 """How often a group is grown, and its plane fitted again."""
+FLATNESS_DIGITS = 9
+"""Cosines between normals and their averages that are equal to so many digits are ties."""
 BORDER_GAP = 1e-9
 """How far polygons stay from the borders of their groups, relative to the object's extent."""
 
@@ -52,7 +56,7 @@ def flat_patches(vertices: Array, triangles: Indices, limits: PatchLimits) -> tu
         if enough and math.pi * found[limits.most - 1][0] ** 2 >= group.area:
             break
         if patch := _patch(surface, group.triangles, -group.outward):
-            insort(found, patch, key=lambda each: -each[0])
+            insort(found, patch, key=lambda each: -graded(each[0] / surface.extent))
     return tuple(face for _, face in found[: limits.most])
 
 
@@ -93,7 +97,8 @@ class _Group:
 def _groups(surface: _Surface, spread: float, depth: float) -> list[_Group]:
     """Groups of triangles, none in two of them, largest first."""
     smooth = _smoothed(surface)
-    flat_first = np.argsort(-np.einsum("ti,ti->t", smooth, surface.normals), kind="stable")
+    flatness = np.einsum("ti,ti->t", smooth, surface.normals)
+    flat_first = np.argsort(-graded(flatness, FLATNESS_DIGITS), kind="stable")
     free = np.ones(len(surface.areas), dtype=np.bool_)
     groups: list[_Group] = []
     for seed in flat_first:
@@ -113,7 +118,7 @@ def _groups(surface: _Surface, spread: float, depth: float) -> list[_Group]:
             plane = mean / np.linalg.norm(mean), middle
         free[group.triangles] = False
         groups.append(group)
-    return sorted(groups, key=lambda each: -each.area)
+    return [groups[place] for place in largest_first([group.area for group in groups])]
 
 
 def _grown(
@@ -171,7 +176,7 @@ def _patch(surface: _Surface, group: Indices, normal: Array) -> tuple[float, Fac
     facets = group[~beyond]
     heights = (surface.corners[facets] - origin) @ normal
     middle = 0.5 * float(heights.min() + heights.max())
-    cosines = np.clip(-surface.normals[facets] @ normal, -1.0, 1.0)
+    leans = angles_between(-surface.normals[facets], normal)
     area, centroid = area_and_centroid([polygon])
     plane = origin + middle * normal
     face = Face(
@@ -181,7 +186,7 @@ def _patch(surface: _Surface, group: Indices, normal: Array) -> tuple[float, Fac
         polygon=plane + polygon @ frame.T,
         holes=(),
         pieces=(plane + polygon @ frame.T,),
-        spread=float(np.arccos(cosines).max()),
+        spread=float(leans.max()),
         depth=0.5 * float(np.ptp(heights)),
         facets=facets,
     )

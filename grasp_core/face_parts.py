@@ -7,7 +7,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.face_pieces import FacePiece
 from grasp_core.polygons import clip
-from grasp_core.values import FINGERS
+from grasp_core.ties import first_best
 
 SMALLER = 0.5
 """Size of random parts, as a share of the piece."""
@@ -41,7 +41,7 @@ def part_at(pieces: Sequence[FacePiece], path: Path) -> Corners:
     part = [piece.corners for piece in pieces]
     for half in path:
         spans = [_longest(corners) for corners in part]
-        widest = max(range(FINGERS), key=lambda i: spans[i][0])
+        widest = first_best([length for length, _ in spans])
         part[widest] = _half(part[widest], spans[widest][1], half)
     return tuple(part)
 
@@ -64,7 +64,7 @@ def _longest(corners: Array) -> tuple[float, Array]:
     """Length and direction of the longest line between two corners."""
     between = (corners[:, None] - corners[None]).reshape(-1, 2)
     lengths = np.linalg.norm(between, axis=1)
-    far = int(np.argmax(lengths))
+    far = first_best(lengths)
     return float(lengths[far]), between[far] / lengths[far]
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.lp import LinearProgram, Optimum, maximize
 from grasp_core.polygons import clip, convex_hull, edge_rows, plane_frame
+from grasp_core.ties import graded
 from grasp_core.values import Polyhedron
 
 THINNEST = 1e-6
@@ -110,12 +111,17 @@ def choices_near(
         most: At most so many.
     """
     ranked = [
-        sorted(shape.pieces, key=lambda piece, at=at: round(_outside(piece, at), SAME_PLACE))[:most]
-        for shape, at in zip(shapes, positions, strict=True)
+        _nearest_first(shape.pieces, at)[:most] for shape, at in zip(shapes, positions, strict=True)
     ]
     every = product(*(range(len(each)) for each in ranked))
     ranks = sorted(every, key=lambda rank: (sum(rank), rank))[:most]
     return [tuple(each[place] for each, place in zip(ranked, rank, strict=True)) for rank in ranks]
+
+
+def _nearest_first(pieces: Sequence[FacePiece], at: Array) -> list[FacePiece]:
+    """Pieces of a face, the nearest to a point of its plane first."""
+    apart = [graded(_outside(piece, at), SAME_PLACE) for piece in pieces]
+    return [pieces[place] for place in sorted(range(len(pieces)), key=apart.__getitem__)]
 
 
 def _outside(piece: FacePiece, point: Array) -> float:

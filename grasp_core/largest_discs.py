@@ -3,8 +3,11 @@
 The first program maximises the smallest radius. It is free in sign, so that the program is
 always feasible and the sign of its optimum, with the multipliers that prove it, decides. The
 second keeps the smallest radius and maximises the sum of the four, so that contacts whose discs
-have room do not end up against an arbitrary edge.
+have room do not end up against an arbitrary edge. Of all that is best so far, the point nearest to
+the origin of the variables is taken (see `ties`).
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,15 +23,26 @@ from grasp_core.lp import (
     maximize_above,
 )
 from grasp_core.placements import NoPlacement
+from grasp_core.ties import nearest_optimum
 
-KEPT = 1e-9
-"""Share of the smallest radius that the second program may give up: the accuracy asked of the
-first."""
+KEPT = 1e-6
+"""Share of the smallest radius that the second program may give up. With less, its optima would be
+slivers, in which rounding moves the nearest point a thousand times as far."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LargestDiscs:
+    """The variables of the discs' program, and what it maximised."""
+
+    x: Array
+    """With the radii reduced by what a program's answer may be off, (n,)."""
+    merit: float
+    """Optimum of the smallest radius: the same on every machine but for the last digits."""
 
 
 def largest_discs(
     A: Array, b: Array, radii: slice, smallest: int, least: float
-) -> Array | NoPlacement:
+) -> LargestDiscs | NoPlacement:
     """Solve both programs over the variables x with A x <= b.
 
     Args:
@@ -39,8 +53,7 @@ def largest_discs(
         least: Smaller discs count as none.
 
     Returns:
-        The variables (n,), with the radii reduced by what a program's answer may be off; or, if
-        the common radius is below `least`, the proof.
+        The discs; or, if the common radius is below `least`, the proof.
 
     Raises:
         SolverError: A program's answer failed its check.
@@ -63,6 +76,7 @@ def largest_discs(
         second = maximize(kept)
     except SolverError:
         second = first  # within rounding of infeasible where discs are tiny
-    x = (second if isinstance(second, Optimum) else first).x.copy()
+    x = nearest_optimum(kept, second) if isinstance(second, Optimum) else first.x
+    x = np.array(x)
     x[radii] = np.maximum(x[radii] - RESIDUAL, 0.0)
-    return x
+    return LargestDiscs(x, first.value - RESIDUAL)

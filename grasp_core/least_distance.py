@@ -36,7 +36,7 @@ WORTH = 2
 """They pay if they serve more than so many; while they do not, they are tried half as often."""
 
 
-def least_distance(C: Array, D: Array) -> Array:
+def least_distance(C: Array, D: Array, *, accuracy: float = EXACT) -> Array:
     """The nearest points, (n, v), as rows; NaN where none was found that meets the conditions.
 
     A row of the answer does not depend on the other rows of D, but for rounding.
@@ -44,6 +44,8 @@ def least_distance(C: Array, D: Array) -> Array:
     Args:
         C: (m, v)
         D: (n, m)
+        accuracy: Violation of the conditions that is accepted, relative to x; active rows that are
+            nearly parallel need more than `EXACT`.
     """
     X = np.zeros((len(D), C.shape[1]))
     outside = np.flatnonzero(D.min(axis=1) < 0.0)
@@ -51,14 +53,14 @@ def least_distance(C: Array, D: Array) -> Array:
     alike = D[outside] / sizes
     near, proved = np.zeros((len(alike), C.shape[1])), np.zeros(len(alike), dtype=bool)
     if compiled(KERNEL) is not None:
-        near, proved = _by_kernel(C, alike)
+        near, proved = _by_kernel(C, alike, accuracy)
     if not proved.all():
         near[~proved] = _by_least_squares(C, alike[~proved])
     X[outside] = sizes * near
     return X
 
 
-def _by_kernel(C: Array, D: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _by_kernel(C: Array, D: Array, accuracy: float) -> tuple[Array, NDArray[np.bool_]]:
     """Points of the compiled method, (n, v), and which are proved to be nearest."""
     X, U = np.zeros((len(D), C.shape[1])), np.zeros(D.shape)
     compiled(KERNEL).solve(np.array(C, order="C"), np.array(D, order="C"), X, U)
@@ -67,7 +69,7 @@ def _by_kernel(C: Array, D: Array) -> tuple[Array, NDArray[np.bool_]]:
     np.maximum(unmet, -slack.min(axis=1), out=unmet)
     np.maximum(unmet, np.where(U != 0.0, slack, 0.0).max(axis=1), out=unmet)
     np.maximum(unmet, -U.min(axis=1), out=unmet)
-    return X, unmet <= _allowed(X)
+    return X, unmet <= accuracy * np.abs(X).max(axis=1, initial=1.0)
 
 
 def _by_least_squares(C: Array, D: Array) -> Array:

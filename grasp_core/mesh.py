@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.ties import first_best
 
 
 def parsed_by_trimesh(kind: str, data: bytes) -> tuple[Array, Indices]:
@@ -37,7 +38,7 @@ def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Ar
     nearest = np.empty((len(points), 3))
     for place, point in enumerate(points):
         candidates = nearest_on_triangles(corners, point)
-        nearest[place] = candidates[int(np.argmin(np.linalg.norm(candidates - point, axis=1)))]
+        nearest[place] = candidates[first_best(-np.linalg.norm(candidates - point, axis=1))]
     return nearest
 
 

@@ -53,6 +53,7 @@ from grasp_core.lines import classify_lines
 from grasp_core.lp import LinearProgram, Optimum, maximize
 from grasp_core.patch_forces import smallest_forces
 from grasp_core.placements import Placement
+from grasp_core.ties import graded
 from grasp_core.values import FINGERS
 from grasp_core.wrenches import cross_matrix, grasp_map, normal_and_tangential
 
@@ -148,7 +149,7 @@ def place_free(
             return general or Undecided(len(waiting) + 1, _share([*waiting, (0.0, path)]))
         margin = patch.margin if patch is not None else 0.0
         for half in (0, 1):
-            heappush(waiting, (-margin, (*path, half)))
+            heappush(waiting, (-graded(margin), (*path, half)))
     if waiting:
         return Undecided(len(waiting), _share(waiting))
     return Absence(tuple(pieces), friction, tuple(leaves))

@@ -56,6 +56,8 @@ from grasp_core.placements import (
     balanced_forces,
     focus_direction,
 )
+from grasp_core.spanning import angles_between
+from grasp_core.ties import surpassing
 from grasp_core.values import FINGERS, FaceQuadruple, ForceCone
 
 Cell: TypeAlias = tuple[float, float]
@@ -92,7 +94,7 @@ def place_pencil(
     for cell in cells:
         found = _place_in_cell(pieces, cones, discs.in_cell(cell), u, cell, least, least_gap)
         if isinstance(found, Placement):
-            best, least = found, found.merit
+            best, least = found, surpassing(found.merit)
         else:
             bound = max(bound, found.bound)
     return best or NoPlacement(bound)
@@ -158,16 +160,17 @@ def _place_in_cell(  # noqa: PLR0913, PLR0917 - a program's data
     if cell == CELL_B:
         near, ends = _near_rows(pieces, cones, discs, u)
         rows, limits = np.concatenate([rows, near]), np.concatenate([limits, ends])
-    v = largest_discs(rows, limits, RADII, SMALLEST, least)
-    if isinstance(v, NoPlacement):
-        return v
+    found = largest_discs(rows, limits, RADII, SMALLEST, least)
+    if isinstance(found, NoPlacement):
+        return found
+    v = found.x
     centers = discs.Q @ v + discs.q
     return Placement(
         positions=np.array([p.point(y) for p, y in zip(pieces, centers, strict=True)]),
         forces=balanced_forces(pieces, np.array([cone.axis for cone in cones])),
         foci=discs.C[[0, 2]] @ v,
         radii=v[RADII],
-        merit=float(v[RADII].min()),
+        merit=found.merit,
     )
 
 
@@ -225,5 +228,5 @@ def _near_rows(
 
 def _kappa(piece: FacePiece, cone: ForceCone) -> float:
     """How far a disc of radius one reaches towards the cone's facets at most."""
-    lean = math.acos(min(1.0, float(piece.normal @ cone.axis)))
+    lean = float(angles_between(piece.normal, cone.axis))
     return 1.0 if lean >= cone.half_angle else math.cos(cone.half_angle - lean)

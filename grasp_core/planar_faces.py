@@ -21,6 +21,7 @@ from grasp_core.polygons import (
     signed_area,
     without_straight_corners,
 )
+from grasp_core.ties import largest_first
 from grasp_core.values import Face
 
 MAX_FACES = 200
@@ -77,7 +78,7 @@ def coplanar_groups(vertices: Array, triangles: Indices, limits: FlatnessLimits)
     sliver = double_area <= distance * longest
     neighbours = triangle_neighbours(triangles)
     group_of = np.full(len(triangles), -1)
-    for seed in np.argsort(-double_area, kind="stable"):
+    for seed in largest_first(double_area):
         if group_of[seed] >= 0:
             continue
         normal, origin = normals[seed], corners[seed, 0]
@@ -127,7 +128,8 @@ def _face(vertices: Array, triangles: Indices, slack: float, triangulate: Triang
     def lift(loop: Array) -> Array:
         return origin + loop @ frame.T
 
-    loops = sorted((flat(loop) for loop in border_loops(triangles)), key=signed_area)[::-1]
+    found = [flat(loop) for loop in border_loops(triangles)]
+    loops = [found[place] for place in largest_first([signed_area(loop) for loop in found])]
     outer, holes = loops[0], loops[1:]
     if not holes and is_convex(outer):
         pieces = [outer]

@@ -10,6 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.ties import first_best
 
 MERGE_ORDERS = 16
 """How many orders of removing diagonals are tried."""
@@ -17,8 +18,13 @@ CONVEX_SLACK = 1e-9
 """How far a corner may turn inwards and still count as straight, relative to the two edge
 lengths' product: well above the rounding of coordinates, well below a visible notch."""
 
+SAME_PART = 1e-3
+"""Of the slack within which corners are straight: heights closer than this are equal."""
 SAME_CORNER = 1e-9
 """Corners closer than this are one, at unit size."""
+ON_LINE = 1e-12
+"""Corners closer than this to a line, relative to their coordinates, are on it: a thousand rounding
+errors. Else a cut through a corner leaves a second corner beside it on some machines."""
 TRIMMED = 1e-3
 """Share of a polygon's area that fewer corners may cost."""
 
@@ -77,6 +83,7 @@ def clip(polygon: Array, rows: Array, limits: Array) -> Array:
     """The part of a convex polygon where rows @ y <= limits; (0, 2) when nothing is left."""
     for row, limit in zip(rows, limits, strict=True):
         height = polygon @ row - limit
+        height[np.abs(height) <= ON_LINE * np.abs(polygon).max(initial=0.0)] = 0.0
         kept: list[Array] = []
         for here in range(len(polygon)):
             after = (here + 1) % len(polygon)
@@ -103,7 +110,7 @@ def with_fewer_corners(polygon: Array) -> Array:
             np.roll(polygon, -1, axis=0) - polygon,
         )
         areas = 0.5 * np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
-        least = int(areas.argmin())
+        least = first_best(-areas, ON_LINE)
         left -= areas[least]
         if left < 0.0:
             break
@@ -119,7 +126,7 @@ def nearest_point(polygon: Array, point: Array) -> Array:
     along = np.roll(polygon, -1, axis=0) - polygon
     shares = ((point - polygon) * along).sum(axis=1) / (along**2).sum(axis=1)
     feet = polygon + np.clip(shares, 0.0, 1.0)[:, None] * along
-    return feet[int(np.linalg.norm(feet - point, axis=1).argmin())]
+    return feet[first_best(-np.linalg.norm(feet - point, axis=1))]
 
 
 def convex_hull(points: Array) -> Array:
@@ -138,6 +145,7 @@ def convex_hull(points: Array) -> Array:
         return chain[:-1]
 
     hull = np.array(lower(ordered) + lower(ordered[::-1]))
+    hull = without_straight_corners(hull, SAME_CORNER * float(np.ptp(points, axis=0).max()))
     places = (points[None] == hull[:, None]).all(axis=2).argmax(axis=1)
     return np.roll(hull, -int(places.argmin()), axis=0)
 
@@ -156,7 +164,7 @@ def without_straight_corners(polygon: Array, slack: float) -> Array:
         chord = after - before
         cross = chord[:, 0] * (kept - before)[:, 1] - chord[:, 1] * (kept - before)[:, 0]
         height = np.abs(cross) / np.maximum(np.linalg.norm(chord, axis=1), slack)
-        straightest = int(np.argmin(height))
+        straightest = first_best(-height, SAME_PART * slack)
         if height[straightest] > slack:
             break
         kept = np.delete(kept, straightest, axis=0)

@@ -22,7 +22,8 @@ from grasp_core.attempt_bounds import AttemptBounds
 from grasp_core.constructions import Construction
 from grasp_core.kernels.tables import Attempts
 from grasp_core.prospects import Prospects
-from grasp_core.ranking import SAME_PROMISE, Outlook, Quadruple, Ranking, outlook
+from grasp_core.ranking import Outlook, Quadruple, Ranking, outlook
+from grasp_core.ties import coarse
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 32, 2048
 """Quadruples whose bounds are tightened together."""
@@ -45,7 +46,7 @@ class _Rest:
 
     listed: Outlook | Ranking
     best: Array
-    """The bounds of its quadruples, falling."""
+    """The bounds of its quadruples, falling, those alike made equal (see `ties.coarse`)."""
     start: int
 
     def until(self, bound: float) -> slice:
@@ -57,7 +58,7 @@ class _Rest:
 
 
 _Waiting: TypeAlias = tuple[float, int, tuple[int, ...], Block | _Rest | Callable[[], Quadruple]]
-"""Minus the bound to so many digits, then what makes ties go by kind and by faces."""
+"""Minus the coarse bound, then what makes ties go by kind and by faces."""
 BLOCK, REST, QUADRUPLE = range(3)
 
 
@@ -78,8 +79,7 @@ def promising(
         tally: Where to count attempts whose bound proves that they have none at all.
     """
     waiting: list[_Waiting] = [
-        (-round(block.room, SAME_PROMISE), BLOCK, (place,), block)
-        for place, block in enumerate(blocks)
+        (-coarse(block.room), BLOCK, (place,), block) for place, block in enumerate(blocks)
     ]
     heapify(waiting)
     while waiting:
@@ -90,7 +90,7 @@ def promising(
         match item:
             case Block():
                 listed = outlook(item.make(), construction, worth)
-                _put_back(waiting, _Rest(listed, listed.bounds, 0), place)
+                _put_back(waiting, _Rest(listed, coarse(listed.bounds), 0), place)
             case _Rest():
                 rows = item.until(-waiting[0][0] if waiting else worth)
                 if isinstance(item.listed, Outlook):
@@ -106,14 +106,14 @@ def promising(
 def _closer(listed: Outlook, rows: slice, worth: float) -> _Rest:
     """Some quadruples with their cones, without what is not worth having: that is forgotten."""
     ranking = listed.ranking(rows)
-    best = ranking.bounds.max(axis=(1, 2), initial=-np.inf)
+    best = coarse(ranking.bounds.max(axis=(1, 2), initial=-np.inf))
     count = int((best > worth).sum())
     return _Rest(ranking.first(count), best[:count], 0)
 
 
 def _put_back(waiting: list[_Waiting], rest: _Rest, place: tuple[int, ...]) -> None:
     if rest.start < len(rest.best):
-        bound = round(float(rest.best[rest.start]), SAME_PROMISE)
+        bound = float(rest.best[rest.start])
         heappush(waiting, (-bound, REST, place, rest))
 
 
@@ -158,7 +158,7 @@ def _tightened(
     tally["infeasible"] += int(none.sum())
     tally["solved"] += int(solved.transpose(0, 2, 1)[none].sum())
     bounds[bounds <= worth] = -np.inf
-    best = np.asarray(np.max(bounds, axis=(1, 2)), dtype=np.float64).round(SAME_PROMISE)
+    best = coarse(np.asarray(np.max(bounds, axis=(1, 2)), dtype=np.float64))
     faces = candidates.faces[ranking.places[rows]].tolist()
     for each in np.flatnonzero(best > -np.inf).tolist():
         make = partial(ranking.quadruple, rows.start + each, bounds[each])

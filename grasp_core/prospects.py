@@ -15,6 +15,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.candidates import LEAST_SPAN_ANGLE, Candidates, PlannedCones
 from grasp_core.spanning import SpanningTable
+from grasp_core.ties import coarse, graded
 from grasp_core.values import FINGERS
 
 FIRST_FACES = 14
@@ -79,7 +80,7 @@ def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
     with_room = shared[(cones.rooms[shared] > 0.0).all(axis=1)]
     parts = [with_room[i : i + LARGEST_BLOCK] for i in range(0, len(with_room), LARGEST_BLOCK)]
     rooms = [
-        cones.rooms[order][_unranked(starts, len(order))[:, -1]],
+        coarse(cones.rooms)[order][_unranked(starts, len(order))[:, -1]],
         np.array([cones.rooms[part].min(axis=1).max() for part in parts]),
     ]
 
@@ -103,11 +104,11 @@ def spanning_blocks(cones: PlannedCones, whole: int) -> Blocks:
     def make(place: int) -> Prospects:
         return _prospects(cones, order[table.quadruples(*pairs[place]).indices])
 
-    return Blocks(cones.rooms[order][firsts], make)
+    return Blocks(coarse(cones.rooms)[order][firsts], make)
 
 
 def _by_room(cones: PlannedCones, whole: int) -> Indices:
-    return np.argsort(-cones.rooms[:whole], kind="stable")
+    return np.argsort(-graded(cones.rooms[:whole]), kind="stable")
 
 
 def _prospects(cones: PlannedCones, quads: Indices) -> Prospects:

@@ -9,10 +9,8 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.candidates import LEAST_SPAN_ANGLE, NORMAL, TILTED, Candidates
 from grasp_core.constructions import LEAST_RADIUS, Construction, FingerOrder
 from grasp_core.prospects import Prospects
+from grasp_core.ties import graded
 from grasp_core.values import FaceQuadruple, ForceCone, four
-
-SAME_PROMISE = 7
-"""Bounds equal to so many digits (object size one) are ties, broken by the faces."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +87,7 @@ class Ranking:
     def _choices(self, place: int, bounds: Array) -> tuple[ConeChoice, ...]:
         return tuple(
             ConeChoice(self.candidates.cones(place, int(kind)), float(bounds[kind]))
-            for kind in np.argsort(-bounds, kind="stable")
+            for kind in np.argsort(-graded(bounds), kind="stable")
             if bounds[kind] > -np.inf
         )
 
@@ -125,7 +123,7 @@ def outlook(prospects: Prospects, construction: Construction, worth: float) -> O
         limits = prospects.cones.limits(prospects.faces, widest)[:, construction.limits]
         promise = bounds = np.minimum(limits.max(axis=1), prospects.rooms)
     usable = (widest > LEAST_SPAN_ANGLE) & (prospects.rooms > 0.0) & (bounds > worth)
-    order = np.argsort(-np.round(promise, SAME_PROMISE), kind="stable")
+    order = np.argsort(-graded(promise), kind="stable")
     order = order[usable[order]]
     return Outlook(prospects.some(order), bounds[order], construction)
 
@@ -152,6 +150,6 @@ def ranked(candidates: Candidates, construction: Construction) -> Ranking:
     bounds = np.where(usable[:, :, None] & (bounds >= LEAST_RADIUS), bounds, -np.inf)
     best = bounds.max(axis=(1, 2), initial=-np.inf)
     promise = best if promise is None else promise
-    order = np.argsort(-np.round(promise, SAME_PROMISE), kind="stable")
+    order = np.argsort(-graded(promise), kind="stable")
     order = order[best[order] > -np.inf]
     return Ranking(candidates, order, bounds[order], construction)

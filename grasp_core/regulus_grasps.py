@@ -59,6 +59,8 @@ from grasp_core.placements import (
     balanced_forces,
     focus_direction,
 )
+from grasp_core.spanning import angles_between
+from grasp_core.ties import nearest_optimum
 from grasp_core.values import FINGERS, ForceCone
 
 SLOPES = (0.5, 0.2, 0.8)
@@ -75,6 +77,8 @@ X0, K, P, X, Z, T = slice(0, 3), 3, 4, slice(5, 7), slice(7, 9), 9
 """Where the variables are."""
 VARIABLES = 10
 
+RESULTANTS = np.array([1.0, 1.0, -1.0, -1.0])
+"""Signs of the resultants of the fingers' pairs along u."""
 KERNEL = "reguli"
 SIDES = (1.0, -1.0)
 """Of the focus line, on which the lines of the first finger pass it."""
@@ -164,9 +168,10 @@ def _best_of(
     for *which, side in choices:
         slopes = [_slope(pair, SLOPES[each]) for pair, each in zip(pairs, which, strict=True)]
         lines = [_line(pairs, slopes, finger) for finger in range(FINGERS)]
-        found = maximize(_program(pieces, facets, lines, slopes, SIDES[side]))
+        program = _program(pieces, facets, lines, slopes, SIDES[side])
+        found = maximize(program)
         if isinstance(found, Optimum) and found.value > _merit(best) + SAME_OFFSET:
-            best = _placement(pieces, lines, found)
+            best = _placement(pieces, lines, nearest_optimum(program, found), found.value)
     return best
 
 
@@ -188,8 +193,8 @@ def _slope_angles(axes: Array, half_angles: Array) -> tuple[Array, Array]:
         axes: (..., 4, 3)
         half_angles: One for all fingers, (..., 1), or one each, (..., 4).
     """
-    along = np.einsum("...ij,...j->...i", axes, focus_direction(axes)) * (1.0, 1.0, -1.0, -1.0)
-    phi = np.arccos(np.clip(along, -1.0, 1.0))
+    resultants = focus_direction(axes)[..., None, :] * RESULTANTS[:, None]
+    phi = angles_between(axes, resultants)
     in_pairs = (*phi.shape[:-1], 2, 2)
     least = (phi - half_angles).reshape(in_pairs).max(axis=-1)
     largest = (phi + half_angles).reshape(in_pairs).min(axis=-1)
@@ -283,18 +288,20 @@ def _program(
     return LinearProgram(-offset, np.vstack(rows), np.hstack(limits), A_eq, b_eq)
 
 
-def _placement(pieces: Sequence[FacePiece], lines: Sequence[_Line], found: Optimum) -> Placement:
+def _placement(
+    pieces: Sequence[FacePiece], lines: Sequence[_Line], x: Array, merit: float
+) -> Placement:
     positions: list[Array] = []
     for piece, line in zip(pieces, lines, strict=True):
-        contact = (line.D - line.F) @ found.x
+        contact = (line.D - line.F) @ x
         positions.append(contact - piece.normal * (piece.normal @ (contact - piece.origin)))
-    passing = np.array([line.D @ found.x for line in lines])
+    passing = np.array([line.D @ x for line in lines])
     return Placement(
         positions=np.array(positions),
-        forces=balanced_forces(pieces, np.array([line.F @ found.x for line in lines])),
+        forces=balanced_forces(pieces, np.array([line.F @ x for line in lines])),
         foci=np.array([passing[:2].mean(axis=0), passing[2:].mean(axis=0)]),
         radii=np.zeros(FINGERS),
-        merit=found.value,
+        merit=merit,
     )
 
 

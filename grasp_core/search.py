@@ -23,6 +23,7 @@ from grasp_core.prospects import Blocks
 from grasp_core.ranking import Attempt, Quadruple, outlook
 from grasp_core.reach import Reach
 from grasp_core.spanning import cones_positively_span
+from grasp_core.ties import graded, surpassing
 from grasp_core.true_surface import on_true_surface
 from grasp_core.values import (
     ContactRegion,
@@ -42,8 +43,6 @@ TOGETHER = 32
 SAME_MERIT = 1e-5
 """What cannot be better than the worst kept by more than this share is not looked at: symmetric
 objects hold thousands of equal grasps."""
-SAME_DIGITS = 7
-"""Merits equal to so many digits (object size one) are ties."""
 SAME_CONTACTS = 1e-6
 """Contacts closer than this, in object radii, are the same grasp found twice."""
 
@@ -119,7 +118,7 @@ class Search:
 
 def best_first(found: Certified) -> tuple[float, FaceQuadruple, FaceQuadruple]:
     """Largest merit first; ties are broken by the faces, then by the fingers, not by rounding."""
-    return -round(found.placement.merit, SAME_DIGITS), four(sorted(found.faces)), found.faces
+    return -graded(found.placement.merit), four(sorted(found.faces)), found.faces
 
 
 def search_construction(
@@ -220,7 +219,7 @@ def _settled(
             break
         cones = four(choice.cones[finger] for finger in attempt.order)
         if found := _best_placement(construction, cones, shapes, least, tally):
-            placed, least = found, found[2].merit
+            placed, least = found, surpassing(found[2].merit)
     if placed is None:
         return None
     chosen, cones, planned = placed
@@ -265,7 +264,7 @@ def _best_placement(
             continue
         placed = construction.place(chosen, cones, least)
         if isinstance(placed, Placement) and placed.merit > least:
-            best, least = (chosen, cones, placed), placed.merit
+            best, least = (chosen, cones, placed), surpassing(placed.merit)
     return best
 
 

@@ -11,7 +11,10 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
 from grasp_core.polygons import signed_area
+from grasp_core.ties import graded, largest_first
 
+GRID_DIGITS = 9
+"""Corners that are triangulated are on a grid of so many digits, relative to the figure."""
 GRID = 4e-8
 """Figures of size one are inset by so much more: the kernel rounds coordinates to 1e-8."""
 
@@ -58,8 +61,14 @@ def extrusion(outline: ArrayLike, height: float, holes: Sequence[ArrayLike] = ()
 
 
 def triangulate(loops: Sequence[Array]) -> Indices:
-    """Triangles between an outer border and its holes, as indices into all corners in order."""
-    return np.asarray(_kernel().triangulate([*loops]), dtype=np.int64)
+    """Triangles between an outer border and its holes, as indices into all corners in order.
+
+    Corners are put on a grid first, on which those of regular figures are truly on one line or
+    circle, so that rounding does not choose between triangulations.
+    """
+    size = float(np.ptp(np.vstack(loops), axis=0).max())
+    on_grid = [graded(loop / size, GRID_DIGITS) for loop in loops]
+    return np.asarray(_kernel().triangulate(on_grid), dtype=np.int64)
 
 
 def inset_figure(loops: Sequence[Array], margin: float) -> list[list[Array]]:
@@ -79,7 +88,12 @@ def inset_figure(loops: Sequence[Array], margin: float) -> list[list[Array]]:
     figure = kernel.CrossSection([loop / size for loop in loops], kernel.FillRule.EvenOdd)
     inset = figure.offset(-(margin / size + GRID), kernel.JoinType.Miter)
     parts = [[np.asarray(loop) * size for loop in part.to_polygons()] for part in inset.decompose()]
-    return [sorted(part, key=signed_area, reverse=True) for part in parts if part]
+    return [_outer_first(part) for part in parts if part]
+
+
+def _outer_first(loops: Sequence[Array]) -> list[Array]:
+    """The largest loop, then the others in the order in which they come."""
+    return [loops[place] for place in largest_first([signed_area(loop) for loop in loops])]
 
 
 def intersection_volume(one: Solid, two: Solid) -> float:

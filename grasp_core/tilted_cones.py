@@ -33,7 +33,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.kernels import compiled
-from grasp_core.spanning import OTHERS, span_sines
+from grasp_core.spanning import OTHERS, angles_between, span_sines
 from grasp_core.values import FINGERS
 
 KERNEL = "tilting"
@@ -202,7 +202,7 @@ def half_angle(axes: Array, normals: Array, thetas: Array) -> Array:
         return reached
     sines = span_sines(axes)
     spans = np.where(sines > 0.0, np.arcsin(np.clip(sines, 0.0, 1.0)), sines)
-    return np.minimum(spans, (thetas - _angles(axes, normals)).min(axis=1))
+    return np.minimum(spans, (thetas - angles_between(axes, normals)).min(axis=1))
 
 
 def _balanced(normals: Array, caps: Array) -> Array:
@@ -263,8 +263,3 @@ def _aside(axes: Array) -> tuple[Array, Array]:
         length = np.linalg.norm(cross, axis=-1, keepdims=True)
         first = np.where(length > BESIDE, cross / np.maximum(length, BESIDE), first)
     return first, np.cross(axes, first)
-
-
-def _angles(one: Array, other: Array) -> Array:
-    """Angles between unit vectors (..., 3), exact for small ones, (...)."""
-    return 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(one - other, axis=-1), 0.0, 1.0))

@@ -18,10 +18,14 @@ from grasp_core.arrays import Array
 from grasp_core.face_pieces import FacePiece, FaceShape, piece_of
 from grasp_core.placements import Placement, balanced_forces
 from grasp_core.polygons import clip, edge_rows, tidy
+from grasp_core.ties import first_best
 from grasp_core.values import ContactRegion, ForceCone
 
 LEAST_FACET = 1e-5
 """Parts of triangles without room for a disc of this radius (object size one) are left."""
+ON_EDGE = 1e-12
+"""A line that passes an edge no farther out meets both triangles beside it, of which the first
+one counts: lengths and volumes of an object of size one, a thousand rounding errors."""
 
 OnFacets = Callable[[tuple[FacePiece, ...]], Placement | None]
 
@@ -90,7 +94,8 @@ def _aimed(
 
 
 def _holds(facet: FacePiece, point: Array) -> bool:
-    return bool((facet.E @ (facet.frame.T @ (point - facet.origin)) <= facet.b).all())
+    beyond = facet.E @ (facet.frame.T @ (point - facet.origin)) - facet.b
+    return bool(beyond.max() <= ON_EDGE)
 
 
 def _facet(
@@ -120,10 +125,10 @@ def _hit(triangles: Array, point: Array, along: Array) -> Array | None:
     edges = np.roll(triangles, -1, axis=1) - triangles
     sides = np.cross(edges, point - triangles) @ along
     normals = np.cross(edges[:, 0], edges[:, 1])
-    met = np.flatnonzero((sides >= 0.0).all(axis=1) & (normals @ along > 0.0))
+    met = np.flatnonzero((sides >= -ON_EDGE).all(axis=1) & (normals @ along > 0.0))
     if not met.size:
         return None
     heights = np.einsum("fi,fi->f", triangles[met, 0] - point, normals[met]) / (
         normals[met] @ along
     )
-    return triangles[met[int(np.abs(heights).argmin())]]
+    return triangles[met[first_best(-np.abs(heights), ON_EDGE)]]

@@ -13,6 +13,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.checked import coefficient
 from grasp_core.on_faces import check_on_faces
+from grasp_core.spanning import angles_between
 from grasp_core.values import Grasp, Polyhedron
 from scenes.ruled_surfaces import between, rulings
 from scenes.shapes import Shape, closed, cone_rim, cone_sides, tube
@@ -110,7 +111,7 @@ def _finger(body: Polyhedron, grasp: Grasp, finger: int, half_angle: float) -> l
         Shape("finger", finger, polygons=bar),
         Shape("friction cone", finger, lines=(closed(rim), *spokes)),
     ]
-    lean = math.acos(min(float(cone.axis @ contact.normal), 1.0))
+    lean = float(angles_between(cone.axis, contact.normal))
     if lean + cone.half_angle <= half_angle + SLACK_RAD:
         sides = cone_sides(tip, cone.axis, cone.half_angle, length)
         shapes.append(Shape("force cone", finger, polygons=sides))

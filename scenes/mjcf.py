@@ -25,6 +25,7 @@ from grasp_core.arrays import Array
 from grasp_core.checked import instance, one_of, path_of, several
 from grasp_core.errors import InputError
 from grasp_core.on_faces import check_body
+from grasp_core.ties import first_best
 from grasp_core.values import Contact, Grasp, Polyhedron
 from scenes.fingertips import FingerSettings
 from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
@@ -267,7 +268,7 @@ def quaternion(rotation: Array) -> Array:
         ]
     )
     vector = np.linalg.eigh(K, UPLO="U")[1][:, -1]
-    return vector * np.sign(vector[int(np.argmax(np.abs(vector)))])
+    return vector * np.sign(vector[first_best(np.abs(vector))])
 
 
 def _add(

@@ -20,6 +20,9 @@ from grasp_core.errors import InputError
 from grasp_core.solids import Solid, extrusion, hull
 from grasp_core.values import Polyhedron
 
+DIGITS = 14
+"""Coordinates are rounded before solids are made of them: the last digit of a cosine depends on the
+processor, and where rounding decides, the order of faces depends on the last digit."""
 GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
 RANDOM_NAME = re.compile(r"random-(\d{1,3})-(\d{1,9})", re.ASCII)
 RANDOM_FACES = range(4, 201)
@@ -67,7 +70,8 @@ def _box(x: float, y: float, z: float) -> Solid:
 
 def _ring(radius: float, sides: int, z: float, turn: float = 0.0) -> Array:
     angles = 2.0 * np.pi * np.arange(sides) / sides + turn
-    return np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(sides, z)])
+    around = np.column_stack([np.cos(angles), np.sin(angles)])
+    return np.column_stack([radius * np.round(around, DIGITS), np.full(sides, z)])
 
 
 def _tetrahedron() -> Solid:
@@ -199,9 +203,10 @@ def _facet_signs(solid: Solid) -> Array:
 
 def _polar_corners(solid: Solid) -> Array:
     """Corner of the polar body for each triangle: the point p with p.v = 1 at its vertices."""
-    ones = np.ones((len(solid.triangles), 3, 1))
-    corners = np.linalg.solve(solid.vertices[solid.triangles], ones)[..., 0]
-    return np.asarray(corners, dtype=np.float64)
+    a, b, c = (solid.vertices[solid.triangles[:, corner]] for corner in range(3))
+    crosses = np.cross(b, c) + np.cross(c, a) + np.cross(a, b)
+    determinants = (a * np.cross(b, c)).sum(axis=1)
+    return np.asarray(np.round(crosses / determinants[:, None], DIGITS), dtype=np.float64)
 
 
 OBJECTS: dict[str, Callable[[], Solid]] = {

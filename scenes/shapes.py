@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, frozen
+from grasp_core.ties import SAME_SHARE, first_best
 
 Role: TypeAlias = Literal[
     "object", "edge", "finger", "friction cone", "force cone", "region", "line of force", "focus",
@@ -56,7 +57,7 @@ def closed(loop: Array) -> Array:
 
 def ring(center: Array, axis: Array, radius: float) -> Array:
     """Points of a circle around a unit axis, (SIDES, 3)."""
-    side = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
+    side = np.cross(axis, np.eye(3)[first_best(-np.abs(axis), SAME_SHARE)])
     side /= np.linalg.norm(side)
     angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
     around = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), np.cross(axis, side))

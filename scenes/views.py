@@ -8,6 +8,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.checked import number, positive
+from grasp_core.ties import first_best
 from grasp_core.values import Grasp, Polyhedron
 
 DISTANCE = 9.0
@@ -16,6 +17,8 @@ AZIMUTHS, ELEVATIONS = range(5, 360, 10), (18, 28, 40)
 """Views to choose from [deg]."""
 EDGE_ON = 0.12
 """Cosine below which a face is seen as a line."""
+SAME_MERIT = 1e-6
+"""Views whose merits differ by less are equally good: the first one counts."""
 FORESHORTENED = 0.8
 """Cosine above which a finger points at the viewer."""
 
@@ -73,10 +76,11 @@ def best_view(body: Polyhedron, grasp: Grasp) -> View:
         apart = _least_gap(view.seen(np.vstack([grasp.positions, ends]))[0]) / body.radius
         pointing = np.maximum(np.abs(outward @ towards) - FORESHORTENED, 0.0).sum()
         lines = areas @ (np.abs(body.normals @ towards) < EDGE_ON) / areas.sum()
-        in_front = (outward @ towards > 0.0).mean()
+        in_front = (outward @ towards > SAME_MERIT).mean()
         return apart + 0.1 * in_front - 2.0 * float(pointing) - 0.5 * float(lines)
 
-    return View.of_angles(*max(angles, key=merit), body)
+    best = first_best([merit(angle) for angle in angles], SAME_MERIT)
+    return View.of_angles(*angles[best], body)
 
 
 def _least_gap(points: Array) -> float:

@@ -18,7 +18,7 @@ from grasp_core.kernels.attempts import (
 )
 from grasp_core.kernels.simplex import Rows
 from grasp_core.kernels.tables import Attempts, FaceTable
-from grasp_core.kernels.vectors import dotted, focus_direction
+from grasp_core.kernels.vectors import angle_between, dotted, focus_direction
 
 VARIABLES, K = 5, 3
 """How many there are, and where half the distance of the foci is among them."""
@@ -91,7 +91,7 @@ def _ball_row(
     face, psi, largest = attempts.faces[a, finger], attempts.half_angles[a], 0.0
     for other in range(FINGERS):
         largest = max(largest, faces.depths[attempts.faces[a, other]])
-    lean = np.arccos(min(1.0, dotted(faces.normals[face], attempts.axes[a, finger])))
+    lean = angle_between(faces.normals[face], attempts.axes[a, finger])
     for j in range(K + 1):
         rows.At[j, row] = -np.sin(psi) * s[j]
     rows.At[-1, row] = 2.0 if lean >= psi else 1.0 + np.cos(psi - lean)  # 1 + kappa
@@ -141,10 +141,10 @@ def _near_row(
     (a, finger, u), (s, s0, sign) = setting, depth
     face = attempts.faces[a, finger]
     toward = sign * dotted(attempts.axes[a, finger], u)
-    across = abs(dotted(faces.normals[face], u))
+    across, T = abs(dotted(faces.normals[face], u)), faces.frames[face]
     for j in range(K + 1):
         rows.At[j, row] = -toward * s[j]
     rows.At[K, row] += 2.0
-    rows.At[-1, row] = np.sqrt(max(1.0 - across * across, 0.0))
+    rows.At[-1, row] = np.hypot(dotted(T[:, 0], u), dotted(T[:, 1], u))
     rows.b[row] = toward * s0 - faces.depths[face] * across
     return row + 1

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array
 from grasp_core.kernels.attempts import facet_sines
 from grasp_core.kernels.tables import Attempts, FaceTable, RegulusTerms
-from grasp_core.kernels.vectors import across, cross, dotted, focus_direction
+from grasp_core.kernels.vectors import across, angle_between, cross, dotted, focus_direction
 
 FLAT = 1e-12
 """Facets that lean no more than this do not bound z / x: they allow all of it or nothing."""
@@ -56,7 +56,7 @@ def pair_frames(faces: FaceTable, attempts: Attempts, a: int, terms: RegulusTerm
             frames.v[pair, j] *= scale
         least, largest = -np.pi, np.pi / 2.0
         for axis in (first, second):
-            phi = np.arccos(min(1.0, max(-1.0, resultant * dotted(axis, u))))
+            phi = angle_between(axis, resultant * u)
             least = max(least, phi - attempts.half_angles[a])
             largest = min(largest, phi + attempts.half_angles[a])
         if largest <= least:

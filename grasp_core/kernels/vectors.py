@@ -21,6 +21,14 @@ def cross(u: Array, v: Array, crossed: Array) -> None:
 
 
 @njit(cache=True)
+def angle_between(u: Array, v: Array) -> float:
+    """Angle between two vectors [rad], as exact for nearly equal ones as for others."""
+    crossed = np.empty(3)
+    cross(u, v, crossed)
+    return np.arctan2(np.sqrt(dotted(crossed, crossed)), dotted(u, v))
+
+
+@njit(cache=True)
 def balancing_weights(axes: Array, weights: Array) -> None:
     """Fill in weights of sum w_i a_i = 0, (4,), as those of `grasp_core.spanning`."""
     front, back, total = np.empty(3), np.empty(3), 0.0

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from grasp_core.arrays import Array
+from grasp_core.spanning import angles_between
 from grasp_core.values import Grasp
 from sim_validate.reports.agreement import as_predicted, wrench_size
 from sim_validate.reports.drawn_grasps import Drawn, certified, largest_push
@@ -101,7 +102,7 @@ def _contacts(grasp: Grasp, radius: float) -> Iterable[Record]:
     for face, contact, cone, region in zip(
         grasp.faces, grasp.contacts, grasp.force_cones, grasp.regions, strict=True
     ):
-        lean = math.degrees(math.acos(min(float(cone.axis @ contact.normal), 1.0)))
+        lean = math.degrees(float(angles_between(cone.axis, contact.normal)))
         half = math.degrees(cone.half_angle)
         yield {
             "face": face,

@@ -1,0 +1,172 @@
+"""The same plans and verdicts under other arithmetic: BLAS kernels, NumPy features, threads.
+
+    python -m tests.benchmarks.machines [--quick] [--meshes FOLDER]
+
+Each arithmetic stands for another machine: the environment of a process tells OpenBLAS, NumPy
+and Numba which processor to work for. Every object is planned at every friction in each of them,
+with all methods and a limit, and those of few faces without a limit; the first grasps are
+simulated. All must give what this machine's own arithmetic gives.
+"""
+
+import argparse
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+import grasp_core as gc
+import scenes
+import sim_validate as sv
+
+FRICTIONS = (math.tan(math.radians(10.0)), 0.3, 0.5, 0.8)
+LIMIT = 20
+FEW_FACES = 12
+"""Objects of so many faces are also planned without a limit."""
+HULLS = tuple(f"random-{faces}-7" for faces in (8, 9, 10, 11, 12, 14, 16, 18, 24))
+QUICK = ("box", "octahedron", "icosahedron", "l-bracket", "random-9-7")
+SAME_PLACE = 1e-9
+"""Contacts in object radii."""
+SAME_FRICTION = 1e-7
+SAME_FIGURE = 1e-6
+"""Of a simulation, relative."""
+
+
+def arithmetics():
+    """Environments by name; the first is the machine's own."""
+    found = {"own": {}}
+    for core in ("Haswell", "Nehalem", "Zen", "Sandybridge"):
+        found[f"OpenBLAS for {core}"] = {"OPENBLAS_CORETYPE": core}
+    found["NumPy without features"] = {"NPY_DISABLE_CPU_FEATURES": " ".join(dispatched())}
+    found["Numba for any processor"] = {"NUMBA_CPU_NAME": "generic"}
+    found["least of all"] = {
+        "OPENBLAS_CORETYPE": "Nehalem",
+        "NUMBA_CPU_NAME": "generic",
+        "NPY_DISABLE_CPU_FEATURES": " ".join(dispatched()),
+    }
+    found["one thread"] = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
+    found["two threads"] = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "2")
+    return found
+
+
+def dispatched():
+    """Features of this processor that NumPy can do without."""
+    module = np._core._multiarray_umath
+    return [name for name in module.__cpu_dispatch__ if module.__cpu_features__.get(name)]
+
+
+def objects(quick, meshes):
+    """Names of built-in objects and paths of meshes."""
+    built_in = [name for name in scenes.example_names() if name != "random-FACES-SEED"]
+    names = QUICK if quick else (*built_in, *HULLS)
+    files = sorted(p for p in meshes.rglob("*") if p.suffix in {".ply", ".obj", ".stl", ".off"}) \
+        if meshes else []  # fmt: skip
+    return [*names, *map(str, files)]
+
+
+def loaded(name):
+    return gc.load_polyhedron(name) if Path(name).suffix else scenes.example_object(name)
+
+
+def answers(names):
+    """What is planned and simulated, by case, for JSON."""
+    found = {}
+    for name in names:
+        body = loaded(name)
+        for friction in FRICTIONS:
+            plan = gc.plan(body, friction, limit=LIMIT)
+            found[f"{name} at {friction:.4f}"] = [as_json(body, grasp) for grasp in plan.grasps]
+            if friction == FRICTIONS[2] and plan.grasps:
+                found[f"{name} simulated"] = simulated(body, plan.grasps[0], friction)
+            if len(body.faces) <= FEW_FACES:
+                every = gc.plan(body, friction).grasps
+                found[f"all of {name} at {friction:.4f}"] = [as_json(body, g) for g in every]
+    return found
+
+
+def as_json(body, grasp):
+    return {
+        "id": grasp.id,
+        "family": grasp.family,
+        "faces": list(grasp.faces),
+        "contacts": ((grasp.positions - body.center_of_mass) / body.radius).ravel().tolist(),
+        "friction": grasp.critical_friction,
+    }
+
+
+def simulated(body, grasp, friction):
+    verdict = sv.validate(body, grasp, friction)
+    return {
+        "outcome": verdict.outcome,
+        "trials": [trial.hold.outcome for trial in verdict.wrenches],
+        "controls": [trial.failed for trial in verdict.controls],
+        "figures": [verdict.critical_friction.simulated],
+    }
+
+
+def differences(case, own, other):
+    """How the answers of two arithmetics to one case differ, as sentences."""
+    if isinstance(own, dict):
+        same = all(own[key] == other[key] for key in ("outcome", "trials", "controls"))
+        near = np.allclose(own["figures"], other["figures"], rtol=SAME_FIGURE, atol=0.0)
+        return [] if same and near else [f"{case}: {own} or {other}"]
+    if [g["id"] for g in own] != [g["id"] for g in other]:
+        ids, others = ([g["id"] for g in each] for each in (own, other))
+        at = next((i for i, (a, b) in enumerate(zip(ids, others, strict=False)) if a != b), None)
+        return [f"{case}: {len(ids)} or {len(others)} grasps, "
+                f"{len(set(ids) ^ set(others))} ids in one only, first at {at}"]  # fmt: skip
+    found = []
+    for one, two in zip(own, other, strict=True):
+        moved = np.abs(np.subtract(one["contacts"], two["contacts"])).max()
+        off = 0.0 if one["friction"] == two["friction"] else abs(one["friction"] - two["friction"])
+        if one["faces"] != two["faces"] or one["family"] != two["family"]:
+            found.append(f"{case}: {one['id']} has other fingers")
+        elif not (moved <= SAME_PLACE and off <= SAME_FRICTION):
+            found.append(f"{case}: {one['id']} is moved by {moved:.1e}, friction by {off:.1e}")
+    return found
+
+
+def asked(environment, names):
+    """The answers of a process with an environment."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "answers.json")
+        command = [sys.executable, "-m", "tests.benchmarks.machines", "--answer", str(path)]
+        subprocess.run([*command, *names], check=True, env={**os.environ, **environment})
+        return json.loads(path.read_text())
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="five objects, three arithmetics")
+    parser.add_argument("--meshes", type=Path, metavar="FOLDER", help="mesh files beside them")
+    parser.add_argument("--only", action="append", metavar="ARITHMETIC", help="beside the own one")
+    parser.add_argument("--answer", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("names", nargs="*", help="objects, instead of all")
+    options = parser.parse_args()
+    if options.answer:
+        options.answer.write_text(json.dumps(answers(options.names)))
+        return
+    names = options.names or objects(options.quick, options.meshes)
+    every = arithmetics()
+    kept = options.only or (("least of all",) if options.quick else list(every)[1:])
+    own, differing = asked({}, names), 0
+    grasps = sum(len(each) for each in own.values() if isinstance(each, list))
+    print(f"{len(names)} objects, {len(own)} cases, {grasps} grasps", flush=True)
+    for arithmetic in kept:
+        begun = time.perf_counter()
+        other = asked(every[arithmetic], names)
+        found = [line for case in own for line in differences(case, own[case], other[case])]
+        differing += len(found)
+        print(f"{arithmetic}: {len(found)} differences, {time.perf_counter() - begun:.0f} s")
+        print(*(f"    {line}" for line in found[:40]), sep="\n", flush=True)
+    if differing:
+        sys.exit("plans or verdicts depend on the arithmetic")
+
+
+if __name__ == "__main__":
+    main()
