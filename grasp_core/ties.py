@@ -11,8 +11,8 @@ These rules replace it wherever something is chosen.
 2. *The best of several:* `first_best` takes the first one that is within a margin of the best.
    Where candidates come one by one, a later one has to be better by a margin, see `surpassing`.
 3. *Orders:* `smallest_first` calls numbers equal that a chain of small gaps connects, so that a
-   second key decides, as a rule the faces, ascending. Where numbers come one by one, `graded`
-   counts in which cell of a grid each lies. The grid is shifted by a fraction that no ratio of small
+   second key decides, as a rule the faces, ascending. Of numbers that come one by one, `graded`
+   counts the cells of a grid up to each. The grid is shifted by a fraction that no ratio of small
    whole numbers comes near: the numbers of regular objects (0, 1/2, 1/3) are far from borders.
 
 What is left to chance is a number that comes within rounding of a border by accident: with
