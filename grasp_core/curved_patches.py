@@ -97,7 +97,7 @@ class _Group:
 def _groups(surface: _Surface, spread: float, depth: float) -> list[_Group]:
     """Groups of triangles, none in two of them, largest first."""
     smooth = _smoothed(surface)
-    flatness = np.einsum("ti,ti->t", smooth, surface.normals)
+    flatness: Array = np.einsum("ti,ti->t", smooth, surface.normals)
     flat_first = np.argsort(-graded(flatness, FLATNESS_DIGITS), kind="stable")
     free = np.ones(len(surface.areas), dtype=np.bool_)
     groups: list[_Group] = []

@@ -131,11 +131,7 @@ def _face(vertices: Array, triangles: Indices, slack: float, triangulate: Triang
     found = [flat(loop) for loop in border_loops(triangles)]
     loops = [found[place] for place in largest_first([signed_area(loop) for loop in found])]
     outer, holes = loops[0], loops[1:]
-    if not holes and is_convex(outer):
-        pieces = [outer]
-    else:
-        pieces = merge_into_convex_pieces(np.vstack(loops), triangulate(loops))
-        pieces = [without_straight_corners(piece, slack) for piece in pieces]
+    pieces = convex_pieces(loops, triangulate, slack)
     area, centroid = area_and_centroid(loops)
     return Face(
         normal=normal,
@@ -145,6 +141,20 @@ def _face(vertices: Array, triangles: Indices, slack: float, triangulate: Triang
         holes=tuple(lift(hole) for hole in holes),
         pieces=tuple(lift(piece) for piece in pieces),
     )
+
+
+def convex_pieces(loops: list[Array], triangulate: Triangulate, slack: float) -> list[Array]:
+    """Convex polygons that tile a plane figure, (k, 2) each.
+
+    Args:
+        loops: Outer border, counter-clockwise, and holes, clockwise, each (k, 2).
+        triangulate: The door to a library that does.
+        slack: How far corners may be from a line and still be on it.
+    """
+    if len(loops) == 1 and is_convex(loops[0]):
+        return loops
+    pieces = merge_into_convex_pieces(np.vstack(loops), triangulate(loops))
+    return [without_straight_corners(piece, slack) for piece in pieces]
 
 
 def border_loops(triangles: Indices) -> list[list[int]]:

@@ -151,7 +151,7 @@ def _planned(body: Polyhedron, request: PlanRequest, searches: Searches) -> Plan
         counts=counts,
         outcomes=outcomes,
         absence=None if grasps else _absence(body, request, counts, outcomes),
-        absences={whole(faces): proof for s in every for faces, proof in s.absences.items()},
+        absences={faces: proofs for s in every for faces, proofs in searches.absences(s).items()},
         finger=request.finger,
         undecided={whole(faces): share for s in every for faces, share in s.undecided.items()},
         unreached={whole(faces): why for faces, why in searches.unreached().items()},

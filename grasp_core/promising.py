@@ -106,7 +106,8 @@ def promising(
 def _closer(listed: Outlook, rows: slice, worth: float) -> _Rest:
     """Some quadruples with their cones, without what is not worth having: that is forgotten."""
     ranking = listed.ranking(rows)
-    best = coarse(ranking.bounds.max(axis=(1, 2), initial=-np.inf))
+    bounds: Array = np.max(ranking.bounds, axis=(1, 2), initial=-np.inf)
+    best = coarse(bounds)
     count = int((best > worth).sum())
     return _Rest(ranking.first(count), best[:count], 0)
 

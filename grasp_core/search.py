@@ -16,8 +16,9 @@ from grasp_core.certified import Certified, certify, named
 from grasp_core.constructions import Construction, regions_of
 from grasp_core.errors import SolverError
 from grasp_core.face_pieces import FacePiece, FaceShape, Shapes, choices_near
+from grasp_core.patch import Absence
 from grasp_core.placements import Placement
-from grasp_core.plans import MethodCounts, Proof
+from grasp_core.plans import MethodCounts
 from grasp_core.promising import Block, in_rows, promising
 from grasp_core.prospects import Blocks
 from grasp_core.ranking import Attempt, Quadruple, outlook
@@ -71,8 +72,8 @@ class Search:
     held: set[FaceQuadruple] = field(default_factory=set[FaceQuadruple])
     """Faces, ascending, on which a grasp was found, kept or not."""
     tally: Counter[str] = field(default_factory=Counter[str])
-    absences: dict[FaceQuadruple, tuple[Proof, ...]] = field(
-        default_factory=dict[FaceQuadruple, tuple[Proof, ...]]
+    absences: dict[FaceQuadruple, tuple[Absence, ...]] = field(
+        default_factory=dict[FaceQuadruple, tuple[Absence, ...]]
     )
     undecided: dict[FaceQuadruple, float] = field(default_factory=dict[FaceQuadruple, float])
     unreached: dict[FaceQuadruple, str] = field(default_factory=dict[FaceQuadruple, str])

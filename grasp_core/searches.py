@@ -3,22 +3,24 @@
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from itertools import combinations, islice
 from typing import TypeAlias
 
+from grasp_core.as_given import Place, absence_as_given, as_given
 from grasp_core.candidates import PlannedCones
 from grasp_core.certified import Certified
 from grasp_core.clear_of_edges import clear_of_edges
 from grasp_core.constructions import CONSTRUCTIONS, MIXED, Construction
 from grasp_core.face_pieces import face_shapes
 from grasp_core.free_search import FreeRequest, search_free, search_undecided
+from grasp_core.patch import Absence
 from grasp_core.plans import Outcomes
 from grasp_core.prospects import Blocks, Prospects, all_blocks, spanning_blocks
 from grasp_core.reach import Reach, reach
 from grasp_core.requests import COMPLETE_CELLS, FAMILIES, METHODS, PlanRequest
 from grasp_core.search import Search, search_construction
 from grasp_core.shared_faces import shared_quadruples, with_halves
+from grasp_core.standard_order import standard
 from grasp_core.values import FINGERS, FaceQuadruple, Family, Method, Polyhedron, four
 
 KEPT_BLOCKS = 8
@@ -49,7 +51,10 @@ class Searches:
 
     def __init__(self, body: Polyhedron, request: PlanRequest) -> None:
         self.request = request
-        self.body = clear_of_edges(body, request.clearance) if request.clearance else body
+        self.standard = standard(body)
+        self.body = self.standard.body
+        if request.clearance:
+            self.body = clear_of_edges(self.body, request.clearance)
         self.owners = tuple(range(len(body.faces)))
         if request.share_faces is not None:
             self.body, self.owners = with_halves(self.body, request.share_faces)
@@ -170,21 +175,32 @@ class Searches:
         return reach(self.body, found.faces, positions, found.normals, finger)
 
     def whole_faces(self, faces: FaceQuadruple) -> FaceQuadruple:
-        """The object's faces, where some may be halves."""
-        return four(self.owners[face] for face in faces)
+        """The faces of the object as it was given, ascending, where some may be halves."""
+        return four(sorted(self.standard.faces[self.owners[face]] for face in faces))
 
     def as_found(self, found: Certified) -> Certified:
-        """A grasp named by the object's faces; of halves of a face by `a` and `b`."""
-        faces = self.whole_faces(found.faces)
-        if faces == found.faces:
-            return found
+        """A grasp on the object as it was given, named by its faces; halves by `a` and `b`."""
         first = {owner: index for index, owner in reversed(list(enumerate(self.owners)))
                  if index != owner}  # fmt: skip
-        parts = [
-            str(face) if face == owner else f"{owner}{'a' if face == first[owner] else 'b'}"
-            for face, owner in zip(found.faces, faces, strict=True)
+        owners = [self.owners[face] for face in found.faces]
+        halves = [
+            "" if face == owner else "a" if face == first[owner] else "b"
+            for face, owner in zip(found.faces, owners, strict=True)
         ]
-        return replace(found, faces=faces, id="-".join([found.id[0], *parts]))
+        places = [
+            Place(self.standard.faces[owner], half)
+            for owner, half in zip(owners, halves, strict=True)
+        ]
+        return as_given(found, places, mirrored=self.standard.mirrored)
+
+    def absences(self, search: Search) -> dict[FaceQuadruple, tuple[Absence, ...]]:
+        """Proofs of absence on the object as it was given."""
+        return {
+            self.whole_faces(faces): tuple(
+                absence_as_given(proof, self.standard, self.owners) for proof in proofs
+            )
+            for faces, proofs in search.absences.items()
+        }
 
     def outcomes(self) -> Outcomes:
         """What became of every four faces."""

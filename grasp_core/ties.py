@@ -20,7 +20,7 @@ fourteen good digits and cells of 1e-7, one in ten million.
 """
 
 import math
-from typing import TypeVar, cast
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,10 +44,12 @@ SAME_SHARE = 1e-6
 SHIFT = 0.5 * (math.sqrt(5.0) - 1.0)
 """Where the grid lies, in cells: the golden section is worst approximated by fractions."""
 
-Figures = TypeVar("Figures", float, Array)
 
-
-def graded(values: Figures, digits: int = SAME_DIGITS) -> Figures:
+@overload
+def graded(values: float, digits: int = SAME_DIGITS) -> float: ...
+@overload
+def graded(values: Array, digits: int = SAME_DIGITS) -> Array: ...
+def graded(values: float | Array, digits: int = SAME_DIGITS) -> float | Array:
     """Number of the cell in which each value lies, of any shape; equal values share a cell.
 
     Args:
@@ -55,12 +57,16 @@ def graded(values: Figures, digits: int = SAME_DIGITS) -> Figures:
         digits: After the point, how narrow cells are.
     """
     cells = np.floor(np.asarray(values, dtype=np.float64) * 10.0**digits + SHIFT)
-    return cast("Figures", cells if cells.ndim else float(cells))
+    return cells if cells.ndim else float(cells)
 
 
-def coarse(values: Figures) -> Figures:
+@overload
+def coarse(values: float) -> float: ...
+@overload
+def coarse(values: Array) -> Array: ...
+def coarse(values: float | Array) -> float | Array:
     """The upper end of each value's cell: an upper bound that equal values share."""
-    return cast("Figures", (graded(values) + (1.0 - SHIFT)) * 10.0**-SAME_DIGITS)
+    return (graded(values) + (1.0 - SHIFT)) * 10.0**-SAME_DIGITS
 
 
 def ranks(values: ArrayLike, share: float = SAME_SHARE) -> Indices:
