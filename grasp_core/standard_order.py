@@ -131,7 +131,8 @@ def _frame(body: Polyhedron, face: int, corner: int) -> Array:
     normal = body.faces[face].normal
     toward = toward - normal * float(normal @ toward)
     toward = toward / np.linalg.norm(toward)
-    return np.column_stack([toward, np.cross(normal, toward), normal])
+    across: Array = np.cross(normal, toward)
+    return np.column_stack([toward, across, normal])
 
 
 def _looks(body: Polyhedron, frame: Array) -> tuple[Cells, ...]:
