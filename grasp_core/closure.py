@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import SMALLEST_SIZE, Array, real_array
-from grasp_core.closure_margin import ROUNDING, decide, margin_ceiling, proved_margin
+from grasp_core.closure_margin import decide, margin_ceiling, proved_margin
 from grasp_core.contact_arrays import contact_arrays, contact_frictions
 from grasp_core.errors import UndecidedError
 from grasp_core.fields import are_frictions, are_units, is_array, is_number
@@ -55,8 +55,10 @@ class ClosureCertificate:
     closed: bool
     margin: float
     """Proved bound of the optimum t of the margin program, dimensionless, unchanged by moving and
-    scaling: if closed, the optimum is no less; if not, it is no more. From `force_closure` it is
-    within some 1e-9 of the optimum, where contacts are not degenerate."""
+    scaling. If closed, the optimum is no less. If not, it is no more than a negative margin, while
+    zero says only that there is no closure: contacts may balance deep inside their cones, and yet
+    leave the object free. `force_closure` gives the optimum to some 1e-9 where contacts and
+    friction are not nearly degenerate; minus infinity for what is below -1e6."""
     positions: Array
     """(k, 3) [m]"""
     normals: Array
@@ -91,10 +93,12 @@ class ClosureCertificate:
             if self.closed is True:
                 return self.separating_wrench is None and 0.0 < self.margin <= self.proved()
             return (
-                self.closed is False
-                and self.forces is None
-                and 0.0 >= self.margin >= self.proved()
+                self.closed is False and self.forces is None and 0.0 >= self.margin >= self.proved()
             )
+
+    def separates(self) -> bool:
+        """Whether the wrench separates, whatever the margin; fields are taken as sound."""
+        return self.forces is None and self.proved() <= 0.0
 
     def _are_contacts(self) -> bool:
         count = len(self.normals) if is_array(self.normals, None, 3) else 0

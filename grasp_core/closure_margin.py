@@ -184,7 +184,8 @@ def margin_ceiling(
         caution: Multiplies what is allowed for rounding.
 
     Returns:
-        An upper bound; zero where M is, to within rounding, infinity where it is more.
+        An upper bound; zero, which bounds nothing but says that there is no closure, where M is
+        zero to within rounding; infinity where M is more.
     """
     if not refutes_closure(twist, arms, normals, friction):
         return math.inf

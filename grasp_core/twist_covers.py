@@ -47,6 +47,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices
 from grasp_core.errors import InputError
+from grasp_core.fields import are_frictions, are_units, is_a, is_array
 
 TWIST = 6
 LEAF = 15
@@ -105,15 +106,19 @@ class TwistCover:
     def verify(self, regions: Sequence[Array], normals: Array, friction: Array) -> bool:
         """Whether all choices of contacts in regions are force-closed, in plain arithmetic.
 
+        What is no region, normal or friction is answered with False.
+
         Args:
             regions: Corners of each contact's convex region, about the origin of points, (c, 3).
             normals: Inward normals, (k, 3).
             friction: (k,)
         """
-        k = len(regions)
-        if (len(normals), len(friction), self.forces.shape[1]) != (k, k, k) or not _units(normals):
+        k = self.forces.shape[1]
+        if not (are_units(normals, k, 3, slack=SLACK) and are_frictions(friction, k)):
             return False
-        if min(map(len, regions)) == 0 or not ((friction >= 0.0) & np.isfinite(friction)).all():
+        if not is_a(regions, Sequence) or len(regions) != k:
+            return False
+        if not all(is_array(r, None, 3) and len(r) for r in regions):
             return False
         largest = np.abs(self.forces).max(axis=(1, 2), initial=0.0)
         if not (largest > 0.0).all() or not self._independent():
@@ -147,10 +152,6 @@ class TwistCover:
             powers += at_origin + (slopes @ region.T).min(axis=2)
             sizes += lengths * slack_of(F, region)[:, None]
         return bool((powers > sizes).all())
-
-
-def _units(normals: Array) -> bool:
-    return bool((np.abs(np.linalg.norm(normals, axis=1) - 1.0) <= SLACK).all())
 
 
 def power_of(F: Array, twists: Array) -> tuple[Array, Array]:
