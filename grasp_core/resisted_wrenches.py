@@ -34,7 +34,7 @@ HELD = 1e-7
 """How far forces at a limit may leave cones and balance, relative to the largest wrench of a unit
 normal force: what conic programs leave."""
 ROUNDING = 1e-9
-"""Of the bound, relative to it, and of the facet's power, relative to the lengths of its factors."""
+"""Of the bound, relative to it, and of the facet's power, relative to the lengths of its parts."""
 MAX_STEPS = 30
 STARTS = 3
 """From how many of the weakest axis wrenches the search starts."""

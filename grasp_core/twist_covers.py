@@ -116,12 +116,8 @@ class TwistCover:
         k = self.forces.shape[1]
         if not (are_units(normals, k, 3, slack=SLACK) and are_frictions(friction, k)):
             return False
-        if not is_a(regions, Sequence) or len(regions) != k:
-            return False
-        if not all(is_array(r, None, 3) and len(r) for r in regions):
-            return False
         largest = np.abs(self.forces).max(axis=(1, 2), initial=0.0)
-        if not (largest > 0.0).all() or not self._independent():
+        if not (_are_places(regions, k) and (largest > 0.0).all() and self._independent()):
             return False
         forces = self.forces / largest[:, None, None]  # else squares of tiny ones are zero
         along = np.einsum("mki,ki->mk", forces, normals)
@@ -152,6 +148,12 @@ class TwistCover:
             powers += at_origin + (slopes @ region.T).min(axis=2)
             sizes += lengths * slack_of(F, region)[:, None]
         return bool((powers > sizes).all())
+
+
+def _are_places(regions: Sequence[Array], count: int) -> bool:
+    """Whether regions are so many lists of points."""
+    listed = is_a(regions, Sequence) and len(regions) == count
+    return listed and all(is_array(region, None, 3) and len(region) > 0 for region in regions)
 
 
 def power_of(F: Array, twists: Array) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ import dataclasses
 
 import numpy as np
 
+WORDS = ("l1", "linf", "point", "disc", "cone", "certified", "")
 NONSENSE = (None, "a", float("nan"), np.zeros((0, 3)), (), np.array([[None]]))
 
 
@@ -28,10 +29,7 @@ def places(value, name=""):
 def get(value, place, rng):
     """The value at a place; None where this certificate has none."""
     for step in steps(place):
-        if step == "[]":
-            value = pick(value, rng)
-        else:
-            value = getattr(value, step, None)
+        value = pick(value, rng) if step == "[]" else getattr(value, step, None)
     return value
 
 
@@ -69,19 +67,16 @@ def change_of(value, other, rng):
     kind = rng.integers(10)
     if kind == 0:
         return NONSENSE[rng.integers(len(NONSENSE))]
-    if kind == 1:
+    if kind == 1 or value is None or _is_empty(value):
         return other
-    if isinstance(value, bool):
-        return not value
-    if isinstance(value, np.ndarray) and value.size:
-        return _of_array(value, rng)
-    if isinstance(value, int | float):
-        return _of_number(value, rng)
-    if isinstance(value, tuple) and value:
-        return _of_tuple(value, rng)
-    if isinstance(value, str):
-        return rng.choice(["l1", "linf", "point", "disc", "cone", "certified", ""]).item()
+    for kinds, way in WAYS:
+        if isinstance(value, kinds):
+            return way(value, rng)
     return other
+
+
+def _is_empty(value):
+    return len(value) == 0 if isinstance(value, tuple) else getattr(value, "size", 1) == 0
 
 
 def _of_number(value, rng):
@@ -135,6 +130,15 @@ def _of_array(value, rng):
     ]  # fmt: skip
     changed = ways[rng.integers(len(ways))]()
     return changed.astype(value.dtype) if _whole(changed, value) else changed
+
+
+WAYS = (
+    (bool, lambda value, _: not value),
+    (np.ndarray, _of_array),
+    ((int, float), _of_number),
+    (tuple, _of_tuple),
+    (str, lambda _, rng: rng.choice(WORDS).item()),
+)
 
 
 def _whole(changed, value):

@@ -1,4 +1,4 @@
-"""Tampering, counted: what is refused, what is accepted and true, and what is accepted and false."""
+"""Tampering, counted: what is accepted and true, and what is accepted and false."""
 
 import dataclasses
 from collections import Counter
@@ -41,7 +41,10 @@ def attack(row, certificates, tries, rng):
             certificate, other = (certificates[i] for i in rng.integers(len(certificates), size=2))
             value, donor = get(certificate, name, rng), get(other, name, rng)
             try:
-                changed = tampered(certificate, name, lambda v, d=donor: change_of(v, d, rng), rng)
+                with np.errstate(all="ignore"):
+                    changed = tampered(
+                        certificate, name, lambda v, d=donor: change_of(v, d, rng), rng
+                    )
             except LookupError:
                 continue  # this certificate has no such part
             except gc.InputError:
