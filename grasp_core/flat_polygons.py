@@ -10,7 +10,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.polygons import clip, edge_rows, plane_frame, signed_area, tidy
 
-FEWEST_CORNERS, MOST_CORNERS = 3, 1000
+FEWEST_CORNERS, MOST_CORNERS = 3, 5000
 WIDTH, FINE = 1e-6, 1e-9
 """How far a radius may be from that of the largest disc: relative to it, and in unit size."""
 LEFT_OUT = 2e-3

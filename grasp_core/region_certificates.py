@@ -98,6 +98,7 @@ class CertifiedRegions:
             and are_frictions(self.friction, FINGERS)
             and is_tuple_of(self.regions, ContactRegion, FINGERS)
             and is_tuple_of(self.borders, np.ndarray, FINGERS)
+            and all(len(border) >= FEWEST_CORNERS for border in self.borders)
             and is_a(self.cover, TwistCover)
             and is_number(self.radius, least=0.0)
         )

@@ -14,7 +14,7 @@ from grasp_core.checked import path_of
 from grasp_core.contact_hash import contacts_sha256
 from grasp_core.errors import InputError, SolverError
 from grasp_core.face_pieces import inscribed_disc_radius_of
-from grasp_core.flat_polygons import FEWEST_CORNERS, MOST_CORNERS
+from grasp_core.flat_polygons import FEWEST_CORNERS
 from grasp_core.region_certificates import CertifiedRegions
 from grasp_core.twist_covers import TwistCover
 from grasp_core.values import FINGERS, ContactRegion, Grasp, Polyhedron, four
@@ -35,6 +35,8 @@ SHAPES: Mapping[str, tuple[int | None, ...]] = {
     **dict.fromkeys((*POLYGONS, *BORDERS), (None, 3)),
 }  # fmt: skip
 """Of the arrays of a proof."""
+MOST_CORNERS = 1000
+"""Of a region's polygon in a file."""
 SMALLEST_SCALE, LARGEST = 1e-6, 1e6
 """Of proofs: of what lengths are relative to, and of any length [m]."""
 
