@@ -35,6 +35,8 @@ HELD = 1e-7
 normal force: what conic programs leave."""
 ROUNDING = 1e-9
 """Of the bound, relative to it, and of the facet's power, relative to the lengths of its parts."""
+LAST_DIGITS = 1e-12
+"""Of a bound near zero, relative to the largest that the facet's length allows."""
 MAX_STEPS = 30
 STARTS = 3
 """From how many of the weakest axis wrenches the search starts."""
@@ -245,7 +247,9 @@ class WrenchBody:
         power = float(twist @ load)
         lengths = float(np.linalg.norm(twist) * np.linalg.norm(load))
         bound = self.max_normal_force * self.bounded.support(twist)[0]
-        return abs(power + 1.0) <= ROUNDING * lengths and bound <= found.upper * (1.0 + ROUNDING)
+        slack = LAST_DIGITS * self.max_normal_force * self.bounded.size * np.linalg.norm(twist)
+        bounded = bound <= found.upper * (1.0 + ROUNDING) + slack
+        return bounded and abs(power + 1.0) <= ROUNDING * lengths
 
     def _about_middle(self, wrench: Array) -> Array:
         """A wrench about the contacts' middle, at unit size."""
