@@ -247,7 +247,8 @@ class WrenchBody:
         power = float(twist @ load)
         lengths = float(np.linalg.norm(twist) * np.linalg.norm(load))
         bound = self.max_normal_force * self.bounded.support(twist)[0]
-        slack = LAST_DIGITS * self.max_normal_force * self.bounded.size * np.linalg.norm(twist)
+        farthest = self.bounded.size * float(np.linalg.norm(twist))
+        slack = LAST_DIGITS * self.max_normal_force * farthest
         bounded = bound <= found.upper * (1.0 + ROUNDING) + slack
         return bounded and abs(power + 1.0) <= ROUNDING * lengths
 
