@@ -1,6 +1,5 @@
 from grasp_core.best_contacts import Improvement as Improvement
 from grasp_core.best_contacts import optimize_contacts as optimize_contacts
-from grasp_core.certified_regions import CertifiedRegions as CertifiedRegions
 from grasp_core.certified_regions import certify_regions as certify_regions
 from grasp_core.closure import ClosureCertificate as ClosureCertificate
 from grasp_core.closure import force_closure as force_closure
@@ -30,6 +29,7 @@ from grasp_core.quality import ferrari_canny as ferrari_canny
 from grasp_core.quality_ceilings import QualityCeiling as QualityCeiling
 from grasp_core.quality_ceilings import quality_ceiling as quality_ceiling
 from grasp_core.reach import Finger as Finger
+from grasp_core.region_certificates import CertifiedRegions as CertifiedRegions
 from grasp_core.resisted_wrenches import WrenchLimit as WrenchLimit
 from grasp_core.resisted_wrenches import max_resisted_wrench as max_resisted_wrench
 from grasp_core.resisted_wrenches import wrench_limits as wrench_limits

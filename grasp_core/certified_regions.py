@@ -4,7 +4,7 @@ Contacts may be anywhere in their own regions, whatever the others do, and the g
 closure: first the largest equal discs for which that is proved (`region_search`), around the
 contacts or around better centres (`region_centers`), then polygons around the discs that the same
 proof allows, or as much area as covers are found for (`region_growth`). Every proof is checked by
-`TwistCover.verify` before it is returned.
+`CertifiedRegions.verify` before it is returned.
 
 On patches of curved surfaces a contact may be as far off the plane as the surface is, and friction
 loses the angle by which the surface leans, so that normals are counted as the plane's.
@@ -17,21 +17,19 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from grasp_core.arrays import Array, frozen
+from grasp_core.arrays import Array
 from grasp_core.checked import (
     coefficient,
-    instance,
     number,
     one_of,
-    positive,
-    several,
     switch,
     whole,
 )
-from grasp_core.closure import force_closure
-from grasp_core.contact_arrays import contact_frictions, stacked
+from grasp_core.closure import ClosureCertificate, force_closure
+from grasp_core.contact_arrays import stacked
 from grasp_core.errors import InputError, SolverError, UndecidedError
 from grasp_core.face_pieces import FacePiece, inscribed_radius, piece_of
+from grasp_core.flat_polygons import convex_polygon, holds_disc
 from grasp_core.on_faces import check_on_faces
 from grasp_core.polygons import (
     SAME_CORNER,
@@ -42,10 +40,11 @@ from grasp_core.polygons import (
     with_fewer_corners,
 )
 from grasp_core.region_centers import better_centers, larger_inside
+from grasp_core.region_certificates import PLACED, CertifiedRegions
 from grasp_core.region_growth import BEGINNINGS, disc_polygons, most_area, shared_out
 from grasp_core.region_search import Grounds, Proved, largest_discs
 from grasp_core.twist_covers import TwistCover
-from grasp_core.values import FINGERS, ContactRegion, Grasp, Polyhedron, four
+from grasp_core.values import ContactRegion, Grasp, Polyhedron, four
 
 Balance: TypeAlias = Literal["radius", "area"]
 """What regions are grown for: the smallest inscribed disc, or the total area."""
@@ -54,75 +53,8 @@ FEWEST = 64
 MOST_CONES = 1_000_000
 CONES = 10_000
 """Cones of one cover at most, unless told otherwise: half a second's work."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CertifiedRegions:
-    """Where each finger may stand while the others are anywhere in their own regions."""
-
-    regions: tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
-    radius: float
-    """Of discs around `centers`: what the faces have of them was proved first, and the polygons
-    hold it but for a thousandth of their area [m]."""
-    centers: Array
-    """(4, 3) [m]"""
-    limit: float
-    """Of discs that hold `open_choice`, a little larger; infinite if none was found [m]."""
-    open_choice: Array | None
-    """Contacts on the faces, in those discs, that are not force-closed, (4, 3) [m]."""
-    friction: Array
-    """For which all choices are force-closed, (4,)."""
-    origin: Array
-    """Of the torques of the proof, (3,) [m]."""
-    normals: Array
-    """Of the faces, into the object, (4, 3)."""
-    depths: Array
-    """How far the surface may be off the regions' planes, (4,) [m]."""
-    cover: TwistCover
-    """The proof; lengths relative to `scale`."""
-    scale: float
-    """[m]"""
-
-    def __post_init__(self) -> None:
-        for name in ("centers", "normals"):
-            object.__setattr__(self, name, frozen(getattr(self, name), (4, 3), name))
-        object.__setattr__(self, "friction", contact_frictions(self.friction, 4))
-        object.__setattr__(self, "origin", frozen(self.origin, (3,), "origin"))
-        object.__setattr__(self, "depths", frozen(self.depths, (4,), "depths"))
-        if self.open_choice is not None:
-            choice = frozen(self.open_choice, (4, 3), "open_choice")
-            object.__setattr__(self, "open_choice", choice)
-        _check_parts(self)
-        if (self.depths < 0.0).any():
-            raise InputError(f"depths must not be negative, got {float(self.depths.min()):.6g}")
-
-    def verify(self) -> bool:
-        """Re-check in plain arithmetic that every choice of contacts is force-closed.
-
-        This is about `regions`, on planes with `normals`, `depths` and `friction`; the radii are
-        not looked at.
-        """
-        prisms = [
-            (np.vstack([r.polygon - depth * n, r.polygon + depth * n]) - self.origin) / self.scale
-            for r, n, depth in zip(self.regions, self.normals, self.depths, strict=True)
-        ]
-        return self.cover.verify(prisms, self.normals, self.friction)
-
-
-def _check_parts(found: CertifiedRegions) -> None:
-    """Refuse what is no region, no cover, or no length.
-
-    Raises:
-        InputError: A part is none.
-    """
-    each = partial(instance, kind=ContactRegion, name="regions")
-    count = len(several(found.regions, each, "regions", "ContactRegion values"))
-    if count != FINGERS:
-        raise InputError(f"regions must be {FINGERS}, one per finger, got {count}")
-    instance(found.cover, TwistCover, "cover")
-    positive(found.scale, "scale")
-    number(found.radius, "radius", least=0.0)
-    number(found.limit, "limit", least=0.0, most=math.inf)
+NARROWED = 1e-3
+"""How finely the discs in grown polygons are measured, relative to those proved first."""
 
 
 def certify_regions(  # noqa: PLR0913 - what a user may choose
@@ -267,9 +199,10 @@ def _placed(
     grounds: Grounds, proved: Proved, polygons: list[Array], cover: TwistCover, unit: _Unit
 ) -> CertifiedRegions:
     """Regions in the object's frame, with their proof."""
-    normals = np.array([piece.normal for piece in grounds.pieces])
-    found = _open_choice(grounds, proved)
     trimmed = [_trimmed(polygon, y) for polygon, y in zip(polygons, proved.ys, strict=True)]
+    centers = unit.back(grounds.points(proved.ys))
+    opened = _open_choice(grounds, proved, unit)
+    choice = None if opened is None else opened.positions
     return CertifiedRegions(
         regions=four(
             ContactRegion(
@@ -279,17 +212,48 @@ def _placed(
             )
             for piece, polygon in zip(grounds.pieces, trimmed, strict=True)
         ),
-        radius=unit.scale * proved.radius,
-        centers=unit.back(grounds.points(proved.ys)),
-        limit=math.inf if found is None else unit.scale * found[0],
-        open_choice=None if found is None else unit.back(found[1]),
+        borders=four(unit.back(grounds.places(i)) for i in range(len(grounds.pieces))),
+        radius=unit.scale * _radius_held(grounds, proved, trimmed),
+        centers=centers,
+        limit=math.inf if choice is None else _farthest(choice, centers),
+        open_choice=choice,
+        open_wrench=None if opened is None else opened.separating_wrench,
         friction=grounds.friction,
         origin=unit.origin,
-        normals=normals,
+        normals=np.array([piece.normal for piece in grounds.pieces]),
         depths=unit.scale * np.array([piece.depth for piece in grounds.pieces]),
         cover=cover,
         scale=unit.scale,
     )
+
+
+def _farthest(points: Array, centers: Array) -> float:
+    return float(np.linalg.norm(points - centers, axis=1).max())
+
+
+def _radius_held(grounds: Grounds, proved: Proved, polygons: list[Array]) -> float:
+    """The radius of the discs proved first, or of smaller ones that the polygons hold.
+
+    Polygons grown for their area may begin with smaller discs.
+    """
+    pairs = [
+        (convex_polygon(polygon, PLACED), convex_polygon(piece.corners, PLACED), y)
+        for piece, polygon, y in zip(grounds.pieces, polygons, proved.ys, strict=True)
+    ]
+
+    def held(radius: float) -> bool:
+        return all(
+            polygon and border and holds_disc(polygon, border, y, radius)
+            for polygon, border, y in pairs
+        )
+
+    if held(proved.radius):
+        return proved.radius
+    low, high = 0.0, proved.radius
+    while high - low > NARROWED * proved.radius:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if held(middle) else (low, middle)
+    return low
 
 
 def _trimmed(polygon: Array, y: Array) -> Array:
@@ -299,8 +263,8 @@ def _trimmed(polygon: Array, y: Array) -> Array:
     return fewer if (E @ y <= b).all() else polygon
 
 
-def _open_choice(grounds: Grounds, proved: Proved) -> tuple[float, Array] | None:
-    """The radius of discs that hold the choice that a search found open, and the choice.
+def _open_choice(grounds: Grounds, proved: Proved, unit: _Unit) -> ClosureCertificate | None:
+    """The proof that the choice that a search found is open, in the object's frame.
 
     None unless it is open by the exact test, and on the pieces. Patches of curved surfaces are
     not planes, so nothing is said of them.
@@ -313,10 +277,7 @@ def _open_choice(grounds: Grounds, proved: Proved) -> tuple[float, Array] | None
     )
     normals = np.array([piece.normal for piece in grounds.pieces])
     try:
-        closed = force_closure(proved.choice, normals, grounds.friction).closed
+        found = force_closure(unit.back(proved.choice), normals, grounds.friction)
     except UndecidedError:
         return None
-    if closed or not on_pieces:
-        return None
-    away = np.linalg.norm(proved.choice - grounds.points(proved.ys), axis=1)
-    return float(away.max()), proved.choice
+    return found if on_pieces and not found.closed else None

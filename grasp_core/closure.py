@@ -15,25 +15,37 @@ s_i(y) = n_i.v_i + mu_i |tangential part of v_i|, and t = max_i s_i(y) for the b
 s_i(y) is positive, then no contact wrench has a positive product with y, and no external
 wrench w with y.w < 0 can be resisted.
 
-Both answers are certificates: `verify` uses sums, norms and one singular value.
+Both answers are certificates: `verify` uses sums, norms and one singular value. Both also bound
+the optimum, forces from below and twists from above.
 
 Source: Sudsang & Ponce 1995, Definition 1 and Proposition 1, with the condition on the rank
 made explicit; the cone program is standard.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array
-from grasp_core.closure_margin import decide, proves_closure, refutes_closure
+from grasp_core.arrays import SMALLEST_SIZE, Array, real_array
+from grasp_core.closure_margin import decide, margin_ceiling, proved_margin
 from grasp_core.contact_arrays import contact_arrays, contact_frictions
 from grasp_core.errors import UndecidedError
+from grasp_core.fields import are_frictions, are_units, is_array, is_number
 from grasp_core.values import Grasp
+from grasp_core.wrenches import normal_and_tangential
 
 UNSAFE = 1e-6
 """A margin larger than this is not itself why nothing can be proved."""
+CAUTION = 1.01
+"""Of margins that are shown: so many times the allowance for rounding with which `verify` asks for
+them, since sums and singular values differ in their last digits from processor to processor."""
+SUMMED = 1e-9
+"""How far the normal parts of closing forces may be from summing to 1, and their wrench at unit
+size from zero."""
+FAR_BELOW = -1e6
+"""Margins proved to be below are told as minus infinity: no forces balance at all, or hardly."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,42 +54,92 @@ class ClosureCertificate:
 
     closed: bool
     margin: float
-    """Optimum t of the margin program: dimensionless, unchanged by moving and scaling."""
+    """Proved bound of the optimum t of the margin program, dimensionless, unchanged by moving and
+    scaling. If closed, the optimum is no less. If not, it is no more than a negative margin, while
+    zero says only that there is no closure: contacts may balance deep inside their cones, and yet
+    leave the object free. `force_closure` gives the optimum to some 1e-9 where contacts and
+    friction are not nearly degenerate; minus infinity for what is below -1e6."""
     positions: Array
     """(k, 3) [m]"""
     normals: Array
-    """(k, 3)"""
+    """(k, 3), of length 1 to nine digits; their directions count."""
     friction: Array
     """Coulomb coefficient of each contact, (k,)."""
     forces: Array | None
-    """If closed: balancing forces strictly inside the cones, (k, 3), normal parts summing to 1."""
+    """If closed: balancing forces strictly inside the cones, (k, 3), normal parts summing to 1,
+    both to within 1e-9. Torques are about the mean contact, at unit size."""
     separating_wrench: Array | None
     """If not: y = (a, b), (6,), about the frame's origin, with y.w <= 0 for every wrench w that
-    the contacts can apply; an external wrench w with y.w < 0 is not resisted."""
+    the contacts can apply, to within 1e-12 of lengths at unit size; an external wrench w with
+    y.w < 0 is not resisted."""
 
     def __post_init__(self) -> None:
         for name in ("positions", "normals", "friction", "forces", "separating_wrench"):
             array = getattr(self, name)
             if array is not None:
-                kept = np.array(array, dtype=np.float64)
+                kept = real_array(array, name)
                 kept.setflags(write=False)
                 object.__setattr__(self, name, kept)
 
     def verify(self) -> bool:
-        """Re-check the verdict in plain arithmetic, without any solver."""
-        if self.closed:
-            arms, _, _ = unit_size(self.positions)
-            return self.forces is not None and proves_closure(
-                self.forces, arms, self.normals, self.friction
-            )
-        return self.separating_wrench is not None and self._separates(self.separating_wrench)
+        """Re-check every field in plain arithmetic, without any solver.
 
-    def _separates(self, wrench: Array) -> bool:
+        Returns:
+            Whether the fields prove the verdict and the margin; False for what is no certificate.
+        """
+        with np.errstate(all="ignore"):
+            if not (self._are_contacts() and is_number(self.margin, least=-math.inf)):
+                return False
+            if self.closed is True:
+                return self.separating_wrench is None and 0.0 < self.margin <= self.proved()
+            return (
+                self.closed is False and self.forces is None and 0.0 >= self.margin >= self.proved()
+            )
+
+    def separates(self) -> bool:
+        """Whether the wrench separates, whatever the margin; fields are taken as sound."""
+        return self.forces is None and self.proved() <= 0.0
+
+    def _are_contacts(self) -> bool:
+        count = len(self.normals) if is_array(self.normals, None, 3) else 0
+        placed = is_array(self.positions, count, 3) and are_units(self.normals, count, 3)
+        if count == 0 or not placed:
+            return False
+        spread = float(np.ptp(self.positions, axis=0).max())
+        return (spread == 0.0 or spread >= SMALLEST_SIZE) and are_frictions(self.friction, count)
+
+    def proved(self, caution: float = 1.0) -> float:
+        """What the fields prove of the margin: a lower bound if closed, an upper one if not.
+
+        Args:
+            caution: Multiplies what is allowed for rounding.
+
+        Returns:
+            Minus infinity or infinity where they prove none.
+        """
         arms, center, size = unit_size(self.positions)
-        twist = np.concatenate(
-            [wrench[:3] + np.cross(wrench[3:], center), wrench[3:] * size]
-        )  # about the contacts' centre, at unit size
-        return refutes_closure(twist, arms, self.normals, self.friction)
+        normals = self.normals / np.linalg.norm(self.normals, axis=1, keepdims=True)
+        if self.closed:
+            forces = self.forces
+            if not (is_array(forces, *arms.shape) and _balance(forces, arms, normals)):
+                return -math.inf
+            if (normal_and_tangential(forces, normals)[1][self.friction == 0.0] > SUMMED).any():
+                return -math.inf
+            return proved_margin(forces, arms, normals, self.friction, caution)
+        wrench = self.separating_wrench
+        if not is_array(wrench, 6):
+            return math.inf
+        turned = np.asarray(np.cross(wrench[3:], center), dtype=np.float64)
+        twist = np.concatenate([wrench[:3] + turned, wrench[3:] * size])
+        ceiling = margin_ceiling(twist, arms, normals, self.friction, caution)
+        return -math.inf if ceiling <= FAR_BELOW else ceiling
+
+
+def _balance(forces: Array, arms: Array, normals: Array) -> bool:
+    """Whether forces at unit size sum to nothing, and their normal parts to 1."""
+    wrench = np.concatenate([forces.sum(axis=0), np.cross(arms, forces).sum(axis=0)])
+    pushes = float(np.einsum("ki,ki->", forces, normals))
+    return float(np.abs(wrench).max()) <= SUMMED and abs(pushes - 1.0) <= SUMMED
 
 
 def force_closure(
@@ -101,13 +163,16 @@ def force_closure(
     mu = contact_frictions(friction, len(points))
     arms, center, size = unit_size(points)
     answer = decide(arms, units, mu)
-    if answer.closed:
-        return ClosureCertificate(True, answer.margin, points, units, mu, answer.forces, None)
-    if answer.closed is False:
-        wrench = _about_origin(answer.twist, center, size)
-        verdict = ClosureCertificate(False, answer.margin, points, units, mu, None, wrench)
-        if verdict.verify():
-            return verdict
+    if answer.closed is not None:
+        forces, wrench = None, None
+        if answer.closed:
+            forces = answer.forces / float(np.einsum("ki,ki->", answer.forces, units))
+        else:
+            wrench = _about_origin(answer.twist, center, size)
+        found = ClosureCertificate(answer.closed, answer.margin, points, units, mu, forces, wrench)
+        found = replace(found, margin=found.proved(CAUTION))
+        if found.verify():
+            return found
     raise UndecidedError(_why_undecided(answer.margin))
 
 

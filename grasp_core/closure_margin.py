@@ -131,19 +131,71 @@ def refutes_closure(twist: Array, arms: Array, normals: Array, friction: Array) 
 
 def proves_closure(forces: Array, arms: Array, normals: Array, friction: Array) -> bool:
     """Whether forces lie in the cones' interior, deep enough to correct their imbalance there."""
+    return proved_margin(forces, arms, normals, friction) > 0.0
+
+
+def proved_margin(
+    forces: Array, arms: Array, normals: Array, friction: Array, caution: float = 1.0
+) -> float:
+    """Margin that forces prove: their depth, less what correcting their imbalance may cost.
+
+    Args:
+        forces: (k, 3)
+        arms: (k, 3)
+        normals: (k, 3)
+        friction: (k,)
+        caution: Multiplies what is allowed for the correction.
+
+    Returns:
+        A lower bound of the optimum of the margin program; minus infinity if there is none.
+    """
     along, _ = normal_and_tangential(forces, normals)
     depth = _depth(forces, normals, friction)
     frictionless = friction[:, None] == 0.0
     balanced = np.where(frictionless, along[:, None] * normals, forces)
     imbalance = float(np.linalg.norm(grasp_map(arms) @ balanced.ravel()))
     generators = _generators(arms, normals, friction)
-    if generators.shape[1] < WRENCH:
-        return False
+    if generators.shape[1] < WRENCH or not np.isfinite(generators).all():
+        return -math.inf
     least = float(np.linalg.svd(generators, compute_uv=False)[WRENCH - 1])
     if least <= RANK:
-        return False
-    reach = np.sqrt(1.0 + friction**2) * (imbalance + ROUNDING) / least
-    return bool((depth > reach).all())
+        return -math.inf
+    corrected = caution * (imbalance + ROUNDING) / least
+    pushes = float(along.sum()) + math.sqrt(len(arms)) * corrected
+    left = float((depth - np.sqrt(1.0 + friction**2) * corrected).min())
+    return left / pushes if pushes > 0.0 else -math.inf
+
+
+def margin_ceiling(
+    twist: Array, arms: Array, normals: Array, friction: Array, caution: float = 1.0
+) -> float:
+    """Margin that no forces exceed, by a twist on which no support is positive.
+
+    With the velocities v_i, M the largest support, and r_i = 1 / mu_i, or 1 without friction, no
+    more than M / sum_i r_i (M - n_i.v_i) can be the optimum t: in forces with t + |tangential part
+    of f_i| <= mu_i n_i.f_i the shares b_i = n_i.f_i - r_i t are not negative, and their power,
+    which is zero, is at most M sum_i b_i + t sum_i r_i n_i.v_i.
+
+    Args:
+        twist: (6,)
+        arms: (k, 3)
+        normals: (k, 3)
+        friction: (k,)
+        caution: Multiplies what is allowed for rounding.
+
+    Returns:
+        An upper bound; zero, which bounds nothing but says that there is no closure, where M is
+        zero to within rounding; infinity where M is more.
+    """
+    if not refutes_closure(twist, arms, normals, friction):
+        return math.inf
+    along, _ = normal_and_tangential(twist[:3] + np.cross(twist[3:], arms), normals)
+    rounding = caution * ROUNDING * float(np.linalg.norm(twist)) * np.sqrt(1.0 + friction**2)
+    largest = float((supports(twist, arms, normals, friction) + rounding).max())
+    if largest >= 0.0:
+        return 0.0
+    shares = np.where(friction == 0.0, 1.0, 1.0 / np.maximum(friction, TINY))
+    return largest / float((shares * (largest - along + rounding)).sum())
 
 
 def many_refute_closure(

@@ -1,16 +1,20 @@
 """Parts of four convex pieces: halves of halves, pieces shrunk at random, and their corners."""
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.face_pieces import FacePiece
+from grasp_core.fields import is_tuple_of
 from grasp_core.polygons import clip
 from grasp_core.ties import first_best
 
 SMALLER = 0.5
 """Size of random parts, as a share of the piece."""
+DEEPEST = 1000
+"""More cuts in a row leave parts smaller than numbers tell apart."""
 Corners = tuple[Array, ...]
 """Corners of a convex part of each piece, (k, 2) in its plane."""
 Path = tuple[int, ...]
@@ -44,6 +48,11 @@ def part_at(pieces: Sequence[FacePiece], path: Path) -> Corners:
         widest = first_best([length for length, _ in spans])
         part[widest] = _half(part[widest], spans[widest][1], half)
     return tuple(part)
+
+
+def is_path(value: Any) -> bool:
+    """Whether a value says which half to take, cut by cut."""
+    return is_tuple_of(value, int) and len(value) <= DEEPEST and set(value) <= {0, 1}
 
 
 def cover_everything(paths: Sequence[Path]) -> bool:

@@ -11,6 +11,13 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.fields import are_units, is_array, is_number
+from grasp_core.flat_polygons import (
+    FEWEST_CORNERS,
+    MOST_CORNERS,
+    convex_polygon,
+    has_inscribed_radius,
+)
 from grasp_core.lp import LinearProgram, Optimum, maximize
 from grasp_core.polygons import clip, convex_hull, edge_rows, plane_frame
 from grasp_core.ties import graded
@@ -18,6 +25,8 @@ from grasp_core.values import Polyhedron
 
 THINNEST = 1e-6
 """Pieces without room for a disc of this radius (object size one) hold no contact."""
+SOUND = 1e-9
+"""How far the parts of a piece may disagree (object size one)."""
 
 SAME_PLACE = 6
 """Distances equal to so many digits (object size one) are ties, broken by the pieces' order."""
@@ -52,6 +61,39 @@ class FacePiece:
     """How far the true surface leans from the plane at most [rad]."""
     depth: float = 0.0
     """How far the true surface is from the plane at most."""
+
+    def sound(self) -> bool:
+        """Whether the fields describe one convex polygon, at about unit size.
+
+        `face`, `spread` and `depth` say where a piece is from, which no polygon tells.
+        """
+        with np.errstate(all="ignore"):
+            count = len(self.corners) if is_array(self.corners, None, 2) else 0
+            rows = len(self.E) if are_units(self.E, None, 2) else 0
+            if not (
+                are_units(self.normal, 3)
+                and is_array(self.origin, 3)
+                and is_array(self.frame, 3, 2)
+                and min(count, rows) >= FEWEST_CORNERS
+                and max(count, rows) <= MOST_CORNERS
+                and is_array(self.b, rows)
+                and is_number(self.inradius, least=0.0)
+            ):
+                return False
+            axes = np.column_stack([self.frame, self.normal])
+            if float(np.abs(axes.T @ axes - np.eye(3)).max()) > SOUND or np.linalg.det(axes) < 0.0:
+                return False
+            return self._is_polygon()
+
+    def _is_polygon(self) -> bool:
+        """Whether `corners` are those of {y : E y <= b}, and `inradius` is that of its discs."""
+        polygon = convex_polygon(self.corners, SOUND)
+        if polygon is None:
+            return False
+        below = polygon.corners @ self.E.T - self.b
+        bordered = (np.abs(below) <= SOUND) & (np.abs(np.roll(below, -1, axis=0)) <= SOUND)
+        within = float(below.max()) <= SOUND and bool(bordered.any(axis=1).all())
+        return within and has_inscribed_radius(polygon, self.inradius)
 
     def point(self, y: Array) -> Array:
         """The point in space of plane coordinates, (3,)."""

@@ -17,7 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.fields import are_units, is_array, is_indices
 from grasp_core.wrench_sets import WrenchSet
+from grasp_core.wrenches import WRENCH
 
 ON_RIDGE = 1e-9
 """A ray that passes a ridge at less than this share of the simplex is no proof."""
@@ -43,6 +45,16 @@ class InnerPolytope:
     """Points of each simplex of the boundary, (m, 6)."""
     normals: Array
     """Outward unit normals of the simplices, (m, 6)."""
+
+    def sound(self, width: int) -> bool:
+        """Whether the fields fit each other and forces with so many parts; no proof as yet."""
+        count = len(self.corners) if is_indices(self.corners, None, WRENCH) else 0
+        return (
+            count > 0
+            and is_array(self.forces, None, width)
+            and len(self.forces) > 0
+            and are_units(self.normals, count, WRENCH)
+        )
 
     def radius(self, wrenches: WrenchSet) -> float:
         """Least height of a corner along the normal of its simplex."""

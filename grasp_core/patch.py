@@ -44,10 +44,12 @@ from grasp_core.face_parts import (
     Path,
     corner_contacts,
     cover_everything,
+    is_path,
     part_at,
     random_parts,
 )
 from grasp_core.face_pieces import FacePiece
+from grasp_core.fields import are_frictions, is_a, is_tuple_of
 from grasp_core.least_distance import least_distance
 from grasp_core.lines import classify_lines
 from grasp_core.lp import LinearProgram, Optimum, maximize
@@ -73,6 +75,10 @@ LEAST_SPREAD = 1e-3
 """Least extent of the contacts across the line they are closest to, in object radii."""
 
 
+SAME_CORNERS = 1e-12
+"""How far contacts of a proof may be from the corners of its part: thousands of roundings."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Absence:
     """Proof that no four contacts on four convex pieces are in force closure."""
@@ -83,18 +89,34 @@ class Absence:
     """Parts that together cover the pieces, each with a twist that separates its patch."""
 
     def verify(self) -> bool:
-        """Re-check in plain arithmetic that the parts cover the pieces and are all separated."""
-        covered = cover_everything([path for path, _ in self.leaves])
-        return covered and all(self._separated(path, proof) for path, proof in self.leaves)
+        """Re-check every field in plain arithmetic.
+
+        That the pieces are convex polygons, and that the parts cover them and are all separated.
+        That the pieces are those of an object's faces is for who has the object.
+        """
+        with np.errstate(all="ignore"):
+            return (
+                are_frictions(np.array([self.friction]), 1)
+                and is_tuple_of(self.pieces, FacePiece, FINGERS)
+                and all(piece.sound() for piece in self.pieces)
+                and is_tuple_of(self.leaves, tuple)
+                and all(len(leaf) == len(("path", "proof")) for leaf in self.leaves)
+                and all(is_path(path) for path, _ in self.leaves)
+                and cover_everything([path for path, _ in self.leaves])
+                and all(self._separated(path, proof) for path, proof in self.leaves)
+            )
 
     def _separated(self, path: Path, proof: ClosureCertificate) -> bool:
+        if not is_a(proof, ClosureCertificate) or proof.closed is not False:
+            return False
+        if not proof.verify() or float(proof.friction.min()) < self.friction:
+            return False
         points, normals = corner_contacts(self.pieces, part_at(self.pieces, path))
         return (
-            not proof.closed
-            and proof.positions.shape == points.shape
-            and bool((proof.positions == points).all() and (proof.normals == normals).all())
-            and bool((proof.friction >= self.friction).all())
-            and proof.verify()
+            proof.positions.shape == points.shape
+            and float(np.abs(proof.positions - points).max()) <= SAME_CORNERS
+            and float(np.abs(proof.normals - normals).max()) <= SAME_CORNERS
+            and replace(proof, positions=points, normals=normals).separates()
         )
 
 

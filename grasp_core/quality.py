@@ -28,12 +28,14 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array
 from grasp_core.checked import number
 from grasp_core.errors import SolverError
+from grasp_core.fields import are_units, is_a, is_array, is_number
 from grasp_core.growing_hull import ABOVE, FLAT, MOST_POINTS, GrowingHull, spread_simplex
 from grasp_core.inner_polytope import InnerPolytope
 from grasp_core.kernels import compiled
 from grasp_core.nearest_wrench import nearest_wrench
 from grasp_core.values import Grasp
 from grasp_core.wrench_sets import Norm, WrenchSet
+from grasp_core.wrenches import WRENCH
 
 GAP = 1e-4
 """Default of the largest (upper - lower) / upper."""
@@ -51,31 +53,44 @@ class FerrariCanny:
     """Bounds of a quality with what proves them."""
 
     lower: float
+    """No larger than the quality [N]."""
     upper: float
+    """No smaller than the quality [N]."""
     wrenches: WrenchSet
     direction: Array
     """Unit twist, (6,), torque scale applied, in which the support is at most `upper`."""
     polytope: InnerPolytope | None
-    """If zero is inside: what proves `lower`."""
+    """If zero is inside: what proves `lower`. None otherwise."""
     forces: Array | None
-    """If not: local forces, (3k,), whose wrench is no longer than -`lower`."""
+    """If not: local forces, (3k,), whose wrench is no longer than -`lower`. None otherwise."""
 
     def verify(self) -> bool:
-        """Re-check both bounds in plain arithmetic, without any solver."""
-        slack = ROUNDING * self.wrenches.size
-        length = float(np.linalg.norm(self.direction))
-        support, _ = self.wrenches.support(self.direction)
-        above = abs(length - 1.0) <= ROUNDING and support <= self.upper + slack
-        return above and self._proves_lower(slack)
+        """Re-check every field in plain arithmetic, without any solver.
+
+        Bounds hold for the set of `wrenches`, which is that of some contacts, to within 1e-12 of
+        its longest wrench.
+        """
+        with np.errstate(all="ignore"):
+            sound = is_a(self.wrenches, WrenchSet) and self.wrenches.sound()
+            ordered = is_number(self.lower) and is_number(self.upper) and self.lower <= self.upper
+            if not (sound and ordered and are_units(self.direction, WRENCH, slack=ROUNDING)):
+                return False
+            slack = ROUNDING * self.wrenches.size
+            support, _ = self.wrenches.support(self.direction)
+            return support <= self.upper + slack and self._proves_lower(slack)
 
     def _proves_lower(self, slack: float) -> bool:
+        width = self.wrenches.G.shape[1]
         if self.polytope is not None:
             return (
-                self.wrenches.holds(self.polytope.forces, ROUNDING)
+                self.forces is None
+                and is_a(self.polytope, InnerPolytope)
+                and self.polytope.sound(width)
+                and self.wrenches.holds(self.polytope.forces, ROUNDING)
                 and self.polytope.proved_radius(self.wrenches) >= self.lower - slack
             )
         return (
-            self.forces is not None
+            is_array(self.forces, width)
             and self.wrenches.holds(self.forces[None], ROUNDING)
             and float(np.linalg.norm(self.wrenches.G @ self.forces)) <= -self.lower + slack
         )

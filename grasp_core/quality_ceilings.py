@@ -18,7 +18,7 @@ may have a larger quality. Faces that are not convex count as a whole, up to the
 Every part left carries its direction, so the bound can be checked again in plain arithmetic.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from heapq import heappop, heappush
@@ -31,13 +31,14 @@ from grasp_core.arrays import Array, frozen_each
 from grasp_core.best_contacts import FINGER_RADIUS
 from grasp_core.checked import LARGEST, coefficient, number, several, whole
 from grasp_core.errors import InputError
-from grasp_core.face_parts import Path, corner_contacts, cover_everything, part_at
+from grasp_core.face_parts import Path, corner_contacts, cover_everything, is_path, part_at
 from grasp_core.face_pieces import FacePiece, inset_piece, unit_pieces
+from grasp_core.fields import are_frictions, are_units, is_a, is_number, is_tuple_of
 from grasp_core.on_faces import check_body
 from grasp_core.quality import wrench_set_quality
 from grasp_core.values import FINGERS, FaceQuadruple, Polyhedron
 from grasp_core.wrench_sets import WrenchSet
-from grasp_core.wrenches import contact_frames, grasp_map, in_frames
+from grasp_core.wrenches import WRENCH, contact_frames, grasp_map, in_frames
 
 PART_GAP = 0.02
 """Gap of the quality of corner contacts: finer bounds do not help while parts are large."""
@@ -45,6 +46,7 @@ MOST_PARTS = 1_000_000
 ENOUGH = 0.01
 """Parts whose bound is within this share of what is known are not cut any more."""
 ROUNDING = 1e-9
+"""By which a part's bound may exceed the ceiling, relative to it or to one newton."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,19 +71,49 @@ class QualityCeiling:
     leaves: tuple[Leaf, ...]
 
     def verify(self) -> bool:
-        """Re-check in plain arithmetic that the parts cover the faces and are all bounded."""
-        covered = bool(self.choices) and all(
+        """Re-check every field in plain arithmetic.
+
+        That the pieces are convex polygons, that the parts cover them, and that all are bounded, to
+        within `ROUNDING`. That the pieces are those of an object's faces is for who has the object.
+        """
+        with np.errstate(all="ignore"):
+            return (
+                is_number(self.upper)
+                and are_frictions(np.array([self.friction]), 1)
+                and is_tuple_of(self.choices, tuple)
+                and len(self.choices) > 0
+                and all(is_tuple_of(choice, FacePiece, FINGERS) for choice in self.choices)
+                and is_tuple_of(self.leaves, Leaf)
+                and all(piece.sound() for piece in self._pieces())
+                and all(self._fits(leaf) for leaf in self.leaves)
+                and self._covers()
+                and all(
+                    self._bound(leaf) <= self.upper + ROUNDING * max(self.upper, 1.0)
+                    for leaf in self.leaves
+                )
+            )
+
+    def _pieces(self) -> Iterable[FacePiece]:
+        return {id(piece): piece for choice in self.choices for piece in choice}.values()
+
+    def _fits(self, leaf: Leaf) -> bool:
+        return (
+            is_a(leaf.choice, int)
+            and 0 <= leaf.choice < len(self.choices)
+            and is_path(leaf.path)
+            and are_units(leaf.direction, WRENCH)
+        )
+
+    def _covers(self) -> bool:
+        return all(
             cover_everything([leaf.path for leaf in self.leaves if leaf.choice == index])
             for index in range(len(self.choices))
-        )
-        return covered and all(
-            self._bound(leaf) <= self.upper * (1.0 + ROUNDING) for leaf in self.leaves
         )
 
     def _bound(self, leaf: Leaf) -> float:
         corners = _corner_wrenches(self.choices[leaf.choice], leaf.path, self.friction)
         unit = leaf.direction / np.linalg.norm(leaf.direction)
-        return corners.support(unit)[0]
+        return float(corners.support(unit)[0])
 
 
 def quality_ceiling(

@@ -23,12 +23,20 @@ from grasp_core.checked import LARGEST, SMALLEST, positive
 from grasp_core.conic import ConicProgram, minimize
 from grasp_core.contact_arrays import contact_arrays, contact_frictions
 from grasp_core.errors import InputError
+from grasp_core.fields import is_array, is_number
 from grasp_core.values import Grasp
 from grasp_core.wrench_sets import WrenchSet
 from grasp_core.wrenches import WRENCH, contact_frames, grasp_map, in_frames
 
 SETTLED = 1e-3
 """The search for the weakest wrench ends when a step lowers the limit by less than this share."""
+HELD = 1e-7
+"""How far forces at a limit may leave cones and balance, relative to the largest wrench of a unit
+normal force: what conic programs leave."""
+ROUNDING = 1e-9
+"""Of the bound, relative to it, and of the facet's power, relative to the lengths of its parts."""
+LAST_DIGITS = 1e-12
+"""Of a bound near zero, relative to the largest that the facet's length allows."""
 MAX_STEPS = 30
 STARTS = 3
 """From how many of the weakest axis wrenches the search starts."""
@@ -41,13 +49,57 @@ class WrenchLimit:
     wrench: Array
     """(6,) [N, N m], torque about the stated centre."""
     limit: float
-    """Largest multiple of `wrench` that is resisted: `forces` balance it, to some 1e-8."""
+    """Largest multiple of `wrench` that is resisted: `forces` balance it."""
     upper: float
     """No multiple above this is resisted: the support of `facet`, in plain arithmetic."""
     forces: Array
-    """Contact forces that resist it at the limit, (k, 3) [N]."""
+    """Contact forces that resist it at the limit, (k, 3) [N]: in their cones, of normal parts up to
+    the largest and balanced, to within `HELD`."""
     facet: Array
     """Twist y of the limiting facet, (6,), with y.wrench = -1, about the stated centre."""
+
+    def verify(
+        self,
+        positions: ArrayLike | Grasp,
+        normals: ArrayLike | None,
+        friction: ArrayLike,
+        *,
+        max_normal_force: float,
+        center: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> bool:
+        """Re-check both sides in plain arithmetic, for the contacts they are said to be about.
+
+        Args:
+            positions: As given to `wrench_limits`, like the others.
+            normals: (k, 3), or None with a Grasp.
+            friction: One for all contacts or one each.
+            max_normal_force: [N]
+            center: (3,) [m]
+
+        Returns:
+            Whether every field is true; False for what is no certificate.
+
+        Raises:
+            InputError: What is given is no contacts.
+        """
+        points, units = contact_arrays(positions, normals)
+        about = frozen(center, (3,), "center")
+        body = WrenchBody(
+            points - about, units, contact_frictions(friction, len(points)), max_normal_force
+        )
+        with np.errstate(all="ignore"):
+            return self._has_numbers(len(points)) and body.attains(self) and body.bounds(self)
+
+    def _has_numbers(self, count: int) -> bool:
+        return (
+            is_array(self.wrench, WRENCH)
+            and bool(self.wrench.any())
+            and is_array(self.facet, WRENCH)
+            and is_array(self.forces, count, 3)
+            and is_number(self.limit, least=0.0)
+            and is_number(self.upper)
+            and self.limit <= self.upper
+        )
 
 
 def max_resisted_wrench(
@@ -147,7 +199,7 @@ class WrenchBody:
         self.scale = np.array([1.0] * 3 + [self.size] * 3)
         self.frames = contact_frames(normals)
         G = in_frames(grasp_map(arms / self.size), self.frames)
-        self.bounded = WrenchSet(G, friction, "linf")
+        self.G, self.bounded = G, WrenchSet(G, friction, "linf")
         self.A = np.zeros((WRENCH + 5 * k, 3 * k + 1))
         self.A[:WRENCH, :-1] = G
         caps, cones = WRENCH + np.arange(2 * k), WRENCH + 2 * k + np.arange(3 * k)
@@ -158,8 +210,7 @@ class WrenchBody:
 
     def limit(self, wrench: Array) -> WrenchLimit:
         """Largest multiple of an external wrench that is resisted, with its proof."""
-        moved = np.append(wrench[:3], wrench[3:] - np.cross(self.middle, wrench[:3]))
-        unit = moved / self.scale
+        unit = self._about_middle(wrench)
         length = float(np.linalg.norm(unit))
         A = self.A.copy()
         A[:6, -1] = unit / length
@@ -178,6 +229,33 @@ class WrenchBody:
             forces=self.max_normal_force * np.einsum("kij,kj->ki", self.frames, local),
             facet=self._about_center(facet / self.scale),
         )
+
+    def attains(self, found: WrenchLimit) -> bool:
+        """Whether the forces are allowed, and balance the limit's multiple of the wrench."""
+        shares = np.einsum("kij,ki->kj", self.frames, found.forces) / self.max_normal_force
+        left = self.G @ shares.ravel()
+        left += found.limit / self.max_normal_force * self._about_middle(found.wrench)
+        balanced = float(np.linalg.norm(left)) <= HELD * self.bounded.size
+        allowed = self.bounded.holds(shares.ravel()[None], HELD * self.bounded.size)
+        return balanced and allowed
+
+    def bounds(self, found: WrenchLimit) -> bool:
+        """Whether the facet shows that no larger multiple than the upper one is resisted."""
+        load, twist = self._about_middle(found.wrench), found.facet * self.scale
+        slides = np.asarray(np.cross(found.facet[3:], self.middle), dtype=np.float64)
+        twist[:3] += slides
+        power = float(twist @ load)
+        lengths = float(np.linalg.norm(twist) * np.linalg.norm(load))
+        bound = self.max_normal_force * self.bounded.support(twist)[0]
+        farthest = self.bounded.size * float(np.linalg.norm(twist))
+        slack = LAST_DIGITS * self.max_normal_force * farthest
+        bounded = bound <= found.upper * (1.0 + ROUNDING) + slack
+        return bounded and abs(power + 1.0) <= ROUNDING * lengths
+
+    def _about_middle(self, wrench: Array) -> Array:
+        """A wrench about the contacts' middle, at unit size."""
+        moved = np.append(wrench[:3], wrench[3:] - np.cross(self.middle, wrench[:3]))
+        return moved / self.scale
 
     def _about_center(self, facet: Array) -> Array:
         slides = np.asarray(np.cross(facet[3:], self.middle), dtype=np.float64)

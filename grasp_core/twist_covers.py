@@ -47,6 +47,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices
 from grasp_core.errors import InputError
+from grasp_core.fields import are_frictions, are_units, is_a, is_array
 
 TWIST = 6
 LEAF = 15
@@ -105,18 +106,18 @@ class TwistCover:
     def verify(self, regions: Sequence[Array], normals: Array, friction: Array) -> bool:
         """Whether all choices of contacts in regions are force-closed, in plain arithmetic.
 
+        What is no region, normal or friction is answered with False.
+
         Args:
             regions: Corners of each contact's convex region, about the origin of points, (c, 3).
             normals: Inward normals, (k, 3).
             friction: (k,)
         """
-        k = len(regions)
-        if (len(normals), len(friction), self.forces.shape[1]) != (k, k, k) or not _units(normals):
-            return False
-        if min(map(len, regions)) == 0 or not ((friction >= 0.0) & np.isfinite(friction)).all():
+        k = self.forces.shape[1]
+        if not (are_units(normals, k, 3, slack=SLACK) and are_frictions(friction, k)):
             return False
         largest = np.abs(self.forces).max(axis=(1, 2), initial=0.0)
-        if not (largest > 0.0).all() or not self._independent():
+        if not (_are_places(regions, k) and (largest > 0.0).all() and self._independent()):
             return False
         forces = self.forces / largest[:, None, None]  # else squares of tiny ones are zero
         along = np.einsum("mki,ki->mk", forces, normals)
@@ -149,8 +150,10 @@ class TwistCover:
         return bool((powers > sizes).all())
 
 
-def _units(normals: Array) -> bool:
-    return bool((np.abs(np.linalg.norm(normals, axis=1) - 1.0) <= SLACK).all())
+def _are_places(regions: Sequence[Array], count: int) -> bool:
+    """Whether regions are so many lists of points."""
+    listed = is_a(regions, Sequence) and len(regions) == count
+    return listed and all(is_array(region, None, 3) and len(region) > 0 for region in regions)
 
 
 def power_of(F: Array, twists: Array) -> tuple[Array, Array]:

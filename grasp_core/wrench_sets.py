@@ -24,14 +24,17 @@ from grasp_core.arrays import Array, frozen
 from grasp_core.checked import one_of, positive, shown
 from grasp_core.contact_arrays import check_spread, contact_arrays, contact_frictions
 from grasp_core.errors import InputError
+from grasp_core.fields import are_frictions, is_a, is_array
 from grasp_core.values import Grasp
-from grasp_core.wrenches import contact_frames, grasp_map, in_frames
+from grasp_core.wrenches import WRENCH, contact_frames, grasp_map, in_frames
 
 Norm: TypeAlias = Literal["l1", "linf"]
 """How contact forces are bounded."""
 
 NO_SLIDE = 1e-290
 """Less than this along the surface has no direction."""
+SAME_FRAME = 1e-9
+"""How far frames may be from orthonormal: normals are unit to nine digits."""
 LARGEST_RATIO = 1e6
 """Between the torque scale and the contacts' extent: beyond it, rounding decides."""
 
@@ -95,6 +98,28 @@ class WrenchSet:
         arms = scaled_arms(points, center, torque_scale)
         G = in_frames(grasp_map(arms), contact_frames(units))
         return cls(G, contact_frictions(friction, len(points)), norm)
+
+    def sound(self) -> bool:
+        """Whether this is the wrench set of some contacts, to within `SAME_FRAME`.
+
+        In the columns of `G` each contact has an orthonormal frame, and torques that are those of
+        the frame's vectors at one point: then torque columns times the frame's are skew.
+        """
+        k = len(self.friction) if is_array(self.friction, None) else 0
+        known = is_a(self.norm, str) and self.norm in get_args(Norm)
+        if not (known and k and are_frictions(self.friction, k)):
+            return False
+        if not is_array(self.G, WRENCH, 3 * k):
+            return False
+        frames, turns = self.G.reshape(2, 3, k, 3).transpose(0, 2, 1, 3)
+        square = frames @ frames.transpose(0, 2, 1)
+        levers = turns @ frames.transpose(0, 2, 1)
+        slack = SAME_FRAME * np.maximum(np.abs(levers).max(axis=(1, 2), keepdims=True), 1.0)
+        return (
+            bool((np.abs(square - np.eye(3)) <= SAME_FRAME).all())
+            and bool((np.abs(levers + levers.transpose(0, 2, 1)) <= slack).all())
+            and float(np.abs(self.G).max()) <= LARGEST_RATIO * LARGEST_RATIO
+        )
 
     @property
     def size(self) -> float:

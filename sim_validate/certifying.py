@@ -7,9 +7,10 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.certified_regions import CONES, Balance, CertifiedRegions, certify_regions
+from grasp_core.certified_regions import CONES, Balance, certify_regions
 from grasp_core.closure import force_closure
 from grasp_core.errors import SolverError, UndecidedError
+from grasp_core.region_certificates import CertifiedRegions
 from grasp_core.values import Grasp, Polyhedron
 from sim_validate.console import Reporter
 from sim_validate.engines import each

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, frozen, frozen_indices, frozen_units
-from grasp_core.certified_regions import CertifiedRegions
 from grasp_core.checked import path_of
 from grasp_core.contact_hash import contacts_sha256
 from grasp_core.errors import InputError, SolverError
 from grasp_core.face_pieces import inscribed_disc_radius_of
+from grasp_core.flat_polygons import FEWEST_CORNERS
+from grasp_core.region_certificates import CertifiedRegions
 from grasp_core.twist_covers import TwistCover
 from grasp_core.values import FINGERS, ContactRegion, Grasp, Polyhedron, four
 from grasp_core.versions import versions
@@ -25,14 +26,17 @@ from sim_validate.npz import read_arrays
 SCHEMA = 3
 REGIONS, PROOFS = "regions.json", "proofs"
 POLYGONS = tuple(f"region{i}_m" for i in range(FINGERS))
+BORDERS = tuple(f"border{i}_m" for i in range(FINGERS))
 SHAPES: Mapping[str, tuple[int | None, ...]] = {
     "axes": (6, 6), "codes": (None,), "forces": (None, FINGERS, 3), "normals": (FINGERS, 3),
     "friction": (FINGERS,), "origin_m": (3,), "depths_m": (FINGERS,), "centers_m": (FINGERS, 3),
-    "open_choice_m": (None, 3), "scale_m": (), "disc_radius_m": (), "open_radius_m": (),
-    **dict.fromkeys(POLYGONS, (None, 3)),
+    "open_choice_m": (None, 3), "open_wrench": (None,), "scale_m": (), "disc_radius_m": (),
+    "open_radius_m": (),
+    **dict.fromkeys((*POLYGONS, *BORDERS), (None, 3)),
 }  # fmt: skip
 """Of the arrays of a proof."""
-FEWEST_CORNERS, MOST_CORNERS = 3, 1000
+MOST_CORNERS = 1000
+"""Of a region's polygon in a file."""
 SMALLEST_SCALE, LARGEST = 1e-6, 1e6
 """Of proofs: of what lengths are relative to, and of any length [m]."""
 
@@ -123,8 +127,8 @@ def proof_arrays(
     proved: CertifiedRegions, grasp: Grasp, body: Polyhedron
 ) -> dict[str, NDArray[Any]]:
     """Regions and their proof as arrays by name."""
-    cover, choice = proved.cover, proved.open_choice
-    regions = {f"region{i}_m": region.polygon for i, region in enumerate(proved.regions)}
+    cover, choice, wrench = proved.cover, proved.open_choice, proved.open_wrench
+    polygons = [region.polygon for region in proved.regions]
     return {
         "grasp": np.array(grasp.id),
         "object_sha256": np.array(body.content_sha256),
@@ -140,7 +144,9 @@ def proof_arrays(
         "disc_radius_m": np.array(proved.radius),
         "open_radius_m": np.array(proved.limit),
         "open_choice_m": np.zeros((0, 3)) if choice is None else choice,
-        **regions,
+        "open_wrench": np.zeros(0) if wrench is None else wrench,
+        **dict(zip(POLYGONS, polygons, strict=True)),
+        **dict(zip(BORDERS, proved.borders, strict=True)),
     }
 
 
@@ -177,16 +183,18 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
     if not SMALLEST_SCALE <= scale <= LARGEST:
         raise InputError(f"scale_m: expected {SMALLEST_SCALE:g} to {LARGEST:g}, got {scale:g}")
     normals = frozen_units(numbers["normals"], (FINGERS, 3), "normals")
-    choice = numbers["open_choice_m"]
+    choice, wrench = numbers["open_choice_m"], numbers["open_wrench"]
     return CertifiedRegions(
         regions=four(
             _region(name, numbers[name], normal, scale)
             for name, normal in zip(POLYGONS, normals, strict=True)
         ),
+        borders=four(numbers[name] for name in BORDERS),
         radius=numbers["disc_radius_m"].item(),
         centers=numbers["centers_m"],
         limit=limit.item(),
         open_choice=choice if len(choice) else None,
+        open_wrench=wrench if len(wrench) else None,
         friction=numbers["friction"],
         origin=numbers["origin_m"],
         normals=normals,

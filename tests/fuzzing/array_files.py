@@ -34,7 +34,8 @@ def _proof() -> dict[str, Any]:
         "origin_m": np.zeros(3), "depths_m": np.zeros(4), "scale_m": np.array(0.1),
         "centers_m": np.ones((4, 3)), "disc_radius_m": np.array(0.004),
         "open_radius_m": np.array(np.inf), "open_choice_m": np.zeros((0, 3)),
-        **{f"region{i}_m": square for i in range(4)},
+        "open_wrench": np.zeros(0),
+        **{f"{name}{i}_m": square for name in ("region", "border") for i in range(4)},
     }  # fmt: skip
 
 

@@ -282,3 +282,27 @@ def test_without_compiled_loops_there_are_regions_too(monkeypatch):
     plain = found("wedge", "pencil", cones=500)[2]
     assert plain.verify()
     assert plain.radius == pytest.approx(compiled.radius, rel=0.02)
+
+
+def test_radii_centres_and_the_open_choice_belong_to_the_proof():
+    _, _, proved = found("wedge", "concurrent")
+    moved = proved.centers + 1e-3 * proved.scale
+    wide = [
+        dataclasses.replace(region, inscribed_radius=1.01 * region.inscribed_radius)
+        for region in proved.regions
+    ]
+    farther = 1.01 * proved.limit if proved.open_choice is not None else 1.0
+    changes = [
+        {"radius": 100.0 * proved.radius}, {"radius": 1.1 * proved.radius}, {"centers": moved},
+        {"regions": tuple(wide)}, {"limit": farther},
+        {"borders": proved.borders[::-1]}, {"depths": proved.depths + 0.3 * proved.scale},
+    ]  # fmt: skip
+    if proved.open_choice is not None:
+        changes += [
+            {"open_choice": None, "open_wrench": None},
+            {"open_choice": proved.centers},
+            {"open_wrench": -proved.open_wrench},
+        ]
+    for change in changes:
+        assert not dataclasses.replace(proved, **change).verify()
+    assert dataclasses.replace(proved, radius=0.5 * proved.radius).verify()

@@ -296,3 +296,38 @@ def test_moving_scaling_and_reordering_change_nothing():
 def test_bad_arguments_are_refused(positions, normals, friction, message):
     with pytest.raises(gc.InputError, match=message):
         gc.force_closure(positions, normals, friction)
+
+
+def certificates_of_both_kinds():
+    rng = np.random.default_rng(12)
+    found = [gc.force_closure(*random_contacts(rng), 0.5) for _ in range(40)]
+    kinds = [[each for each in found if each.closed is closed] for closed in (True, False)]
+    assert min(map(len, kinds)) > 5
+    return kinds
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        lambda c: {"normals": 1.05 * c.normals},
+        lambda _: {"friction": -5.0 * np.ones(4)},
+        lambda c: {"friction": c.friction[:3]},
+        lambda c: {"positions": c.positions[:3]},
+        lambda c: {"normals": c.normals.T},
+        lambda c: {"positions": np.nan * c.positions},
+        lambda _: {"friction": np.full(4, np.inf)},
+        lambda c: {"margin": c.margin + 1e-6},
+        lambda _: {"margin": math.nan},
+        lambda c: {"closed": int(c.closed)},
+        lambda _: {"positions": None},
+        lambda c: {"forces": c.positions, "separating_wrench": np.ones(6)},
+    ],
+)
+def test_no_certificate_verifies_with_a_false_field(changed):
+    """A larger margin: of closed contacts it is too large, of others it is a weaker bound."""
+    for closed in certificates_of_both_kinds():
+        for certificate in closed:
+            change = changed(certificate)
+            if "margin" in change and not certificate.closed and not math.isnan(change["margin"]):
+                change = {"margin": certificate.margin - 1e-6}
+            assert not replace(certificate, **change).verify()

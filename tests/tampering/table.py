@@ -1,0 +1,191 @@
+"""Every kind of certificate: where genuine ones come from, and what makes one true.
+
+A class with `verify` that is not in `TABLE` fails `test_the_table_is_complete`.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+import grasp_core as gc
+import scenes
+from grasp_core.certified_regions import certify_regions
+from grasp_core.face_pieces import unit_pieces
+from grasp_core.patch import Absence, place_free
+from sim_validate.region_files import SHAPES, proof_arrays, regions_of
+from tests.judges import random_contacts
+from tests.tampering import exact_closure, on_planes, wrench_bounds
+
+SIZES = (1e-3, 0.1, 1.0, 100.0)
+FRICTIONS = (0.0, 0.05, 0.3, 0.5, 1.0, 3.0)
+PLANNED = (("wedge", 0.5), ("tetrahedron", 0.3), ("box", 0.5), ("octahedron", 0.7))
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """One kind of certificate."""
+
+    make: Callable[[int], Any]
+    """A genuine certificate, or None, for a seed."""
+    true: Callable[[Any, np.random.Generator], bool]
+    """Whether it is true by definition."""
+    weight: float = 1.0
+    """How often it is tried, relative to the others: less where a check takes long."""
+
+
+def placed(rng):
+    """Contacts of some size and place, with frictions."""
+    count = int(rng.integers(2, 8))
+    x, n = random_contacts(rng, count, rng.choice([0.3, 0.7, 2.0]))
+    same = rng.uniform() < 0.6
+    mu = rng.choice(FRICTIONS) if same else rng.choice(FRICTIONS, size=count)
+    return rng.choice(SIZES) * (x + rng.choice([0.0, 3.0]) * rng.normal(size=3)), n, mu
+
+
+def closure(seed):
+    try:
+        return gc.force_closure(*placed(np.random.default_rng(seed)))
+    except gc.UndecidedError:
+        return None
+
+
+@cache
+def planned(seed):
+    name, friction = PLANNED[seed % len(PLANNED)]
+    body = scenes.example_object(name)
+    return body, friction, gc.plan(body, friction, limit=8).grasps
+
+
+@cache
+def pieces_of(name):
+    return unit_pieces(scenes.example_object(name))
+
+
+def absence(seed):
+    """Some have several parts, of which each has its proof."""
+    rng = np.random.default_rng(seed)
+    pieces = pieces_of(PLANNED[seed % len(PLANNED)][0])
+    chosen = [pieces[i] for i in rng.choice(len(pieces), 4, replace=False)]
+    found = place_free(chosen, rng.choice(FRICTIONS[1:4]), rng=rng, cells=12, restarts=0)
+    return found if isinstance(found, Absence) else None
+
+
+def quality(seed):
+    rng = np.random.default_rng(seed)
+    x, n, mu = placed(rng)
+    size = float(np.ptp(x, axis=0).max())
+    return gc.ferrari_canny(
+        x, n, mu, center=x.mean(axis=0), torque_scale=size, norm=rng.choice(["l1", "linf"]).item(),
+        gap=0.1,
+    )  # fmt: skip
+
+
+def ceiling(seed):
+    body, friction, grasps = planned(seed)
+    faces = tuple(int(f) for f in np.random.default_rng(seed).choice(len(body.faces), 4))
+    faces = faces if seed % 2 and len(set(faces)) == 4 else grasps[seed % len(grasps)].faces
+    return gc.quality_ceiling(body, faces, friction, parts=6)
+
+
+@cache
+def regions(seed):
+    body, friction, grasps = planned(seed)
+    return certify_regions(
+        body, grasps[seed // len(PLANNED) % len(grasps)], friction, cones=200,
+        recenter=seed % 3 == 1, clearance=0.02 * body.radius * (seed % 2),
+    )  # fmt: skip
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Covered:
+    """A cover with what it is to prove."""
+
+    cover: Any
+    regions: Any
+    normals: Any
+    friction: Any
+
+    def verify(self):
+        return self.cover.verify(self.regions, self.normals, self.friction)
+
+
+def cover(seed):
+    found = regions(seed)
+    if found is None:
+        return None
+    corners = [
+        (np.vstack([r.polygon - d * n, r.polygon + d * n]) - found.origin) / found.scale
+        for r, n, d in zip(found.regions, found.normals, found.depths, strict=True)
+    ]
+    return Covered(found.cover, tuple(corners), found.normals, found.friction)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Limited:
+    """A limit with the contacts that it is about."""
+
+    found: Any
+    positions: Any
+    normals: Any
+    friction: Any
+    max_normal_force: Any
+    center: Any
+
+    def verify(self):
+        return self.found.verify(
+            self.positions, self.normals, self.friction,
+            max_normal_force=self.max_normal_force, center=self.center,
+        )  # fmt: skip
+
+
+def wrench_limit(seed):
+    rng = np.random.default_rng(seed)
+    x, n, mu = placed(rng)
+    size, largest = float(np.ptp(x, axis=0).max()), float(10.0 ** rng.uniform(-1, 2))
+    center = x.mean(axis=0) + size * rng.normal(size=3)
+    load = rng.normal(size=6) * np.repeat([1.0, size], 3)
+    given = {"max_normal_force": largest, "center": center}
+    (found,) = gc.wrench_limits(x, n, mu, load[None], **given)
+    return Limited(found, x, n, mu, largest, center)
+
+
+ProofFile = dataclasses.make_dataclass(
+    "ProofFile", SHAPES, frozen=True, eq=False,
+    namespace={"verify": lambda self: regions_of(vars(self)).verify()},
+)  # fmt: skip
+"""The arrays of a proof in a folder that `graspproof regions` writes."""
+
+
+def proof_file(seed):
+    found = regions(seed)
+    if found is None:
+        return None
+    body, _, grasps = planned(seed)
+    arrays = proof_arrays(found, grasps[0], body)
+    return ProofFile(**{name: np.asarray(arrays[name]) for name in SHAPES})
+
+
+TABLE = {
+    "ClosureCertificate": Row(closure, lambda c, _: exact_closure.closure(c), 3.0),
+    "Absence": Row(absence, on_planes.absence, 0.6),
+    "FerrariCanny": Row(quality, wrench_bounds.quality),
+    "QualityCeiling": Row(ceiling, wrench_bounds.ceiling, 0.7),
+    "CertifiedRegions": Row(regions, on_planes.regions, 0.4),
+    "TwistCover": Row(
+        cover, lambda c, rng: on_planes.all_closed(c.regions, c.normals, c.friction, rng), 0.5
+    ),
+    "WrenchLimit": Row(
+        wrench_limit,
+        lambda c, _: wrench_bounds.wrench_limit(
+            c.found, c.positions, c.normals, c.friction, c.max_normal_force, c.center
+        ),
+    ),
+    "proof file of regions": Row(
+        proof_file, lambda c, rng: on_planes.regions(regions_of(vars(c)), rng), 0.4
+    ),
+}
+INTERFACES = {"Proof"}
+"""Classes with `verify` that certify nothing themselves."""

@@ -1,0 +1,130 @@
+"""What is claimed of qualities and limits: by descent, hulls, and programs solved again."""
+
+import math
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.spatial import ConvexHull
+
+from tests.tampering.exact_closure import (
+    UNIT,
+    conic,
+    contacts_make_sense,
+    locals_of,
+    tangents,
+    unit_arms,
+)
+from tests.tampering.on_planes import drawn, piece
+
+
+def support(G, mu, norm, y):
+    slopes = (y @ G).reshape(-1, 3)
+    each = slopes[:, 0] + mu * np.linalg.norm(slopes[:, 1:], axis=1)
+    return each.max() if norm == "l1" else np.maximum(each, 0.0).sum()
+
+
+def quality(q, rng):
+    """Bounds of the least support over unit directions, sought by descent from many starts."""
+    w = q.wrenches
+    k = len(w.friction)
+    if w.G.shape != (6, 3 * k) or (w.friction < 0.0).any() or w.norm not in ("l1", "linf"):
+        return False
+    for i in range(k):
+        R, T = w.G[:3, 3 * i : 3 * i + 3], w.G[3:, 3 * i : 3 * i + 3]
+        S = T @ R.T
+        skew = np.abs(S + S.T).max() <= 1e-8 * (1 + abs(S).max())
+        if not skew or np.abs(R.T @ R - np.eye(3)).max() > 1e-8:
+            return False
+    size = np.linalg.norm(w.G, axis=0).max() * np.sqrt(1.0 + w.friction.max() ** 2)
+    h = lambda y: support(w.G, w.friction, w.norm, y / np.linalg.norm(y))  # noqa: E731
+    if abs(np.linalg.norm(q.direction) - 1.0) > 1e-9 or h(q.direction) > q.upper + 1e-11 * size:
+        return False
+    if not q.lower <= q.upper or (q.polytope is None) == (q.forces is None):
+        return False
+    starts = [q.direction, *rng.normal(size=(4, 6))]
+    least = min(min(minimize(h, y, method="Nelder-Mead").fun, h(y)) for y in starts)
+    return q.lower <= least + 1e-9 * size and _allowed(q)
+
+
+def _allowed(q):
+    forces = q.forces[None] if q.polytope is None else q.polytope.forces
+    if (
+        q.polytope is not None
+        and (abs(np.linalg.norm(q.polytope.normals, axis=1) - 1.0) > UNIT).any()
+    ):
+        return False
+    each = forces.reshape(len(forces), -1, 3)
+    across = np.linalg.norm(each[:, :, 1:], axis=2)
+    pushes = each[:, :, 0]
+    summed = abs(pushes.sum(axis=1) - 1.0) if q.wrenches.norm == "l1" else pushes.max(axis=1) - 1.0
+    return (across <= q.wrenches.friction * pushes + 1e-11).all() and (summed <= 1e-11).all()
+
+
+def hull_quality(x, n, mu):
+    """A lower bound: the hull of sixteen edges of each cone."""
+    turns = 2.0 * np.pi * np.arange(16) / 16
+    rows = []
+    for p, normal in zip(x, n, strict=True):
+        u = tangents(normal)
+        f = normal + mu * (np.cos(turns)[:, None] * u[:, 0] + np.sin(turns)[:, None] * u[:, 1])
+        rows.append(np.hstack([f, np.cross(p, f)]))
+    W = np.vstack(rows)
+    if np.linalg.matrix_rank(W - W[0], 1e-9) < 6:
+        return -math.inf
+    return float(-ConvexHull(W, qhull_options="QJ").equations[:, -1].max())
+
+
+def ceiling(c, rng):
+    """No contacts on the pieces have a larger quality, of those that are drawn."""
+    pieces = {id(p): p for choice in c.choices for p in choice}.values()
+    if not all(map(piece, pieces)) or not 0.0 <= c.friction < math.inf or not np.isfinite(c.upper):
+        return False
+    for leaf in c.leaves:
+        if abs(np.linalg.norm(leaf.direction) - 1.0) > UNIT or not 0 <= leaf.choice < len(
+            c.choices
+        ):
+            return False
+    for choice in c.choices:
+        n = np.array([p.normal for p in choice])
+        for _ in range(4):
+            x = np.array([p.origin + p.frame @ drawn(p.corners, rng) for p in choice])
+            if hull_quality(x, n, c.friction) > c.upper + 2e-9 * max(c.upper, 1.0):
+                return False
+    return True
+
+
+def wrench_limit(found, x, n, mu, largest, center):
+    """The largest multiple, solved again, is between the limit and the upper bound."""
+    mu = np.full(len(x), mu) if np.ndim(mu) == 0 else np.asarray(mu)
+    if not contacts_make_sense(np.asarray(x), np.asarray(n), mu):
+        return False
+    middle = x.mean(axis=0)
+    arms, size = unit_arms(x)
+    load = np.append(
+        found.wrench[:3], (found.wrench[3:] - np.cross(middle - center, found.wrench[:3])) / size
+    )
+    k, length = len(x), np.linalg.norm(load)
+    A = np.zeros((6 + 4 * k, 3 * k + 1))
+    A[:6, :-1], A[:6, -1] = locals_of(arms, n, mu), load / length
+    A[6 + np.arange(k), 3 * np.arange(k)] = 1.0
+    A[6 + k :, :-1] = -np.eye(3 * k)
+    solved = conic(
+        np.append(np.zeros(3 * k), -1.0),
+        A,
+        np.r_[np.zeros(6), np.ones(k), np.zeros(3 * k)],
+        6,
+        k,
+        k,
+    )
+    best = largest * solved.x[-1] / length
+    slack = 1e-6 * (best + largest / length)
+    f = found.forces / largest
+    along = np.einsum("ki,ki->k", f, n)
+    across = np.linalg.norm(f - along[:, None] * n, axis=1)
+    left = np.append(f.sum(axis=0), np.cross(arms, f).sum(axis=0)) + found.limit / largest * load
+    weight = np.sqrt(1.0 + mu.max() ** 2)
+    return bool(
+        found.limit <= best + slack and found.upper >= best - slack and found.limit <= found.upper
+        and (across <= mu * along + 1e-6 * weight).all() and along.max() <= 1.0 + 1e-6 * weight
+        and np.linalg.norm(left) <= 1e-6 * weight and abs(found.facet @ found.wrench + 1.0) <= 1e-6
+    )  # fmt: skip
