@@ -16,7 +16,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure import unit_size
-from grasp_core.closure_margin import Answer, decide
+from grasp_core.closure_margin import Answer, decide, proves_closure
 from grasp_core.errors import SolverError
 from grasp_core.extreme_frictions import hopeless_twist, pushing_forces, rounds
 from grasp_core.friction_interval import FrictionInterval, at_the_first
@@ -52,9 +52,11 @@ EVENED = 3
 """How often a program is solved again in units of the pushes that it found."""
 FAINTEST = 1e-10
 """Smallest push that has units of its own, in those of the largest."""
-SHAVED = 1e-10
-"""Taken off the friction up to which a twist separates, and put on what forces need, for rounding;
-relative."""
+ADDED, SHAVED = 5e-9, 1e-10
+"""Added to the friction that forces need, and taken off the one up to which a twist separates, for
+rounding; relative."""
+STALLED = 1e-3
+"""Unit twists that are this small once contacts are at rest are rounding."""
 
 
 def search_interval(points: Array, units: Array) -> FrictionInterval:
@@ -64,11 +66,18 @@ def search_interval(points: Array, units: Array) -> FrictionInterval:
         points: (k, 3) [m]
         units: Inward normals, (k, 3).
     """
-    ends = Ends.of(points, units)
-    arms = ends.arms
+    for strict in (False, True):
+        found = _searched(Ends.of(points, units, strict=strict)).interval()
+        if found.verify():
+            return found
+    return FrictionInterval(0.0, math.inf, points, units, None, None)
+
+
+def _searched(ends: "Ends") -> "Ends":
+    arms, units = ends.arms, ends.units
     hopeless = hopeless_twist(arms, units)
     if hopeless is not None and ends.open_at_all(hopeless):
-        return ends.interval()
+        return ends
     _try_little(ends)
     trial = max(FIRST_TRIAL, 2.0 * ends.lower)
     for _ in range(MOST_TRIALS):
@@ -85,7 +94,7 @@ def search_interval(points: Array, units: Array) -> FrictionInterval:
         pushing = pushing_forces(arms, units)
         if pushing is not None:
             ends.close(pushing, LARGEST_FRICTION)
-    return ends.interval()
+    return ends
 
 
 def _try_little(ends: "Ends") -> None:
@@ -141,6 +150,8 @@ class Ends:
     """Inward normals, (k, 3)."""
     arms: Array
     """The same points at unit size."""
+    strict: bool = True
+    """Whether each step is proved in rational arithmetic, or only what rounding may undo."""
     lower: float = 0.0
     upper: float = math.inf
     forces: Array | None = None
@@ -154,9 +165,9 @@ class Ends:
     """How far from there proofs are looked for."""
 
     @classmethod
-    def of(cls, points: Array, units: Array) -> "Ends":
+    def of(cls, points: Array, units: Array, *, strict: bool = True) -> "Ends":
         """Nothing is proved yet."""
-        return cls(points, units, unit_size(points)[0])
+        return cls(points, units, unit_size(points)[0], strict)
 
     @property
     def settled(self) -> bool:
@@ -192,14 +203,20 @@ class Ends:
         along, across = normal_and_tangential(forces, self.units)
         if not along.min() > 0.0:
             return
-        needed = float((across / along).max()) * (1.0 + SHAVED)
+        needed = float((across / along).max()) * (1.0 + ADDED)
         tried = [needed + share * (friction - needed) for share in PROOF_SHARES]
         for enough in (friction,) if exactly else (*tried, friction):
             enough = max(enough, FRICTIONLESS)
             below = enough <= friction and enough < self.upper
-            if below and closes(forces, self.points, self.units, enough):
+            if below and self._closes(forces, enough):
                 self.upper, self.forces = enough, forces
                 return
+
+    def _closes(self, forces: Array, friction: float) -> bool:
+        alike = np.full(len(self.arms), friction)
+        if not self.strict and proves_closure(forces, self.arms, self.units, alike):
+            return True
+        return closes(forces, self.points, self.units, friction)
 
     def open(self, twist: Array) -> None:
         """Raise the lower end to the friction up to which a twist separates."""
@@ -219,7 +236,8 @@ class Ends:
 
     def _opened(self, twist: Array, friction: float) -> None:
         twist = at_the_first(twist, self.points)
-        if separates(twist, self.points, self.units, friction):
+        easy = not self.strict and friction < math.inf
+        if easy or separates(twist, self.points, self.units, friction):
             self.lower, self.twist = friction, twist
 
     def next_trial(self, friction: float, margin: float, slope: float) -> float:
@@ -249,6 +267,8 @@ def _put_to_rest(twist: Array, arms: Array, normals: Array, slow: float) -> tupl
         for _ in range(2):  # once more for what rounding leaves
             twist = twist - np.linalg.lstsq(resting, resting @ twist, rcond=NEARLY_AT_REST)[0]
     along, across = normal_and_tangential(rows[~slowest] @ twist, normals[~slowest])
+    if not np.linalg.norm(twist) > STALLED:
+        return twist, 0.0
     with np.errstate(over="ignore"):  # contacts that hardly slide are separated at any friction
         ratios = -along / np.maximum(across, np.finfo(np.float64).tiny)
     return twist, float(ratios.min(initial=2.0 * LARGEST_FRICTION))
