@@ -20,7 +20,7 @@ the search is made program by program (see `friction_search`), with proofs in ra
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -117,7 +117,12 @@ def critical_friction_interval(
     if quick.found[0]:
         ends.close(quick.forces[0], float(quick.upper[0]), exactly=True)
         ends.open(quick.twists[0])
-    return ends.interval() if ends.settled else search_interval(points, units)
+    if ends.settled:
+        return ends.interval()
+    slow = search_interval(points, units)
+    if ends.forces is None:
+        return slow
+    return replace(slow, upper=ends.upper, forces=ends.forces)  # as `critical_friction` has it
 
 
 def _upper_ends(points: Array, units: Array) -> Array:
