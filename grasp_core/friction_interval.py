@@ -13,11 +13,18 @@ from grasp_core.wrenches import WRENCH
 
 FEWEST = 2
 """Contacts that can balance anything."""
+FRICTIONLESS = 1e-6
+"""Smallest friction at which closure is sought, and up to which a critical friction is reported as
+zero: a contact in a file with six digits is not placed better."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrictionInterval:
-    """Contacts are open at every common friction up to `lower`, closed at all from `upper` on."""
+    """Contacts are open at every common friction up to `lower`, closed at all from `upper` on.
+
+    The proof that they are open holds for contacts moved by at most 1e-12 of their size, where
+    their wrenches are dependent but for rounding; the proof that they are closed, as they are.
+    """
 
     lower: float
     """Coulomb coefficient; 0 where nothing is claimed, infinite where no friction is enough."""
@@ -43,6 +50,11 @@ class FrictionInterval:
                 kept = np.array(array, dtype=np.float64)
                 kept.setflags(write=False)
                 object.__setattr__(self, name, kept)
+
+    @property
+    def critical_friction(self) -> float:
+        """The upper end as functions and files report it: 0.0 up to `FRICTIONLESS`."""
+        return 0.0 if self.upper <= FRICTIONLESS else self.upper
 
     def verify(self) -> bool:
         """Check both ends again, in rational arithmetic and without any solver."""

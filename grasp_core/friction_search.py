@@ -19,16 +19,13 @@ from grasp_core.closure import unit_size
 from grasp_core.closure_margin import Answer, decide, proves_closure
 from grasp_core.errors import SolverError
 from grasp_core.extreme_frictions import hopeless_twist, pushing_forces, rounds
-from grasp_core.friction_interval import FrictionInterval, at_the_first
+from grasp_core.friction_interval import FRICTIONLESS, FrictionInterval, at_the_first
 from grasp_core.margin_program import margin_program
 from grasp_core.rational_proofs import NEARLY_AT_REST, closes, separates
 from grasp_core.wrenches import WRENCH, grasp_map, normal_and_tangential
 
 FRICTION_ACCURACY = 5e-8
 """Relative width of the final interval of a critical friction."""
-FRICTIONLESS = 1e-6
-"""Smallest friction at which closure is sought, and below which a critical friction is reported as
-zero: a contact in a file with six digits is not placed better."""
 FIRST_TRIAL = 0.5
 PROOF_SHARES = (0.0, 1e-3, 0.03)
 """Where closure is proved between the friction that forces need and that of the trial."""

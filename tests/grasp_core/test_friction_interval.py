@@ -14,7 +14,7 @@ import pytest
 from scipy import sparse
 
 import grasp_core as gc
-from grasp_core.friction_search import FRICTIONLESS
+from grasp_core.friction_interval import FRICTIONLESS
 from grasp_core.wrenches import contact_frames, grasp_map
 from scenes.objects import example_object
 from tests.grasp_core.exact_judges import closed_exactly, open_exactly
@@ -88,7 +88,7 @@ def check_sets(count, seed):
         found = gc.critical_friction_interval(positions, normals)
         assert found.verify()
         upper = gc.critical_friction(positions, normals)
-        assert upper == (0.0 if found.upper <= FRICTIONLESS else found.upper)
+        assert upper == found.critical_friction
         if found.upper == math.inf:
             assert found.lower >= LARGEST_FRICTION
             seen["closed by no friction"] += found.lower == math.inf
