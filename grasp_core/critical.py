@@ -112,10 +112,10 @@ def critical_friction_interval(
         ends.open(quick.twists[0])
     if ends.settled:
         return ends.interval()
-    slow = search_interval(points, units)
-    if ends.forces is None:
+    slow, quick_half = search_interval(points, units), ends.interval()
+    if quick_half.forces is None:
         return slow
-    return replace(slow, upper=ends.upper, forces=ends.forces)  # as `critical_friction` has it
+    return replace(slow, upper=ends.upper, forces=quick_half.forces)  # as `critical_friction` says
 
 
 def _upper_ends(points: Array, units: Array) -> Array:

@@ -21,7 +21,7 @@ from grasp_core.errors import SolverError
 from grasp_core.extreme_frictions import hopeless_twist, pushing_forces, rounds
 from grasp_core.friction_interval import FRICTIONLESS, FrictionInterval, at_the_first
 from grasp_core.margin_program import margin_program
-from grasp_core.rational_proofs import NEARLY_AT_REST, closes, separates
+from grasp_core.rational_proofs import NEARLY_AT_REST, closes, closing_forces, separates
 from grasp_core.wrenches import WRENCH, grasp_map, normal_and_tangential
 
 FRICTION_ACCURACY = 5e-8
@@ -29,17 +29,17 @@ FRICTION_ACCURACY = 5e-8
 FIRST_TRIAL = 0.5
 PROOF_SHARES = (0.0, 1e-3, 0.03)
 """Where closure is proved between the friction that forces need and that of the trial."""
-GROWTH = 3.0
-"""How much farther from an undecided friction the next trial is; twice as far once that is a tenth
-of `FRICTIONLESS`."""
+GROWTH = ((0.1 * FRICTIONLESS, 3.0), (1e-3, 2.0), (math.inf, 10.0))
+"""How much farther from an undecided friction the next trial is, up to which distance: fast where
+proofs are expected, and where they are not."""
 NUDGE = 0.4
 OVERSHOOT = 1.0
 """Trials pass the expected threshold, to close in from both sides: by this share of the accuracy,
 and by this multiple of the error of Newton's method, the step's square over the friction."""
 HALVING = 6
 """Every so many trials the interval is halved, whatever Newton's method says."""
-MOST_TRIALS = 150
-"""Nine are usual, and some eighty where contacts are nearly degenerate."""
+MOST_TRIALS = 80
+"""Nine are usual, and some fifty where contacts are nearly degenerate."""
 LITTLE = 1e-3
 """Frictions up to this are tried where any friction seems enough."""
 RESTING = (NEARLY_AT_REST, 1e-7, 1e-5, 1e-3)
@@ -175,10 +175,13 @@ class Ends:
         return self.upper <= FRICTIONLESS or narrow or around or beyond
 
     def interval(self) -> FrictionInterval:
-        """What has been proved."""
-        return FrictionInterval(
-            self.lower, self.upper, self.points, self.units, self.forces, self.twist
-        )
+        """What has been proved, by forces that balance as well as floats can."""
+        forces, contacts = self.forces, (self.points, self.units)
+        if forces is not None:
+            exact = closing_forces(forces, *contacts, self.upper)
+            if exact is not None and closes(exact, *contacts, self.upper):
+                forces = exact
+        return FrictionInterval(self.lower, self.upper, *contacts, forces, self.twist)
 
     def learn(self, friction: float, answer: Answer) -> None:
         """Take what the answer at a friction proves."""
@@ -191,7 +194,7 @@ class Ends:
         if undecided and math.isnan(self.center):
             self.center, self.spread = friction, NUDGE * FRICTION_ACCURACY * friction
         elif undecided:
-            self.spread *= GROWTH if self.spread < 0.1 * FRICTIONLESS else 2.0
+            self.spread *= next(factor for far, factor in GROWTH if self.spread < far)
         elif self.upper <= self.center or self.lower >= self.center:
             self.center, self.spread = math.nan, 0.0  # the threshold turned out to be elsewhere
 

@@ -25,7 +25,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Indices
 from grasp_core.wrenches import WRENCH, grasp_map, normal_and_tangential
 
 Exact = list[Fraction]
@@ -50,26 +50,36 @@ def closes(forces: Array, positions: Array, normals: Array, friction: float) -> 
         normals: Inward, of unit length, (k, 3).
         friction: Coulomb coefficient of all contacts.
     """
+    return closing_forces(forces, positions, normals, friction) is not None
+
+
+def closing_forces(
+    forces: Array, positions: Array, normals: Array, friction: float
+) -> Array | None:
+    """The forces that `closes` finds next to the given ones, but for rounding; None without.
+
+    Args:
+        forces: (k, 3)
+        positions: (k, 3) [m]
+        normals: Inward, of unit length, (k, 3).
+        friction: Coulomb coefficient of all contacts.
+    """
     if not (np.isfinite(forces).all() and 0.0 < friction < math.inf):
-        return False
+        return None
     arms, size = _arms(positions)
     along, across = normal_and_tangential(forces, normals)
     depths = np.maximum(friction * along - across, 0.0)
-    deepest_first = np.argsort(-depths, kind="stable")
-    forces = _nearly_balanced(forces, arms, depths)
-    wrenches = grasp_map(arms).T.reshape(-1, 3, WRENCH)
-    for least in INDEPENDENT:
-        found = _independent(wrenches[deepest_first].reshape(-1, WRENCH), least)
-        if len(found) == WRENCH:
-            break
-    else:
-        return False
-    columns = [(int(deepest_first[each // 3]), each % 3) for each in found]
-    balanced = _balanced(_vectors(forces), _exact_arms(positions, size), columns)
+    columns = _columns(arms, np.argsort(-depths, kind="stable"))
+    if columns is None:
+        return None
+    nearly = _vectors(_nearly_balanced(forces, arms, depths))
+    balanced = _balanced(nearly, _exact_arms(positions, size), columns)
     slope = Fraction(friction) ** 2
-    return balanced is not None and all(
+    if balanced is None or not all(
         _inside(f, n, slope) for f, n in zip(balanced, _vectors(normals), strict=True)
-    )
+    ):
+        return None
+    return np.array([[float(x) for x in force] for force in balanced])
 
 
 def separates(twist: Array, positions: Array, normals: Array, friction: float) -> bool:
@@ -116,6 +126,16 @@ def _vectors(rows: Array) -> list[Exact]:
 def _exact_arms(positions: Array, size: float) -> list[Exact]:
     exact, unit = _vectors(positions), Fraction(size)
     return [[(x - o) / unit for x, o in zip(point, exact[0], strict=True)] for point in exact]
+
+
+def _columns(arms: Array, order: Indices) -> list[tuple[int, int]] | None:
+    """Six independent columns of the grasp map, as (contact, axis), from contacts in an order."""
+    wrenches = grasp_map(arms).T.reshape(-1, 3, WRENCH)[order].reshape(-1, WRENCH)
+    for least in INDEPENDENT:
+        found = _independent(wrenches, least)
+        if len(found) == WRENCH:
+            return [(int(order[each // 3]), each % 3) for each in found]
+    return None
 
 
 def _nearly_balanced(forces: Array, arms: Array, depths: Array) -> Array:
