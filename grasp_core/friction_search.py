@@ -102,6 +102,8 @@ def _try_little(ends: "Ends") -> None:
     while little.forces and friction <= LITTLE and ends.forces is None:
         ends.close(little.at(friction, ends.units), friction, exactly=True)
         friction *= 2.0
+    if ends.forces is None and ends.lower < FRICTIONLESS:
+        ends.learn(FRICTIONLESS, _asked(ends.arms, ends.units, FRICTIONLESS))
 
 
 def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:

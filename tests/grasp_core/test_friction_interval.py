@@ -290,3 +290,17 @@ def test_an_interval_is_read_only():
     assert found.twist is None
     with pytest.raises(dataclasses.FrozenInstanceError):
         found.upper = 0.0
+
+
+def test_a_critical_friction_of_a_few_ten_millionths_is_zero():
+    """Pairs of sides of a prism that face each other but for rounding in a file."""
+    one, two = 0.0230865515768528, 0.004592202603816986
+    a, b = 0.9807853206537729, 0.19509011966287754
+    positions = np.array([
+        [-one, -two, 0.012817831020598976], [-two, -one, -0.000493248572818749],
+        [two, one, 0.00031023244767062347], [one, two, 0.012817831020598972],
+    ])  # fmt: skip
+    normals = np.array([[-a, -b, 0.0], [-b, -a, 0.0], [b, a, 0.0], [a, b, 0.0]])
+    found = gc.critical_friction_interval(positions, normals)
+    assert found.verify()
+    assert found.critical_friction == gc.critical_friction(positions, normals) == 0.0
