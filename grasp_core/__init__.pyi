@@ -4,6 +4,7 @@ from grasp_core.certified_regions import certify_regions as certify_regions
 from grasp_core.closure import ClosureCertificate as ClosureCertificate
 from grasp_core.closure import force_closure as force_closure
 from grasp_core.critical import critical_friction as critical_friction
+from grasp_core.critical import critical_friction_interval as critical_friction_interval
 from grasp_core.critical import critical_frictions as critical_frictions
 from grasp_core.errors import GraspError as GraspError
 from grasp_core.errors import InputError as InputError
@@ -14,6 +15,7 @@ from grasp_core.errors import SolverError as SolverError
 from grasp_core.errors import UndecidedError as UndecidedError
 from grasp_core.errors import UnfaithfulError as UnfaithfulError
 from grasp_core.forces import contact_forces as contact_forces
+from grasp_core.friction_interval import FrictionInterval as FrictionInterval
 from grasp_core.lines import classify_lines as classify_lines
 from grasp_core.mesh_limits import MeshLimits as MeshLimits
 from grasp_core.metrics import hull_volume as hull_volume

@@ -182,8 +182,5 @@ def _quality(placement: Placement, normals: Array, friction: float) -> tuple[flo
 
 
 def _critical(placement: Placement, normals: Array, friction: float) -> float:
-    """The critical friction; where it cannot be bracketed, the friction that is proved enough."""
-    try:
-        return critical_friction(placement.positions, normals)
-    except UndecidedError:
-        return friction
+    """The critical friction, no more than the friction that is proved enough."""
+    return min(critical_friction(placement.positions, normals), friction)

@@ -7,7 +7,6 @@ import numpy as np
 
 from grasp_core.certified import Certified
 from grasp_core.critical import critical_friction
-from grasp_core.errors import UndecidedError
 from grasp_core.quality import ferrari_canny
 from grasp_core.requests import FAMILIES, PlanRequest
 from grasp_core.ties import first_best, smallest_first
@@ -51,10 +50,7 @@ def _in_order(found: Sequence[Certified], figures: Sequence[float]) -> list[Cert
 
 def _critical(found: Certified) -> float:
     """Least friction at which the contacts are in force closure."""
-    try:
-        return critical_friction(found.placement.positions, found.normals)
-    except UndecidedError:
-        return np.inf
+    return critical_friction(found.placement.positions, found.normals)
 
 
 def _weakness(friction: float) -> Callable[[Certified], float]:

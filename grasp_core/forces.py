@@ -5,7 +5,8 @@ the true cones. Two objectives for balanced forces: the least norm, and the leas
 that is, the smallest coefficient max_i |tangential part| / normal part. The latter is found
 by Dinkelbach's iteration: with r the current coefficient, forces that minimise the largest
 tangential part minus r times the normal part have a smaller one, until they do not; the last
-2 % that pyramids give away come from `least_friction`. Where nothing balances,
+2 % that pyramids give away come from `least_friction`. Where pyramids hold no forces that balance,
+as just above the critical friction, exact cones may (`cone_forces`). Where nothing balances,
 `closest_forces` leaves the least imbalance.
 
 Both objectives ask for the nearest point of a polyhedron (`least_distance`), once the balance
@@ -26,6 +27,7 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import SMALLEST_SIZE, Array, frozen
 from grasp_core.balance import RESIDUAL, Balance, needed_friction
 from grasp_core.checked import LARGEST, SMALLEST, number, one_of, several, shown
+from grasp_core.cone_forces import least_norm_in_cones
 from grasp_core.contact_arrays import contact_arrays, contact_frictions
 from grasp_core.errors import InputError, NoForcesError, SolverError
 from grasp_core.least_distance import least_distance
@@ -66,8 +68,9 @@ def contact_forces(  # noqa: PLR0913 - the contract's arguments
         wrench: External (force, torque), (6,), or n of them, (n, 6) [N, N m], torque about
             `center`.
         objective: What to make least: the norm of all forces, in pyramids of 16 sides inside the
-            cones, or the largest share that a contact needs of its friction. The latter is found
-            by iteration: where limits on the forces are far above the load it may stop early.
+            cones or, where these hold no forces, in the cones; or the largest share that a contact
+            needs of its friction. The latter is found by iteration: where limits on the forces are
+            far above the load it may stop early.
         normal_force: Least and largest normal force of each contact [N].
         center: (3,) [m]
 
@@ -85,12 +88,12 @@ def contact_forces(  # noqa: PLR0913 - the contract's arguments
     balance = _balance(positions, normals, loads, normal_force, center, by_load=True)
     mu = contact_frictions(friction, len(balance.frames))
     F = _objective(objective)(balance, mu)
-    missing = np.flatnonzero(~(needed_friction(F, mu) <= 1.0 + RESIDUAL))
+    missing = np.flatnonzero([not _in_cones(f, mu) for f in F])
     if missing.size:
         which = "this wrench" if single else f"wrench {missing[0]}, counting from 0"
         raise NoForcesError(
             f"no forces found with friction {_text(mu)} and normal forces in "
-            f"{normal_force} N that balance {which}; lower the load or raise the limits"
+            f"{normal_force} N that balance {which}; {_remedy(normal_force)}"
         )
     forces = balance.in_space(F)
     return forces[0] if single else forces
@@ -161,11 +164,16 @@ def _least_norm(balance: Balance, friction: Array) -> Array:
     P, hopeless = np.eye(F.shape[1]), balance.beyond(friction)
     for i in np.flatnonzero(np.isnan(F[:, 0])):
         one = balance.one(int(i))
-        f = None if hopeless[i] else _solve(P, 0.0 * P[0], rows, one, balanced=True)
+        if hopeless[i]:
+            break
+        f = _solve(P, 0.0 * P[0], rows, one, balanced=True)
         if f is not None:
             F[i] = one.checked(f[None])[0]
-        if np.isnan(F[i, 0]):
-            break
+        if not _in_cones(F[i], friction):
+            f = least_norm_in_cones(one, friction)
+            if f is None:
+                break
+            F[i] = f
     return F
 
 
@@ -176,11 +184,22 @@ def _least_friction_each(balance: Balance, friction: Array) -> Array:
     F = np.full(balance.F0.shape, np.nan)
     hopeless = balance.beyond(friction)
     for i in range(len(F)):
-        f = None if hopeless[i] else _least_friction(balance.one(i), largest, weights)
+        if hopeless[i]:
+            break
+        one = balance.one(i)
+        f = _least_friction(one, largest, weights)
+        if f is None or not _in_cones(f, friction):
+            start = least_norm_in_cones(one, friction)
+            f = f if start is None else lower_friction(one, weights, start)
         if f is None:
             break
         F[i] = f
     return F
+
+
+def _in_cones(f: Array, friction: Array) -> bool:
+    """Whether local forces (3k,) are there and need no more than the friction."""
+    return bool(needed_friction(f[None], friction)[0] <= 1.0 + RESIDUAL)
 
 
 def _least_friction(balance: Balance, start: float, weights: Array) -> Array | None:
@@ -261,6 +280,13 @@ def _rows(wrench: ArrayLike) -> tuple[Array, bool]:
             f"{float(sizes[sizes > 0.0].min()):.3g}"
         )
     return loads, single
+
+
+def _remedy(normal_force: tuple[float, float]) -> str:
+    """What may help: without limits, forces for one load are forces for it at any size."""
+    if math.isfinite(normal_force[1]):
+        return "lower the load or raise the limits"
+    return "use more friction or place the contacts otherwise"
 
 
 def _text(friction: Array) -> str:

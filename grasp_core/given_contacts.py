@@ -95,7 +95,7 @@ def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCerti
         name: What to call the grasp.
 
     Raises:
-        UndecidedError: Closure, or the critical friction, is too close to call.
+        UndecidedError: Closure is too close to call.
     """
     body = seated.body
     positions = np.array([contact.position for contact in seated.contacts])
@@ -117,7 +117,7 @@ def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCerti
         regions=four(ContactRegion("point", point[None], 0.0) for point in positions),
         radius=0.0,
         span_angle=span_angle(normals),
-        critical_friction=critical_friction(positions, normals),
+        critical_friction=min(critical_friction(positions, normals), friction),
         closure_margin=certificate.margin,
         ferrari_canny=(quality.lower, quality.upper),
         witness=Witness(positions, certificate.forces),

@@ -13,9 +13,10 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.closure import ClosureCertificate, force_closure
 from grasp_core.contact_sets import ContactSet
-from grasp_core.critical import critical_friction
+from grasp_core.critical import critical_friction_interval
 from grasp_core.errors import InputError, NoForcesError, SolverError, UndecidedError
 from grasp_core.forces import contact_forces
+from grasp_core.friction_interval import FrictionInterval
 from grasp_core.metrics import hull_volume, min_weight, smallest_singular_value
 from grasp_core.quality import ferrari_canny
 from grasp_core.resisted_wrenches import WrenchLimit, axis_wrenches, wrench_limits
@@ -25,6 +26,7 @@ MOST_EDGES = 10_000
 """Of all pyramids of a grasp together: their hull in six dimensions takes ten seconds then."""
 
 Answer = TypeVar("Answer")
+Checked = TypeVar("Checked", ClosureCertificate, FrictionInterval)
 Wrench = tuple[float, float, float, float, float, float]
 
 
@@ -74,8 +76,8 @@ class Analysis:
     contacts: ContactSet
     certificate: ClosureCertificate | None
     """Checked again in plain arithmetic."""
-    critical_friction: float | None
-    """Common coefficient; infinite if none suffices."""
+    friction_interval: FrictionInterval | None
+    """Of the least common friction for closure; checked again in rational arithmetic."""
     l1: Bounds | None
     linf: Bounds | None
     min_weight: float | None
@@ -96,6 +98,12 @@ class Analysis:
         if self.certificate is None:
             return Outcome.UNDECIDED
         return Outcome.CLOSED if self.certificate.closed else Outcome.OPEN
+
+    @property
+    def critical_friction(self) -> float | None:
+        """Common coefficient that suffices; infinite if none does."""
+        found = self.friction_interval
+        return None if found is None else found.critical_friction
 
     @property
     def separating_wrench(self) -> Array | None:
@@ -131,7 +139,9 @@ def analyze(contacts: ContactSet, question: Question) -> Analysis:
     return Analysis(
         contacts=contacts,
         certificate=ask("closure", lambda: _checked(force_closure(*given))),
-        critical_friction=ask("critical_friction", lambda: critical_friction(*given[:2])),
+        friction_interval=ask(
+            "critical_friction", lambda: _checked(critical_friction_interval(*given[:2]))
+        ),
         l1=ask("ferrari_canny_l1", lambda: _bounds(contacts, "l1")),
         linf=linf,
         min_weight=ask("min_weight", lambda: min_weight(*given, edges=edges)),
@@ -166,7 +176,7 @@ class _Asking:
             return None
 
 
-def _checked(certificate: ClosureCertificate) -> ClosureCertificate:
+def _checked(certificate: Checked) -> Checked:
     if not certificate.verify():
         raise UndecidedError("the certificate failed its check")
     return certificate

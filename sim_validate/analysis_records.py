@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from grasp_core.arrays import Array
+from grasp_core.friction_interval import FrictionInterval
 from grasp_core.resisted_wrenches import WrenchLimit
 from grasp_core.versions import versions
 from sim_validate.analysis import Analysis, Bounds, Outcome, Question, Resisted
@@ -50,6 +51,7 @@ def _analysis_record(analysis: Analysis) -> dict[str, object]:
         "forces": None if certificate is None else _rows(certificate.forces),
         "separating_wrench": _rows(analysis.separating_wrench),
         "critical_friction": _number(analysis.critical_friction),
+        "critical_friction_interval": _interval(analysis.friction_interval),
         "ferrari_canny_l1_n": _pair(l1),
         "ferrari_canny_linf_n": _pair(linf),
         "verified": {
@@ -97,6 +99,10 @@ def _resisted_record(found: Resisted | None) -> dict[str, object] | None:
 def _number(value: float | None) -> float | None:
     """A number as JSON has it: null where it is unknown or infinite, and no minus zero."""
     return None if value is None or not math.isfinite(value) else value + 0.0
+
+
+def _interval(found: FrictionInterval | None) -> list[float | None] | None:
+    return None if found is None else [_number(found.lower), _number(found.upper)]
 
 
 def _pair(bounds: Bounds | None) -> list[float | None] | None:

@@ -8,6 +8,7 @@ import numpy as np
 from grasp_core.arrays import Array, to_digits
 from grasp_core.contact_sets import ContactSet, Overrides, contact_sets_from_json
 from grasp_core.errors import InputError
+from grasp_core.friction_interval import FrictionInterval
 from sim_validate import cli
 from sim_validate.analysis import Analysis, Bounds, Outcome, Question, analyze, check_edges
 from sim_validate.analysis_records import analyses_to_document, summary
@@ -107,6 +108,7 @@ def _facts(found: Analysis) -> list[tuple[str, str]]:
     return [
         *rows,
         ("critical friction", _friction(found.critical_friction)),
+        ("  proved between", _ends(found.friction_interval)),
         ("Ferrari-Canny l1 [N]", _bounds(found.l1)),
         ("Ferrari-Canny linf [N]", _bounds(found.linf)),
         ("min-weight", _number(found.min_weight)),
@@ -155,6 +157,11 @@ def _friction(critical: float | None) -> str:
     if critical is None:
         return UNKNOWN
     return f"{critical:.4f}" if np.isfinite(critical) else "none suffices"
+
+
+def _ends(found: FrictionInterval | None) -> str:
+    """Friction that is too little, and friction that is enough."""
+    return UNKNOWN if found is None else f"{found.lower:.9g} and {found.upper:.9g}"
 
 
 def _bounds(found: Bounds | None) -> str:

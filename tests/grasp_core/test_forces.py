@@ -9,7 +9,8 @@ from scipy.optimize import nnls
 import grasp_core as gc
 from grasp_core import forces as forces_module
 from grasp_core import least_distance as least_distance_module
-from grasp_core.balance import PYRAMID_SIDES
+from grasp_core.balance import PYRAMID_SIDES, Balance
+from grasp_core.cone_forces import least_norm_in_cones
 from grasp_core.forces import NoForcesError, closest_forces, contact_forces, least_friction_forces
 from grasp_core.resisted_wrenches import WrenchBody, axis_wrenches
 from grasp_core.wrenches import contact_frames, grasp_map, normal_and_tangential
@@ -429,6 +430,72 @@ def test_loads_far_below_the_limit_are_balanced_all_the_same():
         gc.contact_forces(pair, -pair, 0.5, [0, 0, 0, 9e-6, 0, 0], normal_force=(0.0, 10.0))
     with pytest.raises(gc.NoForcesError):
         gc.contact_forces(TETRA_CENTERS, TETRA_NORMALS, 0.0, [0, 0, 0, 9e-6, 0, 0])
+
+
+def closed_just_so(rng):
+    """Random contacts with a friction above the critical one by 0.5 % to twice, and a wrench."""
+    while True:
+        count = int(rng.choice((3, 4, 5, 6), p=(0.1, 0.7, 0.1, 0.1)))
+        positions, normals = random_contacts(rng, count, spread=rng.uniform(0.3, 1.5))
+        critical = gc.critical_friction(positions, normals)
+        if 1e-3 < critical < 5.0:
+            above = 0.005 if rng.uniform() < 0.3 else 10.0 ** rng.uniform(-2.3, 0.0)
+            wrench = 10.0 ** rng.uniform(-2.0, 2.0) * rng.normal(size=6)
+            return positions, normals, (1.0 + above) * critical, wrench
+
+
+def check_closed_contacts(objective, count, seed):
+    """Every wrench gets forces that balance it within the cones."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        positions, normals, friction, wrench = closed_just_so(rng)
+        forces = contact_forces(positions, normals, friction, wrench, objective=objective)
+        along, across = normal_and_tangential(forces, normals)
+        assert (across <= (1.0 + 1e-6) * friction * along + 1e-6 * np.abs(forces).max()).all()
+        off = np.abs(grasp_map(positions) @ forces.ravel() + wrench).max()
+        assert off <= 1e-6 * np.abs(wrench).max()
+
+
+@pytest.mark.parametrize("objective", ["least_norm", "least_friction"])
+def test_contacts_in_closure_balance_every_wrench(objective):
+    """Just above the critical friction too, where pyramids in the cones hold no forces."""
+    check_closed_contacts(objective, 60, seed=40)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize("objective", ["least_norm", "least_friction"])
+def test_two_thousand_sets_of_contacts_in_closure_balance_every_wrench(objective):
+    check_closed_contacts(objective, 2_000, seed=41)
+
+
+def test_forces_in_exact_cones_are_no_larger_than_those_in_pyramids():
+    """And no smaller by more than pyramids with as much more friction save."""
+    rng, tested = np.random.default_rng(42), 0
+    for trial in range(30):
+        positions, normals, friction, wrench = closed_just_so(rng)
+        each = np.full(len(normals), 1.5 * friction)
+        each[0] *= trial % 3 > 0
+        limits = (0.0, math.inf) if trial % 2 else (0.0, 50.0 * np.abs(wrench).max())
+        try:
+            outer = contact_forces(
+                positions, normals, each / INSCRIBED, wrench, normal_force=limits
+            )
+            inner = contact_forces(positions, normals, each, wrench, normal_force=limits)
+        except NoForcesError:  # a frictionless contact, or limits
+            continue
+        balance = Balance.of(positions, normals, wrench[None], limits, by_load=True)
+        exact = balance.in_space(least_norm_in_cones(balance, each)[None])[0]
+        sizes = [np.linalg.norm(forces) for forces in (outer, exact, inner)]
+        assert sizes[0] * (1.0 - 1e-6) <= sizes[1] <= sizes[2] * (1.0 + 1e-6)
+        tested += 1
+    assert tested >= 15
+
+
+def test_limits_are_no_remedy_where_there_are_none():
+    pair = np.array([[1.0, 0, 0], [-1, 0, 0]])
+    with pytest.raises(NoForcesError, match="use more friction or place the contacts otherwise"):
+        contact_forces(pair, -pair, 0.5, [0, 0, 0, 1.0, 0, 0])
 
 
 @pytest.mark.timeout(60)

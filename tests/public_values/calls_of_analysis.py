@@ -71,6 +71,7 @@ CALLS = [
         "friction": each_of(FRICTION, "zero", "tiny"),
     }),
     Call("gc.critical_friction", two_arrays(), contacts()),
+    Call("gc.critical_friction_interval", two_arrays(), contacts()),
     Call("gc.critical_frictions", many_arrays, contacts(many=True)),
     Call("gc.contact_forces", two_arrays(friction=0.5, wrench=WRENCH), contacts() | {
         "friction": each_of(FRICTION, "zero"),

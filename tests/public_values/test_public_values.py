@@ -18,6 +18,7 @@ MADE_BY_FUNCTIONS = {
     "gc.CertifiedRegions": "certify_regions and read_regions",
     "gc.ClosureCertificate": "force_closure",
     "gc.FerrariCanny": "ferrari_canny",
+    "gc.FrictionInterval": "critical_friction_interval",
     "gc.Improvement": "optimize_contacts",
     "gc.Plan": "plan",
     "gc.QualityCeiling": "quality_ceiling",

@@ -127,6 +127,23 @@ def test_two_contacts_are_never_closed(analyze):
     assert grasp["hull_volume"] == grasp["smallest_singular_value"] == 0.0
 
 
+def test_both_ends_of_the_critical_friction_are_shown(analyze, capsys):
+    """Contacts on the sides of a box, each 0.2 aside of the middle and by turns 0.3 up and down."""
+    turned = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, -1]])
+    turns = [np.linalg.matrix_power(turned, i) for i in range(4)]
+    sides = contacts([t @ [1.0, 0.2, 0.3] for t in turns], [t @ [-1.0, 0, 0] for t in turns])
+    code, document = analyze({"contacts": sides, "friction": 0.5})
+    (grasp,) = document["grasps"]
+    lower, upper = grasp["critical_friction_interval"]
+    assert code == Exit.GOOD
+    assert lower <= 0.2 <= upper == grasp["critical_friction"]
+    assert upper - lower <= 1e-7
+    main(["analyze", "contacts.json"])
+    assert f"proved between {lower:.9g} and {upper:.9g}" in " ".join(
+        capsys.readouterr().out.split()
+    )
+
+
 def test_a_weight_that_no_weights_balance_is_null(analyze):
     """Contacts that all push along z."""
     code, document = analyze({"contacts": contacts(CROSS, [[0.0, 0, 1]] * 4), "friction": 0.0})
