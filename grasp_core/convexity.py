@@ -8,8 +8,6 @@ none of them is above it: the whole triangle is then within 3 d of the hull's bo
 import importlib
 from typing import Any
 
-import numpy as np
-
 from grasp_core.arrays import Array
 from grasp_core.values import Polyhedron
 
