@@ -84,11 +84,11 @@ AT_SMALL_SIZE = (
 """They would do for objects of some centimetres."""
 
 
-def refusal(surface, table, numbers, radius_m):
+def refusal(surface, table, numbers, radius_m, friction=0.5):
     """The error that stops these settings, None if nothing does."""
     try:
         setup = setup_from_tables({table: numbers}, Setup(surface=surface), "setup.toml")
-        require_faithful(setup, radius_m=radius_m)
+        require_faithful(setup, friction, radius_m)
     except gc.GraspError as error:
         return error
     return None
@@ -111,8 +111,8 @@ def test_so_are_more_of_them(surface, table, numbers, kind):
 @pytest.mark.slow
 @pytest.mark.parametrize(("surface", "table", "numbers", "kind"), AT_SMALL_SIZE)
 def test_what_is_too_coarse_for_a_small_object_is_refused_there(surface, table, numbers, kind):
-    assert refusal(surface, table, numbers, USUAL) is None
-    assert type(refusal(surface, table, numbers, TINY)) is kind
+    assert refusal(surface, table, numbers, USUAL, 1.0) is None
+    assert type(refusal(surface, table, numbers, TINY, 1.0)) is kind
 
 
 def test_enough_settings_are_tried():
