@@ -23,6 +23,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.checked import instance, one_of, path_of, several
+from grasp_core.convexity import is_convex
 from grasp_core.errors import InputError
 from grasp_core.on_faces import check_body
 from grasp_core.ties import first_best
@@ -36,8 +37,6 @@ Surface = Literal["pads", "mesh"]
 """What fingertips touch: a pad each, or the convex hull of the object's mesh."""
 FEWEST_CONTACTS = 2
 AXES = ("normal", "tangent1", "tangent2")
-FLUSH = 1e-6
-"""How far a vertex of a convex object may be in front of a face, in object radii."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,7 +79,7 @@ def build_scene(
     ):  # fmt: skip
         if value is not None:
             instance(value, kind, name)
-    if surface == "mesh" and not _is_convex(body):
+    if surface == "mesh" and not is_convex(body):
         raise InputError(f"{body.name} is not convex: fingertips would touch its hull; use pads")
     contacts = grasp if isinstance(grasp, Grasp) else _listed(grasp)
     layout = arrange(body, contacts, friction, fingers)
@@ -94,13 +93,6 @@ def _listed(contacts: Iterable[Contact]) -> tuple[Contact, ...]:
     if len(listed) < FEWEST_CONTACTS:
         raise InputError(f"grasp must have {FEWEST_CONTACTS} contacts at least, got {len(listed)}")
     return listed
-
-
-def _is_convex(body: Polyhedron) -> bool:
-    """Whether no vertex is in front of a face's plane."""
-    points = np.array([face.centroid for face in body.faces])
-    heights = np.einsum("fi,fvi->fv", body.normals, body.vertices - points[:, None, :])
-    return bool((heights >= -FLUSH * body.radius).all())
 
 
 def write_scene(scene: Scene, path: str | Path) -> Path:

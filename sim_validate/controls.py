@@ -5,6 +5,7 @@ failure, and its separating wrench is the first thing it is tested with: no cont
 within the cones can oppose that wrench, whatever the fingers do.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -13,6 +14,8 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure import ClosureCertificate, force_closure
+from grasp_core.contact_arrays import stacked
+from grasp_core.critical import critical_friction
 from grasp_core.errors import SolverError, UndecidedError
 from grasp_core.values import Contact, Grasp, Polyhedron
 from sim_validate.uncorrected import uncorrected_contacts
@@ -70,10 +73,28 @@ def _low_friction(grasp: Grasp) -> Iterator[Control]:
 
 
 def _fingers_removed(grasp: Grasp, friction: float) -> Iterator[Control]:
-    """Three contacts that lose closure, or else two, which can always be turned about a line."""
-    for count in (3, 2):
-        for rest in combinations(grasp.contacts, count):
-            yield from _refuted("fingers_removed", rest, friction)
+    """Three contacts that lose closure, at less friction if they must be made to, or else two.
+
+    Without friction no three contacts are in closure, so three are open below some friction. Two
+    are at any, as they can always be turned about the line between them.
+    """
+    threes = list(combinations(grasp.contacts, 3))
+    for rest in threes:
+        yield from _refuted("fingers_removed", rest, friction)
+    for rest in threes:
+        lower = FRICTION_SHARE * _critical(rest)
+        if LEAST_FRICTION <= lower <= friction:
+            yield from _refuted("fingers_removed", rest, lower)
+    for rest in combinations(grasp.contacts, 2):
+        yield from _refuted("fingers_removed", rest, friction)
+
+
+def _critical(contacts: Sequence[Contact]) -> float:
+    """The critical friction of contacts; infinite where it is not decided."""
+    try:
+        return critical_friction(*stacked(contacts))
+    except (SolverError, UndecidedError):
+        return math.inf
 
 
 def _normal_flipped(grasp: Grasp, friction: float) -> Iterator[Control]:
@@ -114,10 +135,8 @@ def _near_corner(pieces: Sequence[Array], rng: np.random.Generator) -> Array:
 
 def _refuted(name: str, contacts: Sequence[Contact], friction: float) -> Iterator[Control]:
     """The control, if the analysis proves that it is not in force closure."""
-    positions = np.array([contact.position for contact in contacts])
-    normals = np.array([contact.normal for contact in contacts])
     try:
-        certificate = force_closure(positions, normals, friction)
+        certificate = force_closure(*stacked(contacts), friction)
     except UndecidedError:
         return
     if not certificate.closed:

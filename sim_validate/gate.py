@@ -6,7 +6,8 @@ from functools import lru_cache
 
 from grasp_core.errors import UnfaithfulError
 from grasp_core.versions import versions
-from sim_validate.known_cases import Case, Check, known_answers
+from sim_validate.gate_case import Case, Check
+from sim_validate.known_cases import known_answers, mesh_touches
 from sim_validate.setup import Setup
 
 USUAL_FRICTION, USUAL_RADIUS_M = 0.5, 0.07
@@ -54,10 +55,15 @@ def measured_gate(
         radius_m: Of the object under test; the known cases get its size to two digits.
     """
     fingers = replace(setup.fingers, radius_m=None, approach=None)
-    setup = replace(setup, fingers=fingers, surface="pads", threads=1, timeout_s=math.inf)
+    setup = replace(setup, fingers=fingers, threads=1, timeout_s=math.inf)
     return _measured(Case(setup, friction, float(f"{radius_m:.1e}")))
 
 
 @lru_cache(maxsize=32)
 def _measured(case: Case) -> Gate:
-    return Gate(known_answers(case), versions()["mujoco"])
+    pads = replace(case, setup=replace(case.setup, surface="pads"))  # controls are always on pads
+    checks = known_answers(pads)
+    if case.setup.surface == "mesh":
+        meshes = (*mesh_touches(case), *known_answers(case))
+        checks += tuple(replace(check, name=f"on a mesh: {check.name}") for check in meshes)
+    return Gate(checks, versions()["mujoco"])

@@ -26,8 +26,11 @@ from grasp_core.errors import InputError
 MOST_ROUNDS = 40
 SECONDS, POSITIVE = (0.05, 60.0), (SMALLEST, LARGEST)
 RANGES = {
-    "load_share": (0.01, 0.999),
-    "least_normal_share": (1e-9, 0.5),
+    "hold_s": (0.2, 60.0),  # shorter ones do not see a small imbalance move anything
+    "load_share": (0.1, 0.999),  # less would say next to nothing of a grasp
+    "control_load": (0.05, 2.0),  # less, and the servos, which hide up to 0.01, might hold it
+    "least_normal_share": (1e-4, 0.1),
+    "least_excess": (1e-4, 0.01),  # less, and the servos might hold; more, and no control needs it
     "least_friction": (1e-6, 0.01),
     "settling_friction": (1.0, 100.0),
 }

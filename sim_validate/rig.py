@@ -96,13 +96,26 @@ class Rig:
 
     def release(self, settling_friction: float, frictions: Sequence[float]) -> tuple[Trace, ...]:
         """Motion of the unloaded object after friction is lowered to each of several values."""
+        return self._traces(self._releases(settling_friction, frictions))
+
+    def _releases(self, settling_friction: float, frictions: Sequence[float]) -> list[Schedule]:
         clock, protocol = self.bench.clock, self.setup.friction
-        return self._traces(
-            [
-                schedules.release(self.idle.forces, settling_friction, friction, clock, protocol)
-                for friction in frictions
-            ]
-        )
+        return [
+            schedules.release(self.idle.forces, settling_friction, friction, clock, protocol)
+            for friction in frictions
+        ]
+
+    def motions_of_holds(self, loads: Sequence[Load]) -> Array:
+        """Joint positions under each load, from the closed fingers on, (trials, n, 7 + 3k)."""
+        return self._joints(self._holds(loads, None))
+
+    def motions_of_releases(self, settling_friction: float, frictions: Sequence[float]) -> Array:
+        """The same, of the unloaded object after friction is lowered to each of several values."""
+        return self._joints(self._releases(settling_friction, frictions))
+
+    def _joints(self, trials: Sequence[Schedule]) -> Array:
+        motions = self.bench.run(trials, self.closed and self.closed.state)
+        return np.array([motion.joints for motion in motions])
 
     def _traces(self, trials: Sequence[Schedule]) -> tuple[Trace, ...]:
         return self._traced(trials, self.bench.run(trials, self.closed and self.closed.state))

@@ -50,6 +50,8 @@ PARTS = {
     "friction": FrictionProtocol,
 }
 MOST_THREADS = 1024
+HARD_FINGER = 3
+"""Dimension of a contact whose force has a normal and two tangential parts."""
 LimitSearch: TypeAlias = Literal["none", "ramp", "bisection"]
 
 
@@ -58,7 +60,8 @@ class Setup:
     """How trials are simulated.
 
     Raises:
-        InputError: A part is none, or a number is out of its range.
+        InputError: A part is none, a number is out of its range, or the physics is not that of the
+            predictions.
     """
 
     fingers: FingerSettings = field(default_factory=FingerSettings)
@@ -76,6 +79,7 @@ class Setup:
     def __post_init__(self) -> None:
         for name, kind in PARTS.items():
             instance(getattr(self, name), kind, name)
+        _check_model(self.physics)
         one_of(self.surface, get_args(Surface), "surface")
         whole(self.threads, "threads", least=1, most=MOST_THREADS)
         number(self.timeout_s, "timeout_s", above=0.0, most=math.inf)
@@ -84,6 +88,20 @@ class Setup:
         """The scene of a grasp with these settings."""
         return build_scene(
             body, grasp, friction, fingers=self.fingers, physics=self.physics, surface=self.surface
+        )
+
+
+def _check_model(physics: PhysicsSettings) -> None:
+    """Refuse physics in which forces act that the predictions do not know."""
+    if any(physics.gravity):
+        raise InputError(
+            f"physics.gravity must be zero, got {physics.gravity}: masses are scaled, so it would "
+            "not be the object's weight; give that as a wrench (--weight-n, or Agenda.wrenches)"
+        )
+    if physics.condim != HARD_FINGER:
+        raise InputError(
+            f"physics.condim must be {HARD_FINGER}, got {physics.condim}: predictions are for hard "
+            "fingers, whose contacts have friction and no torsion"
         )
 
 

@@ -60,7 +60,11 @@ def setup_from_tables(tables: Mapping[str, Any], setup: Setup, path: str) -> Set
         if name not in OF_USERS or not isinstance(given, dict):
             raise InputError(f"{path}: tables are {', '.join(OF_USERS)}; got {shown(name)}")
         table = cast("dict[str, Any]", given)
-        setup = replace(setup, **{name: _filled(path, name, getattr(setup, name), table)})
+        filled = _filled(path, name, getattr(setup, name), table)
+        try:
+            setup = replace(setup, **{name: filled})
+        except InputError as error:  # of a part that suits no prediction
+            raise InputError(f"{path}: [{name}] {error}") from error
     return setup
 
 

@@ -178,6 +178,31 @@ def _unlogged() -> Iterator[None]:
         mujoco.MjLogConfig.set(before)
 
 
+def first_touch(scene: Scene) -> tuple[Array, Array]:
+    """What each fingertip touches before anything moves.
+
+    Args:
+        scene: With rigid fingertips that are put into the object.
+
+    Returns:
+        Normals out of the fingertips, (k, 3), world axes, and depths, (k,) [m]; NaN for a fingertip
+        that has not exactly one contact.
+    """
+    model = _compiled(scene)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    count = len(scene.layout.contacts)
+    tips = [model.geom(f"finger{finger}").id for finger in range(count)]
+    normals, depths = np.full((count, 3), np.nan), np.full(count, np.nan)
+    for finger, tip in enumerate(tips):
+        own = [contact for contact in data.contact if tip in contact.geom]
+        if len(own) == 1:
+            (contact,) = own
+            normals[finger] = contact.frame[:3] * (1.0 if contact.geom[0] == tip else -1.0)
+            depths[finger] = -contact.dist
+    return normals, depths
+
+
 def acceleration(scene: Scene, wrenches: Array) -> Array:
     """What acceleration of the object each of several wrenches causes at once, unloaded fingers.
 

@@ -28,6 +28,7 @@ from sim_validate.grasp_verdict import Verdict
 from sim_validate.independent import Bounds, independent_bounds
 from sim_validate.limits import SimulatedLimit, bisected_limits, ramped_limits
 from sim_validate.loads import PlannedLoad, planned_loads
+from sim_validate.mesh_contacts import require_touch
 from sim_validate.noise.repeats import Robustness, for_repeats, robustness
 from sim_validate.released import CriticalFriction, released_friction
 from sim_validate.rig import Rig, squeezed
@@ -71,6 +72,7 @@ def validate(
             f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got {friction}"
         )
     gate = require_faithful(setup, friction, body.radius)
+    require_touch(body, grasp.contacts, setup)
     scene = setup.scene(body, grasp, friction)
     trial = _Bout(body, replace(grasp, critical_friction=critical), friction, scene, agenda, setup)
     wrenches = trial.wrenches()
@@ -116,6 +118,7 @@ def simulated_critical_friction(
         raise InputError(f"grasp {grasp.id}: no friction gives force closure")
     friction = max(predicted, setup.friction.least_friction)
     require_faithful(setup, radius_m=body.radius)
+    require_touch(body, grasp.contacts, setup)
     scene = setup.scene(body, grasp, friction)
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
     found = released_friction(bench, grasp.positions, grasp.normals, predicted, setup)

@@ -49,6 +49,35 @@ def test_the_number_alone_is_one_call():
         )
 
 
+def test_a_finger_that_hardly_needs_to_push_does_not_let_the_object_turn():
+    """Two fingers need the friction; with the others idle the object turned 8 % above it."""
+    body = scenes.example_object("box")
+    found = gc.plan(body, 2.0, limit=2).grasps
+    (grasp,) = [each for each in found if each.id == "c-0-1-2-3"]
+    assert sv.simulated_critical_friction(body, grasp) == pytest.approx(
+        grasp.critical_friction, rel=0.005
+    )
+    forces = forces_just_above(grasp.positions, grasp.normals, grasp.critical_friction)
+    assert np.einsum("ki,ki->k", forces, grasp.normals).min() > 5e-6
+
+
+@pytest.mark.parametrize("extent_m", [1e-3, 2.0])
+@pytest.mark.parametrize("name", ["box", "prism"])
+def test_it_is_found_at_any_size(name, extent_m):
+    example, tested = scenes.example_object(name), 0
+    scale = extent_m / float(np.ptp(example.vertices, axis=0).max())
+    body = gc.Polyhedron.from_mesh(scale * example.vertices, example.triangles, name=name)
+    for family in FAMILIES:
+        for grasp in gc.plan(body, 0.3, families=(family,), limit=4).grasps:
+            if grasp.critical_friction < FrictionProtocol().least_friction:
+                continue
+            assert sv.simulated_critical_friction(body, grasp) == pytest.approx(
+                grasp.critical_friction, rel=0.005
+            )
+            tested += 1
+    assert tested >= 4
+
+
 def test_forces_just_above_the_critical_friction_need_it_and_balance():
     body, (grasp, *_) = grasps("random-12-1", 0.5, 1, ("regulus",))
     forces = forces_just_above(grasp.positions, grasp.normals, grasp.critical_friction)

@@ -1,0 +1,119 @@
+"""Settings that are broken on purpose: none must get as far as a grasp, which would be blamed."""
+
+import pytest
+
+import grasp_core as gc
+from sim_validate.gate import require_faithful
+from sim_validate.setup import Setup
+from sim_validate.setup_file import setup_from_tables
+
+USUAL, TINY = 0.07, 5e-4
+"""Radius of the object under test [m]."""
+DEFAULTS = {
+    "cone": "pyramidal", "impratio": 1.0, "integrator": "Euler", "tolerance": 1e-8,
+    "solref": [0.02, 1.0], "solimp": [0.9, 0.95, 0.001, 0.5, 2.0],
+}  # fmt: skip
+GATE, RANGE = gc.UnfaithfulError, gc.InputError
+EVERYDAY = (
+    ("pads", "physics", {"solver": "CG"}, GATE),
+    ("pads", "physics", {"tolerance": 1e-4}, GATE),
+    ("pads", "hold", {"hold_threshold": 1e-6}, GATE),
+    ("mesh", "physics", {"ccd_iterations": 1}, GATE),
+    ("pads", "hold", {"load_share": 0.01}, RANGE),
+    ("pads", "hold", {"control_load": 1e-6}, RANGE),
+    ("pads", "hold", {"control_load": 1e4}, RANGE),
+    ("pads", "hold", {"least_normal_share": 0.5}, RANGE),
+    ("pads", "hold", {"least_excess": 1e-8}, RANGE),
+    ("pads", "hold", {"least_excess": 1.0}, RANGE),
+    ("pads", "hold", {"hold_s": 0.05}, RANGE),
+    ("pads", "physics", {"gravity": [0.0, 0.0, -9.81]}, RANGE),
+    ("pads", "physics", {"gravity": [1.0, 0.0, 0.0]}, RANGE),
+    ("pads", "physics", {"condim": 1}, RANGE),
+    ("pads", "physics", {"condim": 4}, RANGE),
+    ("pads", "physics", {"condim": 6}, RANGE),
+)
+REST = (
+    ("pads", "physics", {"cone": "pyramidal"}, GATE),
+    ("pads", "physics", {"autoreset": True}, GATE),
+    ("pads", "physics", {"integrator": "implicitfast", "tolerance": 1e-8}, GATE),
+    ("pads", "physics", DEFAULTS, GATE),
+    ("pads", "physics", {"impratio": 1e-3}, GATE),
+    ("pads", "physics", {"impratio": 1.0}, GATE),
+    ("pads", "physics", {"impratio": 10.0}, GATE),
+    ("pads", "physics", {"impratio": 1.0, "noslip_iterations": 5}, GATE),
+    ("pads", "physics", {"solver": "PGS"}, GATE),
+    ("pads", "physics", {"iterations": 1}, GATE),
+    ("pads", "physics", {"ls_iterations": 1}, GATE),
+    ("pads", "physics", {"tolerance": 1e-8}, GATE),
+    ("pads", "physics", {"timestep": 0.05}, GATE),
+    ("pads", "physics", {"timestep": 0.02}, GATE),
+    ("pads", "physics", {"timestep": 0.01}, GATE),
+    ("pads", "physics", {"solimp": [0.5, 0.5, 0.001, 0.5, 2.0]}, GATE),
+    ("pads", "physics", {"solref": [0.1, 1.0]}, GATE),
+    ("pads", "physics", {"solref": [0.02, 1.0]}, GATE),
+    ("pads", "physics", {"margin": 1e-3}, GATE),
+    ("pads", "physics", {"margin": 1e-2}, GATE),
+    ("pads", "physics", {"wind": [10.0, 0.0, 0.0], "density": 1000.0}, GATE),
+    ("mesh", "physics", {"ccd_iterations": 2}, GATE),
+    ("mesh", "physics", {"ccd_iterations": 3}, GATE),
+    ("mesh", "physics", {"ccd_iterations": 5}, GATE),
+    ("mesh", "physics", {"ccd_tolerance": 0.01}, GATE),
+    ("mesh", "physics", {"margin": 1e-3}, GATE),
+    ("pads", "fingers", {"mass_kg": 1e6}, GATE),
+    ("pads", "fingers", {"mass_kg": 1e-6}, GATE),
+    ("pads", "fingers", {"stiffness_n_per_m": 0.01}, GATE),
+    ("pads", "fingers", {"stiffness_n_per_m": 10.0}, GATE),
+    ("pads", "fingers", {"stiffness_n_per_m": 1e6}, GATE),
+    ("pads", "hold", {"hold_threshold": 0.02}, GATE),
+    ("pads", "hold", {"hold_threshold": 1e-9}, GATE),
+    ("pads", "hold", {"total_threshold": 1e-6}, GATE),
+    ("pads", "hold", {"gap_threshold": 1.0}, GATE),
+    ("pads", "limit", {"ramp_threshold": 0.01}, GATE),
+    ("pads", "limit", {"ramp_threshold": 1e-9}, GATE),
+    ("pads", "limit", {"spans": [0.9], "rounds": 1}, GATE),
+    ("pads", "limit", {"spans": [1e-4]}, GATE),
+    ("pads", "friction", {"threshold": 0.01}, GATE),
+    ("pads", "friction", {"threshold": 1e-9}, GATE),
+    ("pads", "friction", {"spans": [0.9], "rounds": 1}, GATE),
+    ("pads", "friction", {"spans": [1e-4]}, GATE),
+)
+AT_SMALL_SIZE = (
+    ("pads", "physics", {"tolerance": 1e-12}, GATE),
+    ("mesh", "physics", {"ccd_tolerance": 1e-3}, GATE),
+)
+"""They would do for objects of some centimetres."""
+
+
+def refusal(surface, table, numbers, radius_m, friction=0.5):
+    """The error that stops these settings, None if nothing does."""
+    try:
+        setup = setup_from_tables({table: numbers}, Setup(surface=surface), "setup.toml")
+        require_faithful(setup, friction, radius_m)
+    except gc.GraspError as error:
+        return error
+    return None
+
+
+@pytest.mark.parametrize(("surface", "table", "numbers", "kind"), EVERYDAY)
+def test_broken_settings_are_refused_before_a_grasp_is_simulated(surface, table, numbers, kind):
+    error = refusal(surface, table, numbers, USUAL)
+    assert type(error) is kind
+    if kind is RANGE:
+        assert next(iter(numbers)) in str(error)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("surface", "table", "numbers", "kind"), REST)
+def test_so_are_more_of_them(surface, table, numbers, kind):
+    assert type(refusal(surface, table, numbers, USUAL)) is kind
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("surface", "table", "numbers", "kind"), AT_SMALL_SIZE)
+def test_what_is_too_coarse_for_a_small_object_is_refused_there(surface, table, numbers, kind):
+    assert refusal(surface, table, numbers, USUAL, 1.0) is None
+    assert type(refusal(surface, table, numbers, TINY, 1.0)) is kind
+
+
+def test_enough_settings_are_tried():
+    assert len({repr(case) for case in EVERYDAY + REST}) >= 40
