@@ -27,8 +27,8 @@ STRICT = {"obj": obj.read, "stl": stl.read, "ply": ply.read, "off": off.read, "g
 ROUNDING = {"glb": 1e-9}
 """Of matrices multiplied in another order; other formats write numbers as they are."""
 ONE_READING = ("off",)
-"""Formats whose strict reading stands where trimesh raises, as it does on pentagons: text of counted
-lines that are all accounted for, which leaves nothing to read in another way."""
+"""Formats whose strict reading stands where trimesh raises, as it does on pentagons: text of
+counted lines that are all accounted for, which leaves nothing to read in another way."""
 FORBIDDEN = ("socket.", "subprocess.", "os.", "shutil.", "pty.", "tempfile.", "urllib.", "http.")
 LOOKING = ("os.listdir", "os.scandir", "os.putenv", "os.unsetenv")
 """What imports need."""
