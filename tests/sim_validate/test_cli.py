@@ -309,6 +309,23 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
     facts = json.loads(capsys.readouterr().out)
     assert facts["patches"]["most"] == 20
     assert 0.0 < facts["largest_spread_deg"] <= 10.0
+    assert main(["inspect", "scan.ply", "--unit", "mm"]) == Exit.GOOD
+    said = capsys.readouterr().out
+    assert "20 nearly flat patches of a curved surface" in said
+    assert "deg at most, 10 deg allowed" in said
+
+
+def test_a_mesh_is_described_in_words(capsys):
+    """Not by the repr of anything."""
+    assert main(["inspect", "wedge"]) == Exit.GOOD
+    said = capsys.readouterr().out
+    assert said.splitlines()[:3] == [
+        "wedge",
+        "  mesh                 6 vertices, 8 triangles",
+        "  faces                8 planar, 0 not convex, 0 with holes",
+    ]
+    assert re.search(r"volume +0\.000199083 m\^3\n", said)
+    assert not re.search(r"[{}\[\]']|None|_", said)
 
 
 @pytest.mark.usefixtures("here")
