@@ -46,7 +46,7 @@ def exact(kind, data, points, faces):
     assert found[corners].tolist() == [[list(points[i]) for i in face] for face in faces]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(obj_texts())
 def test_obj_in_any_style(case):
     (points, faces), text = case
@@ -108,21 +108,21 @@ def test_off_with_a_line_too_many_or_too_few_is_still_refused(tmp_path):
     assert refused == 4
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(meshes())
 def test_both_kinds_of_stl(mesh):
     exact("stl", stl(*mesh), *mesh)
     exact("stl", stl_text(*mesh).encode(), *mesh)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(meshes(DOUBLE))
 def test_off(mesh):
     points, faces = mesh
     exact("off", off(f"{len(points)} {len(faces)} 0", points, faces).encode(), points, faces)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(meshes(), st.sampled_from(["ascii", "binary_little_endian", "binary_big_endian"]))
 def test_ply_of_every_kind(mesh, form):
     points, faces = mesh
@@ -140,7 +140,7 @@ def test_ply_of_every_kind(mesh, form):
 UNIT = st.floats(-1.0, 1.0).filter(lambda x: abs(x) > 1e-3)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(UNIT, min_size=10, max_size=10), st.booleans())
 def test_glb_with_nodes_that_move_turn_stretch_and_mirror(numbers, nested):
     turn = np.array(numbers[:4]) / np.linalg.norm(numbers[:4])
@@ -159,7 +159,7 @@ FILES = {
 
 
 @pytest.mark.parametrize("kind", FILES)
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(data=st.data())
 def test_a_word_that_is_damaged_is_refused_or_read_as_it_is(kind, data):
     """By the plain reading of the fuzzer, which knows nothing of ours."""

@@ -5,7 +5,6 @@ import shlex
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -16,6 +15,7 @@ from sim_validate import commands
 from sim_validate.cli import Exit, main
 from sim_validate.examples import EXAMPLES
 from tests.grasp_core.curved import bumpy_ellipsoid
+from tests.patience import HANGING_S
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -266,13 +266,14 @@ def test_an_interrupted_run_keeps_what_is_done(here):
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
     folder = here / "graspproof-out" / "icosahedron"
-    deadline = time.monotonic() + 120
-    while len(list(folder.glob("scenes/*.xml"))) < 420 and time.monotonic() < deadline:
-        time.sleep(0.1)
-    time.sleep(4.0)
+    said = []
+    for line in process.stderr:  # the first line of progress says that some are simulated
+        said.append(line)
+        if re.match(r"simulating [1-9]\d*/420", line):
+            break
     process.send_signal(signal.SIGINT)
-    _, complaint = process.communicate(timeout=60)
-    assert process.returncode == Exit.INTERRUPTED, complaint
+    _, complaint = process.communicate(timeout=HANGING_S)
+    assert process.returncode == Exit.INTERRUPTED, [*said, complaint]
     assert len(json.loads((folder / "grasps.json").read_text())["grasps"]) == 420
     verdicts = json.loads((folder / "verdicts.json").read_text())
     assert verdicts["complete"] is False
