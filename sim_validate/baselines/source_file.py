@@ -79,9 +79,17 @@ def _beside(name: str, folders: Iterable[Path]) -> list[Path]:
     return [
         path
         for folder in unique.values()
-        for path in sorted(folder.iterdir())
+        for path in _entries(folder)
         if path.stem == name and path.suffix.lower().lstrip(".") in FORMATS and path.is_file()
     ]
+
+
+def _entries(folder: Path) -> list[Path]:
+    """What is in a folder, sorted; nothing where it is not there yet, or may not be looked into."""
+    try:
+        return sorted(folder.iterdir())
+    except OSError:
+        return []
 
 
 def _is_source(path: Path, body: Polyhedron) -> bool:

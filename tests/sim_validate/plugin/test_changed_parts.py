@@ -115,6 +115,16 @@ def test_comments_line_ends_and_the_order_of_vertices_are_no_change(project):
     assert found == 3
 
 
+def test_a_folder_that_is_not_there_yet_holds_no_part(project):
+    (project / "part.obj").unlink()
+    grasps = project / "grasps.json"
+    found = source_of(
+        grasps_from_json(grasps.read_text()), grasps, [project / "to" / "be" / "made"]
+    )
+    assert found.file is None
+    assert "was tested" in found.note
+
+
 def test_a_part_elsewhere_is_named_in_the_file(project):
     """And other files with the object's name then do not count."""
     elsewhere = project / "cad"
