@@ -28,8 +28,9 @@ LONGEST_ANSWER = 2**16
 ROW_BYTES = 24
 """Of three coordinates, or three numbers of vertices."""
 GRACE_S = 240.0
-"""Beside the seconds of a processor that a file may cost, for a process that gets little of one: two
-seconds for its start took 75 s at low priority beside four others. It only ends what hangs."""
+"""Beside the seconds of a processor that a file may cost, for a process that gets little of one: by
+the weights of Linux, two seconds for its start take 75 s at niceness 10 beside four busy processes.
+It only ends what hangs."""
 
 
 @dataclass(frozen=True, slots=True)
