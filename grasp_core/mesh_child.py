@@ -27,8 +27,10 @@ LONGEST_ANSWER = 2**16
 """Of a line that says what comes, or why nothing does."""
 ROW_BYTES = 24
 """Of three coordinates, or three numbers of vertices."""
-GRACE_S = 20.0
-"""For the start of the process, on a busy machine."""
+GRACE_S = 240.0
+"""Beside the seconds of a processor that a file may cost, for a process that gets little of one: by
+the weights of Linux, two seconds for its start take 75 s at niceness 10 beside four busy processes.
+It only ends what hangs."""
 
 
 @dataclass(frozen=True, slots=True)

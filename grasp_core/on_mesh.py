@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.mesh import nearest_on_triangles
+from grasp_core.nearest_points import nearest_on_triangles
 
 LEAN = math.cos(3e-3)
 """Of the angle between a normal and a triangle's that count as one: planar faces are as flat as

@@ -2,10 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from textwrap import shorten
 from typing import Protocol
 
 from grasp_core.reach import Finger
+from grasp_core.short_text import counted, summary
 from grasp_core.values import FaceQuadruple, Grasp
+
+LONGEST_REASON = 160
+"""Characters of a reason in the `repr` of a plan, which is to be two lines at most."""
 
 
 class Proof(Protocol):
@@ -76,7 +81,7 @@ class PlanCounts:
     """By method, the three families and perhaps `free`."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Plan:
     """The grasps found on one object, best radius first, and what was tried."""
 
@@ -104,3 +109,14 @@ class Plan:
     """Face quadruples with contacts that fingers do not reach, and why."""
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
     """Processor time of each method, from its first program to the last critical friction."""
+
+    def __repr__(self) -> str:
+        """How many grasps there are, the largest of them, and what is known of all quadruples."""
+        of, known = self.counts.quadruples, self.outcomes
+        sets = f"of {counted(of, 'face quadruple')} {known.held} held, {known.absent} absent"
+        sets += f", {known.open} open, {known.out_of_reach} out of reach"
+        parts = [counted(len(self.grasps), "grasp"), sets]
+        if self.absence is not None:
+            parts.append(repr(shorten(self.absence, LONGEST_REASON)))
+        radius = max((grasp.radius for grasp in self.grasps), default=0.0)
+        return summary("Plan", *parts, friction=self.friction, largest_radius=radius)

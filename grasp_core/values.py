@@ -24,6 +24,7 @@ from grasp_core.checked import (
     whole,
 )
 from grasp_core.errors import InputError
+from grasp_core.short_text import counted, summary, vector
 
 Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
 """The class of a grasp's witness lines."""
@@ -41,7 +42,7 @@ FINGERS = 4
 RIGHT_ANGLE = np.pi / 2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Face:
     """A planar face: one outer border, perhaps holes, and a split into convex pieces."""
 
@@ -77,6 +78,10 @@ class Face:
         number(self.spread, "spread", least=0.0, below=RIGHT_ANGLE)
         number(self.depth, "depth", least=0.0, most=LARGEST)
 
+    def __repr__(self) -> str:
+        parts = [counted(len(self.polygon), "corner"), counted(len(self.holes), "hole")]
+        return summary("Face", *parts, area=self.area, centroid=self.centroid, normal=self.normal)
+
 
 @dataclass(frozen=True, slots=True)
 class PatchLimits:
@@ -99,7 +104,7 @@ class PatchLimits:
         whole(self.most, "most", least=FINGERS, most=200)  # what the planner takes
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Polyhedron:
     """A solid bounded by planar faces, with the mass properties of uniform density 1."""
 
@@ -182,8 +187,14 @@ class Polyhedron:
         """The faces' normals, (faces, 3)."""
         return np.array([face.normal for face in self.faces]).reshape(-1, 3)
 
+    def __repr__(self) -> str:
+        kind = "face" if self.patches is None else "patch"
+        sizes = [(self.vertices, "vertex"), (self.triangles, "triangle"), (self.faces, kind)]
+        parts = [counted(len(things), name) for things, name in sizes]
+        return summary("Polyhedron", shown(self.name), *parts, radius=self.radius)
 
-@dataclass(frozen=True, slots=True, eq=False)
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ForceCone:
     """A circular cone of force directions inside a friction cone.
 
@@ -199,8 +210,11 @@ class ForceCone:
         object.__setattr__(self, "axis", frozen_units(self.axis, (3,), "axis"))
         number(self.half_angle, "half_angle", least=0.0, below=RIGHT_ANGLE)
 
+    def __repr__(self) -> str:
+        return summary("ForceCone", axis=self.axis, half_angle=self.half_angle)
 
-@dataclass(frozen=True, slots=True, eq=False)
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Contact:
     """Where one fingertip touches, and which way it can push."""
 
@@ -213,8 +227,11 @@ class Contact:
         object.__setattr__(self, "position", frozen(self.position, (3,), "position"))
         object.__setattr__(self, "normal", frozen_units(self.normal, (3,), "normal"))
 
+    def __repr__(self) -> str:
+        return summary("Contact", position=self.position, normal=self.normal)
 
-@dataclass(frozen=True, slots=True, eq=False)
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ContactRegion:
     """Where one finger may stand while the others stay anywhere in their own regions."""
 
@@ -232,8 +249,12 @@ class ContactRegion:
         object.__setattr__(self, "polygon", frozen(self.polygon, (None, 3), "polygon"))
         number(self.inscribed_radius, "inscribed_radius", least=0.0, most=LARGEST)
 
+    def __repr__(self) -> str:
+        corners = counted(len(self.polygon), "corner")
+        return summary("ContactRegion", self.kind, corners, inscribed_radius=self.inscribed_radius)
 
-@dataclass(frozen=True, slots=True, eq=False)
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Witness:
     """Balanced forces, whose four lines show what family a grasp belongs to."""
 
@@ -251,8 +272,11 @@ class Witness:
         """Unit vectors along the lines, (4, 3)."""
         return self.forces / np.linalg.norm(self.forces, axis=1, keepdims=True)
 
+    def __repr__(self) -> str:
+        return summary("Witness", *(vector(force) for force in self.forces))
 
-@dataclass(frozen=True, slots=True, eq=False)
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Grasp:
     """Four contacts in finger order, with the witness of why they hold."""
 
@@ -317,6 +341,13 @@ class Grasp:
     def normals(self) -> Array:
         """Inward normals in finger order, (4, 3)."""
         return np.array([contact.normal for contact in self.contacts])
+
+    def __repr__(self) -> str:
+        return summary(
+            "Grasp", shown(self.id), self.family, faces=self.faces, radius=self.radius,
+            critical_friction=self.critical_friction, closure_margin=self.closure_margin,
+            ferrari_canny=np.array(self.ferrari_canny),
+        )  # fmt: skip
 
 
 PER_FINGER = {"contacts": Contact, "force_cones": ForceCone, "regions": ContactRegion}

@@ -11,6 +11,7 @@ from sim_validate.baselines.comparing import Finding, Status, failing
 from sim_validate.baselines.junit import junit_text
 from sim_validate.baselines.measuring import complete, measured, seen_from
 from sim_validate.baselines.settings import of_settings, setup_for
+from sim_validate.baselines.source_file import Source, source_of
 from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.files import write_text
 from sim_validate.grasps_file import read_grasps
@@ -25,6 +26,7 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
     """Write a baseline."""
     check_writable(command.out)
     saved = read_grasps(command.grasps)
+    source = source_of(saved, command.grasps, [command.out.parent])
     agenda = Agenda(
         random_wrenches=command.random_wrenches,
         wrenches=() if command.wrenches is None else wrenches_from_file(command.wrenches),
@@ -40,6 +42,7 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
     write_baseline(command.out, found)
     held = sum(entry.held for entry in found.entries)
     reporter.say(f"wrote {command.out}: {held} of {len(found.entries)} grasps held")
+    _say_source(source, reporter)
     reporter.document({"baseline": str(command.out), "grasps": len(found.entries), "held": held})
     return cli.Exit.GOOD
 
@@ -49,6 +52,7 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     before = read_baseline(command.baseline)
     path = command.grasps or command.baseline.parent / before.grasps_file
     saved = read_grasps(path)
+    source = source_of(saved, path, [command.baseline.parent])
     setup, agenda = of_settings(before.settings, str(command.baseline))
     if command.setup is not None:
         setup = setup_from_file(command.setup, setup)
@@ -59,11 +63,17 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
         text = junit_text(str(command.baseline), done.findings, strict=command.strict)
         write_text(command.junit, text)
     _show(done, reporter)
+    _say_source(source, reporter)
     if command.bless:
         write_baseline(command.baseline, complete(done.measured))
         reporter.say(f"wrote {command.baseline}")
         return cli.Exit.GOOD
     return exit_code(done.findings, strict=command.strict)
+
+
+def _say_source(source: Source, reporter: Reporter) -> None:
+    if source.note:
+        reporter.say(source.note)
 
 
 def exit_code(findings: Sequence[Finding], *, strict: bool) -> int:

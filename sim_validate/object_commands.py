@@ -1,16 +1,21 @@
 """The commands about objects: what one is as a polyhedron, and which are built in."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import asdict
-from typing import Any, cast
 
 from grasp_core.candidates import LEAST_SPAN_ANGLE
 from grasp_core.planar_faces import MAX_FACES
+from grasp_core.short_text import vector
 from grasp_core.spanning import count_spanning
+from grasp_core.values import Polyhedron
 from scenes.objects import example_names
 from sim_validate import cli
 from sim_validate.console import Reporter
 from sim_validate.plan_command import load_object
+
+WIDTH = 20
+"""Of the column that says what a fact is about, in characters."""
 
 
 def inspect_object(command: cli.Inspect, reporter: Reporter) -> int:
@@ -37,16 +42,37 @@ def inspect_object(command: cli.Inspect, reporter: Reporter) -> int:
         "notes": list(body.notes),
     }
     reporter.document(facts)
-    reporter.table(body.name, ("property", "value"), [(k, _short(v)) for k, v in facts.items()])
+    reporter.say(body.name)
+    for what, said in _in_words(body, spanning):
+        reporter.say(f"  {what:{WIDTH}} {said}")
     return cli.Exit.GOOD
 
 
-def _short(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    if isinstance(value, list):
-        return ", ".join(_short(item) for item in cast("list[Any]", value)) or "-"
-    return "-" if value is None else str(value)
+def _in_words(body: Polyhedron, spanning: int | None) -> Iterator[tuple[str, str]]:
+    """The facts for people: what, and how much of it."""
+    yield "mesh", f"{len(body.vertices)} vertices, {len(body.triangles)} triangles"
+    if body.patches is None:
+        holed = sum(bool(face.holes) for face in body.faces)
+        dented = sum(len(face.pieces) > 1 for face in body.faces)
+        yield "faces", f"{len(body.faces)} planar, {dented} not convex, {holed} with holes"
+    else:
+        spread = math.degrees(max((face.spread for face in body.faces), default=0.0))
+        depth = max((face.depth for face in body.faces), default=0.0)
+        asked = body.patches
+        yield "faces", f"{len(body.faces)} nearly flat patches of a curved surface"
+        yield "their spread", f"{spread:.4g} deg at most, {asked.spread_deg:.4g} deg allowed"
+        yield (
+            "their depth",
+            (f"{depth:.4g} m at most, {asked.depth:.4g} of the object's largest extent allowed"),
+        )
+    yield "volume", f"{body.volume:.6g} m^3"
+    yield "centre of mass", f"{vector(body.center_of_mass)} m"
+    yield "radius about it", f"{body.radius:.6g} m"
+    if spanning is not None:
+        yield "spanning quadruples", f"{spanning} sets of four faces whose normals positively span"
+    yield "sha256 of content", body.content_sha256
+    for note in body.notes:
+        yield "note", note
 
 
 def list_objects(_: cli.Objects, reporter: Reporter) -> int:

@@ -10,8 +10,11 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
+    from sim_validate.baselines.source_file import Source
     from sim_validate.baselines.suite import Suite
     from sim_validate.grasp_verdict import Verdict
+
+    Entries = tuple[dict[str, Any] | None, dict[str, Any] | None]
 
 ENDING = ".grasps.toml"
 MARKER = (
@@ -109,6 +112,14 @@ class _Collecting:
         """Take what a test, here or in another process, has to say."""
         self._lines += getattr(report, TRAVELS, [])
 
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        """Say which tests were not of a mesh file, but of a copy of it."""
+        notes = sorted({line["mesh_note"] for line in self._lines if line["mesh_note"]})
+        if notes:
+            terminalreporter.section("meshes of grasps")
+        for note in notes:
+            terminalreporter.write_line(note)
+
 
 class GraspsFile(pytest.File):
     """Grasps that must stay as they were."""
@@ -155,13 +166,17 @@ class GraspItem(_SuiteItem):
         from grasp_core.errors import GraspError
         from sim_validate.baselines.comparing import Status, failing
         from sim_validate.baselines.explaining import explained
+        from sim_validate.baselines.source_file import ChangedPartError
         from sim_validate.baselines.values import plain
 
         suite = self.suite
         try:
             done = suite.tested(self.name)
+        except ChangedPartError as error:
+            _note(self, self.name, Status.NOT_COMPARABLE.value, str(error))
+            raise
         except GraspError as error:
-            _note(self, self.name, "refused", str(error), None, None)
+            _note(self, self.name, "refused", str(error))
             raise
         (finding,) = done.findings
         fails = finding.status in (*failing(strict=suite.strict), Status.NOT_COMPARABLE)
@@ -170,7 +185,7 @@ class GraspItem(_SuiteItem):
         why = explained(finding, done.verdicts.get(self.name), files, done.how) if told else ""
         before, after = plain(finding.before), plain(finding.after)
         self.user_properties += [("status", finding.status.value), *(after or {}).items()]
-        _note(self, finding.id, finding.status.value, why, before, after)
+        _note(self, finding.id, finding.status.value, why, (before, after), suite.source)
         if fails:
             raise UnstableError(f"{why}\n  to accept it: pytest --grasp-bless {self.path}")
 
@@ -185,7 +200,7 @@ class BlessItem(_SuiteItem):
         found = self.suite.bless()
         self.user_properties.append(("grasps", len(found.entries)))
         for entry in found.entries:
-            _note(self, entry.id, "blessed", "", None, plain(entry))
+            _note(self, entry.id, "blessed", "", (None, plain(entry)), self.suite.source)
 
 
 @pytest.fixture
@@ -225,7 +240,9 @@ def assert_stable(
         entry = plain(entry_of(chosen.grasp, verdict, chosen.body.radius)) or {}
         for key, value in entry.items():
             record_property(f"{name}.{key}", value)
-        _note(request.node, name, "unstable" if why else "stable", why, None, entry)
+        _note(
+            request.node, name, "unstable" if why else "stable", why, (None, entry), chosen.source
+        )
         if why:
             raise UnstableError(why)
         return verdict
@@ -234,12 +251,15 @@ def assert_stable(
 
 
 def _note(
-    item: pytest.Item, grasp: str, status: str, why: str,
-    before: dict[str, Any] | None, after: dict[str, Any] | None,
+    item: pytest.Item, grasp: str, status: str, why: str, entries: "Entries" = (None, None),
+    source: "Source | None" = None,
 ) -> None:  # fmt: skip
-    """Remember what became of a grasp in a test."""
-    line = {
+    """Remember what became of a grasp in a test, with its entries before and after."""
+    line: dict[str, Any] = {
         "test": item.nodeid, "grasp": grasp, "status": status, "why": why,
-        "before": before, "after": after,
+        "before": entries[0], "after": entries[1], "mesh_file": None, "mesh_note": "",
     }  # fmt: skip
+    if source is not None:
+        line["mesh_file"] = None if source.file is None else str(source.file)
+        line["mesh_note"] = source.note
     item.stash.setdefault(LINES, []).append(line)

@@ -98,6 +98,14 @@ def test_every_block_of_code_is_one_that_a_test_runs():
         )  # fmt: skip
 
 
+def test_no_page_has_a_heading_twice():
+    for page, text in PAGES.items():
+        prose = re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+        headings = re.findall(r"^#+ .*$", prose, re.MULTILINE)
+        assert headings
+        assert len(set(headings)) == len(headings), page
+
+
 def test_links_lead_somewhere_and_every_page_is_linked():
     linked = set()
     for path in (ROOT / "README.md", *DOCS):

@@ -1,7 +1,7 @@
 """Grasps that a marked test is run with: those of a file, or planned on the spot."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ from grasp_core.planner import plan
 from grasp_core.polyhedra import load_polyhedron
 from grasp_core.values import Grasp, Polyhedron
 from scenes.objects import example_object
+from sim_validate.baselines.source_file import Source, source_of
 from sim_validate.grasps_file import read_grasps
 
 FRICTION = 0.5
@@ -24,6 +25,8 @@ class GraspCase:
     body: Polyhedron
     grasp: Grasp
     friction: float
+    source: Source = field(default_factory=Source)
+    """The mesh file that the grasp was planned from, if it comes from a file of grasps."""
 
 
 def case_of(given: Sequence[Any], friction: float | None) -> GraspCase:
@@ -40,7 +43,7 @@ def case_of(given: Sequence[Any], friction: float | None) -> GraspCase:
     if kinds == [GraspCase]:
         case: GraspCase = given[0]
         return case if friction is None else replace(case, friction=_number(friction))
-    if kinds[:2] == [Polyhedron, Grasp] and len(given) <= len(fields(GraspCase)):
+    if kinds[:2] == [Polyhedron, Grasp] and len(given) <= len(("object", "grasp", "friction")):
         named = [] if friction is None else [friction]
         frictions = [*given[2:], *named]
         if len(frictions) <= 1:
@@ -59,7 +62,8 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
             file `friction` alone.
 
     Raises:
-        InputError: A setting is unknown, missing or refused, or there is no grasp.
+        InputError: A setting is unknown, missing or refused, there is no grasp, or the mesh file
+            of a file of grasps has changed.
     """
     if len(args) > 1 or not all(isinstance(each, str) for each in args):
         raise InputError(f"@pytest.mark.grasp takes one file of grasps, got {list(args)}")
@@ -69,8 +73,11 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
             beside = "beside a file takes" if args else "takes"
             raise InputError(f"@pytest.mark.grasp {beside} {', '.join(known)}; got {name!r}")
     friction = _number(settings.get("friction", FRICTION))
+    source = Source()
     if args:
-        saved = read_grasps(folder / args[0])
+        path = folder / args[0]
+        saved = read_grasps(path)
+        source = source_of(saved, path, [folder])
         body, grasps = saved.body, saved.grasps
         friction = friction if "friction" in settings else saved.friction
     else:
@@ -79,7 +86,7 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
         grasps = _planned(body, wanted)
     if not grasps:
         raise InputError(f"@pytest.mark.grasp: there is no grasp of {body.name}")
-    return [GraspCase(body, grasp, friction) for grasp in grasps]
+    return [GraspCase(body, grasp, friction, source) for grasp in grasps]
 
 
 def _number(value: Any) -> float:

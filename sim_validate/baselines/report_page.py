@@ -16,7 +16,7 @@ from sim_validate.reports.pages import asset, page
 Line: TypeAlias = Mapping[str, Any]
 PAGE, DATA = "index.html", "report.json"
 COLUMNS = ("test", "grasp", "what became of it", "outcome", "critical friction", "in simulation",
-           "weakest wrench, N", "in simulation", "moved, um", "held with noise", "why")  # fmt: skip
+           "weakest wrench, N", "in simulation", "moved, um", "held with noise")  # fmt: skip
 MEASURED = ("outcome", "critical_friction", "simulated_critical_friction", "limit_n",
             "simulated_limit_n", "displacement_m")  # fmt: skip
 CALM = ("same", "within bands", "stable", "blessed")
@@ -27,8 +27,8 @@ def write_report(folder: Path, lines: Iterable[Line]) -> Path:
 
     Args:
         folder: Is made if it is not there.
-        lines: What became of each grasp: `test`, `grasp`, `status`, `why`, and `before` and `after`
-            as baselines keep them, or None.
+        lines: What became of each grasp: `test`, `grasp`, `status`, `why`, `before` and `after` as
+            baselines keep them, or None, `mesh_file` or None, and `mesh_note`, which may be empty.
 
     Returns:
         The path of the page.
@@ -40,13 +40,20 @@ def write_report(folder: Path, lines: Iterable[Line]) -> Path:
 
 
 def _page(lines: Sequence[Line]) -> str:
+    rows = [{"number": number, **_row(line)} for number, line in enumerate(lines)]
+    told = [row for row in rows if row["why"]]
     counts = Counter(str(line["status"]) for line in lines)
     return page(
         "stability.html",
         style=asset("style.css"),
         counts=", ".join(f"{count} {name}" for name, count in sorted(counts.items())),
+        notes=sorted({line["mesh_note"] for line in lines if line["mesh_note"]}),
+        reasons=(
+            ("To look at", [row for row in told if not row["calm"]]),
+            ("Differs as versions and rounding do", [row for row in told if row["calm"]]),
+        ),
         columns=COLUMNS,
-        rows=[_row(line) for line in lines],
+        rows=rows,
     )
 
 

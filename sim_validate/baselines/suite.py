@@ -18,6 +18,7 @@ from sim_validate.baselines.measuring import (
     with_planned_fingers,
 )
 from sim_validate.baselines.settings import noise_from_table, of_settings, setup_for
+from sim_validate.baselines.source_file import Source, source_of
 from sim_validate.baselines.values import Baseline
 from sim_validate.grasps_file import read_grasps
 from sim_validate.noise.draws import Noise
@@ -27,12 +28,12 @@ from sim_validate.wrench_file import wrenches_from_file
 
 ENDING = ".grasps.toml"
 KINDS: Mapping[str, type] = {
-    "grasps": str, "baseline": str, "strict": bool, "setup": str, "wrenches": str, "limits": str,
-    "random_wrenches": int, "trials": int, "noise": dict, "seed": int,
+    "grasps": str, "object": str, "baseline": str, "strict": bool, "setup": str, "wrenches": str,
+    "limits": str, "random_wrenches": int, "trials": int, "noise": dict, "seed": int,
 }  # fmt: skip
 """Settings of the file, and what they are."""
 WORDS = {str: "text", bool: "true or false", int: "a whole number", dict: "a table"}
-PATHS = ("grasps", "baseline", "setup", "wrenches")
+PATHS = ("grasps", "object", "baseline", "setup", "wrenches")
 DIRECT = ("limits", "random_wrenches", "trials", "seed")
 """Fields of an agenda as the file has them."""
 
@@ -46,6 +47,8 @@ class Suite:
     grasps: Path
     """A grasps.json."""
     baseline: Path
+    object: Path | None = None
+    """The mesh file that the grasps were planned from; one of its name beside them if not given."""
     strict: bool = False
     """Whether what is better fails, too."""
     setup: Path | None = None
@@ -68,6 +71,15 @@ class Suite:
             InputError: Their file is missing or refused.
         """
         return read_grasps(self.grasps)
+
+    @cached_property
+    def source(self) -> Source:
+        """The mesh file that the grasps were planned from, if it is there.
+
+        Raises:
+            InputError: It has changed since, or a file is refused.
+        """
+        return source_of(self.saved, self.grasps, [self.path.parent], self.object)
 
     @cached_property
     def kept(self) -> Baseline:
@@ -100,9 +112,10 @@ class Suite:
         """What became of one grasp, simulated with the baseline's settings and those of the file.
 
         Raises:
-            InputError: A file is refused.
+            InputError: A file is refused, or the part has changed.
             UnfaithfulError: The simulator fails the gate.
         """
+        _ = self.source
         before = self.kept
         return check_one(before, self.saved, self.where, self._settings(before), name)
 
@@ -110,9 +123,10 @@ class Suite:
         """Simulate all grasps and write the baseline, with the settings that it has.
 
         Raises:
-            InputError: A file or a grasp is refused.
+            InputError: A file or a grasp is refused, or the part has changed.
             UnfaithfulError: The simulator fails the gate.
         """
+        _ = self.source
         check_writable(self.baseline)
         before, saved = self._kept_if_any(), self.saved
         setup, agenda = self._settings(before)

@@ -34,7 +34,6 @@ def test_some_bad_meshes_are_refused():
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)
 @pytest.mark.parametrize("group", GROUPS)
 def test_all_bad_input_is_refused(group):
     from tests.bad_input import catalogue  # makes whole files, which takes a while

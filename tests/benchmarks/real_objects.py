@@ -14,7 +14,7 @@ from pathlib import Path
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.mesh import FORMATS
+from grasp_core.mesh_files import FORMATS
 from sim_validate.engines import available_cores, each
 
 FRICTION = 0.5

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.patience import HANGING_S
+
 ROOT = Path(__file__).parent.parent.parent
 CLI = [sys.executable, "-c", "from sim_validate.cli import run_and_exit; run_and_exit()"]
 
@@ -18,7 +20,7 @@ def graspproof():
         environment = {**os.environ, "PYTHONPATH": str(ROOT), **(env or {})}
         given = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **given}
         return subprocess.run(
-            [*CLI, *words], env=environment, text=True, timeout=120, check=False, **given
+            [*CLI, *words], env=environment, text=True, timeout=HANGING_S, check=False, **given
         )
 
     return run
@@ -39,7 +41,7 @@ def everywhere():
             *words,
         ]
         done = subprocess.run(
-            command, cwd=ROOT, capture_output=True, text=True, timeout=280, check=False
+            command, cwd=ROOT, capture_output=True, text=True, timeout=HANGING_S, check=False
         )
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)

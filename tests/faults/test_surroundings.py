@@ -11,6 +11,7 @@ import pytest
 from sim_validate import engines
 from sim_validate.cli import Exit, main
 from tests.faults.conftest import CLI, ROOT, contents
+from tests.patience import HANGING_S
 
 RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q"]
 NOWHERE = "/proc/nowhere"
@@ -132,7 +133,7 @@ def test_an_interrupt_while_planning_leaves_nothing_half(number, more, tmp_path)
         time.sleep(0.05)
     time.sleep(1.0)
     process.send_signal(number)
-    _, said = process.communicate(timeout=60)
+    _, said = process.communicate(timeout=HANGING_S)
     assert process.returncode == Exit.INTERRUPTED
     assert said.splitlines()[-1] == "graspproof: interrupted"
     assert "Traceback" not in said

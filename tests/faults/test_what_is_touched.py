@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.bad_input.mesh_texts import obj
+from tests.patience import HANGING_S
 
 AUDITING = Path(__file__).with_name("auditing")
 ROOT = Path(__file__).parents[2]
@@ -56,7 +57,7 @@ class Witness:
         ]
         ended = subprocess.run(
             [*command, *line.split()], cwd=self.folder, env=environment, capture_output=True,
-            timeout=200, check=False,
+            timeout=HANGING_S, check=False,
         )  # fmt: skip
         os.write(handle, b'["end"]\n')
         reader.join()

@@ -4,7 +4,7 @@ import json
 from dataclasses import fields, replace
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import grasp_core as gc
@@ -29,10 +29,7 @@ SCALARS = st.one_of(
     st.none(), st.booleans(), st.integers(-(2**70), 2**70), st.floats(), st.text(max_size=20),
     st.sampled_from([[], {}, [1], {"a": 1}, "../x", "/etc/passwd", "\x1b[2J", -1, 0, 1e300]),
 )  # fmt: skip
-FEW = settings(
-    max_examples=60, deadline=None, derandomize=True,
-    suppress_health_check=[HealthCheck.too_slow],
-)  # fmt: skip
+FEW = settings(max_examples=60, derandomize=True)
 
 
 def _places(document, trail=()):

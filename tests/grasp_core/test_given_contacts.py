@@ -8,7 +8,7 @@ import trimesh
 
 import grasp_core as gc
 from grasp_core.given_contacts import LARGEST_LEAN, LARGEST_MOVE, grasp_of, seat
-from grasp_core.mesh import nearest_on_surface
+from grasp_core.nearest_points import nearest_on_surface
 from grasp_core.on_faces import check_on_faces, face_under
 from scenes.objects import example_object
 

@@ -46,28 +46,83 @@ def exact(kind, data, points, faces):
     assert found[corners].tolist() == [[list(points[i]) for i in face] for face in faces]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(obj_texts())
 def test_obj_in_any_style(case):
     (points, faces), text = case
     exact("obj", text, points, faces)
 
 
-@settings(max_examples=30, deadline=None)
+PRISM = """\
+%s
+%s
+0 0 0
+4 0 0
+5 2 0 %s
+2 4 0
+-1 2 0
+0 0 1 # a comment
+4 0 1
+
+5 2 1
+2 4 1
+-1 2 1
+5 4 3 2 1 0
+5 5 6 7 8 9 %s
+4 0 1 6 5
+4 1 2 7 6
+4 2 3 8 7
+3 3 4 9
+3 3 9 8
+4 4 0 5 9
+"""
+"""On a pentagon, with counts, the rest of a vertex's line and that of a face's to fill in."""
+
+
+@pytest.mark.parametrize(
+    "style",
+    [
+        ("OFF", "10 8 15", "", ""),
+        ("OFF 10 8 15", "", "", ""),
+        ("# by hand\nOFF", "# vertices, faces\n10 8", "", ""),
+        ("COFF", "10 8 0", "255 0 0 255", ""),
+        ("OFF", "10 8 0", "", "0.5 0.5 0.5"),
+    ],
+)
+def test_off_of_polygons_in_any_style(style, tmp_path):
+    """The area of the pentagon is 16."""
+    path = tmp_path / "prism.off"
+    path.write_text(PRISM % style)
+    body = gc.load_polyhedron(path)
+    assert len(body.faces) == 7
+    assert body.volume == pytest.approx(16.0, rel=1e-12)
+
+
+def test_off_with_a_line_too_many_or_too_few_is_still_refused(tmp_path):
+    path, refused = tmp_path / "prism.off", 0
+    for counts in ("10 7 0", "10 9 0", "9 8 0", "11 8 0"):
+        path.write_text(PRISM % ("OFF", counts, "", ""))
+        with pytest.raises(gc.MeshError, match=r"line|end"):
+            gc.load_polyhedron(path)
+        refused += 1
+    assert refused == 4
+
+
+@settings(max_examples=30)
 @given(meshes())
 def test_both_kinds_of_stl(mesh):
     exact("stl", stl(*mesh), *mesh)
     exact("stl", stl_text(*mesh).encode(), *mesh)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(meshes(DOUBLE))
 def test_off(mesh):
     points, faces = mesh
     exact("off", off(f"{len(points)} {len(faces)} 0", points, faces).encode(), points, faces)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(meshes(), st.sampled_from(["ascii", "binary_little_endian", "binary_big_endian"]))
 def test_ply_of_every_kind(mesh, form):
     points, faces = mesh
@@ -85,7 +140,7 @@ def test_ply_of_every_kind(mesh, form):
 UNIT = st.floats(-1.0, 1.0).filter(lambda x: abs(x) > 1e-3)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(UNIT, min_size=10, max_size=10), st.booleans())
 def test_glb_with_nodes_that_move_turn_stretch_and_mirror(numbers, nested):
     turn = np.array(numbers[:4]) / np.linalg.norm(numbers[:4])
@@ -104,7 +159,7 @@ FILES = {
 
 
 @pytest.mark.parametrize("kind", FILES)
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(data=st.data())
 def test_a_word_that_is_damaged_is_refused_or_read_as_it_is(kind, data):
     """By the plain reading of the fuzzer, which knows nothing of ours."""

@@ -55,7 +55,7 @@ def answered(ask, *arguments):
 
 
 @pytest.mark.parametrize("what", OF_CONTACTS)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(shape=SHAPES, data=st.data())
 def test_any_arrays_are_answered_or_refused(what, shape, data):
     numbers = arrays(np.float64, shape, elements=ANY)
@@ -63,7 +63,7 @@ def test_any_arrays_are_answered_or_refused(what, shape, data):
 
 
 @pytest.mark.parametrize("what", OF_CONTACTS)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(shape=SHAPES, data=st.data())
 def test_any_contacts_with_unit_normals_are_answered_or_refused(what, shape, data):
     points = data.draw(arrays(np.float64, shape, elements=FINITE))
@@ -73,7 +73,7 @@ def test_any_contacts_with_unit_normals_are_answered_or_refused(what, shape, dat
     answered(OF_CONTACTS[what], points, ways / lengths)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(size=SIZES, friction=st.sampled_from([1e-3, 0.5, 1e3]))
 def test_closure_of_a_tetrahedron_is_answered_at_any_size(size, friction):
     assert gc.force_closure(size * TETRA_CENTERS, TETRA_NORMALS, friction).closed
@@ -81,7 +81,7 @@ def test_closure_of_a_tetrahedron_is_answered_at_any_size(size, friction):
     assert gc.classify_lines(size * TETRA_CENTERS, TETRA_NORMALS) == "concurrent"
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(wrench=arrays(np.float64, 6, elements=ANY), center=arrays(np.float64, 3, elements=ANY),
        most=ANY)  # fmt: skip
 def test_any_wrench_center_and_limit_is_answered_or_refused(wrench, center, most):
@@ -92,7 +92,7 @@ def test_any_wrench_center_and_limit_is_answered_or_refused(wrench, center, most
     answered(lambda: gc.ferrari_canny(*contacts, center=center, torque_scale=most, gap=0.1))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.one_of(st.text(), st.from_regex(r"random-\w{1,4}-\w{1,3}", fullmatch=True)))
 def test_any_name_of_an_object_is_answered_or_refused(name):
     answered(scenes.example_object, name)

@@ -5,7 +5,6 @@ import shlex
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -16,6 +15,7 @@ from sim_validate import commands
 from sim_validate.cli import Exit, main
 from sim_validate.examples import EXAMPLES
 from tests.grasp_core.curved import bumpy_ellipsoid
+from tests.patience import HANGING_S
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -266,13 +266,14 @@ def test_an_interrupted_run_keeps_what_is_done(here):
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
     folder = here / "graspproof-out" / "icosahedron"
-    deadline = time.monotonic() + 120
-    while len(list(folder.glob("scenes/*.xml"))) < 420 and time.monotonic() < deadline:
-        time.sleep(0.1)
-    time.sleep(4.0)
+    said = []
+    for line in process.stderr:  # the first line of progress says that some are simulated
+        said.append(line)
+        if re.match(r"simulating [1-9]\d*/420", line):
+            break
     process.send_signal(signal.SIGINT)
-    _, complaint = process.communicate(timeout=60)
-    assert process.returncode == Exit.INTERRUPTED, complaint
+    _, complaint = process.communicate(timeout=HANGING_S)
+    assert process.returncode == Exit.INTERRUPTED, [*said, complaint]
     assert len(json.loads((folder / "grasps.json").read_text())["grasps"]) == 420
     verdicts = json.loads((folder / "verdicts.json").read_text())
     assert verdicts["complete"] is False
@@ -309,6 +310,23 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
     facts = json.loads(capsys.readouterr().out)
     assert facts["patches"]["most"] == 20
     assert 0.0 < facts["largest_spread_deg"] <= 10.0
+    assert main(["inspect", "scan.ply", "--unit", "mm"]) == Exit.GOOD
+    said = capsys.readouterr().out
+    assert "20 nearly flat patches of a curved surface" in said
+    assert "deg at most, 10 deg allowed" in said
+
+
+def test_a_mesh_is_described_in_words(capsys):
+    """Not by the repr of anything."""
+    assert main(["inspect", "wedge"]) == Exit.GOOD
+    said = capsys.readouterr().out
+    assert said.splitlines()[:3] == [
+        "wedge",
+        "  mesh                 6 vertices, 8 triangles",
+        "  faces                8 planar, 0 not convex, 0 with holes",
+    ]
+    assert re.search(r"volume +0\.000199083 m\^3\n", said)
+    assert not re.search(r"[{}\[\]']|None|_", said)
 
 
 @pytest.mark.usefixtures("here")

@@ -14,6 +14,7 @@ import pytest
 
 from sim_validate.cli import Exit, main
 from sim_validate.datasets.verify import verify
+from tests.patience import HANGING_S
 
 pytest.importorskip("pyarrow")
 FLAGS = ("--friction", "0.4", "--friction", "0.5", "--family", "concurrent", "--limit", "2")
@@ -104,7 +105,7 @@ def test_a_worker_that_is_killed_costs_nothing_but_time(dataset, tmp_path):
                 os.kill(int(child), signal.SIGKILL)
                 killed += 1
     assert killed
-    assert process.wait(timeout=120) == Exit.GOOD
+    assert process.wait(timeout=HANGING_S) == Exit.GOOD
     assert files(folder) == files(dataset)
 
 

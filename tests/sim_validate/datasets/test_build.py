@@ -22,6 +22,7 @@ from sim_validate.datasets.tasks import Limits
 from sim_validate.datasets.units import units_of
 from sim_validate.datasets.verify import verify
 from sim_validate.engines import local_processes
+from tests.patience import HANGING_S
 from tests.sim_validate.datasets.engines import Here, WorkerEndedError, contents, silent
 from tests.sim_validate.datasets.pair import CONFIG, all_rows
 
@@ -48,7 +49,7 @@ def test_a_dataset_holds_every_object_at_every_friction(dataset):
 def test_it_is_the_same_bytes_on_processes_and_in_another_order(dataset, tmp_path):
     turned = dataclasses.replace(CONFIG, objects=CONFIG.objects[::-1])
     with local_processes(2) as engine:
-        built = build(turned, tmp_path / "other", engine, silent, Limits(120.0))
+        built = build(turned, tmp_path / "other", engine, silent, Limits(HANGING_S))
     assert built.made == 4
     before, after = contents(dataset), contents(tmp_path / "other")
     tables = {path for path in before if path.startswith("data/")}
@@ -141,7 +142,7 @@ def test_a_unit_that_ends_its_worker_is_tried_again_alone_then_quarantined(tmp_p
 def test_a_unit_that_never_ends_is_given_up(tmp_path):
     config = dataclasses.replace(CONFIG, objects=("tetrahedron",), frictions=(0.5,))
     with local_processes(1) as engine:
-        built = build(config, tmp_path / "ds", engine, silent, Limits(0.1))
+        built = build(config, tmp_path / "ds", engine, silent, Limits(1e-3))
     assert built.quarantined == 1
     assert "took too long, twice" in (tmp_path / "ds" / "quarantine.jsonl").read_text()
 
@@ -273,6 +274,7 @@ pathlib.Path.replace = counted(pathlib.Path.replace)
 pathlib.Path.rename = counted(pathlib.Path.rename)
 os.replace, os.unlink = counted(os.replace), counted(os.unlink)
 from tests.sim_validate.datasets.pair import CONFIG
+from tests.patience import HANGING_S
 from tests.sim_validate.datasets.engines import Here, silent
 from sim_validate.datasets.build import build
 build(CONFIG, pathlib.Path(sys.argv[1]), Here(), silent)

@@ -16,7 +16,7 @@ import trimesh
 
 import grasp_core as gc
 import sim_validate
-from grasp_core.mesh import nearest_on_surface
+from grasp_core.nearest_points import nearest_on_surface
 from sim_validate.cli import Exit, main
 from sim_validate.dataset_flags import ExportFormat, SplitName
 from sim_validate.datasets.build import build

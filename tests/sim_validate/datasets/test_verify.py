@@ -10,9 +10,11 @@ import pytest
 import trimesh
 
 import grasp_core as gc
+from scenes.objects import example_object
 from sim_validate.datasets.build import build
 from sim_validate.datasets.loading import load_dataset
 from sim_validate.datasets.manifest import listed, read_manifest, write_manifest
+from sim_validate.datasets.meshes import mesh_text
 from sim_validate.datasets.redo import Sample, drawn
 from sim_validate.datasets.tables import parquet_bytes, read_rows
 from sim_validate.datasets.verify import verify
@@ -108,6 +110,23 @@ def test_rows_that_contradict_each_other_are_named(copy, name, change, message):
 
 def test_all_of_it_comes_out_again(dataset):
     assert verify(dataset, Sample(1.0)) == []
+
+
+def test_a_dataset_of_tiny_triangles_verifies(tmp_path):
+    """A fine mesh of an object of 3 mm, turned: areas of 5e-9 square metres."""
+    solid = example_object("tetrahedron")
+    points, corners = solid.vertices, solid.triangles
+    for _ in range(4):
+        points, corners = trimesh.remesh.subdivide(points, corners)
+    turn = trimesh.transformations.rotation_matrix(1.0, [1.0, 2.0, 3.0])[:3, :3]
+    points = 1.5e-3 / solid.radius * points @ turn
+    mesh = tmp_path / "tiny.obj"
+    mesh.write_text(mesh_text(gc.Polyhedron.from_mesh(points, corners)))
+    config = dataclasses.replace(CONFIG, objects=(str(mesh),), frictions=(0.5,))
+    built = build(config, tmp_path / "ds", Here(), silent)
+    assert built.rows["objects"] == 1
+    assert built.rows["grasps"] >= 2
+    assert verify(tmp_path / "ds") == []
 
 
 def shifted(rows, column):

@@ -1,0 +1,109 @@
+"""Is the mesh in a `grasps.json` still that of the file it was planned from?
+
+Grasps are tested on the mesh that their file holds. A part that has been changed since would pass
+unseen, so its mesh file is looked for, and a changed one is refused. It is the same if its bytes
+are those that were planned from, or if it gives the same solid in some unit: comments, line ends
+and the order of vertices do not count.
+"""
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from grasp_core.errors import InputError, MeshError
+from grasp_core.mesh_files import FORMATS
+from grasp_core.polyhedra import UNITS_M, load_polyhedron
+from grasp_core.records import RECORDED, SavedGrasps
+from grasp_core.values import Polyhedron
+from sim_validate.files import read_bytes
+
+
+class ChangedPartError(InputError):
+    """The mesh file is not that which the grasps were planned from."""
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """The mesh file that grasps were planned from."""
+
+    file: Path | None = None
+    """Whose mesh is the tested one; None if there is none, or it was not found."""
+    note: str = ""
+    """What to know about the test if it was not found; empty if there is nothing to say."""
+
+
+def source_of(
+    saved: SavedGrasps, grasps: Path, folders: Iterable[Path], named: Path | None = None
+) -> Source:
+    """Find the mesh file that grasps were planned from, and refuse one that has changed.
+
+    Args:
+        saved: The grasps.
+        grasps: Their file, for messages; its folder is searched first.
+        folders: More of those in which a mesh file with the object's name is searched.
+        named: The mesh file, if the user says which; nothing else is looked at then.
+
+    Raises:
+        ChangedPartError: There are such files, and none holds the mesh that the grasps are on.
+        InputError: The named file is missing, or the grasps were not planned from a file.
+    """
+    body = saved.body
+    if body.source_sha256 == body.content_sha256:
+        if named is not None:
+            raise InputError(
+                f"{grasps}: was not planned from a mesh file, so it cannot be that of {named}; "
+                "leave `object` out, or plan from the file"
+            )
+        return Source()
+    found = [named] if named is not None else _beside(body.name, [grasps.parent, *folders])
+    for path in found:
+        if _is_source(path, body):
+            return Source(file=path)
+    if found:
+        raise ChangedPartError(
+            f"{found[0]}: is not the mesh that {grasps} was planned on: it has changed since, or "
+            f"is another object's. Plan on it again (graspproof plan {found[0]} --out ...) and "
+            "bless the baseline, put the former file back, or say which file it is with `object` "
+            "in a *.grasps.toml"
+        )
+    return Source(
+        note=f"{grasps}: the mesh that it holds was tested; the file it was planned from, "
+        f"{body.name!r} with some ending, is not beside it (`object` in a *.grasps.toml says where)"
+    )
+
+
+def _beside(name: str, folders: Iterable[Path]) -> list[Path]:
+    """Mesh files of a name, sorted within their folders."""
+    unique = {folder.resolve(): folder for folder in folders}
+    return [
+        path
+        for folder in unique.values()
+        for path in _entries(folder)
+        if path.stem == name and path.suffix.lower().lstrip(".") in FORMATS and path.is_file()
+    ]
+
+
+def _entries(folder: Path) -> list[Path]:
+    """What is in a folder, sorted; nothing where it is not there yet, or may not be looked into."""
+    try:
+        return sorted(folder.iterdir())
+    except OSError:
+        return []
+
+
+def _is_source(path: Path, body: Polyhedron) -> bool:
+    """Whether a file is the one that a body is from, or holds the same solid in some unit."""
+    if hashlib.sha256(read_bytes(path)).hexdigest() == body.source_sha256:
+        return True
+    return any(_content(path, unit, body) == body.content_sha256 for unit in UNITS_M)
+
+
+def _content(path: Path, unit: str, body: Polyhedron) -> str:
+    """The hash of a file's solid; empty if it is none in this unit."""
+    faces = "planar" if body.patches is None else "patches"
+    try:
+        read = load_polyhedron(path, unit=unit, faces=faces, patches=body.patches, limits=RECORDED)
+    except MeshError:
+        return ""
+    return read.content_sha256
