@@ -16,6 +16,7 @@ those are products of four lengths, which no one threshold suits.
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.ties import first_best
 
 
 def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Array:
@@ -30,7 +31,7 @@ def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Ar
     nearest = np.empty((len(points), 3))
     for place, point in enumerate(points):
         candidates = nearest_on_triangles(corners, point)
-        nearest[place] = candidates[int(np.argmin(np.linalg.norm(candidates - point, axis=1)))]
+        nearest[place] = candidates[first_best(-np.linalg.norm(candidates - point, axis=1))]
     return nearest
 
 

@@ -131,8 +131,8 @@ def _frame(body: Polyhedron, face: int, corner: int) -> Array:
     normal = body.faces[face].normal
     toward = toward - normal * float(normal @ toward)
     toward = toward / np.linalg.norm(toward)
-    across: Array = np.cross(normal, toward)
-    return np.column_stack([toward, across, normal])
+    across = np.cross(normal, toward)
+    return np.asarray(np.column_stack([toward, across, normal]), dtype=np.float64)
 
 
 def _looks(body: Polyhedron, frame: Array) -> tuple[Cells, ...]:
@@ -170,5 +170,4 @@ def _begun(loop: Array, body: Polyhedron, frame: Array) -> Array:
 
 
 def _corner_cells(corners: Array, body: Polyhedron, frame: Array) -> Array:
-    seen: Array = (corners - body.center_of_mass) / body.radius @ frame
-    return graded(seen, CELL_DIGITS)
+    return graded((corners - body.center_of_mass) / body.radius @ frame, CELL_DIGITS)
