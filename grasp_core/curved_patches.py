@@ -27,7 +27,7 @@ from grasp_core.convex_clearings import clearest_point, clearing
 from grasp_core.planar_faces import triangle_neighbours
 from grasp_core.polygons import area_and_centroid, edge_rows, plane_frame
 from grasp_core.spanning import angles_between
-from grasp_core.ties import graded, largest_first
+from grasp_core.ties import first_best, graded, largest_first, ranks
 from grasp_core.values import Face, PatchLimits
 
 SMOOTHING = 10
@@ -51,13 +51,37 @@ def flat_patches(vertices: Array, triangles: Indices, limits: PatchLimits) -> tu
     surface = _Surface.of(vertices, triangles)
     depth = limits.depth * surface.extent
     found: list[tuple[float, Face]] = []
+    radii: list[float] = []
     for group in _groups(surface, math.radians(limits.spread_deg), depth):
-        enough = len(found) >= limits.most
-        if enough and math.pi * found[limits.most - 1][0] ** 2 >= group.area:
+        enough = len(radii) >= limits.most
+        if enough and math.pi * radii[-limits.most] ** 2 >= group.area:
             break
         if patch := _patch(surface, group.triangles, -group.outward):
-            insort(found, patch, key=lambda each: -graded(each[0] / surface.extent))
-    return tuple(face for _, face in found[: limits.most])
+            found.append(patch)
+            insort(radii, patch[0])
+    return _largest_apart(found, limits.most, surface.extent)
+
+
+def _largest_apart(found: list[tuple[float, Face]], most: int, extent: float) -> tuple[Face, ...]:
+    """The patches with the largest discs; of equal ones each next as far from all as can be.
+
+    A ring has dozens of equal patches, and the first ones of its list are all on one side.
+
+    Args:
+        found: Radii of the largest discs, and patches.
+        most: How many to keep.
+        extent: Of the object [m].
+    """
+    sizes = ranks([-radius for radius, _ in found])
+    places = np.array([[*face.normal, *(face.centroid / extent)] for _, face in found])
+    nearest, left = np.full(len(found), np.inf), np.ones(len(found), dtype=np.bool_)
+    kept: list[int] = []
+    while left.any() and len(kept) < most:
+        largest = left & (sizes == sizes[left].min())
+        kept.append(first_best(np.where(largest, nearest, -1.0)))
+        left[kept[-1]] = False
+        nearest = np.minimum(nearest, np.linalg.norm(places - places[kept[-1]], axis=1))
+    return tuple(found[place][1] for place in kept)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import LARGEST_ENTRY, UNIT_SLACK, Array
+from grasp_core.arrays import Array, real_array
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure import unit_size
+from grasp_core.fields import are_units, is_array, is_number
 from grasp_core.rational_proofs import closes, separates
 from grasp_core.wrenches import WRENCH
 
@@ -42,12 +43,10 @@ class FrictionInterval:
     which no force inside cones of friction `lower` has positive power. None where `lower` is 0."""
 
     def __post_init__(self) -> None:
-        for name in ("lower", "upper"):
-            object.__setattr__(self, name, float(getattr(self, name)))
         for name in ("positions", "normals", "forces", "twist"):
             array = getattr(self, name)
             if array is not None:
-                kept = np.array(array, dtype=np.float64)
+                kept = real_array(array, name)
                 kept.setflags(write=False)
                 object.__setattr__(self, name, kept)
 
@@ -61,16 +60,16 @@ class FrictionInterval:
         return self._fits() and self._open_below() and self._closed_above()
 
     def _fits(self) -> bool:
-        k = len(self.positions) if self.positions.ndim else 0
-        given = [(self.positions, (k, 3)), (self.normals, (k, 3))]
-        given += [(self.forces, (k, 3))] * (self.forces is not None)
-        given += [(self.twist, (WRENCH,))] * (self.twist is not None)
-        if k < FEWEST or not all(
-            array is not None and array.shape == shape and (np.abs(array) <= LARGEST_ENTRY).all()
-            for array, shape in given
-        ):
-            return False
-        return bool(np.abs(np.linalg.norm(self.normals, axis=1) - 1.0).max() <= UNIT_SLACK)
+        count = len(self.normals) if is_array(self.normals, None, 3) else 0
+        return (
+            count >= FEWEST
+            and are_units(self.normals, count, 3)
+            and is_array(self.positions, count, 3)
+            and (self.forces is None or is_array(self.forces, count, 3))
+            and (self.twist is None or is_array(self.twist, WRENCH))
+            and is_number(self.lower, most=math.inf)
+            and is_number(self.upper, most=math.inf)
+        )
 
     def _open_below(self) -> bool:
         if not 0.0 <= self.lower <= self.upper:  # nor if one is not a number

@@ -117,19 +117,22 @@ def surpassing(best: float) -> float:
     return best + SAME_SHARE * abs(best)
 
 
-def nearest_optimum(program: LinearProgram, optimum: Optimum) -> Array:
+def nearest_optimum(
+    program: LinearProgram, optimum: Optimum, share: float = SAME_VALUE
+) -> Array:
     """Of all optima of a program the one nearest to the origin, (n,).
 
     Args:
         program: Its data are of order one.
         optimum: One of its optima.
+        share: What may be given up of the value, as a share of 1 + |value|.
 
     Returns:
-        A point that meets all rows, with a value at most `SAME_VALUE` (1 + |value|) below the best;
-        the optimum itself if the nearest one cannot be found.
+        A point that meets all rows with such a value; the optimum itself if the nearest one cannot
+        be found.
     """
     G, h = program.stacked()
-    kept = optimum.value - SAME_VALUE * (1.0 + abs(optimum.value))
+    kept = optimum.value - share * (1.0 + abs(optimum.value))
     equalities = slice(len(program.b), None)
     rows = np.vstack([G, -program.c[None], -G[equalities]])
     limits = np.concatenate([h, [-kept], -h[equalities]])

@@ -18,14 +18,14 @@ from grasp_core.arrays import Array
 from grasp_core.face_pieces import FacePiece, FaceShape, piece_of
 from grasp_core.placements import Placement, balanced_forces
 from grasp_core.polygons import clip, edge_rows, tidy
-from grasp_core.ties import first_best
+from grasp_core.ties import graded
 from grasp_core.values import ContactRegion, ForceCone
 
 LEAST_FACET = 1e-5
 """Parts of triangles without room for a disc of this radius (object size one) are left."""
 ON_EDGE = 1e-12
 """A line that passes an edge no farther out meets both triangles beside it, of which the first
-one counts: lengths and volumes of an object of size one, a thousand rounding errors."""
+one with room counts: lengths and volumes of an object of size one, a thousand rounding errors."""
 
 OnFacets = Callable[[tuple[FacePiece, ...]], Placement | None]
 
@@ -104,9 +104,12 @@ def _facet(
     """The part of the surface's triangle on the line through a point that is over a region."""
     if shape.facets is None:
         return piece
-    triangle = _hit(shape.facets, at, along)
-    if triangle is None:
-        return None
+    parts = (_part(piece, triangle, region) for triangle in _hit(shape.facets, at, along))
+    return next((part for part in parts if part is not None), None)
+
+
+def _part(piece: FacePiece, triangle: Array, region: ContactRegion) -> FacePiece | None:
+    """The part of a triangle that is over a region, if there is room on it."""
     cross = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
     facet = piece_of(piece.face, cross / np.linalg.norm(cross), triangle)
     claimed = (region.polygon - piece.origin) @ piece.frame
@@ -120,15 +123,13 @@ def _facet(
     return part if part.inradius > LEAST_FACET else None
 
 
-def _hit(triangles: Array, point: Array, along: Array) -> Array | None:
-    """The triangle that a line meets, nearest to the line's point, (3, 3)."""
+def _hit(triangles: Array, point: Array, along: Array) -> Array:
+    """The triangles that a line meets, those nearest to the line's point first, (k, 3, 3)."""
     edges = np.roll(triangles, -1, axis=1) - triangles
     sides = np.cross(edges, point - triangles) @ along
     normals = np.cross(edges[:, 0], edges[:, 1])
     met = np.flatnonzero((sides >= -ON_EDGE).all(axis=1) & (normals @ along > 0.0))
-    if not met.size:
-        return None
     heights = np.einsum("fi,fi->f", triangles[met, 0] - point, normals[met]) / (
         normals[met] @ along
     )
-    return triangles[met[first_best(-np.abs(heights), ON_EDGE)]]
+    return triangles[met[np.argsort(graded(np.abs(heights)), kind="stable")]]

@@ -18,7 +18,6 @@ from grasp_core.regulus_grasps import (
     nearly_symmetric,
     place_regulus,
 )
-from grasp_core.ties import SAME_VALUE
 from tests.grasp_core.quadruples import paired_quadruples
 
 TOLERANCE = 1e-7
@@ -66,7 +65,7 @@ def test_contacts_lie_on_their_faces_within_the_stated_offset(reguli):
         for piece, at in zip(quad, placed.positions, strict=True):
             flat = piece.frame.T @ (at - piece.origin)
             assert (piece.E @ flat <= piece.b + TOLERANCE).all()
-            given_up = SAME_VALUE * (1.0 - placed.merit)
+            given_up = regulus_grasps.GIVEN_UP * (1.0 - placed.merit)
             assert np.abs(flat).max() <= -placed.merit + given_up + TOLERANCE
 
 

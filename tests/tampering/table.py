@@ -52,6 +52,11 @@ def closure(seed):
         return None
 
 
+def friction_interval(seed):
+    x, n, _ = placed(np.random.default_rng(seed))
+    return gc.critical_friction_interval(x, n)
+
+
 @cache
 def planned(seed):
     name, friction = PLANNED[seed % len(PLANNED)]
@@ -170,6 +175,7 @@ def proof_file(seed):
 
 TABLE = {
     "ClosureCertificate": Row(closure, lambda c, _: exact_closure.closure(c), 3.0),
+    "FrictionInterval": Row(friction_interval, lambda c, _: exact_closure.interval(c), 0.6),
     "Absence": Row(absence, on_planes.absence, 0.6),
     "FerrariCanny": Row(quality, wrench_bounds.quality),
     "QualityCeiling": Row(ceiling, wrench_bounds.ceiling, 0.7),
