@@ -50,7 +50,7 @@ class FacePiece:
     Tied to the object, so that turning it turns the pyramids inscribed in force cones too.
     """
     corners: Array
-    """(k, 2), counter-clockwise about the normal."""
+    """(k, 2), counter-clockwise in the frame, which is a mirror image where the piece is one."""
     E: Array
     """Unit outward edge normals, (k, 2)."""
     b: Array
@@ -81,9 +81,7 @@ class FacePiece:
             ):
                 return False
             axes = np.column_stack([self.frame, self.normal])
-            if float(np.abs(axes.T @ axes - np.eye(3)).max()) > SOUND or np.linalg.det(axes) < 0.0:
-                return False
-            return self._is_polygon()
+            return bool(np.abs(axes.T @ axes - np.eye(3)).max() <= SOUND) and self._is_polygon()
 
     def _is_polygon(self) -> bool:
         """Whether `corners` are those of {y : E y <= b}, and `inradius` is that of its discs."""

@@ -79,10 +79,10 @@ def ranks(values: ArrayLike, share: float = SAME_SHARE) -> Indices:
     numbers = np.asarray(values, dtype=np.float64)
     order = np.argsort(numbers, kind="stable")
     ordered = numbers[order]
-    with np.errstate(invalid="ignore"):  # infinities are equal to themselves
-        gaps = np.diff(ordered)
-    larger = np.maximum(np.abs(ordered[1:]), np.abs(ordered[:-1]))
-    apart = ~(gaps <= share * larger) & (ordered[1:] != ordered[:-1])
+    sizes = np.where(np.isfinite(ordered), np.abs(ordered), 0.0)
+    with np.errstate(invalid="ignore"):  # infinities are equal to themselves, and to nothing else
+        near = np.diff(ordered) <= share * np.maximum(sizes[1:], sizes[:-1])
+    apart = ~near & (ordered[1:] != ordered[:-1])
     found = np.empty(len(numbers), dtype=np.int64)
     found[order] = np.concatenate([[0], np.cumsum(apart)])[: len(numbers)]
     return found
@@ -114,12 +114,10 @@ def first_best(values: ArrayLike, margin: float | None = None) -> int:
 
 def surpassing(best: float) -> float:
     """What a challenger's figure must exceed to be larger than the best so far, ties apart."""
-    return best + SAME_SHARE * abs(best)
+    return best + SAME_SHARE * abs(best) if math.isfinite(best) else best
 
 
-def nearest_optimum(
-    program: LinearProgram, optimum: Optimum, share: float = SAME_VALUE
-) -> Array:
+def nearest_optimum(program: LinearProgram, optimum: Optimum, share: float = SAME_VALUE) -> Array:
     """Of all optima of a program the one nearest to the origin, (n,).
 
     Args:

@@ -134,7 +134,9 @@ def interval(c):
 def _balanced(f, x, n, friction):
     """Forces without their imbalance, which those deep in their cones take up."""
     arms = unit_arms(x)[0]
-    G = np.vstack([np.tile(np.eye(3), len(x)), np.hstack([np.cross(np.eye(3), a).T for a in -arms])])
+    G = np.vstack(
+        [np.tile(np.eye(3), len(x)), np.hstack([np.cross(np.eye(3), a).T for a in -arms])]
+    )
     along = np.einsum("ki,ki->k", f, n)
     depths = friction * along - np.linalg.norm(f - along[:, None] * n, axis=1)
     W = np.repeat(np.maximum(depths, 0.0) / np.abs(depths).max(), 3)
