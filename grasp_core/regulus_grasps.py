@@ -73,7 +73,7 @@ LEAST_GAP = 0.01
 """Least distance l_i, along N_i, at which a line passes the focus line, in object radii."""
 SAME_OFFSET = 1e-9
 """Offsets that differ by no more are equal: the slopes tried first win."""
-GIVEN_UP = 1e-7
+GIVEN_UP = 1e-9
 """Of an offset, in favour of the least variables: less than makes the contacts of two pairings
 others than each other's."""
 X0, K, P, X, Z, T = slice(0, 3), 3, 4, slice(5, 7), slice(7, 9), 9

@@ -211,7 +211,8 @@ def _region(name: str, polygon: Array, normal: Array, scale: float) -> ContactRe
             f"{name}: expected {FEWEST_CORNERS} to {MOST_CORNERS} corners within {LARGEST:g} m"
         )
     try:
-        return ContactRegion("certified", polygon, _inscribed(polygon, normal, scale))
+        with np.errstate(invalid="ignore", divide="ignore"):  # edges without length have no answer
+            return ContactRegion("certified", polygon, _inscribed(polygon, normal, scale))
     except SolverError as error:
         raise InputError(f"{name}: its corners are those of no convex polygon") from error
 

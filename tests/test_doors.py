@@ -108,14 +108,6 @@ def test_a_command_imports_no_more_than_it_needs(arguments, heavy, said):
     assert said in shown
 
 
-def test_planning_without_kernels_needs_no_scipy():
-    """With them numba imports it."""
-    code = "from sim_validate.cli import main; main(['plan', 'tetrahedron'])"
-    names, shown = imported(code, (*NOT_TO_PLAN, "scipy", "numba"), GRASPPROOF_KERNELS="off")
-    assert names == []
-    assert "5 grasps" in shown
-
-
 def test_every_command_has_its_function():
     flags = dataset_flags
     actions = {flags.Build, flags.Import, flags.Verify, flags.Export}

@@ -223,7 +223,7 @@ def _same_setup(data: bytes, found: Setup) -> None:
 
 SETUP = b"""[physics]
 timestep = 0.001
-gravity = [0.0, 0.0, -9.81]
+gravity = [0.0, 0.0, 0.0]
 cone = "elliptic"
 autoreset = true
 [fingers]

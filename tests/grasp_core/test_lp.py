@@ -101,7 +101,7 @@ def recorded(monkeypatch, name, friction):
     return asked
 
 
-@pytest.mark.parametrize(("name", "friction"), [("wedge", 0.3), ("tetrahedron", 0.5)])
+@pytest.mark.parametrize(("name", "friction"), [("wedge", 0.3), ("octahedron", 0.5)])
 def test_the_planners_programs_have_the_same_answers_in_both_ways(monkeypatch, name, friction):
     asked = recorded(monkeypatch, name, friction)
     left = [answer for _, _, answer in asked if answer is None]

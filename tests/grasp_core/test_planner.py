@@ -11,6 +11,7 @@ from grasp_core.face_pieces import face_shapes
 from grasp_core.prospects import all_blocks
 from grasp_core.ranking import outlook
 from grasp_core.requests import METHODS
+from grasp_core.standard_order import standard
 from scenes.objects import example_object
 from tests.benchmarks.planning import sphere_hull
 from tests.judges import pyramid_margin, random_rotation
@@ -322,7 +323,9 @@ def test_grasps_are_streamed_as_they_are_found():
 
 
 def test_radii_stay_below_the_bounds_that_prune():
-    body, theta = example_object("random-12-1"), math.radians(8.0)
+    given, theta = example_object("random-12-1"), math.radians(8.0)
+    planned = standard(given)
+    body = planned.body
     cones = PlannedCones(body, face_shapes(body), theta, tilted=True)
     blocks, tested = all_blocks(cones, len(body.faces), np.empty((0, 4), dtype=int)), 0
     (room,) = blocks.rooms
@@ -334,9 +337,12 @@ def test_radii_stay_below_the_bounds_that_prune():
         limits = [coarse[tuple(each)] for each in faces]
         assert (ranking.bounds.max(axis=(1, 2)) <= limits).all()
         ordered = (ranking.quadruple(row, ranking.bounds[row]) for row in range(len(ranking)))
-        bounds = {each.faces: each.bound for each in ordered}
+        bounds = {
+            tuple(sorted(planned.faces[face] for face in each.faces)): each.bound
+            for each in ordered
+        }
         assert max(bounds.values()) <= room
-        for grasp in gc.plan(body, 1.0, theta_deg=8.0, families=family, cones="tilted").grasps:
+        for grasp in gc.plan(given, 1.0, theta_deg=8.0, families=family, cones="tilted").grasps:
             assert grasp.radius <= bounds[tuple(sorted(grasp.faces))] * body.radius * (1 + 1e-6)
             tested += 1
     assert tested >= 80

@@ -11,7 +11,6 @@ from grasp_core import promising as promising_module
 from grasp_core.attempt_bounds import AttemptBounds
 from grasp_core.constructions import CONSTRUCTIONS
 from grasp_core.errors import SolverError
-from grasp_core.face_pieces import face_shapes
 from grasp_core.promising import Block, promising
 from grasp_core.requests import PlanRequest
 from grasp_core.search import SAME_MERIT
@@ -63,7 +62,8 @@ def test_cones_that_are_tilted_late_are_not_missed(monkeypatch):
 def opened(body, family, least):
     """Quadruples as they are handed out, with the tally, and blocks that were made."""
     request = PlanRequest(0.4, (family,), None, "tilted")
-    blocks = Searches(body, request).tilted_blocks.blocks
+    searches = Searches(body, request)
+    blocks = searches.tilted_blocks.blocks
     construction, tally, made = CONSTRUCTIONS[family], Counter(), []
 
     def make(place):
@@ -73,7 +73,7 @@ def opened(body, family, least):
     listed = [
         Block(room, lambda place=place: make(place)) for place, room in enumerate(blocks.rooms)
     ]
-    discs = AttemptBounds(face_shapes(body))
+    discs = AttemptBounds(searches.shapes)
     return promising(construction, listed, discs, lambda _: least[0], tally), made
 
 
