@@ -129,7 +129,7 @@ def _hit(triangles: Array, point: Array, along: Array) -> Array:
     sides = np.cross(edges, point - triangles) @ along
     normals = np.cross(edges[:, 0], edges[:, 1])
     met = np.flatnonzero((sides >= -ON_EDGE).all(axis=1) & (normals @ along > 0.0))
-    heights = np.einsum("fi,fi->f", triangles[met, 0] - point, normals[met]) / (
-        normals[met] @ along
-    )
-    return triangles[met[np.argsort(graded(np.abs(heights)), kind="stable")]]
+    heights: Array = ((triangles[met, 0] - point) * normals[met]).sum(axis=1)
+    heights = heights / (normals[met] @ along)
+    nearest_first = sorted(range(len(met)), key=graded(np.abs(heights)).__getitem__)
+    return triangles[met[nearest_first]]
