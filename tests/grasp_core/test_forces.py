@@ -462,7 +462,7 @@ def test_contacts_in_closure_balance_every_wrench(objective):
     check_closed_contacts(objective, 60, seed=40)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("objective", ["least_norm", "least_friction"])
 def test_two_thousand_sets_of_contacts_in_closure_balance_every_wrench(objective):

@@ -117,7 +117,7 @@ def test_every_interval_is_proved_narrow_and_as_independent_judges_say():
     assert all(seen[what] >= share * 250 for what, share in AT_LEAST.items()), seen
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("part", range(4))
 def test_twenty_thousand_intervals_are_proved_narrow_and_as_independent_judges_say(part):
@@ -225,7 +225,7 @@ def test_another_processors_rounding_changes_no_more_than_the_width(tmp_path):
     agree_everywhere(tmp_path, 60, {"OPENBLAS_CORETYPE": "Nehalem"})
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(
     "environment",

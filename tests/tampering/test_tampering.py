@@ -41,7 +41,7 @@ def test_nothing_false_is_accepted(name):
     assert sum(score.tries.values()) >= TABLE[name].weight * QUICK
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("name", TABLE)
 def test_nothing_false_is_accepted_in_many_tries(name):
