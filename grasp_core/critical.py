@@ -29,7 +29,7 @@ from grasp_core.arrays import Array
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure_margin import RANK, many_prove_closure, proves_closure
 from grasp_core.contact_arrays import contact_arrays
-from grasp_core.friction_interval import FRICTIONLESS, FrictionInterval
+from grasp_core.friction_interval import FRICTIONLESS, REPORTED_AS_ZERO, FrictionInterval
 from grasp_core.friction_search import FRICTION_ACCURACY, SHAVED, Ends, search_interval
 from grasp_core.kernels import compiled
 from grasp_core.many_contacts import many_contact_arrays, unit_sizes
@@ -60,7 +60,7 @@ def critical_friction(
 
     Returns:
         The upper end: every larger coefficient suffices, by balanced forces inside the cones. 0.0
-        where closure is proved at `FRICTIONLESS`, and not sought below; `math.inf` where it is
+        where closure is proved at `REPORTED_AS_ZERO`; `math.inf` where it is
         proved at no friction up to `LARGEST_FRICTION`.
 
     Raises:
@@ -124,7 +124,7 @@ def _upper_ends(points: Array, units: Array) -> Array:
     for i in np.flatnonzero(~quick.found):
         easy = _close_without_friction(arms[i], units[i])
         upper[i] = 0.0 if easy else search_interval(points[i], units[i]).upper
-    upper[upper <= FRICTIONLESS] = 0.0
+    upper[upper <= REPORTED_AS_ZERO] = 0.0
     return upper
 
 
