@@ -29,13 +29,13 @@ class Place:
     """Where a finger stands."""
 
     face: int
-    """Of the object as it was given."""
+    """The face's number on the object as it was given."""
     half: str
-    """Of that face, `a` or `b`; empty for a whole one."""
+    """The half of the face that is meant, `a` or `b`; empty for a whole face."""
 
     @property
     def name(self) -> str:
-        """As in the id of a grasp."""
+        """The face and its half as the id of a grasp writes them."""
         return f"{self.face}{self.half}"
 
 
@@ -105,7 +105,7 @@ def _mirrored_grasp(found: Certified) -> Certified:
 
 
 def _mirrored_piece(piece: FacePiece) -> FacePiece:
-    """The same plane coordinates in a mirrored frame."""
+    """The piece behind a mirror: its frame is mirrored, its plane coordinates stay."""
     return replace(
         piece,
         normal=piece.normal * FLIP,

@@ -39,8 +39,8 @@ from grasp_core.wrenches import normal_and_tangential
 UNSAFE = 1e-6
 """A margin larger than this is not itself why nothing can be proved."""
 CAUTION = 1.01
-"""Of margins that are shown: so many times the allowance for rounding with which `verify` asks for
-them, since sums and singular values differ in their last digits from processor to processor."""
+"""A margin is shown with this multiple of the rounding that `verify` allows for, since sums and
+singular values differ in their last digits from processor to processor."""
 SUMMED = 1e-9
 """How far the normal parts of closing forces may be from summing to 1, and their wrench at unit
 size from zero."""

@@ -41,7 +41,7 @@ KERNEL = "critical"
 NO_FORCE = 1e-100
 """Stands in where a contact does not push: no friction is enough there."""
 SEARCHED = 0.95
-"""Of the accuracy, how narrow intervals the compiled search is asked for; the rest is rounding."""
+"""The compiled search is asked for this share of the accuracy; the rest is for rounding."""
 
 
 def critical_friction(

@@ -36,7 +36,7 @@ class Block:
     """Quadruples that are listed when they are needed."""
 
     room: float
-    """No disc is larger."""
+    """No disc is larger; equal rooms are equal numbers (see `ties.coarse`)."""
     make: Callable[[], Prospects]
 
 
@@ -79,7 +79,7 @@ def promising(
         tally: Where to count attempts whose bound proves that they have none at all.
     """
     waiting: list[_Waiting] = [
-        (-coarse(block.room), BLOCK, (place,), block) for place, block in enumerate(blocks)
+        (-block.room, BLOCK, (place,), block) for place, block in enumerate(blocks)
     ]
     heapify(waiting)
     while waiting:

@@ -81,7 +81,7 @@ def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
     parts = [with_room[i : i + LARGEST_BLOCK] for i in range(0, len(with_room), LARGEST_BLOCK)]
     rooms = [
         coarse(cones.rooms)[order][_unranked(starts, len(order))[:, -1]],
-        np.array([cones.rooms[part].min(axis=1).max() for part in parts]),
+        coarse(np.array([cones.rooms[part].min(axis=1).max() for part in parts])),
     ]
 
     def make(place: int) -> Prospects:
