@@ -16,6 +16,9 @@ from sim_validate.console import TABLE_ROWS, Reporter
 from sim_validate.engines import each
 from sim_validate.files import read_text
 
+DIGITS = 7
+STEP = 10.0**-DIGITS
+"""The ends of an interval are printed in steps of as much as they are reproducible to."""
 UNKNOWN = "?"
 """Stands in tables for what could not be decided."""
 
@@ -160,8 +163,11 @@ def _friction(critical: float | None) -> str:
 
 
 def _ends(found: FrictionInterval | None) -> str:
-    """Friction that is too little, and friction that is enough."""
-    return UNKNOWN if found is None else f"{found.lower:.9g} and {found.upper:.9g}"
+    """A proved interval with both ends rounded outwards, so that what is printed is proved too."""
+    if found is None:
+        return UNKNOWN
+    lower, upper = np.array([np.floor(found.lower / STEP), np.ceil(found.upper / STEP)]) * STEP
+    return f"{lower:.{DIGITS}f} and {upper:.{DIGITS}f}"
 
 
 def _bounds(found: Bounds | None) -> str:
