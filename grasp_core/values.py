@@ -170,7 +170,7 @@ class Polyhedron:
         Raises:
             MeshError: The mesh is not a solid; its `reason` says why.
         """
-        from grasp_core.polyhedra import polyhedron_from_mesh
+        from grasp_core.objects.build import polyhedron_from_mesh
 
         return polyhedron_from_mesh(
             vertices, triangles, name=name, faces=faces, patches=patches,

@@ -10,28 +10,28 @@ from typing import get_args
 
 import pytest
 
-from sim_validate import baseline_flags, dataset_flags
-from sim_validate.cli import Command
-from sim_validate.commands import ACTIONS
+from sim_validate.cli import baseline_flags, dataset_flags
+from sim_validate.cli.command_flags import Command
+from sim_validate.main import ACTIONS
 
 ROOT = Path(__file__).parent.parent
 DOORS = {
-    "trimesh": "grasp_core/mesh.py",
-    "manifold3d": "grasp_core/solids.py",
-    "highspy": "grasp_core/lp.py",
+    "trimesh": "grasp_core/geometry/mesh.py",
+    "manifold3d": "grasp_core/objects/booleans.py",
+    "highspy": "grasp_core/solvers/lp.py",
     "numba": "grasp_core/kernels/",
-    "clarabel": "grasp_core/conic.py",
-    "qpsolvers": "grasp_core/forces.py",
-    "scipy.optimize": "grasp_core/least_distance.py",
-    "mujoco": ("sim_validate/simulate.py", "scenes/frames.py"),
-    "PIL": "scenes/frames.py",
-    "matplotlib": "scenes/canvas.py",
+    "clarabel": "grasp_core/solvers/conic.py",
+    "qpsolvers": "grasp_core/forces/contact_forces.py",
+    "scipy.optimize": "grasp_core/solvers/nearest_point.py",
+    "mujoco": ("sim_validate/simulation/simulate.py", "scenes/drawing/frames.py"),
+    "PIL": "scenes/drawing/frames.py",
+    "matplotlib": "scenes/drawing/canvas.py",
     "jinja2": "sim_validate/reports/pages.py",
-    "scipy.stats": "sim_validate/noise/proportions.py",
-    "pebble": "sim_validate/engines.py",
-    "ray": "sim_validate/clusters.py",
-    "distributed": "sim_validate/clusters.py",
-    "pyarrow": "sim_validate/datasets/tables.py",
+    "scipy.stats": "sim_validate/validation/proportions.py",
+    "pebble": "sim_validate/parallel/processes.py",
+    "ray": "sim_validate/parallel/clusters.py",
+    "distributed": "sim_validate/parallel/clusters.py",
+    "pyarrow": "sim_validate/datasets/parquet.py",
     "h5py": "sim_validate/datasets/exports/hdf5.py",
 }
 
@@ -77,7 +77,8 @@ def imported(code, among, **environment):
 
 
 @pytest.mark.parametrize(
-    "module", ["grasp_core", "scenes", "sim_validate", "sim_validate.cli", "sim_validate.flags"]
+    "module",
+    ["grasp_core", "scenes", "sim_validate", "sim_validate.main", "sim_validate.cli.flag_groups"],
 )
 def test_importing_a_package_imports_nothing_heavy(module):
     assert imported(f"import {module}", HEAVY) == ([], "")
@@ -103,7 +104,7 @@ def test_using_a_name_imports_no_more_than_it_needs(name):
     ],
 )  # fmt: skip
 def test_a_command_imports_no_more_than_it_needs(arguments, heavy, said):
-    names, shown = imported(f"from sim_validate.cli import main; main({arguments!r})", heavy)
+    names, shown = imported(f"from sim_validate.main import main; main({arguments!r})", heavy)
     assert names == []
     assert said in shown
 

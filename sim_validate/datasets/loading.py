@@ -4,8 +4,8 @@ from pathlib import Path
 
 from grasp_core.checked import path_of
 from sim_validate.datasets.columns import TABLES, Name
-from sim_validate.datasets.selection import select
-from sim_validate.datasets.tables import Columns, read_columns
+from sim_validate.datasets.open_dataset import select
+from sim_validate.datasets.parquet import Columns, read_columns
 
 
 def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Columns]:

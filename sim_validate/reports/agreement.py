@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_validate.reports.news import GONE, HELD, Record
-from sim_validate.wrench_verdict import AGREEMENT
+from sim_validate.validation.wrench_verdict import AGREEMENT
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from grasp_core.arrays import Array
-from grasp_core.spanning import angles_between
+from grasp_core.cones.spanning import angles_between
 from grasp_core.values import Grasp
 from sim_validate.reports.agreement import as_predicted, wrench_size
 from sim_validate.reports.drawn_grasps import Drawn, certified, largest_push

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
+from grasp_core.provenance import versions
 from grasp_core.values import Grasp
-from grasp_core.versions import versions
 from sim_validate.reports.agreement import (
     Agreement,
     frictions_in,

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from sim_validate.verdict import LET_GO, Outcome
+from sim_validate.simulation.hold_verdict import LET_GO, Outcome
 
 Record = Mapping[str, Any]
 """An object of a JSON file."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure_margin import many_prove_closure, many_refute_closure, refutes_closure
+from grasp_core.closure.proofs import many_prove_closure, many_refute_closure, refutes_closure
 from tests.grasp_core.bodies import BODIES, holds, moved
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 

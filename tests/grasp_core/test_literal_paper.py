@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.lines import plucker_vectors
-from grasp_core.pencil_grasps import CELL_A, place_pencil
-from grasp_core.placements import Placement
-from grasp_core.regulus_grasps import LEAST_DEPTH, place_regulus
-from grasp_core.spanning import balancing_weights
-from sim_validate.uncorrected import (
+from grasp_core.closure.lines import plucker_vectors
+from grasp_core.cones.spanning import balancing_weights
+from grasp_core.families.pencil import CELL_A, place_pencil
+from grasp_core.families.placements import Placement
+from grasp_core.families.regulus import LEAST_DEPTH, place_regulus
+from sim_validate.validation.paper_as_printed import (
     LEAST,
     PAIR,
     Discs,

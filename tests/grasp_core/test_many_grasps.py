@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.objects import example_names, example_object
+from scenes.example_objects import example_names, example_object
 
 THETA = math.radians(10.0)
 FRICTION = math.tan(THETA)

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core import concurrent_grasps
-from grasp_core.concurrent_grasps import inscribed_facets, place_concurrent
-from grasp_core.face_pieces import FacePiece, unit_pieces
-from grasp_core.lines import plucker_vectors
-from grasp_core.pencil_grasps import CELL_A, place_pencil
-from grasp_core.placements import NoPlacement, Placement
-from grasp_core.polygons import edge_rows, plane_frame
-from grasp_core.solids import hull
+from grasp_core.closure.lines import plucker_vectors
+from grasp_core.families import concurrent as concurrent_grasps
+from grasp_core.families.concurrent import inscribed_facets, place_concurrent
+from grasp_core.families.pencil import CELL_A, place_pencil
+from grasp_core.families.placements import NoPlacement, Placement
+from grasp_core.geometry.polygons import edge_rows, plane_frame
+from grasp_core.objects.booleans import hull
+from grasp_core.objects.face_pieces import FacePiece, unit_pieces
 from grasp_core.values import ForceCone
-from scenes.objects import example_object
+from scenes.example_objects import example_object
 from tests.grasp_core.quadruples import tilted_side_cones
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.requests import METHODS
-from scenes.objects import example_object
+from grasp_core.planning.request import METHODS
+from scenes.example_objects import example_object
 
 TEN_DEGREES = math.tan(math.radians(10.0))
 FAMILIES = ("concurrent", "pencil", "regulus")

@@ -7,11 +7,12 @@ import sys
 import pytest
 
 from grasp_core.checked import LARGEST_FRICTION, MOST_EDGES, MOST_SEED
+from grasp_core.compiled import SWITCH, compiled
 from grasp_core.errors import InputError
-from grasp_core.kernels import SWITCH, compiled
-from sim_validate.cli import Exit, main
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.main import main
 
-RUN = "from sim_validate.cli import run_and_exit; run_and_exit()"
+RUN = "from sim_validate.main import run_and_exit; run_and_exit()"
 FRICTIONS = ["0", "-1", "nan", "inf", "1e9", "1e-300", "1e300", f"{LARGEST_FRICTION + 1.0}"]
 WITH_FRICTION = [
     ["plan", "tetrahedron"], ["run", "tetrahedron"], ["validate", "no.json"], ["scene", "no.json"],

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import UndecidedError
-from sim_validate import analysis
-from sim_validate.cli import Exit, main
+from sim_validate import contact_analysis as analysis
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.main import main
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
 
 ROOT = Path(__file__).parent.parent.parent
@@ -378,7 +379,7 @@ def test_an_interrupted_analysis_tells_what_is_done(analyze, monkeypatch):
             raise KeyboardInterrupt
         return analysis.analyze(contacts, question)
 
-    monkeypatch.setattr("sim_validate.analyze_command.analyze", interrupted)
+    monkeypatch.setattr("sim_validate.commands.analyze.analyze", interrupted)
     grasp = {"contacts": TETRAHEDRON["contacts"]}
     code, document = analyze({"grasps": [grasp, grasp], "friction": 0.5})
     assert code == Exit.INTERRUPTED

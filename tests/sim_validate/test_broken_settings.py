@@ -3,9 +3,9 @@
 import pytest
 
 import grasp_core as gc
-from sim_validate.gate import require_faithful
-from sim_validate.setup import Setup
-from sim_validate.setup_file import setup_from_tables
+from sim_validate.gate.gate import require_faithful
+from sim_validate.records.setup_toml import setup_from_tables
+from sim_validate.simulation.setup import Setup
 
 USUAL, TINY = 0.07, 5e-4
 """Radius of the object under test [m]."""

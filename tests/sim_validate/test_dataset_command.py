@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim_validate.cli import Exit, main
-from sim_validate.datasets.verify import verify
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.datasets.verifying.verify import verify
+from sim_validate.main import main
 from tests.patience import HANGING_S
 
 pytest.importorskip("pyarrow")
@@ -30,7 +31,7 @@ def files(folder):
 
 
 def command(folder, jobs):
-    run = "from sim_validate.cli import run_and_exit; run_and_exit()"
+    run = "from sim_validate.main import run_and_exit; run_and_exit()"
     return [sys.executable, "-c", run, "dataset", "build", *OBJECTS, *FLAGS,
             "--out", str(folder), "--jobs", str(jobs), "-q"]  # fmt: skip
 

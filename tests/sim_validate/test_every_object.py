@@ -7,7 +7,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from sim_validate.controls import FRICTION_SHARE, LEAST_FRICTION
+from sim_validate.validation.controls import FRICTION_SHARE, LEAST_FRICTION
 
 PIECES = Path(__file__).parents[3] / "shared" / "objects" / "ycb" / "pieces"
 NAMES = [n for n in scenes.example_names() if "FACES" not in n] + [

@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.json_text import DEEPEST, object_of, value_of
-from sim_validate import npz
-from sim_validate.cli import Exit, main
-from sim_validate.datasets.given import read_given
-from sim_validate.files import read_bytes, read_text
-from sim_validate.inside import path_inside, require_inside
-from sim_validate.npz import arrays_of
-from sim_validate.toml_text import MOST_LETTERS, read_tables, tables_of_toml
+from grasp_core.files.strict_json import DEEPEST, object_of, value_of
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.datasets.given_contacts import read_given
+from sim_validate.files import npz
+from sim_validate.files.npz import arrays_of
+from sim_validate.files.paths import path_inside, require_inside
+from sim_validate.files.reading import read_bytes, read_text
+from sim_validate.files.toml_tables import MOST_LETTERS, read_tables, tables_of_toml
+from sim_validate.main import main
 
 
 def test_only_regular_files_are_read(tmp_path):

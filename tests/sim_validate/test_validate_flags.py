@@ -6,9 +6,10 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from sim_validate.cli import Exit, main
-from sim_validate.flags import RuleName
-from sim_validate.rules import RULES
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.cli.flag_groups import RuleName
+from sim_validate.main import main
+from sim_validate.simulation.other_rules import RULES
 
 TASK = '{"wrenches": [{"name": "lift", "force_n": [0, 0, -3], "torque_n_m": [0, 0.01, 0]}]}'
 

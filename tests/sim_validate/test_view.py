@@ -10,12 +10,13 @@ import pytest
 from PIL import Image
 
 import scenes
-from scenes import canvas, clips
-from scenes.canvas import format_of
-from sim_validate import view_command
-from sim_validate.cli import Exit, main
-from sim_validate.showing_flags import CLIPS, PICTURES
-from sim_validate.view_command import COMING, closing
+from scenes.drawing import canvas, clips
+from scenes.drawing.canvas import format_of
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.cli.showing_flags import CLIPS, PICTURES
+from sim_validate.commands import view as view_command
+from sim_validate.commands.view import COMING, closing
+from sim_validate.main import main
 from tests.sim_validate.rigs import grasps
 
 
@@ -133,7 +134,7 @@ def test_fingers_come_in_along_their_ways_and_stay():
 
 def test_without_graphics_the_picture_turns(planned, tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("MUJOCO_GL", "no-such-library")
-    monkeypatch.setattr("scenes.turning_clips.FRAMES", 4)
+    monkeypatch.setattr("scenes.drawing.turning_clips.FRAMES", 4)
     path = tmp_path / "a.gif"
     assert main(["view", str(planned), "--clip", str(path)]) == Exit.GOOD
     assert "the picture turns instead" in capsys.readouterr().err
@@ -163,7 +164,7 @@ def test_doctor_says_what_there_is_and_what_to_do(monkeypatch, capsys):
     def none():
         raise clips.GraphicsError("egl: no such library")
 
-    monkeypatch.setattr("sim_validate.doctor_command.available_graphics", none)
+    monkeypatch.setattr("sim_validate.commands.doctor.available_graphics", none)
     assert main(["doctor", "--json"]) == Exit.GOOD
     shown = capsys.readouterr()
     document = json.loads(shown.out)
@@ -177,7 +178,7 @@ def test_doctor_says_what_there_is_and_what_to_do(monkeypatch, capsys):
 
 
 def test_doctor_names_what_failed(monkeypatch, capsys):
-    monkeypatch.setattr("sim_validate.doctor_command.critical_friction", lambda _: 0.1)
+    monkeypatch.setattr("sim_validate.commands.doctor.critical_friction", lambda _: 0.1)
     assert main(["doctor"]) == Exit.INTERNAL
     shown = capsys.readouterr()
     assert "FAILED critical friction" in " ".join(shown.out.split())

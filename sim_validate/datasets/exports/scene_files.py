@@ -6,8 +6,8 @@ from pathlib import Path
 from scenes.mjcf import build_scene
 from sim_validate.datasets.columns import Name
 from sim_validate.datasets.exports.stored_grasps import grasped_objects, is_grasp, new_path
-from sim_validate.datasets.selection import Selection
-from sim_validate.files import write_text
+from sim_validate.datasets.open_dataset import Selection
+from sim_validate.files.reading import write_text
 
 
 def write_mjcf(

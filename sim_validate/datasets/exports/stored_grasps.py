@@ -10,8 +10,8 @@ from typing import Any
 from grasp_core.errors import InputError
 from grasp_core.values import Contact, Polyhedron
 from sim_validate.datasets.meshes import stored_body
+from sim_validate.datasets.open_dataset import Selection
 from sim_validate.datasets.rows import GIVEN
-from sim_validate.datasets.selection import Selection
 
 UNSAFE = re.compile(r"[^A-Za-z0-9._-]")
 GRASPS = ("grasp", GIVEN)

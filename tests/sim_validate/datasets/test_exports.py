@@ -13,21 +13,22 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
+from tests.sim_validate.datasets.test_verify import forged
 
 import grasp_core as gc
 import sim_validate
-from grasp_core.nearest_points import nearest_on_surface
-from sim_validate.cli import Exit, main
-from sim_validate.dataset_flags import ExportFormat, SplitName
-from sim_validate.datasets.build import build
+from grasp_core.geometry.nearest_points import nearest_on_surface
+from sim_validate.cli.dataset_flags import ExportFormat, SplitName
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.datasets.building.build import build
 from sim_validate.datasets.columns import TABLES
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.exports.formats import EXPORTERS, export
 from sim_validate.datasets.exports.isaac import yaml_number
 from sim_validate.datasets.rows import SPLITS
-from sim_validate.files import whole_folder
+from sim_validate.files.reading import whole_folder
+from sim_validate.main import main
 from tests.sim_validate.datasets.engines import Here, silent
-from tests.sim_validate.datasets.test_verify import forged
 
 pytest.importorskip("pyarrow")
 FORMATS = tuple(EXPORTERS)

@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from sim_validate.cli import Exit, main
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.main import main
 
 BEHIND = '{"schema": 1, "verdicts": [], "object": {"content_sha256": ""}, "friction": 1}'
 NOISE = ("--noise-shift", ".02", "--noise-turn-deg", "3", "--noise-friction", ".3")

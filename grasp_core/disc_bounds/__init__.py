@@ -1,0 +1,1 @@
+"""ROOM grasp_core/disc_bounds."""
