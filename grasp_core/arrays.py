@@ -17,6 +17,11 @@ Indices: TypeAlias = NDArray[np.int64]
 DIGITS = 9
 """Digits kept by `to_digits`: a thousand times more than any result needs, a million times fewer
 than solvers' noise reaches."""
+SHIFT = 0.5 * (math.sqrt(5.0) - 1.0)
+"""Where a grid lies on which numbers are rounded or compared, in cells: the golden section is worst
+approximated by fractions, so the numbers of regular objects are far from borders."""
+ASIDE = 0.05
+"""Keeps round numbers, such as the 1.0 of a unit vector, away from where digits begin to count."""
 LARGEST_ENTRY = 1e50
 """The product of three such numbers has a finite square."""
 SMALLEST_SIZE = 1e-50
@@ -106,13 +111,18 @@ def frozen_indices(value: Any, shape: tuple[int | None, ...], name: str) -> Indi
     return indices
 
 
-def to_digits(values: Array) -> Array:
-    """Values rounded to `DIGITS` digits of the largest of them.
+def to_digits(values: Array, size: float = 0.0) -> Array:
+    """Values rounded to `DIGITS` digits of the largest of them, on a shifted grid.
 
     The last bits of solvers' and factorisations' answers depend on where their numbers lie in
     memory; what is simulated or written must not.
+
+    Args:
+        values: Of any shape.
+        size: Counts as one of them, where values may be zero but for rounding.
     """
-    largest = float(np.abs(values).max(initial=0.0))
+    largest = max(float(np.abs(values).max(initial=0.0)), size)
     if largest == 0.0:
         return values
-    return np.round(values, DIGITS - 1 - math.floor(math.log10(largest)))
+    scale = 10.0 ** (DIGITS - 1 - math.floor(math.log10(largest) + ASIDE))
+    return np.floor(values * scale + SHIFT) / scale

@@ -110,6 +110,10 @@ def arrange(
 ) -> Layout:
     """Place object, fingertips and drives for a grasp.
 
+    Contacts are rounded to nine digits of the object's radius: closing fingers strike and rebound,
+    which turns the last digits of a number, which are others on another machine, into motions of a
+    visible size. What follows from contacts is plain arithmetic, the same everywhere.
+
     Args:
         body: The object.
         grasp: A grasp, or contacts from elsewhere.
@@ -122,28 +126,36 @@ def arrange(
     coefficient(friction)
     fingers = fingers or FingerSettings()
     contacts = grasp.contacts if isinstance(grasp, Grasp) else tuple(grasp)
-    normals = np.array([contact.normal for contact in contacts])
-    positions = np.array([contact.position for contact in contacts])
+    normals = _rounded_units(np.array([contact.normal for contact in contacts]))
+    arms = np.array([contact.position for contact in contacts]) - body.center_of_mass
+    arms = to_digits(arms, body.radius)
+    positions = arms + body.center_of_mass
     size = max(grasp_size(positions), LEAST_SIZE * body.radius)
     largest = fingers.max_normal_force_n
     mass = largest * RESPONSE_TIME_S**2 / size
     return Layout(
         name=body.name,
-        vertices=body.vertices - body.center_of_mass,
+        vertices=to_digits(body.vertices - body.center_of_mass),
         triangles=body.triangles,
-        radius_m=body.radius,
-        center=positions.mean(axis=0) - body.center_of_mass,
+        radius_m=_to_digits(body.radius),
+        center=to_digits(arms.mean(axis=0), body.radius),
         grasp_size_m=size,
         mass_kg=mass,
         inertia_kg_m2=_inertia(mass, positions, size),
-        contacts=positions - body.center_of_mass,
+        contacts=arms,
         frames=contact_frames(normals),
         borders=tuple(_border(body, contact) for contact in contacts),
         friction=friction,
         drive=_drive(body, positions, normals, fingers, size),
         squeeze=SQUEEZE * largest * _pushes(positions, normals, friction),
-        approach=-RETREAT * size * _ways_in(grasp, normals, fingers),
+        approach=to_digits(-RETREAT * size * _ways_in(grasp, normals, fingers)),
     )
+
+
+def _rounded_units(vectors: Array) -> Array:
+    """Unit vectors (k, 3) of rounded ones, by operations that are the same on every machine."""
+    x, y, z = to_digits(vectors).T
+    return np.column_stack([x, y, z]) / np.sqrt(x * x + y * y + z * z)[:, None]
 
 
 def _border(body: Polyhedron, contact: Contact) -> tuple[Array, ...]:
@@ -159,7 +171,7 @@ def _drive(
     if fingers.radius_m is not None:
         where = ", the object's radius in m, or None"
         number(fingers.radius_m, "fingers.radius_m", most=body.radius, where=where)
-    radius = fingers.radius_m or fitting_radius(body, positions, normals)
+    radius = fingers.radius_m or _to_digits(fitting_radius(body, positions, normals))
     return FingerDrive(
         radius_m=radius,
         mass_kg=mass,
@@ -188,7 +200,11 @@ def grasp_size(positions: Array) -> float:
     """
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
     lever = np.linalg.norm(spread[1:]) / math.sqrt(len(positions))
-    return float(to_digits(np.array(lever, dtype=np.float64)))
+    return _to_digits(float(lever))
+
+
+def _to_digits(value: float) -> float:
+    return float(to_digits(np.array(value, dtype=np.float64)))
 
 
 def _inertia(mass: float, positions: Array, size: float) -> Array:

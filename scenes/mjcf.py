@@ -12,6 +12,7 @@ servo: `ctrl = f / kp` makes it push with force f at its zero position, and the 
 normal is limited to the largest normal force. Rigid fingers have neither slides nor servos.
 """
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -21,7 +22,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, to_digits
 from grasp_core.checked import instance, one_of, path_of, several
 from grasp_core.errors import InputError
 from grasp_core.files.whole_files import write_parts
@@ -232,7 +233,7 @@ def _keyframes(root: ElementTree.Element, layout: Layout) -> None:
     fingers = len(layout.contacts)
     home = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], np.zeros(3 * fingers)])
     away = home.copy()
-    away[7:] = np.einsum("kij,ki->kj", layout.frames, layout.approach).ravel()
+    away[7:] = to_digits(np.einsum("kij,ki->kj", layout.frames, layout.approach)).ravel()
     push = layout.squeeze / layout.drive.stiffness_n_per_m
     told = {
         "pregrasp": (away, away[7:]),
@@ -248,19 +249,20 @@ def _keyframes(root: ElementTree.Element, layout: Layout) -> None:
 def quaternion(rotation: Array) -> Array:
     """Unit quaternion (w, x, y, z) of a rotation matrix, (4,), with its largest part positive.
 
-    The symmetric matrix below has the quaternion as its eigenvector of largest eigenvalue.
+    The rows below are 4 q_i q for each part q_i of the quaternion q; the one of the largest part
+    has the most digits.
     """
-    R = rotation
-    K = np.array(
+    (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
+    rows = np.array(
         [
-            [np.trace(R), R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
-            [0.0, R[0, 0] - R[1, 1] - R[2, 2], R[0, 1] + R[1, 0], R[0, 2] + R[2, 0]],
-            [0.0, 0.0, R[1, 1] - R[0, 0] - R[2, 2], R[1, 2] + R[2, 1]],
-            [0.0, 0.0, 0.0, R[2, 2] - R[0, 0] - R[1, 1]],
+            [1.0 + a + e + i, h - f, c - g, d - b],
+            [h - f, 1.0 + a - e - i, b + d, c + g],
+            [c - g, b + d, 1.0 - a + e - i, f + h],
+            [d - b, c + g, f + h, 1.0 - a - e + i],
         ]
     )
-    vector = np.linalg.eigh(K, UPLO="U")[1][:, -1]
-    return vector * np.sign(vector[first_best(np.abs(vector))])
+    row = rows[first_best(np.diag(rows))]
+    return row / math.sqrt(sum(part * part for part in row.tolist()))
 
 
 def _add(

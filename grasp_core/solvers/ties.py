@@ -25,7 +25,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import SHIFT, Array, Indices
 from grasp_core.solvers.lp import LinearProgram, Optimum
 from grasp_core.solvers.nearest_point import least_distance
 
@@ -41,8 +41,6 @@ SAME_DIGITS = 7
 """Figures are equal to so many digits after the point (object size one), unless told otherwise."""
 SAME_SHARE = 1e-6
 """Figures whose difference is a smaller share of the best are equal."""
-SHIFT = 0.5 * (math.sqrt(5.0) - 1.0)
-"""Where the grid lies, in cells: the golden section is worst approximated by fractions."""
 
 
 @overload

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, to_digits
 from grasp_core.errors import InputError
 from scenes.mjcf import Scene
 from sim_validate.simulation.schedules import Clock, Schedule
@@ -128,8 +128,11 @@ class Bench:
         wrenches[..., 3:] -= np.cross(layout.center, wrenches[..., :3])
         forces = np.array([schedule.forces for schedule in schedules])
         pushes = np.einsum("kij,mnki->mnkj", layout.frames, forces)
+        for trial in range(len(schedules)):  # like the scene (see `layout.arrange`)
+            for part in (wrenches[trial, :, :3], wrenches[trial, :, 3:], pushes[trial]):
+                part[...] = to_digits(part)
         controls = pushes.reshape(*pushes.shape[:2], -1) / layout.drive.stiffness_n_per_m
-        frictions = np.array([schedule.friction for schedule in schedules])
+        frictions = np.array([to_digits(schedule.friction) for schedule in schedules])
         applied, servos = trials.bind("xfrc_applied"), trials.bind("ctrl")
         friction, joints = trials.expand("geom_friction"), trials.bind("qpos")
         done: list[Array] = []

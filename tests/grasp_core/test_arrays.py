@@ -1,7 +1,9 @@
+import math
+
 import numpy as np
 import pytest
 
-from grasp_core.arrays import frozen, frozen_indices, frozen_units
+from grasp_core.arrays import frozen, frozen_indices, frozen_units, to_digits
 from grasp_core.errors import InputError
 
 
@@ -37,3 +39,13 @@ def test_a_vector_that_is_not_unit_is_refused_with_its_length():
 def test_indices_are_whole_and_not_negative(bad):
     with pytest.raises(InputError, match="whole numbers"):
         frozen_indices(bad, (None,), "i")
+
+
+@pytest.mark.parametrize("largest", [1.0, 0.05, 3.0, 1e-3, 120.0])
+def test_numbers_apart_by_their_last_bits_are_rounded_to_the_same(largest):
+    values = largest * np.array([1.0, -1.0, 0.5, 1 / 3, math.sqrt(0.5), 0.0, -1e-17])
+    rounded = to_digits(values)
+    for nudged in (np.nextafter(values, -np.inf), np.nextafter(values, np.inf)):
+        np.testing.assert_array_equal(to_digits(nudged), rounded)
+    np.testing.assert_allclose(rounded, values, rtol=0.0, atol=1e-8 * largest)
+    assert not np.signbit(rounded[-2:]).any()

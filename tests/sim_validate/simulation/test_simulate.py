@@ -7,6 +7,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
+from grasp_core.arrays import to_digits
 from sim_validate.simulation import schedules
 from sim_validate.simulation.hold_verdict import Outcome, judge
 from sim_validate.simulation.protocol import HoldProtocol
@@ -45,12 +46,12 @@ def plain_loop(scene, schedule, start):
     mujoco.mj_setState(model, data, start, mujoco.mjtState.mjSTATE_INTEGRATION)
     layout, rows = scene.layout, []
     touching = [i for i in range(model.ngeom) if model.geom_contype[i] or model.geom_conaffinity[i]]
-    samples = zip(schedule.wrenches, schedule.forces, schedule.friction, strict=True)
-    for wrench, forces, friction in samples:
-        local = np.einsum("kij,ki->kj", layout.frames, forces)
-        data.ctrl[:] = local.ravel() / layout.drive.stiffness_n_per_m
-        torque = wrench[3:] - np.cross(layout.center, wrench[:3])
-        data.xfrc_applied[model.body("object").id] = np.concatenate([wrench[:3], torque])
+    local = to_digits(np.einsum("kij,nki->nkj", layout.frames, schedule.forces))
+    torques = schedule.wrenches[:, 3:] - np.cross(layout.center, schedule.wrenches[:, :3])
+    wrenches = np.hstack([to_digits(schedule.wrenches[:, :3]), to_digits(torques)])
+    for wrench, pushes, friction in zip(wrenches, local, to_digits(schedule.friction), strict=True):
+        data.ctrl[:] = pushes.ravel() / layout.drive.stiffness_n_per_m
+        data.xfrc_applied[model.body("object").id] = wrench
         model.geom_friction[touching, 0] = friction
         mujoco.mj_step(model, data, nstep=CHUNK)
         rows.append(data.qpos.copy())
