@@ -19,7 +19,10 @@ from grasp_core.errors import UndecidedError as UndecidedError
 from grasp_core.errors import UnfaithfulError as UnfaithfulError
 from grasp_core.forces.contact_forces import contact_forces as contact_forces
 from grasp_core.mesh_files.limits import MeshLimits as MeshLimits
-from grasp_core.objects.build import load_polyhedron as load_polyhedron
+from grasp_core.objects.face import Face as Face
+from grasp_core.objects.face import PatchLimits as PatchLimits
+from grasp_core.objects.polyhedron import Polyhedron as Polyhedron
+from grasp_core.objects.polyhedron import load_polyhedron as load_polyhedron
 from grasp_core.optimizing.better_contacts import Improvement as Improvement
 from grasp_core.optimizing.better_contacts import optimize_contacts as optimize_contacts
 from grasp_core.optimizing.ceiling import QualityCeiling as QualityCeiling
@@ -41,9 +44,6 @@ from grasp_core.regions.certificates import CertifiedRegions as CertifiedRegions
 from grasp_core.regions.certify_regions import certify_regions as certify_regions
 from grasp_core.values import Contact as Contact
 from grasp_core.values import ContactRegion as ContactRegion
-from grasp_core.values import Face as Face
 from grasp_core.values import ForceCone as ForceCone
 from grasp_core.values import Grasp as Grasp
-from grasp_core.values import PatchLimits as PatchLimits
-from grasp_core.values import Polyhedron as Polyhedron
 from grasp_core.values import Witness as Witness

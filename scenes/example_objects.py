@@ -18,7 +18,7 @@ from grasp_core.arrays import Array
 from grasp_core.checked import SHOWN, shown, text
 from grasp_core.errors import InputError
 from grasp_core.objects.booleans import Solid, extrusion, hull
-from grasp_core.values import Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
 
 DIGITS = 14
 """Coordinates are rounded before solids are made of them: the last digit of a cosine depends on the

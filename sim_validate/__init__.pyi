@@ -1,4 +1,4 @@
-from sim_validate.datasets.loading import load_dataset as load_dataset
+from sim_validate.datasets.open_dataset import load_dataset as load_dataset
 from sim_validate.records.regions import read_regions as read_regions
 from sim_validate.reports.margin_charts import margin_figure as margin_figure
 from sim_validate.reports.report import write_report as write_report

@@ -1,4 +1,4 @@
-"""The `graspproof` command: arguments become flags, flags lead to a command, errors to an exit code.
+"""The `graspproof` command: arguments become flags, flags a command, errors an exit code.
 
 Nothing heavy is imported here, so that help and usage errors answer at once.
 """

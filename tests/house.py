@@ -51,7 +51,9 @@ class House:
     @property
     def fullest(self) -> tuple[int, str]:
         """Number of modules in the fullest folder, and its name."""
-        folders = [name.rsplit(".", 1)[0] for name, path in self.modules.items() if not _is_init(path)]
+        folders = [
+            name.rsplit(".", 1)[0] for name, path in self.modules.items() if not _is_init(path)
+        ]
         return max((folders.count(folder), folder) for folder in set(folders))
 
     @property

@@ -19,7 +19,6 @@ DOORS = {
     "trimesh": "grasp_core/geometry/mesh.py",
     "manifold3d": "grasp_core/objects/booleans.py",
     "highspy": "grasp_core/solvers/lp.py",
-    "numba": "grasp_core/kernels/",
     "clarabel": "grasp_core/solvers/conic.py",
     "qpsolvers": "grasp_core/forces/contact_forces.py",
     "scipy.optimize": "grasp_core/solvers/nearest_point.py",
@@ -27,7 +26,7 @@ DOORS = {
     "PIL": "scenes/drawing/frames.py",
     "matplotlib": "scenes/drawing/canvas.py",
     "jinja2": "sim_validate/reports/pages.py",
-    "scipy.stats": "sim_validate/validation/proportions.py",
+    "scipy.stats": "sim_validate/validation/repeats.py",
     "pebble": "sim_validate/parallel/processes.py",
     "ray": "sim_validate/parallel/clusters.py",
     "distributed": "sim_validate/parallel/clusters.py",
@@ -54,6 +53,18 @@ def test_a_package_is_imported_at_its_door_only(package):
         users = {str(p.relative_to(ROOT)) for p in sources if f'("{package}", ' in p.read_text()}
     assert users
     assert all(user.startswith(DOORS[package]) for user in users)
+
+
+def test_only_kernels_are_compiled():
+    """A module that imports numba is a kernel, and only kernels and their rooms import kernels."""
+    sources = list((ROOT / "grasp_core").rglob("*.py"))
+    kernels = {path for path in sources if re.search(r"^(import|from) numba", path.read_text(), re.M)}
+    assert len(kernels) > 10
+    assert all(path.stem.endswith("_kernel") for path in kernels)
+    for path in sources:
+        for name in re.findall(r"\bgrasp_core\.([a-z_.]+_kernel)\b", path.read_text()):
+            if not path.stem.endswith("_kernel"):
+                assert name.split(".")[0] in {path.parent.name, path.stem, "closure"}, (path, name)
 
 
 HEAVY = (

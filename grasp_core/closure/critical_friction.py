@@ -27,10 +27,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.checked import LARGEST_FRICTION
-from grasp_core.closure.contact_arrays import contact_arrays
+from grasp_core.closure.contact_arrays import contact_arrays, many_contact_arrays, unit_sizes
 from grasp_core.closure.friction_interval import FRICTIONLESS, REPORTED_AS_ZERO, FrictionInterval
 from grasp_core.closure.friction_search import FRICTION_ACCURACY, SHAVED, Ends, search_interval
-from grasp_core.closure.many_contacts import many_contact_arrays, unit_sizes
 from grasp_core.closure.margin_program import ROUNDING, deepest_forces
 from grasp_core.closure.proofs import RANK, many_prove_closure, proves_closure
 from grasp_core.closure.wrenches import WRENCH, normal_and_tangential

@@ -1,7 +1,7 @@
 """All quadruples of directions that positively span at some least angle, by bit sets of triples.
 
 With s(i, j, k) the signed sine of the angle at which three cones first touch one plane (see
-`grasp_core.cones.spanning`), four directions i, j, k < l span at an angle if the three others go around
+`spanning`), four directions i, j, k < l span at an angle if the three others go around
 -l in a circle, s(i, j, l), s(j, k, l) and s(k, i, l) of one sign, s(i, j, k) of the other, and all
 larger in size than the sine of that angle. The table keeps for each ordered pair the set of third
 directions with a positive s, one bit each; what completes a pair is common to three of its rows,
@@ -146,7 +146,7 @@ def _mark(table: NDArray[np.uint64], i: int, j: int, k: int) -> None:
 
 @njit(cache=True)
 def _sine(u: Array, v: Array, w: Array) -> float:
-    """Size of `triple_sine` of `grasp_core.cones.spanning`."""
+    """Size of `triple_sine` of `spanning`."""
     x, y, z = _crossed(v, w)
     determinant = abs(x * u[0] + y * u[1] + z * u[2])
     if determinant <= DEPENDENT:

@@ -32,7 +32,8 @@ from grasp_core.families.concurrent import concurrent_radius_bounds
 from grasp_core.families.constructions import PAIRINGS
 from grasp_core.families.pencil import pencil_radius_bounds
 from grasp_core.families.tables_kernel import Corners
-from grasp_core.values import FINGERS, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import FINGERS
 
 KERNEL = "grasp_core.disc_bounds.corner_bounds_kernel"
 PARALLEL = 1e-6

@@ -1,6 +1,10 @@
-"""Files that are written whole or not at all: a complete one is renamed into place."""
+"""Regular files, read up to a bound, and files that are written whole or not at all.
+
+A file is complete before it is renamed into place.
+"""
 
 import os
+import stat
 import tempfile
 from collections.abc import Generator, Iterable
 from contextlib import contextmanager
@@ -58,3 +62,24 @@ def remove_unfinished(folder: Path) -> None:
     """Remove what killed writers have left in a folder that nobody writes to."""
     for path in folder.glob(f".*{UNFINISHED}*"):
         path.unlink(missing_ok=True)
+
+
+def bounded_bytes(path: Path, most: int) -> bytes:
+    """The bytes of a file, or its first `most + 1` where there are more; pipes never block.
+
+    Raises:
+        OSError: It cannot be read, or is a folder, a pipe or a device.
+    """
+    try:
+        handle = os.open(
+            path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+        )
+    except ValueError as error:
+        raise OSError(None, f"no name of a file ({error})", str(path)) from error
+    try:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise OSError(None, "a folder, a pipe or a device", str(path))
+        with os.fdopen(handle, "rb", closefd=False) as stream:
+            return stream.read(most + 1)
+    finally:
+        os.close(handle)

@@ -1,7 +1,7 @@
 """Bytes of mesh files -> triangles, each file read twice; also a program of its own.
 
 A strict reading of ours says what a file holds or where it breaks its format; trimesh must find the
-same triangles. Run as `python -P -m grasp_core.mesh_files.child_main`, by `grasp_core.mesh_files.child` only, it
+same triangles. Run as `python -P -m grasp_core.mesh_files.child_main`, by `child` only, it
 answers one request after another, with limits on memory and on the processor's time: a hostile file
 may end it, but not the program that asked. It opens no files and no sockets.
 """

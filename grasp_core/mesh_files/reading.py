@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.files.regular_files import bounded_bytes
+from grasp_core.files.whole_files import bounded_bytes
 from grasp_core.mesh_files import stl
 from grasp_core.mesh_files.limits import MeshLimits
 

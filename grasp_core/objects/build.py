@@ -1,28 +1,28 @@
-"""Triangle mesh -> Polyhedron, or a refusal with its reason.
+"""Triangles -> the parts of a polyhedron, or a refusal with its reason.
 
 The order of the checks: the file, its numbers, one consistent side, that it is closed with two
 triangles per edge, its volume, and that no two of its parts overlap. Close vertices are welded, and
 a closed inside-out mesh is turned. A surface that is taken as patches need not be closed: of a
-faulty one the largest part is used, wound as it is. The polyhedron's notes say what was done.
+faulty one the largest part is used, wound as it is. The notes say what was done.
 Nothing else is repaired.
 """
 
 import hashlib
 import math
-from pathlib import Path
-from typing import TypeVar, get_args
+from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, real_array
-from grasp_core.checked import instance, one_of, path_of, text
+from grasp_core.checked import instance, one_of
 from grasp_core.errors import InputError, MeshError, MeshRefusal
-from grasp_core.mesh_files.child import read_triangles
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.objects.booleans import Solid, hull, triangulate
 from grasp_core.objects.curved_patches import flat_patches
-from grasp_core.objects.mass import mass_properties
+from grasp_core.objects.face import Face, FaceKind, PatchLimits
+from grasp_core.objects.mass import MassProperties, mass_properties
 from grasp_core.objects.planar_faces import MAX_FACES, FlatnessLimits, coplanar_groups, planar_faces
 from grasp_core.objects.solid_checks import (
     check_volume,
@@ -31,11 +31,7 @@ from grasp_core.objects.solid_checks import (
     surface_fault,
     welded,
 )
-from grasp_core.values import FINGERS, Face, FaceKind, PatchLimits, Polyhedron
-
-AnyPolyhedron = TypeVar("AnyPolyhedron", bound=Polyhedron)
-
-UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+from grasp_core.values import FINGERS
 
 SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0
 """Half a millimetre to twenty metres: outside it the unit is almost surely wrong."""
@@ -45,90 +41,40 @@ DEFAULT_FLATNESS = FlatnessLimits()
 DEFAULT_LIMITS = MeshLimits()
 
 
-def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
-    path: str | Path,
-    *,
-    unit: str = "m",
-    flatness: FlatnessLimits = DEFAULT_FLATNESS,
-    faces: FaceKind = "auto",
-    patches: PatchLimits | None = None,
-    center_of_mass: ArrayLike | None = None,
-    limits: MeshLimits = DEFAULT_LIMITS,
-) -> Polyhedron:
-    """Read a solid from a mesh file.
+@dataclass(frozen=True, slots=True, eq=False)
+class Parts:
+    """What a polyhedron is made of."""
 
-    Args:
-        path: An OBJ, STL, PLY, OFF or GLB file.
-        unit: What one unit in the file is: "m", "cm", "mm" or "in".
-        flatness: How far triangles may deviate and still be one planar face.
-        faces: `planar` for exact planar faces; `patches` for the nearly flat parts of a curved or
-            scanned surface, which may have holes; `auto` takes patches where there are more than
-            `MAX_FACES` planar faces.
-        patches: How flat patches are, and how many.
-        center_of_mass: (3,) [m], in the file's frame; that of uniform density if not given,
-            estimated from the convex hull where the surface has holes.
-        limits: How large the file may be, and what reading it may cost.
-
-    Raises:
-        InputError: The unit is unknown.
-        MeshError: The file is not a solid; its `reason` says why.
-    """
-    one_of(unit, UNITS_M, "unit")
-    _check_choices(faces, patches, flatness)
-    path = path_of(path, "path")
-    instance(limits, MeshLimits, "limits")
-    vertices, triangles, data = read_triangles(path, limits)
-    try:
-        return polyhedron_from_mesh(
-            vertices * UNITS_M[unit],
-            triangles,
-            name=path.stem,
-            source_sha256=hashlib.sha256(data).hexdigest(),
-            flatness=flatness,
-            faces=faces,
-            patches=patches,
-            center_of_mass=center_of_mass,
-            limits=limits,
-        )
-    except MeshError as error:
-        raise MeshError(error.reason, f"{path}: {error.message}") from error
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+    vertices: Array
+    """Welded, (n, 3) [m]."""
+    triangles: Indices
+    """Vertex indices, (t, 3), counter-clockwise seen from outside."""
+    faces: tuple[Face, ...]
+    mass: MassProperties
+    content_sha256: str
+    """Hash of the canonical mesh."""
+    patches: PatchLimits | None
+    """How flat patches are; None where faces are exact."""
+    notes: tuple[str, ...]
+    """What was mended, for people to read."""
 
 
-def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
+def build(  # noqa: PLR0913, PLR0917 - as `load_polyhedron`
     vertices: ArrayLike,
     triangles: ArrayLike,
-    *,
-    name: str = "object",
-    source_sha256: str | None = None,
-    flatness: FlatnessLimits = DEFAULT_FLATNESS,
-    faces: FaceKind = "auto",
-    patches: PatchLimits | None = None,
-    center_of_mass: ArrayLike | None = None,
-    limits: MeshLimits = DEFAULT_LIMITS,
-    kind: type[AnyPolyhedron] = Polyhedron,
-) -> AnyPolyhedron:
-    """Check a triangle mesh and build the polyhedron of its faces.
-
-    Args:
-        vertices: (n, 3) [m].
-        triangles: Vertex indices, (t, 3).
-        name: What to call the object.
-        source_sha256: Hash of the file it came from, if any.
-        flatness: As `load_polyhedron`.
-        faces: As `load_polyhedron`.
-        patches: As `load_polyhedron`.
-        center_of_mass: As `load_polyhedron`.
-        limits: As `load_polyhedron`.
-        kind: The class to build.
+    flatness: FlatnessLimits,
+    faces: FaceKind,
+    patches: PatchLimits | None,
+    center_of_mass: ArrayLike | None,
+    limits: MeshLimits,
+) -> Parts:
+    """Check a triangle mesh and find its faces; arguments as `load_polyhedron`.
 
     Raises:
         InputError: The centre of mass is not a point.
         MeshError: The mesh is not a solid; its `reason` says why.
     """
-    text(name, "name")
-    _check_choices(faces, patches, flatness)
+    check_choices(faces, patches, flatness)
     points, corners = _checked_arrays(vertices, triangles, limits.max_triangles)
     center = _given_center(points, center_of_mass)
     points, corners, dropped = welded(points, corners)
@@ -154,23 +100,15 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
     solid = hull(points) if fault and fault.reason is MeshRefusal.OPEN else Solid(points, corners)
     check_volume(solid)
     mass = mass_properties(solid, center)
-    content = content_hash(points, corners)
-    return kind(
-        name=name,
-        vertices=points,
-        triangles=corners,
-        faces=found,
-        volume=mass.volume,
-        center_of_mass=mass.center,
-        inertia=mass.inertia,
-        content_sha256=content,
-        source_sha256=source_sha256 or content,
-        patches=flat,
-        notes=tuple(notes),
-    )
+    return Parts(points, corners, found, mass, content_hash(points, corners), flat, tuple(notes))
 
 
-def _check_choices(faces: FaceKind, patches: PatchLimits | None, flatness: FlatnessLimits) -> None:
+def check_choices(faces: FaceKind, patches: PatchLimits | None, flatness: FlatnessLimits) -> None:
+    """Refuse choices of the wrong kind.
+
+    Raises:
+        InputError: One of them is.
+    """
     one_of(faces, get_args(FaceKind), "faces")
     if patches is not None:
         instance(patches, PatchLimits, "patches")

@@ -9,7 +9,7 @@ import importlib
 from typing import Any
 
 from grasp_core.arrays import Array
-from grasp_core.values import Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
 
 FLUSH = 1e-6
 """How far below the hull's border a triangle's centroid may be, in object radii: coordinates in

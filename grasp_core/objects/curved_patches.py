@@ -26,9 +26,9 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.cones.spanning import angles_between
 from grasp_core.geometry.clearings import clearest_point, clearing
 from grasp_core.geometry.polygons import area_and_centroid, edge_rows, plane_frame
+from grasp_core.objects.face import Face, PatchLimits
 from grasp_core.objects.planar_faces import triangle_neighbours
 from grasp_core.solvers.ties import first_best, graded, largest_first, ranks
-from grasp_core.values import Face, PatchLimits
 
 SMOOTHING = 10
 """Rounds in which normals are averaged with those of neighbours, to find where it is flat."""

@@ -19,9 +19,9 @@ from grasp_core.geometry.flat_polygons import (
     has_inscribed_radius,
 )
 from grasp_core.geometry.polygons import clip, convex_hull, edge_rows, plane_frame
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import graded
-from grasp_core.values import Polyhedron
 
 THINNEST = 1e-6
 """Pieces without room for a disc of this radius (object size one) hold no contact."""

@@ -5,7 +5,9 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.checked import instance
 from grasp_core.errors import InputError
-from grasp_core.values import Contact, Face, Grasp, Polyhedron
+from grasp_core.objects.face import Face
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact, Grasp
 
 ON_FACE = 1e-6
 """How far a contact may be off its face, in object radii: what six digits in a file keep."""

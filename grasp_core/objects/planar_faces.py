@@ -21,8 +21,8 @@ from grasp_core.geometry.polygons import (
     signed_area,
     without_straight_corners,
 )
+from grasp_core.objects.face import Face
 from grasp_core.solvers.ties import largest_first
-from grasp_core.values import Face
 
 MAX_FACES = 200
 """Objects with more count as curved: 65 million quadruples, some 6 million of which span."""

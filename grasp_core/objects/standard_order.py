@@ -24,9 +24,10 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.objects.booleans import triangulate
+from grasp_core.objects.face import Face
 from grasp_core.objects.planar_faces import FlatnessLimits, convex_pieces
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import graded
-from grasp_core.values import Face, Polyhedron
 
 FLIP = np.array([1.0, 1.0, -1.0])
 """The mirror image: z changes its sign, which is exact."""

@@ -27,11 +27,12 @@ from grasp_core.families.free import of_general_type
 from grasp_core.families.placements import Placement
 from grasp_core.objects.face_pieces import FacePiece, inset_piece, unit_pieces
 from grasp_core.objects.on_faces import check_on_faces
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.ascent import ContactFaces
 from grasp_core.planning.certify import certify, to_grasp
 from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
 from grasp_core.solvers.ties import largest_first, surpassing
-from grasp_core.values import FINGERS, ForceCone, Grasp, Polyhedron
+from grasp_core.values import FINGERS, ForceCone, Grasp
 
 FINGER_RADIUS = 0.05
 """In object radii, where none is given: half the radius of a fingertip in the scenes."""

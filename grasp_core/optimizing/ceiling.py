@@ -36,9 +36,10 @@ from grasp_core.families.face_parts import Path, corner_contacts, cover_everythi
 from grasp_core.fields import are_frictions, are_units, is_a, is_number, is_tuple_of
 from grasp_core.objects.face_pieces import FacePiece, inset_piece, unit_pieces
 from grasp_core.objects.on_faces import check_body
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
 from grasp_core.quality.ferrari_canny import wrench_set_quality
-from grasp_core.values import FINGERS, FaceQuadruple, Polyhedron
+from grasp_core.values import FINGERS, FaceQuadruple
 
 PART_GAP = 0.02
 """Gap of the quality of corner contacts: finer bounds do not help while parts are large."""

@@ -24,7 +24,8 @@ from grasp_core.disc_bounds.corner_bounds import (
 from grasp_core.families.constructions import LEAST_RADIUS
 from grasp_core.families.tables_kernel import Corners
 from grasp_core.objects.face_pieces import Shapes
-from grasp_core.values import ForceCone, Polyhedron, four
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import ForceCone, four
 
 LEAST_SPAN_ANGLE = math.atan(LEAST_RADIUS)
 """With narrower cones no disc at a depth of one object radius would count."""

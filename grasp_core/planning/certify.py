@@ -14,6 +14,7 @@ from grasp_core.cones.spanning import span_angle
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.placements import Placement
 from grasp_core.objects.face_pieces import FacePiece
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.values import (
     Contact,
@@ -22,7 +23,6 @@ from grasp_core.values import (
     Family,
     ForceCone,
     Grasp,
-    Polyhedron,
     Witness,
     four,
 )

@@ -26,12 +26,7 @@ from grasp_core.planning.ranking import Attempt, Quadruple, outlook
 from grasp_core.planning.reach import Reach
 from grasp_core.planning.result import MethodCounts
 from grasp_core.solvers.ties import graded, surpassing
-from grasp_core.values import (
-    ContactRegion,
-    FaceQuadruple,
-    ForceCone,
-    four,
-)
+from grasp_core.values import ContactRegion, FaceQuadruple, ForceCone, four
 
 Cones: TypeAlias = tuple[ForceCone, ForceCone, ForceCone, ForceCone]
 Found: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement]

@@ -20,17 +20,17 @@ from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.cones.spanning import span_angle
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import plane_frame
+from grasp_core.objects.face import Face
 from grasp_core.objects.on_faces import within
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.values import (
     FINGERS,
     Contact,
     ContactRegion,
-    Face,
     FaceQuadruple,
     ForceCone,
     Grasp,
-    Polyhedron,
     Witness,
     four,
 )

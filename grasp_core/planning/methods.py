@@ -8,10 +8,10 @@ from typing import TypeAlias
 
 from grasp_core.families.constructions import CONSTRUCTIONS, MIXED, Construction
 from grasp_core.families.free import Absence
-from grasp_core.objects.clear_of_edges import clear_of_edges
 from grasp_core.objects.face_pieces import face_shapes
-from grasp_core.objects.shared_faces import shared_quadruples, with_halves
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import standard
+from grasp_core.objects.trimmed_faces import clear_of_edges, shared_quadruples, with_halves
 from grasp_core.planning.as_given import Place, absence_as_given, as_given
 from grasp_core.planning.blocks import Blocks, Prospects, all_blocks, spanning_blocks
 from grasp_core.planning.candidates import PlannedCones
@@ -21,7 +21,7 @@ from grasp_core.planning.free_search import FreeRequest, search_free, search_und
 from grasp_core.planning.reach import Reach, reach
 from grasp_core.planning.request import COMPLETE_CELLS, FAMILIES, METHODS, PlanRequest
 from grasp_core.planning.result import Outcomes
-from grasp_core.values import FINGERS, FaceQuadruple, Family, Method, Polyhedron, four
+from grasp_core.values import FINGERS, FaceQuadruple, Family, Method, four
 
 KEPT_BLOCKS = 8
 """Blocks of quadruples that are made once for all families: some hundred megabytes."""

@@ -17,6 +17,7 @@ from grasp_core.checked import function, several, text
 from grasp_core.cones.spanning import count_spanning
 from grasp_core.families.constructions import LEAST_RADIUS
 from grasp_core.objects.planar_faces import MAX_FACES
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.candidates import LEAST_SPAN_ANGLE
 from grasp_core.planning.certify import to_grasp
 from grasp_core.planning.methods import Progress, Searches
@@ -24,7 +25,7 @@ from grasp_core.planning.reach import Finger
 from grasp_core.planning.request import METHODS, ConeKind, PlanRequest, RankBy, check_request
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.planning.selection import chosen
-from grasp_core.values import Grasp, Method, Polyhedron
+from grasp_core.values import Grasp, Method
 
 
 def plan(  # noqa: PLR0913 - the contract's keywords

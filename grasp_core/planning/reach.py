@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array
 from grasp_core.checked import positive
 from grasp_core.geometry.polygons import plane_frame
-from grasp_core.values import FaceQuadruple, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import FaceQuadruple
 
 TOUCHING = 1e-6
 """Overlap that does not count, in object radii: what six digits in a file keep."""

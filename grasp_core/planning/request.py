@@ -19,8 +19,9 @@ from grasp_core.checked import (
 from grasp_core.errors import InputError
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.planar_faces import MAX_FACES
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from grasp_core.values import Family, Method, Polyhedron
+from grasp_core.values import Family, Method
 
 FAMILIES: tuple[Family, ...] = get_args(Family)
 """The families of the paper, each with its construction."""

@@ -15,14 +15,14 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.checked import MOST_EDGES, whole
-from grasp_core.closure.contact_arrays import contact_arrays
-from grasp_core.closure.force_closure import unit_size
-from grasp_core.closure.many_contacts import (
+from grasp_core.closure.contact_arrays import (
+    contact_arrays,
     many_contact_arrays,
     many_frames,
     many_frictions,
     unit_sizes,
 )
+from grasp_core.closure.force_closure import unit_size
 from grasp_core.closure.wrench_sets import WrenchSet, scaled_arms
 from grasp_core.closure.wrenches import WRENCH, grasp_map
 from grasp_core.compiled import compiled

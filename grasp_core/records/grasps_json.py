@@ -14,22 +14,14 @@ import numpy as np
 
 from grasp_core.errors import InputError
 from grasp_core.mesh_files.limits import MeshLimits
-from grasp_core.objects.build import polyhedron_from_mesh
+from grasp_core.objects.face import PatchLimits
 from grasp_core.objects.on_faces import check_on_faces
+from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.planning.certify import check_witness
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import versions
-from grasp_core.values import (
-    Contact,
-    ContactRegion,
-    ForceCone,
-    Grasp,
-    PatchLimits,
-    Polyhedron,
-    Witness,
-    four,
-)
+from grasp_core.values import Contact, ContactRegion, ForceCone, Grasp, Witness, four
 
 if TYPE_CHECKING:
     from grasp_core.records.grasps_schema import GraspRecord

@@ -12,10 +12,9 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.regions.contact_sites import Sites
-from grasp_core.regions.cover_game import AHEAD, ANSWERS, EVEN, ROUNDS, TINY
 from grasp_core.regions.motions_kernel import MOTIONS, is_open, longest, lowest, velocity
 from grasp_core.regions.proof import LEAF, TWIST
+from grasp_core.regions.sites import AHEAD, ANSWERS, EVEN, ROUNDS, TINY, Sites
 
 RAYS = TWIST
 COVERED, REFUTED, UNDECIDED = 1, -1, 0
@@ -109,7 +108,7 @@ def reweigh(regrets: Array, powers: Array, weights: Array) -> None:
 def find_forces(ids: Indices, motions: Array, sites: Sites, forces: Array, weights: Array) -> bool:
     """Fill in forces with power on all rays of a cone, if some are found; else a bad twist in it.
 
-    The game of `grasp_core.regions.cover_game`, which ends at once where no answer has power.
+    The game of `grasp_core.regions.sites`, which ends at once where no answer has power.
     """
     regrets, powers = np.zeros(RAYS), np.empty(RAYS)
     weights[:] = 1.0 / RAYS

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
-from grasp_core.regions.contact_sites import Sites
-from grasp_core.regions.cover_game import AHEAD, ANSWERS, EVEN, ROUNDS, TINY
 from grasp_core.regions.proof import EDGES, LEAF, TWIST, TwistCover, halves, orthants
+from grasp_core.regions.sites import AHEAD, ANSWERS, EVEN, ROUNDS, TINY, Sites
 
 KERNEL = "grasp_core.regions.cover_kernel"
 

@@ -15,10 +15,10 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.geometry.polygons import SAME_CORNER, clip, edge_rows, signed_area, tidy
-from grasp_core.regions.contact_sites import Sites
 from grasp_core.regions.cover_search import search_cover
 from grasp_core.regions.largest_discs import Grounds, Proved, part_of_disc
 from grasp_core.regions.proof import TwistCover, power_of, slack_of, summed
+from grasp_core.regions.sites import Sites
 
 SHARINGS = 2
 """Times that what is left is given away."""

@@ -15,10 +15,9 @@ import numpy as np
 from grasp_core.arrays import Array, to_digits
 from grasp_core.geometry.polygons import clip
 from grasp_core.objects.face_pieces import FacePiece
-from grasp_core.regions.contact_sites import Sites, stacked_corners
-from grasp_core.regions.cover_game import TINY
 from grasp_core.regions.cover_search import search_cover
 from grasp_core.regions.proof import TwistCover
+from grasp_core.regions.sites import TINY, Sites, stacked_corners
 
 FINENESS = 0.02
 """The radius is found to this, relative to it."""

@@ -10,8 +10,7 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array
-from grasp_core.regions.contact_sites import Sites
-from grasp_core.regions.cover_game import AHEAD, TINY
+from grasp_core.regions.sites import AHEAD, TINY, Sites
 
 MOTIONS = 6
 STEPS = 40

@@ -14,7 +14,8 @@ from grasp_core.arrays import Array
 from grasp_core.checked import coefficient
 from grasp_core.cones.spanning import angles_between
 from grasp_core.objects.on_faces import check_on_faces
-from grasp_core.values import Grasp, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Grasp
 from scenes.drawing.ruled_surfaces import between, rulings
 from scenes.drawing.shapes import Shape, closed, cone_rim, cone_sides, tube
 

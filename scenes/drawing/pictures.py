@@ -9,7 +9,8 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.checked import coefficient, instance, path_of, switch
 from grasp_core.objects.on_faces import check_on_faces
-from grasp_core.values import Grasp, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Grasp
 from scenes.drawing.canvas import (
     Around,
     add_polygons,

@@ -8,8 +8,9 @@ import numpy as np
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.checked import number, positive
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
-from grasp_core.values import Grasp, Polyhedron
+from grasp_core.values import Grasp
 
 DISTANCE = 9.0
 """Of the camera, in object radii: some perspective, little distortion."""

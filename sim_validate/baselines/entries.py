@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
-from grasp_core.closure.contact_hash import contacts_sha256
+from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.values import Grasp
 from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.setup import WEAKEST

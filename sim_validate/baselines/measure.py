@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grasp_core.errors import InputError
-from grasp_core.provenance import versions
+from grasp_core.provenance import arithmetic, versions
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.entries import Baseline, entry_of
 from sim_validate.baselines.settings import settings_of
-from sim_validate.datasets.rounding import arithmetic
-from sim_validate.gate.gate import require_faithful
 from sim_validate.parallel.processes import each
+from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.validation.grasp_verdict import Verdict
 from sim_validate.validation.jobs import Job, verdict_of, with_threads

@@ -132,3 +132,9 @@ class Steps:
             if done > EARLIEST * total:
                 line += f", {(total - done) / rate:.0f} s left"
             self.console.print(Text(line), soft_wrap=True)
+
+
+def say_cut(count: int, reporter: Reporter) -> None:
+    """Say how many rows a table has not shown."""
+    if count > TABLE_ROWS:
+        reporter.say(f"... and {count - TABLE_ROWS} more")

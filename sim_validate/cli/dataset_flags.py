@@ -9,10 +9,8 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, subcommand
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from sim_validate.cli.flag_bounds import FINITE, at_least
 from sim_validate.cli.flag_groups import Count, Friction, Positive, Seed, Speech
+from sim_validate.datasets.columns import ExportFormat, SplitName
 from sim_validate.parallel.processes import available_cores
-
-ExportFormat = Literal["csv", "jsonl", "npz", "hdf5", "isaac", "mjcf"]
-SplitName = Literal["train", "validation", "test"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,8 @@ from grasp_core.errors import InputError
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.planning.request import METHODS
 from sim_validate.cli import dataset_flags
-from sim_validate.cli.console import TABLE_ROWS, Reporter
+from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.plan import say_cut
 from sim_validate.datasets.building.build import build
 from sim_validate.datasets.building.driver import Engine
 from sim_validate.datasets.building.worker import Limits

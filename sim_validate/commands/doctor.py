@@ -10,17 +10,18 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.compiled import SWITCH, compiled
 from grasp_core.families.concurrent import PYRAMID_SIDES
 from grasp_core.families.discs import KEPT
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planner import plan
 from grasp_core.provenance import versions
-from grasp_core.values import Grasp, Polyhedron
+from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, available_graphics, has_display, remedy
 from scenes.example_objects import example_object
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.gate.gate import Gate, measured_gate
 from sim_validate.parallel.processes import available_cores
 from sim_validate.records.verdicts_json import finite, gate_record
+from sim_validate.simulation.gate.gate import Gate, measured_gate
 from sim_validate.simulation.setup import Setup
 from sim_validate.validation.validation import validate
 

@@ -6,14 +6,14 @@ from dataclasses import asdict
 
 from grasp_core.cones.spanning import count_spanning
 from grasp_core.objects.planar_faces import MAX_FACES
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.candidates import LEAST_SPAN_ANGLE
 from grasp_core.short_text import vector
-from grasp_core.values import Polyhedron
 from scenes.example_objects import example_names
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.plan import load_object
+from sim_validate.commands.from_flags import load_object
 
 WIDTH = 20
 """Of the column that says what a fact is about, in characters."""

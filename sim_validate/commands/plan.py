@@ -3,84 +3,28 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from grasp_core.errors import InputError
-from grasp_core.mesh_files.limits import MeshLimits
-from grasp_core.mesh_files.reading import FORMATS
-from grasp_core.objects.build import load_polyhedron
+import numpy as np
+
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planner import plan
-from grasp_core.planning.reach import Finger
 from grasp_core.planning.request import methods_for
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import Moved, plan_to_json
-from grasp_core.values import FaceQuadruple, Grasp, PatchLimits, Polyhedron
-from scenes.example_objects import example_object
+from grasp_core.values import FaceQuadruple, Grasp
 from sim_validate.cli import command_flags, flag_groups
-from sim_validate.cli.console import TABLE_ROWS, Reporter
+from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
+from sim_validate.commands.from_flags import asked_finger, object_to_plan
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.reading import write_text
 from sim_validate.files.stale_results import remove_results
 from sim_validate.parallel.certifying import Asked, Found, certified, wider
-from sim_validate.parallel.improving import improved, show_gains
+from sim_validate.parallel.improving import improved
 from sim_validate.records.regions import write_regions
-
-
-def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
-    """A mesh file, or a built-in object when the name has no mesh ending."""
-    path = Path(name)
-    if path.suffix.lower().lstrip(".") in FORMATS or path.is_file():
-        given = mesh.limits
-        return load_polyhedron(
-            path,
-            unit=mesh.unit,
-            faces=mesh.faces,
-            patches=PatchLimits(mesh.patch_spread_deg, mesh.patch_depth, mesh.patches),
-            center_of_mass=mesh.center_of_mass_m,
-            limits=MeshLimits(
-                max_bytes=given.max_mesh_bytes,
-                max_triangles=given.max_triangles,
-                max_faces=given.max_faces,
-                max_parts=given.max_parts,
-                max_seconds=given.max_mesh_seconds,
-                max_memory_mib=given.max_mesh_memory_mib,
-            ),
-        )
-    if path.suffix or len(path.parts) > 1:
-        raise InputError(f"{name}: no such file, and the ending is none of {', '.join(FORMATS)}")
-    if replace(mesh, limits=flag_groups.MeshLimits()) != flag_groups.Mesh():
-        raise InputError(
-            f"{name} is built in; --unit, --faces, --patches, --patch-spread-deg, --patch-depth "
-            "and --center-of-mass-m say how mesh files are read"
-        )
-    return example_object(name)
-
-
-def object_to_plan(name: str, planning: flag_groups.Planning, reporter: Reporter) -> Polyhedron:
-    """The object, once all that is asked for fits it.
-
-    Raises:
-        InputError: The object or a setting is refused.
-    """
-    if planning.ceiling is not None and not planning.optimize:
-        raise InputError("--ceiling bounds what --optimize may reach; give both or neither")
-    _check_optimize(planning)
-    if planning.regions and planning.share_faces_m is not None:
-        raise InputError(
-            "--regions would let fingers that share a face meet; leave it or --share-faces-m out"
-        )
-    body = load_object(name, planning.mesh)
-    if planning.optimize and body.patches:
-        raise InputError(
-            f"{body.name} has a curved surface; --optimize is for exact planar faces only"
-        )
-    for note in body.notes:
-        reporter.warn(f"{body.name}: {note}")
-    reporter.detail(f"{body.name}: mesh {body.content_sha256}, {len(body.triangles)} triangles")
-    return body
 
 
 def plan_object(
@@ -110,10 +54,13 @@ def plan_object(
         )
     moves: tuple[Moved, ...] = ()
     if planning.optimize and found.grasps:
-        found, moves = improved(
-            body, found, finger_radius=planning.finger_radius_m, parts=planning.ceiling, jobs=jobs,
-            reporter=reporter,
-        )  # fmt: skip
+        with reporter.progress("optimising") as steps:
+            found, moves = improved(
+                body, found, finger_radius=planning.finger_radius_m, parts=planning.ceiling,
+                jobs=jobs, progress=steps.update,
+            )  # fmt: skip
+        if left_out := len(moves) - len(found.grasps):
+            reporter.say(f"{left_out} optimised grasps are left out: others have the same contacts")
     return found, moves
 
 
@@ -127,38 +74,17 @@ def with_regions(
     asked = Asked(found.friction, clearance=planning.edge_clearance_m)
     grasps = list[Grasp]()
 
-    def kept() -> Iterator[Found]:
-        for grasp, proved in certified(body, found.grasps, asked, jobs=jobs, reporter=reporter):
+    def kept(each: Iterator[Found]) -> Iterator[Found]:
+        for grasp, proved in each:
             grasps.append(wider(grasp, proved))
             yield grasp, proved
 
-    write_regions(folder, body, asked, kept())
+    with reporter.progress("certifying") as steps:
+        each = certified(body, found.grasps, asked, jobs=jobs, progress=steps.update)
+        write_regions(folder, body, asked, kept(each))
     widened = sum(new is not old for new, old in zip(grasps, found.grasps, strict=True))
     reporter.say(f"{widened} of {len(grasps)} grasps got regions with proofs of their own")
     return replace(found, grasps=tuple(grasps))
-
-
-def _check_optimize(planning: flag_groups.Planning) -> None:
-    kept = (planning.edge_clearance_m, planning.share_faces_m, planning.approach_m)
-    if planning.optimize and any(kept):
-        raise InputError(
-            "--optimize moves contacts without regard to --edge-clearance-m, --share-faces-m and "
-            "--approach-m; leave it out, or them"
-        )
-
-
-def asked_finger(planning: flag_groups.Planning) -> Finger | None:
-    """The fingers whose free lines are to be planned, if any."""
-    if planning.approach_m is None:
-        if planning.finger_radius_m is not None and not planning.optimize:
-            raise InputError(
-                "--finger-radius-m also needs --approach-m, the length of the free line on which "
-                "fingers come, or --optimize, which keeps contacts that far from edges"
-            )
-        return None
-    if planning.finger_radius_m is None:
-        raise InputError("--approach-m also needs --finger-radius-m, the radius of the fingertips")
-    return Finger(planning.finger_radius_m, planning.approach_m)
 
 
 def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
@@ -236,7 +162,18 @@ def _listed(faces: FaceQuadruple) -> str:
     return "-".join(str(face) for face in faces)
 
 
-def say_cut(count: int, reporter: Reporter) -> None:
-    """Say how many rows a table has not shown."""
-    if count > TABLE_ROWS:
-        reporter.say(f"... and {count - TABLE_ROWS} more")
+def show_gains(moves: Sequence[Moved], reporter: Reporter) -> None:
+    """Tell how the quality changed: grasp by grasp, then how the gains are distributed."""
+    rows = [
+        (move.id, f"{move.before[0]:.4f}", f"{move.after[0]:.4f}", f"{move.gain:.3f}",
+         "" if move.ceiling is None else f"{move.ceiling:.4f}")
+        for move in moves[:TABLE_ROWS]
+    ]  # fmt: skip
+    columns = ("grasp", "quality before", "after", "gain", "none above")
+    reporter.table("Ferrari-Canny l1 [N]", columns, rows)
+    gains = np.array([move.gain for move in moves])
+    low, quarter, middle, upper, high = np.percentile(gains, [0, 25, 50, 75, 100])
+    reporter.say(
+        f"{int((gains > 1.0).sum())} of {len(gains)} grasps raised; gain from {low:.3f} to "
+        f"{high:.3f}, median {middle:.3f}, half of them between {quarter:.3f} and {upper:.3f}"
+    )

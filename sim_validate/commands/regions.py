@@ -6,9 +6,8 @@ from typing import Any
 
 from grasp_core.errors import InputError
 from sim_validate.cli import command_flags
-from sim_validate.cli.console import TABLE_ROWS, Reporter
+from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.plan import say_cut
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import remove_regions
 from sim_validate.parallel.certifying import Asked, certified
@@ -29,10 +28,11 @@ def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
         command.reserve, command.balance, command.recenter, command.edge_clearance_m, command.cones,
     )  # fmt: skip
     with alone_in(command.out):
-        found = certified(saved.body, chosen, asked, jobs=command.jobs, reporter=reporter)
         if command.out is not None:
             remove_regions(command.out)
-        document = write_regions(command.out, saved.body, asked, found)
+        with reporter.progress("certifying") as steps:
+            found = certified(saved.body, chosen, asked, jobs=command.jobs, progress=steps.update)
+            document = write_regions(command.out, saved.body, asked, found)
     _show(document, reporter)
     if command.out is not None:
         reporter.say(f"wrote {command.out / REGIONS}")

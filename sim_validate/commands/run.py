@@ -4,27 +4,26 @@ import re
 from pathlib import Path
 
 from grasp_core.errors import GraspError
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.records.grasps_json import SavedGrasps, plan_to_json
-from grasp_core.values import Polyhedron
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit, reason_of
-from sim_validate.cli.flag_groups import Testing
 from sim_validate.cli.showing_flags import Report
+from sim_validate.commands.from_flags import asked_finger, object_to_plan, prepared
 from sim_validate.commands.plan import (
-    asked_finger,
-    object_to_plan,
     plan_object,
     say_counts,
     with_regions,
 )  # fmt: skip
 from sim_validate.commands.report import shown_report
-from sim_validate.commands.validate import prepared, simulate_grasps, with_planned_fingers
+from sim_validate.commands.validate import simulate_grasps
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.reading import write_text
 from sim_validate.files.stale_results import REPORT, remove_results, require_report_folder
-from sim_validate.gate.gate import require_faithful
 from sim_validate.parallel.improving import show_gains
+from sim_validate.simulation.gate.gate import require_faithful
+from sim_validate.simulation.setup import Agenda, Setup
 
 RESULTS = Path("graspproof-out")
 """Where results go, a folder for each object, if not told otherwise."""
@@ -39,24 +38,29 @@ REPORTED = 200
 def run_object(command: command_flags.Run, reporter: Reporter) -> int:
     """Plan on an object, simulate its grasps, write and show everything."""
     planning = command.planning
-    testing = with_planned_fingers(command.testing, asked_finger(planning))
-    setup, _ = prepared(testing, planning.seed, command.out or RESULTS)
+    trials = prepared(
+        command.testing, asked_finger(planning), planning.seed, command.out or RESULTS
+    )
     body = object_to_plan(command.object, planning, reporter)
     folder = command.out or RESULTS / _folder_name(body)
     with alone_in(folder):
         if not command.no_report:
             require_report_folder(folder / REPORT)
-        require_faithful(setup, planning.friction, body.radius)
-        return _run_in(folder, body, command, testing, reporter)
+        require_faithful(trials[0], planning.friction, body.radius)
+        return _run_in(folder, body, command, trials, reporter)
 
 
 def _run_in(
-    folder: Path, body: Polyhedron, command: command_flags.Run, testing: Testing, reporter: Reporter
+    folder: Path,
+    body: Polyhedron,
+    command: command_flags.Run,
+    trials: tuple[Setup, Agenda],
+    reporter: Reporter,
 ) -> int:
-    setup, _ = prepared(testing, command.planning.seed, folder)
-    found, moves = plan_object(body, command.planning, testing.jobs, reporter)
+    (setup, agenda), jobs = trials, command.testing.jobs
+    found, moves = plan_object(body, command.planning, jobs, reporter)
     remove_results(folder)
-    found = with_regions(body, found, command.planning, folder, testing.jobs, reporter)
+    found = with_regions(body, found, command.planning, folder, jobs, reporter)
     write_text(folder / "grasps.json", plan_to_json(body, found, moves))
     say_counts(body, found, reporter)
     if found.absence:
@@ -69,10 +73,10 @@ def _run_in(
         scene = setup.scene(body, grasp, found.friction)
         write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
     saved = SavedGrasps(body, found.friction, found.seed, found.grasps, found.finger)
-    code = simulate_grasps(saved, testing, folder, reporter)
+    code = simulate_grasps(saved, setup, agenda, jobs=jobs, folder=folder, reporter=reporter)
     reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
     if not command.no_report:
-        _report(folder, testing.jobs, reporter)
+        _report(folder, jobs, reporter)
     return code
 
 

@@ -5,10 +5,11 @@ from scenes.mjcf import build_scene
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
+from sim_validate.commands.from_flags import finger_settings
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.reading import write_text
 from sim_validate.records.grasps import grasp_with_id, read_grasps
-from sim_validate.simulation.asked_fingers import finger_settings, planned_fingers
+from sim_validate.simulation.setup import with_planned_radius
 
 
 def write_scenes(command: command_flags.Scene, reporter: Reporter) -> int:
@@ -20,7 +21,7 @@ def write_scenes(command: command_flags.Scene, reporter: Reporter) -> int:
     if command.out is None and len(chosen) > 1:
         raise InputError("several scenes need --out DIR; or choose one with --grasp ID")
     friction = saved.friction if command.friction is None else command.friction
-    fingers = finger_settings(planned_fingers(command.fingers, saved.finger))
+    fingers = with_planned_radius(finger_settings(command.fingers), saved.finger)
     written: list[str] = []
     with alone_in(command.out):
         for grasp in chosen:

@@ -1,30 +1,23 @@
 """The commands that simulate: grasps on the bench, verdicts to files and tables."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from grasp_core.planning.reach import Finger
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
-from sim_validate.cli import command_flags, flag_groups
-from sim_validate.cli.console import TABLE_ROWS, Reporter
+from sim_validate.cli import command_flags
+from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.cli.flag_bounds import FlagsError
-from sim_validate.commands.plan import say_cut
+from sim_validate.commands.from_flags import prepared
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.reading import write_arrays, write_text
 from sim_validate.files.stale_results import remove_verdicts
-from sim_validate.gate.gate import require_faithful
 from sim_validate.records.grasps import read_grasps
-from sim_validate.records.setup_toml import setup_from_file
 from sim_validate.records.verdicts_json import summary, trace_arrays, verdicts_to_json
-from sim_validate.records.wrenches import weights, wrenches_from_file
-from sim_validate.simulation.asked_fingers import finger_settings, planned_fingers
+from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.hold_verdict import Outcome
-from sim_validate.simulation.noise import Noise
 from sim_validate.simulation.other_rules import RULES
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.validation.grasp_verdict import Verdict
@@ -47,86 +40,23 @@ def validate_file(command: command_flags.Validate, reporter: Reporter) -> int:
         saved.grasps[: command.limit],
         saved.finger,
     )
-    testing = with_planned_fingers(command.testing, saved.finger)
+    setup, agenda = prepared(command.testing, saved.finger, chosen.seed, command.out)
     with alone_in(command.out):
-        return simulate_grasps(chosen, testing, command.out, reporter)
-
-
-def with_planned_fingers(
-    testing: flag_groups.Testing, planned: Finger | None
-) -> flag_groups.Testing:
-    """Trials with fingertips of the radius that was planned for, unless another is asked for."""
-    return replace(testing, fingers=planned_fingers(testing.fingers, planned))
-
-
-def noise_of(given: flag_groups.Repeats) -> Noise:
-    """What the flags say about noise.
-
-    Raises:
-        InputError: There is noise, but no repeat to put it on.
-    """
-    plain = flag_groups.Repeats()
-    if not given.trials and given != plain:
-        raise FlagsError("--noise-... is for repeats: give --trials, too")
-    return Noise(
-        shift=given.noise_shift,
-        turn_deg=given.noise_turn_deg,
-        normal_deg=given.noise_normal_deg,
-        friction=given.noise_friction,
-        mass=given.noise_mass,
-    )
-
-
-def prepared(testing: flag_groups.Testing, seed: int, folder: Path | None) -> tuple[Setup, Agenda]:
-    """What the flags and files say about trials, checked before anything runs.
-
-    Raises:
-        InputError: A flag or a file is refused, or flags contradict each other.
-    """
-    return _setup(testing), _agenda(testing, seed, folder)
-
-
-def _setup(testing: flag_groups.Testing) -> Setup:
-    """How the flags, and then a file, say trials are simulated."""
-    setup = Setup(
-        fingers=finger_settings(testing.fingers),
-        surface=testing.surface,
-        timeout_s=testing.timeout_s,
-    )
-    return setup if testing.setup is None else setup_from_file(testing.setup, setup)
-
-
-def _agenda(testing: flag_groups.Testing, seed: int, folder: Path | None) -> Agenda:
-    """Which trials the flags ask for."""
-    if testing.down and testing.weight_n is None:
-        raise FlagsError("--down is a direction of the weight: give --weight-n too")
-    if testing.traces and folder is None:
-        raise FlagsError("--traces are written to files: give --out DIR too")
-    own = () if testing.wrenches is None else wrenches_from_file(testing.wrenches)
-    weight = () if testing.weight_n is None else weights(testing.weight_n, testing.down)
-    return Agenda(
-        random_wrenches=testing.random_wrenches,
-        wrenches=(*own, *weight),
-        limits=testing.limits,
-        independent=testing.independent,
-        rules=testing.also_judge_by,
-        trials=testing.repeats.trials,
-        noise=noise_of(testing.repeats),
-        keep_traces=testing.traces,
-        seed=seed,
-    )
+        return simulate_grasps(
+            chosen, setup, agenda, jobs=command.testing.jobs, folder=command.out, reporter=reporter
+        )
 
 
 def simulate_grasps(
-    saved: SavedGrasps, testing: flag_groups.Testing, folder: Path | None, reporter: Reporter
-) -> int:
+    saved: SavedGrasps, setup: Setup, agenda: Agenda, *, jobs: int, folder: Path | None,
+    reporter: Reporter,
+) -> int:  # fmt: skip
     """Validate grasps, write what is done even when interrupted, and show the verdicts.
 
     Raises:
-        InputError: A flag, a file or a grasp is refused.
+        InputError: A grasp is refused.
         UnfaithfulError: The simulator fails the gate; no grasp is simulated then.
     """
-    setup, agenda = prepared(testing, saved.seed, folder)
     gate = require_faithful(setup, saved.friction, saved.body.radius)
     for check in gate.checks:
         reporter.detail(str(check))
@@ -136,7 +66,7 @@ def simulate_grasps(
     verdicts: list[Verdict] = []
     try:
         with reporter.progress("simulating") as steps:
-            for verdict in validated(tasks, testing.jobs):
+            for verdict in validated(tasks, jobs):
                 verdicts.append(verdict)
                 if folder and agenda.keep_traces:
                     write_arrays(folder / "traces" / f"{verdict.id}.npz", trace_arrays(verdict))

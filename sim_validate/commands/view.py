@@ -12,19 +12,18 @@ from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
-from scenes.drawing.clips import GraphicsError, has_display, write_clip
+from scenes.drawing.clips import GraphicsError, has_display, write_clip, write_turning_clip
 from scenes.drawing.pictures import write_picture
-from scenes.drawing.turning_clips import write_turning_clip
+from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, build_scene
 from sim_validate.cli import showing_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.cli.flag_groups import Fingers
 from sim_validate.files.reading import write_text
 from sim_validate.records.grasps import grasp_with_id, read_grasps
 from sim_validate.reports.run_folder import GRASPS
 from sim_validate.reports.turntable import turntable_page
-from sim_validate.simulation.asked_fingers import finger_settings, planned_fingers
+from sim_validate.simulation.setup import with_planned_radius
 
 COMING, RESTING = 60, 20
 """Frames in which fingers come in, and stay."""
@@ -55,7 +54,7 @@ def view_grasp(command: showing_flags.View, reporter: Reporter) -> int:
 
 
 def _scene(saved: SavedGrasps, grasp: Grasp, friction: float) -> Scene:
-    fingers = finger_settings(planned_fingers(Fingers(), saved.finger))
+    fingers = with_planned_radius(FingerSettings(), saved.finger)
     return build_scene(saved.body, grasp, friction, fingers=fingers)
 
 

@@ -1,16 +1,16 @@
-"""What is asked for of a dataset, all of it or one split, and what is known of its making."""
+"""A finished dataset, or one split of it: its tables as arrays, and what is known of its making."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from grasp_core.checked import one_of
+from grasp_core.checked import one_of, path_of
 from grasp_core.errors import InputError
 from sim_validate.datasets.columns import TABLES, Name
 from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_toml
 from sim_validate.datasets.manifest import Listed, Manifest, listed, read_manifest
-from sim_validate.datasets.parquet import each_row
+from sim_validate.datasets.parquet import Columns, each_row, read_columns
 from sim_validate.datasets.rows import SPLITS
 from sim_validate.files.paths import path_inside
 
@@ -103,3 +103,21 @@ def select(folder: Path, split: str | None = None) -> Selection:
     if split is not None:
         one_of(split, splits, "split")
     return Selection(folder, read_manifest(folder), split)
+
+
+def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Columns]:
+    """The tables of a dataset, each a dictionary of its columns.
+
+    Args:
+        folder: Of the dataset.
+        split: `train`, `validation` or `test`; everything if not given.
+
+    Returns:
+        By table and column, arrays with a row per row: contact points, say, are (n, 4, 3) [m].
+        Missing numbers are NaN, or -1 in columns of whole numbers; missing text is None.
+
+    Raises:
+        InputError: There is no such split, no finished dataset, or a file is damaged.
+    """
+    chosen = select(path_of(folder, "folder"), split)
+    return {name: read_columns(chosen.paths(name), name) for name in TABLES}

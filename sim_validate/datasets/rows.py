@@ -8,7 +8,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from grasp_core.values import FINGERS, Contact, Grasp, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import FINGERS, Contact, Grasp
 from sim_validate.datasets.columns import Name
 from sim_validate.datasets.given_contacts import GivenGrasp
 from sim_validate.datasets.units import WorkUnit

@@ -17,9 +17,8 @@ from types import MappingProxyType
 
 from grasp_core.errors import GraspError, InputError
 from grasp_core.mesh_files.reading import FORMATS
-from grasp_core.objects.build import load_polyhedron
+from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.provenance import versions
-from grasp_core.values import Polyhedron
 from scenes.example_objects import example_object
 from sim_validate.datasets.config import CREDITS, DatasetConfig
 from sim_validate.datasets.given_contacts import GivenGrasp, given_sha256, read_given

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
-from grasp_core.files.regular_files import bounded_bytes
-from grasp_core.files.whole_files import write_parts
+from grasp_core.files.whole_files import bounded_bytes, write_parts
 
 MAX_TEXT_BYTES = 256 * 2**20
 MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")

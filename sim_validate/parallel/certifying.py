@@ -1,6 +1,6 @@
 """Regions certified for many grasps, in parallel."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -9,10 +9,10 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import SolverError, UndecidedError
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.regions.certificates import CertifiedRegions
 from grasp_core.regions.certify_regions import CONES, Balance, certify_regions
-from grasp_core.values import Grasp, Polyhedron
-from sim_validate.cli.console import Reporter
+from grasp_core.values import Grasp
 from sim_validate.parallel.processes import each
 
 Found: TypeAlias = tuple[Grasp, CertifiedRegions | str]
@@ -41,14 +41,22 @@ class _Task:
 
 
 def certified(
-    body: Polyhedron, grasps: Sequence[Grasp], asked: Asked, *, jobs: int, reporter: Reporter
-) -> Iterator[Found]:
-    """Each grasp with its regions, or why there are none, in order."""
+    body: Polyhedron, grasps: Sequence[Grasp], asked: Asked, *, jobs: int,
+    progress: Callable[[int, int], None],
+) -> Iterator[Found]:  # fmt: skip
+    """Yield each grasp with its regions, or why there are none, in order.
+
+    Args:
+        body: The object.
+        grasps: Grasps of it.
+        asked: How regions are certified.
+        jobs: Largest number of processes.
+        progress: Called with (done, total) after each grasp.
+    """
     tasks = [_Task(body, grasp, asked) for grasp in grasps]
-    with reporter.progress("certifying") as steps:
-        for done, found in enumerate(zip(grasps, each(_certify, tasks, jobs=jobs), strict=True)):
-            steps.update(done + 1, len(tasks))
-            yield found
+    for done, found in enumerate(zip(grasps, each(_certify, tasks, jobs=jobs), strict=True)):
+        progress(done + 1, len(tasks))
+        yield found
 
 
 def _certify(task: _Task) -> CertifiedRegions | str:

@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, frozen, frozen_indices, frozen_units
 from grasp_core.checked import path_of
-from grasp_core.closure.contact_hash import contacts_sha256
+from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.errors import InputError, SolverError
 from grasp_core.geometry.flat_polygons import FEWEST_CORNERS
 from grasp_core.objects.face_pieces import inscribed_disc_radius_of
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.regions.certificates import CertifiedRegions
 from grasp_core.regions.proof import TwistCover
-from grasp_core.values import FINGERS, ContactRegion, Grasp, Polyhedron, four
+from grasp_core.values import FINGERS, ContactRegion, Grasp, four
 from sim_validate.files.npz import read_arrays
 from sim_validate.files.reading import write_arrays, write_text
 from sim_validate.parallel.certifying import Asked, Found

@@ -7,11 +7,11 @@ from dataclasses import asdict
 from typing import Any, cast
 
 from grasp_core.arrays import Array
-from grasp_core.closure.contact_hash import contacts_sha256
+from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
-from grasp_core.values import Polyhedron
-from sim_validate.gate.gate import Gate
 from sim_validate.records.setup_toml import OF_USERS
+from sim_validate.simulation.gate.gate import Gate
 from sim_validate.simulation.hold_verdict import HoldVerdict, Outcome
 from sim_validate.validation.control_trials import ControlVerdict
 from sim_validate.validation.grasp_verdict import Verdict

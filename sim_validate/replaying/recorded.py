@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from grasp_core.values import Contact, Grasp, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact, Grasp
 from sim_validate.simulation.setup import Agenda, Setup
 
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from grasp_core.closure.contact_arrays import stacked
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
-from grasp_core.values import Contact, Grasp, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact, Grasp
 from scenes.fingertips import clashes
 from scenes.mjcf import Scene
 from sim_validate.replaying.recorded import Recorded

@@ -22,9 +22,9 @@ from sim_validate.files.stale_results import CHARTS, CLIPS, PICTURES
 from sim_validate.replaying.from_verdicts import of_verdict
 from sim_validate.replaying.recorded import Wanted
 from sim_validate.replaying.replay import Replayed, replayed
+from sim_validate.reports.agreement import Record
 from sim_validate.reports.margin_charts import margin_figure
 from sim_validate.reports.motion_charts import motion_figure
-from sim_validate.reports.news import Record
 from sim_validate.reports.run_folder import RunFolder
 from sim_validate.reports.wrench_charts import wrench_figure
 

@@ -12,8 +12,9 @@ from grasp_core.arrays import Array
 from grasp_core.checked import positive
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.wrench_limits import wrench_limits
-from grasp_core.values import Grasp, Polyhedron
+from grasp_core.values import Grasp
 from scenes.drawing.canvas import Around, entitle, in_style, new_figure, panels
 from scenes.drawing.palette import BAD, INK, NEUTRAL
 from scenes.drawing.pictures import check_drawn

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-from grasp_core.closure.contact_hash import contacts_sha256
+from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
 from grasp_core.records.grasps_json import SavedGrasps
@@ -16,7 +16,7 @@ from sim_validate.records.regions import REGIONS
 from sim_validate.records.regions import SCHEMA as REGIONS_SCHEMA
 from sim_validate.records.verdicts_json import SCHEMA as VERDICTS_SCHEMA
 from sim_validate.records.verdicts_schema import RegionsFile, VerdictsFile
-from sim_validate.reports.news import BAD, Record, said_of
+from sim_validate.reports.agreement import BAD, Record, said_of
 from sim_validate.simulation.hold_verdict import Outcome
 
 GRASPS, VERDICTS = "grasps.json", "verdicts.json"

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.values import Grasp, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Grasp
 from scenes.drawing.drawings import drawing_of, glass
 from scenes.drawing.palette import LOOKS, colour_of
 from scenes.drawing.pictures import number_places

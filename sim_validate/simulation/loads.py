@@ -8,8 +8,9 @@ import numpy as np
 from grasp_core.arrays import Array, to_digits
 from grasp_core.closure.contact_arrays import contact_frictions, stacked
 from grasp_core.closure.wrenches import normal_and_tangential
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit, axis_wrenches
-from grasp_core.values import Contact, Polyhedron
+from grasp_core.values import Contact
 from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, Setup
 from sim_validate.simulation.wrench_limits import part

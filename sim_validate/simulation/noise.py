@@ -19,7 +19,8 @@ from grasp_core.arrays import Array
 from grasp_core.checked import number
 from grasp_core.closure.wrenches import contact_frames
 from grasp_core.objects.on_faces import within
-from grasp_core.values import Contact, Grasp, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact, Grasp
 from sim_validate.simulation.traces import rotated
 
 STREAM = 1

@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal, TypeAlias, get_args
 
@@ -26,7 +26,9 @@ from grasp_core.checked import (
 )
 from grasp_core.errors import InputError
 from grasp_core.files.strict_json import shown
-from grasp_core.values import Contact, Grasp, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.reach import Finger
+from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, Surface, build_scene
 from scenes.physics import PhysicsSettings
@@ -176,3 +178,10 @@ class Agenda:
             if each.name in taken:
                 raise InputError(f"two wrenches are named {each.name!r}: rename yours")
             taken.add(each.name)
+
+
+def with_planned_radius(fingers: FingerSettings, planned: Finger | None) -> FingerSettings:
+    """Fingertips of the radius that was planned for, unless they have one of their own."""
+    if planned is None or fingers.radius_m is not None:
+        return fingers
+    return replace(fingers, radius_m=planned.radius_m)

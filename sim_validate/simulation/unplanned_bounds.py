@@ -20,8 +20,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.wrench_limits import axis_wrenches
-from grasp_core.values import Grasp, Polyhedron
+from grasp_core.values import Grasp
 from sim_validate.simulation.rig import Rig, squeezed
 from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.setup import Setup

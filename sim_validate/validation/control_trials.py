@@ -11,8 +11,8 @@ import numpy as np
 
 from grasp_core.arrays import Array, to_digits
 from grasp_core.forces.contact_forces import closest_forces, least_friction_forces
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.wrench_limits import axis_wrenches
-from grasp_core.values import Polyhedron
 from sim_validate.simulation.hold_verdict import LET_GO, HoldVerdict, Outcome, judge
 from sim_validate.simulation.other_rules import FORCE_AXES, accepted, rules_named
 from sim_validate.simulation.rig import Rig, squeezed

@@ -17,7 +17,8 @@ from grasp_core.closure.contact_arrays import stacked
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.errors import SolverError, UndecidedError
-from grasp_core.values import Contact, Grasp, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact, Grasp
 from sim_validate.validation.paper_as_printed import uncorrected_contacts
 
 FRICTION_SHARE = 0.9

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from grasp_core.values import Contact
 from scenes.mjcf import Scene
-from sim_validate.gate.gate import Gate
 from sim_validate.simulation.critical_friction import CriticalFriction
+from sim_validate.simulation.gate.gate import Gate
 from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.simulation.unplanned_bounds import Bounds

@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from grasp_core.values import Grasp, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Grasp
 from sim_validate.parallel.processes import each, processes
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.validation.grasp_verdict import Verdict

@@ -20,8 +20,9 @@ from grasp_core.families.concurrent import inscribed_facets
 from grasp_core.families.constructions import PAIRINGS
 from grasp_core.families.regulus import LEAST_DEPTH
 from grasp_core.objects.face_pieces import FacePiece, unit_pieces
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
-from grasp_core.values import Contact, ForceCone, Grasp, Polyhedron
+from grasp_core.values import Contact, ForceCone, Grasp
 
 LEAST = 1e-3
 """Smallest disc of the printed pencil program, in object radii."""

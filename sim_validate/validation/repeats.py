@@ -7,15 +7,17 @@ a negative control. Analysis and simulation must agree in every repeat; how many
 and comes with an interval.
 """
 
+import importlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from grasp_core.arrays import Array
 from grasp_core.closure.contact_arrays import stacked
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import UndecidedError
-from grasp_core.values import Grasp, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Grasp
 from scenes.fingertips import clashes
 from scenes.mjcf import Scene, to_text
 from sim_validate.simulation.hold_verdict import LET_GO, Outcome, invalid_start, judge
@@ -26,7 +28,6 @@ from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.simulation.simulate import Bench
 from sim_validate.validation.control_trials import try_control
 from sim_validate.validation.controls import Control
-from sim_validate.validation.proportions import interval
 from sim_validate.validation.wrench_verdict import AGREEMENT, WrenchVerdict
 
 NamedLoad: TypeAlias = tuple[str, Array]
@@ -205,3 +206,22 @@ def _opened(body: Polyhedron, control: Control, number: int, setup: Setup) -> No
     first = verdict.tried[0]
     ended = first.hold.outcome
     return NoisyTrial(number, False, ended, first.name, first.hold.reason, _silent(ended))
+
+
+CONFIDENCE = 0.95
+
+
+def interval(count: int, of: int) -> tuple[float, float]:
+    """Where the share behind a count is with 95 % confidence (Clopper and Pearson, exact).
+
+    Args:
+        count: How many did.
+        of: How many were tried, at least one.
+    """
+    found = _stats().binomtest(count, of).proportion_ci(CONFIDENCE, method="exact")
+    return float(found.low), float(found.high)
+
+
+def _stats() -> Any:
+    """SciPy's statistics, which has no types and takes half a second to import."""
+    return importlib.import_module("scipy.stats")

@@ -18,12 +18,13 @@ from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.objects.on_faces import check_on_faces
-from grasp_core.values import Grasp, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Grasp
 from scenes.fingertips import clashes
 from scenes.mjcf import Scene
-from sim_validate.gate.gate import require_faithful
-from sim_validate.gate.mesh_contacts import require_touch
 from sim_validate.simulation.critical_friction import CriticalFriction, released_friction
+from sim_validate.simulation.gate.gate import require_faithful
+from sim_validate.simulation.gate.mesh_contacts import require_touch
 from sim_validate.simulation.hold_verdict import invalid_start, judge
 from sim_validate.simulation.loads import PlannedLoad, planned_loads
 from sim_validate.simulation.other_rules import FORCE_AXES, accepted, rules_named

@@ -19,10 +19,10 @@ import scenes
 from grasp_core.closure.contact_arrays import contact_frictions
 from grasp_core.quality.wrench_limits import WrenchBody
 from scenes.mjcf import build_scene
-from sim_validate.gate.gate import require_faithful
 from sim_validate.parallel.processes import available_cores, each
 from sim_validate.records.verdicts_json import verdicts_to_json
 from sim_validate.simulation.critical_friction import released_friction
+from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.hold_verdict import Outcome, judge
 from sim_validate.simulation.other_rules import RULES
 from sim_validate.simulation.rig import squeezed

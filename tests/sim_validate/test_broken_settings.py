@@ -3,8 +3,8 @@
 import pytest
 
 import grasp_core as gc
-from sim_validate.gate.gate import require_faithful
 from sim_validate.records.setup_toml import setup_from_tables
+from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.setup import Setup
 
 USUAL, TINY = 0.07, 5e-4

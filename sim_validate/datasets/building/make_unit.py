@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grasp_core.errors import InputError, UndecidedError
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import grasp_of, seat
 from grasp_core.planning.planner import plan
-from grasp_core.values import Grasp, Polyhedron
+from grasp_core.values import Grasp
 from sim_validate.datasets.given_contacts import GivenGrasp
 from sim_validate.datasets.meshes import mesh_path, mesh_text
 from sim_validate.datasets.rows import GIVEN, GraspRows, Rows, object_row

@@ -12,6 +12,7 @@ from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
+from grasp_core.provenance import arithmetic
 from sim_validate.datasets.building.staging import Finished, Staging
 from sim_validate.datasets.columns import TABLES
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
@@ -20,7 +21,6 @@ from sim_validate.datasets.describing.croissant import CROISSANT, croissant_text
 from sim_validate.datasets.given_contacts import given_text
 from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest, listed, write_manifest
 from sim_validate.datasets.parquet import TableFiles
-from sim_validate.datasets.rounding import arithmetic
 from sim_validate.datasets.units import WorkUnit, provenance, units_sha256
 from sim_validate.files.reading import write_text
 

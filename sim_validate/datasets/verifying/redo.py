@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.errors import GraspError
+from grasp_core.provenance import arithmetic
 from sim_validate.datasets.building.make_unit import made_of
 from sim_validate.datasets.building.write_tables import CONFIG, CONTACTS, QUARANTINE, TWIN
 from sim_validate.datasets.columns import KEYS, TABLES, Name
@@ -27,7 +28,6 @@ from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.open_dataset import Selection
 from sim_validate.datasets.parquet import as_read
 from sim_validate.datasets.quarantine import read_left_out
-from sim_validate.datasets.rounding import arithmetic
 from sim_validate.datasets.rows import id_beginning
 from sim_validate.datasets.units import WorkUnit, provenance
 from sim_validate.datasets.verifying.rows_by_object import ObjectRows, Row, by_object

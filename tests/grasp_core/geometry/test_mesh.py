@@ -5,7 +5,7 @@ import trimesh
 import grasp_core as gc
 from grasp_core.errors import MeshRefusal
 from grasp_core.mesh_files.reading import FORMATS
-from grasp_core.objects.build import polyhedron_from_mesh
+from grasp_core.objects.polyhedron import polyhedron_from_mesh
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import trimesh
 
 from grasp_core.objects.booleans import hull
 from grasp_core.objects.planar_faces import FlatnessLimits, border_loops, coplanar_groups
-from grasp_core.values import Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
 from scenes.example_objects import example_object
 
 

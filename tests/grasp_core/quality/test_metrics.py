@@ -6,7 +6,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
 import grasp_core as gc
-from grasp_core.closure.many_contacts import many_frames
+from grasp_core.closure.contact_arrays import many_frames
 from grasp_core.closure.wrenches import contact_frames
 from grasp_core.compiled import compiled
 from grasp_core.quality import metrics

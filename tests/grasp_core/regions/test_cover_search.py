@@ -6,8 +6,8 @@ import pytest
 import grasp_core as gc
 import grasp_core.regions.cover_search as search
 from grasp_core.closure.wrenches import contact_frames
-from grasp_core.regions.contact_sites import Sites
 from grasp_core.regions.proof import SLACK
+from grasp_core.regions.sites import Sites
 from tests.judges import random_rotation
 
 TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)

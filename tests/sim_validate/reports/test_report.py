@@ -17,7 +17,7 @@ from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.records.grasps import read_grasps
-from sim_validate.reports.news import said_of
+from sim_validate.reports.agreement import said_of
 from sim_validate.reports.pages import asset
 from sim_validate.reports.report import write_report
 from sim_validate.reports.turntable import UNITS

@@ -11,8 +11,7 @@ from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.noise import Noise
 from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.setup import Agenda, NamedWrench, Setup
-from sim_validate.validation.proportions import interval
-from sim_validate.validation.repeats import disturbed_in, heavier, noisy_trial
+from sim_validate.validation.repeats import disturbed_in, heavier, interval, noisy_trial
 from tests.sim_validate.rigs import grasps
 
 STILL = Noise(shift=0.0, turn_deg=0.0, normal_deg=0.0, friction=0.0, mass=0.0)

@@ -12,9 +12,9 @@ import trimesh
 import grasp_core as gc
 from scenes.example_objects import example_object
 from sim_validate.datasets.building.build import build
-from sim_validate.datasets.loading import load_dataset
 from sim_validate.datasets.manifest import listed, read_manifest, write_manifest
 from sim_validate.datasets.meshes import mesh_text
+from sim_validate.datasets.open_dataset import load_dataset
 from sim_validate.datasets.parquet import parquet_bytes, read_rows
 from sim_validate.datasets.verifying.redo import Sample, drawn
 from sim_validate.datasets.verifying.verify import verify

@@ -6,8 +6,8 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from scenes.physics import PhysicsSettings
-from sim_validate.gate.gate import measured_gate, require_faithful
-from sim_validate.gate.mesh_contacts import require_touch
+from sim_validate.simulation.gate.gate import measured_gate, require_faithful
+from sim_validate.simulation.gate.mesh_contacts import require_touch
 from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.simulation.setup import Setup
 from tests.sim_validate.rigs import grasps

@@ -6,8 +6,8 @@ from functools import lru_cache
 
 from grasp_core.errors import UnfaithfulError
 from grasp_core.provenance import versions
-from sim_validate.gate.case import Case, Check
-from sim_validate.gate.known_cases import known_answers, mesh_touches
+from sim_validate.simulation.gate.case import Case, Check
+from sim_validate.simulation.gate.known_cases import known_answers, mesh_touches
 from sim_validate.simulation.setup import Setup
 
 USUAL_FRICTION, USUAL_RADIUS_M = 0.5, 0.07

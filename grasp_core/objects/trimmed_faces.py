@@ -1,7 +1,8 @@
-"""Two fingers on one face: the face counts twice, as two halves with a gap between them.
+"""Faces made smaller before planning: two halves for two fingers, or a margin along the edges.
 
-Each face is cut once, across its longest direction and in its middle. What is found there holds for
-the face; that nothing is found proves nothing, as other cuts were not tried.
+For two fingers on one face, the face counts twice, as two halves with a gap between them. It is cut
+once, across its longest direction and in its middle. What is found there holds for the face; that
+nothing is found proves nothing, as other cuts were not tried.
 """
 
 from collections.abc import Sequence
@@ -11,8 +12,11 @@ from itertools import combinations
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.geometry.polygons import clip, convex_hull, plane_frame
-from grasp_core.values import FINGERS, Face, Polyhedron
+from grasp_core.geometry.polygons import clip, convex_hull, merge_into_convex_pieces, plane_frame
+from grasp_core.objects.booleans import inset_figure, triangulate
+from grasp_core.objects.face import Face
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import FINGERS
 
 SAME_LENGTH = 1.0 - 1e-6
 """Of equally long directions the first counts, so that rounding decides nothing."""
@@ -87,3 +91,23 @@ def _longest(border: Array) -> Array:
     gaps = np.linalg.norm(border[:, None] - border[None], axis=2)
     i, j = np.argwhere(gaps >= SAME_LENGTH * gaps.max())[0]
     return (border[j] - border[i]) / gaps[i, j]
+
+
+def clear_of_edges(body: Polyhedron, margin: float) -> Polyhedron:
+    """The object with faces on which contacts keep a distance from all edges and holes.
+
+    Args:
+        body: The object.
+        margin: [m]; faces without room keep no pieces.
+    """
+    return replace(body, faces=tuple(_without_margin(face, margin) for face in body.faces))
+
+
+def _without_margin(face: Face, margin: float) -> Face:
+    frame = plane_frame(face.normal)
+    loops = [(loop - face.centroid) @ frame for loop in (face.polygon, *face.holes)]
+    pieces: list[Array] = []
+    for figure in inset_figure(loops, margin):
+        convex = merge_into_convex_pieces(np.vstack(figure), triangulate(figure))
+        pieces += [face.centroid + piece @ frame.T for piece in convex]
+    return replace(face, pieces=tuple(pieces))

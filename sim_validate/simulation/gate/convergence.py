@@ -12,7 +12,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.values import Contact
-from sim_validate.gate.case import PUSH, Case, Check, tetrahedron
+from sim_validate.simulation.gate.case import PUSH, Case, Check, tetrahedron
 from sim_validate.simulation.rig import Rig
 from sim_validate.simulation.wrench_limits import part
 

@@ -26,10 +26,10 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.values import Contact
-from sim_validate.gate.case import PUSH, Case, Check, tetrahedron
-from sim_validate.gate.convergence import solver_gap
-from sim_validate.gate.mesh_contacts import DEPTH_ERROR, NORMAL_ERROR, worst_touch
 from sim_validate.simulation.critical_friction import bisected, forces_just_above, released_friction
+from sim_validate.simulation.gate.case import PUSH, Case, Check, tetrahedron
+from sim_validate.simulation.gate.convergence import solver_gap
+from sim_validate.simulation.gate.mesh_contacts import DEPTH_ERROR, NORMAL_ERROR, worst_touch
 from sim_validate.simulation.hold_verdict import holds
 from sim_validate.simulation.rig import Rig
 from sim_validate.simulation.schedules import Load

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.errors import UnfaithfulError
-from grasp_core.values import Contact, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact
 from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.simulate import first_touch
 

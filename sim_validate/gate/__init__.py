@@ -1,1 +1,0 @@
-"""ROOM sim_validate/gate."""

@@ -1,0 +1,1 @@
+"""ROOM sim_validate/simulation/gate."""
