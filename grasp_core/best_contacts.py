@@ -28,9 +28,10 @@ from grasp_core.face_pieces import FacePiece, inset_piece, unit_pieces
 from grasp_core.on_faces import check_on_faces
 from grasp_core.patch import of_general_type
 from grasp_core.placements import Placement
+from grasp_core.polygons import SAME_CORNER
 from grasp_core.quality import FerrariCanny, ferrari_canny
 from grasp_core.quality_ascent import ContactFaces
-from grasp_core.ties import largest_first, surpassing
+from grasp_core.ties import first_best, largest_first, on_grid, surpassing
 from grasp_core.values import FINGERS, ForceCone, Grasp, Polyhedron
 
 FINGER_RADIUS = 0.05
@@ -38,6 +39,8 @@ FINGER_RADIUS = 0.05
 RANDOM_STARTS = 3
 """Followed besides the grasp itself: the best of `RANDOM_TRIALS`."""
 RANDOM_TRIALS = 24
+START_DIGITS = 8
+"""Digits after the point of where the climb from the grasp itself begins, at unit size."""
 ROUGH = 2e-2
 """Gap of the quality's bounds while starting points are compared."""
 
@@ -112,7 +115,9 @@ def optimize_contacts(
         if found.lower <= surpassing(before.lower):
             break
         moved = _certified(body, grasp, faces, y, rng)
-        if moved is not None and (after := _quality(body, moved, friction)).lower > before.lower:
+        if moved is not None and (
+            (after := _quality(body, moved, friction)).lower > surpassing(before.lower)
+        ):
             return Improvement(moved, before, after, clearances)
     return Improvement(grasp, before, before, clearances)
 
@@ -139,12 +144,15 @@ def pieces_under(body: Polyhedron, grasp: Grasp) -> tuple[FacePiece, ...]:
     """The convex piece that each contact lies on."""
     pieces = unit_pieces(body)
     return tuple(
-        max(
-            (piece for piece in pieces if piece.face == face),
-            key=lambda piece: float((piece.b - piece.E @ _in_plane(piece, point)).min()),
-        )
+        _deepest([piece for piece in pieces if piece.face == face], point)
         for face, point in zip(grasp.faces, _unit_points(body, grasp), strict=True)
     )
+
+
+def _deepest(pieces: Sequence[FacePiece], point: Array) -> FacePiece:
+    """The piece that a point is deepest in, the first one of those on whose common edge it is."""
+    depths = [float((piece.b - piece.E @ _in_plane(piece, point)).min()) for piece in pieces]
+    return pieces[first_best(depths, SAME_CORNER)]
 
 
 def _unit_points(body: Polyhedron, grasp: Grasp) -> Array:
@@ -157,7 +165,7 @@ def _in_plane(piece: FacePiece, point: Array) -> Array:
 
 def _clear_of_edges(room: FacePiece, point: Array) -> Array:
     """A point in the plane of a face, moved towards the middle of its room until inside, (2,)."""
-    y, middle = _in_plane(room, point), room.corners.mean(axis=0)
+    y, middle = on_grid(_in_plane(room, point), START_DIGITS), room.corners.mean(axis=0)
     beyond = room.E @ y - room.b
     inward = room.E @ (y - middle)
     share = float((beyond[beyond > 0.0] / inward[beyond > 0.0]).max(initial=0.0))
