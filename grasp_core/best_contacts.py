@@ -3,8 +3,8 @@
 Contacts stay on the convex pieces of the faces that they are on.
 
 The climb of `quality_ascent` has many local optima, so it starts from the grasp's own contacts and
-from random ones. The best end is certified like any grasp, and replaces the given one only if its
-proved lower bound is larger.
+from random ones. The best end is certified like any grasp, and replaces the given one only if it is
+proved to be better: if its lower bound is above the given one's upper bound.
 
 Moved contacts keep a finger's radius from the edges of their faces, or half the radius of the
 largest disc in the face where that is less. Where no radius is asked for, they may also come as
@@ -31,7 +31,7 @@ from grasp_core.placements import Placement
 from grasp_core.polygons import SAME_CORNER
 from grasp_core.quality import FerrariCanny, ferrari_canny
 from grasp_core.quality_ascent import ContactFaces
-from grasp_core.ties import first_best, largest_first, on_grid, surpassing
+from grasp_core.ties import coarse, first_best, largest_first, on_grid, surpassing
 from grasp_core.values import FINGERS, ForceCone, Grasp, Polyhedron
 
 FINGER_RADIUS = 0.05
@@ -115,9 +115,7 @@ def optimize_contacts(
         if found.lower <= surpassing(before.lower):
             break
         moved = _certified(body, grasp, faces, y, rng)
-        if moved is not None and (
-            (after := _quality(body, moved, friction)).lower > surpassing(before.lower)
-        ):
+        if moved is not None and ((after := _quality(body, moved, friction)).lower > before.upper):
             return Improvement(moved, before, after, clearances)
     return Improvement(grasp, before, before, clearances)
 
@@ -128,10 +126,11 @@ def _insets(
     """How far contacts stay from the edges of each piece, at unit size."""
     if finger_radius is not None:
         return [finger_radius / body.radius] * FINGERS
-    return [
-        min(FINGER_RADIUS, max(float((piece.b - piece.E @ _in_plane(piece, at)).min()), 0.0))
+    depths = [
+        float((piece.b - piece.E @ _in_plane(piece, at)).min())
         for piece, at in zip(pieces, _unit_points(body, grasp), strict=True)
     ]
+    return [min(FINGER_RADIUS, max(-coarse(-depth, START_DIGITS), 0.0)) for depth in depths]
 
 
 def _quality(body: Polyhedron, grasp: Grasp, friction: float) -> FerrariCanny:

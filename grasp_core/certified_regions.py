@@ -54,7 +54,7 @@ MOST_CONES = 1_000_000
 CONES = 10_000
 """Cones of one cover at most, unless told otherwise: half a second's work."""
 UNIT_DIGITS, PLACE_DIGITS = 6, 8
-"""Digits after the point of the unit and its origin, in object radii, and of centres in the unit."""
+"""Digits after the point of the unit and its origin, in object radii; of centres, in the unit."""
 NARROWED = 1e-3
 """How finely the discs in grown polygons are measured, relative to those proved first."""
 

@@ -20,21 +20,19 @@ Source: Ferrari & Canny 1992; the growing polytope is the expanding-polytope alg
 collision detection in six dimensions (also Zheng 2013 for this metric).
 """
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
-from grasp_core.checked import SMALLEST, number
+from grasp_core.checked import number
 from grasp_core.errors import SolverError
 from grasp_core.fields import are_units, is_a, is_array, is_number
 from grasp_core.growing_hull import ABOVE, FLAT, MOST_POINTS, GrowingHull, spread_simplex
 from grasp_core.inner_polytope import InnerPolytope
 from grasp_core.kernels import compiled
 from grasp_core.nearest_wrench import nearest_wrench
-from grasp_core.ties import SHIFT, on_grid
 from grasp_core.values import Grasp
 from grasp_core.wrench_sets import Norm, WrenchSet
 from grasp_core.wrenches import WRENCH
@@ -47,8 +45,6 @@ MOST_SIMPLICES = 60_000
 """The polytope stops growing here; its bounds hold all the same, a little farther apart."""
 ROUNDING = 1e-12
 """Slack of the plain-arithmetic checks, relative to the longest wrench."""
-TOLD_DIGITS = 10
-"""Of forces, and of torques, that polytopes are grown for."""
 KERNEL = "polytope"
 
 
@@ -140,11 +136,9 @@ def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
 
 def wrench_set_quality(wrenches: WrenchSet, gap: float = GAP) -> FerrariCanny:
     """Signed distance of zero from the boundary of a wrench set, with its proof."""
-    if compiled(KERNEL) is not None:
-        for G in (_told(wrenches.G), np.array(wrenches.G, order="C")):
-            found = _by_kernel(wrenches, G, gap)
-            if found is not None:
-                return found
+    found = _by_kernel(wrenches, gap) if compiled(KERNEL) is not None else None
+    if found is not None:
+        return found
     direction, polytope = _grown(wrenches, gap)
     if direction is not None and polytope is not None:
         radius = polytope.radius(wrenches)
@@ -161,11 +155,11 @@ def _inside(
     return FerrariCanny(lower, upper, wrenches, direction, polytope, None)
 
 
-def _by_kernel(wrenches: WrenchSet, G: Array, gap: float) -> FerrariCanny | None:
-    """Bounds by the compiled polytope of nearly these wrenches; None where they are not proved."""
+def _by_kernel(wrenches: WrenchSet, gap: float) -> FerrariCanny | None:
+    """Bounds by the compiled polytope; None where they are not proved."""
     kernel = compiled(KERNEL)
     linf = wrenches.norm == "linf"
-    cones = kernel.Cones(G, np.array(wrenches.friction), linf)
+    cones = kernel.Cones(np.array(wrenches.G, order="C"), np.array(wrenches.friction), linf)
     limits = kernel.Limits(gap, MOST_SIMPLICES, MOST_POINTS, FLAT, ABOVE)
     status, forces, corners, normals, weakest = kernel.grow(cones, wrenches.edges(), limits)
     slack = ROUNDING * wrenches.size
@@ -179,18 +173,6 @@ def _by_kernel(wrenches: WrenchSet, G: Array, gap: float) -> FerrariCanny | None
     except SolverError:
         return None
     return outside if outside.upper <= slack else None
-
-
-def _told(G: Array) -> Array:
-    """What a polytope is grown for, (6, 3k): where points are equally far, no last digits decide.
-
-    Its bounds are those of the exact wrenches.
-    """
-    told = np.empty(G.shape)
-    for part in (slice(3), slice(3, WRENCH)):
-        size = math.log10(max(float(np.abs(G[part]).max()), SMALLEST))
-        told[part] = on_grid(G[part], TOLD_DIGITS - math.floor(size + SHIFT))
-    return told
 
 
 def _grown(wrenches: WrenchSet, gap: float) -> tuple[Array | None, InnerPolytope | None]:

@@ -74,9 +74,14 @@ class ContactFaces:
         return np.array([piece.point(at) for piece, at in zip(self.pieces, y, strict=True)])
 
     def quality(self, y: Array, gap: float = SEARCH_GAP) -> FerrariCanny:
-        """The `l1` quality of contacts, torques in units of the object's size."""
+        """The `l1` quality of contacts, torques in units of the object's size.
+
+        Its wrenches are on a grid: a polytope that grows where it is weakest has many equal planes
+        to choose from.
+        """
         G = in_frames(grasp_map(self.positions(y)), self.frames)
-        return wrench_set_quality(WrenchSet(G, np.full(len(y), self.friction), "l1"), gap)
+        wrenches = WrenchSet(G, np.full(len(y), self.friction), "l1")
+        return wrench_set_quality(wrenches.on_grid(), gap)
 
     def climbed(self, y: Array) -> tuple[Array, FerrariCanny]:
         """Contacts (k, 2) of a local optimum, starting from given ones, and their quality."""

@@ -211,11 +211,12 @@ def _bounded(
         best = first_best(-bounds)
         if bounds[best] <= target:
             return float(bounds[best]), directions[best]
-    found = wrench_set_quality(corners, PART_GAP)
-    directions.append(found.direction)
-    if best is not None and bounds[best] < found.upper:
+    direction = wrench_set_quality(corners.on_grid(), PART_GAP).direction
+    directions.append(direction)
+    upper = corners.support(direction)[0]
+    if best is not None and bounds[best] < upper:
         return float(bounds[best]), directions[best]
-    return found.upper, found.direction
+    return upper, direction
 
 
 def _corner_wrenches(choice: Sequence[FacePiece], path: Path, friction: float) -> WrenchSet:
