@@ -104,7 +104,9 @@ class WrenchSet:
 
     def on_grid(self) -> "WrenchSet":
         """Nearly the same for a search, which is to see no last digits."""
-        return replace(self, G=on_grid(self.G, SAME_DIGITS))
+        return replace(
+            self, G=on_grid(self.G, SAME_DIGITS), friction=on_grid(self.friction, SAME_DIGITS)
+        )
 
     def sound(self) -> bool:
         """Whether this is the wrench set of some contacts, to within `SAME_FRAME`.
