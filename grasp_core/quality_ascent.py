@@ -124,7 +124,8 @@ class ContactFaces:
     def nearest_planes(self, found: FerrariCanny, polytope: InnerPolytope) -> tuple[Array, Array]:
         """Distances (m,) and slopes (m, 2k) of the planes nearest to zero."""
         points = polytope.forces @ found.wrenches.G.T
-        heights = np.einsum("mcj,mj->mc", points[polytope.corners], polytope.normals).min(axis=1)
+        height = np.einsum("mcj,mj->mc", points[polytope.corners], polytope.normals)
+        heights: Array = height.min(axis=1)
         cells = graded(heights)
         near = np.argsort(cells, kind="stable")[:MOST_ROWS]
         near = near[cells[near] <= graded((1.0 + BAND) * float(heights.min()))]
