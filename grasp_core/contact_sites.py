@@ -5,7 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.cover_game import AHEAD
 from grasp_core.errors import InputError
+from grasp_core.ties import GRID_DIGITS, coarse, on_grid
 
 
 class Sites(NamedTuple):
@@ -23,6 +25,28 @@ class Sites(NamedTuple):
     """Of discs that widen the polygons, (k,)."""
     depths: Array
     """How far contacts may be off the planes, (k,)."""
+
+    def on_grid(self) -> "Sites":
+        """The same for a search, which is to see no last digits; friction is less than it is."""
+        friction = -coarse(-self.friction, GRID_DIGITS)
+        return Sites(
+            on_grid(self.points),
+            on_grid(self.frames),
+            np.clip(friction, 0.0, self.friction),
+            on_grid(self.corners),
+            on_grid(self.radii),
+            on_grid(self.depths),
+        )
+
+    def clear(self) -> Array:
+        """Power per length of twist that one unit of each contact's normal force must leave, (k,).
+
+        Rounding to the grid costs forces less.
+        """
+        aside = np.sqrt(np.einsum("kcj,kcj->kc", self.corners, self.corners)).max(axis=1)
+        places = np.sqrt(np.einsum("kj,kj->k", self.points, self.points))
+        farthest = 1.0 + float((places + aside + self.radii + self.depths).max())
+        return AHEAD * farthest * (1.0 + self.friction)
 
     def lowest(self, i: int, slopes: Array) -> Array:
         """Least values over a contact's polygon and disc of linear functions, (...,).

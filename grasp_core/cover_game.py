@@ -8,8 +8,9 @@ answers, late ones counting more, comes to have power on all rays if any forces 
 ROUNDS = 30
 ANSWERS = 3
 """Forces that are tried per contact as the best answer to weights."""
-AHEAD = 1e-9
-"""Power per length of twist with which a force counts."""
+AHEAD = 1e-8
+"""Power with which a force counts, relative to its size and the farthest place: more than rounding
+sites to a grid may cost it."""
 EVEN = 0.02
 """Weight that each ray keeps in the choice of the edge that is cut, so that all are cut in time."""
 TINY = 1e-12

@@ -20,6 +20,7 @@ from grasp_core.friction_interval import FrictionInterval
 from grasp_core.metrics import hull_volume, min_weight, smallest_singular_value
 from grasp_core.quality import ferrari_canny
 from grasp_core.resisted_wrenches import WrenchLimit, axis_wrenches, wrench_limits
+from grasp_core.ties import first_best
 from grasp_core.wrench_sets import Norm
 
 MOST_EDGES = 10_000
@@ -196,7 +197,7 @@ def _weakest_axis(contacts: ContactSet, question: Question) -> WrenchLimit:
         axis_wrenches(contacts.torque_scale),
         max_normal_force=question.max_normal_force, center=contacts.center,
     )  # fmt: skip
-    return min(limits, key=lambda found: found.limit)
+    return limits[first_best([-found.limit for found in limits])]
 
 
 def _resisted(contacts: ContactSet, wrench: Wrench, question: Question) -> Resisted:
