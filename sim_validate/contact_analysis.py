@@ -21,6 +21,7 @@ from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.quality.metrics import hull_volume, min_weight, smallest_singular_value
 from grasp_core.quality.wrench_limits import WrenchLimit, axis_wrenches, wrench_limits
 from grasp_core.records.contacts_json import ContactSet
+from grasp_core.solvers.ties import first_best
 
 MOST_EDGES = 10_000
 """Of all pyramids of a grasp together: their hull in six dimensions takes ten seconds then."""
@@ -196,7 +197,7 @@ def _weakest_axis(contacts: ContactSet, question: Question) -> WrenchLimit:
         axis_wrenches(contacts.torque_scale),
         max_normal_force=question.max_normal_force, center=contacts.center,
     )  # fmt: skip
-    return min(limits, key=lambda found: found.limit)
+    return limits[first_best([-found.limit for found in limits])]
 
 
 def _resisted(contacts: ContactSet, wrench: Wrench, question: Question) -> Resisted:

@@ -58,7 +58,9 @@ def test_a_package_is_imported_at_its_door_only(package):
 def test_only_kernels_are_compiled():
     """A module that imports numba is a kernel, and only kernels and their rooms import kernels."""
     sources = list((ROOT / "grasp_core").rglob("*.py"))
-    kernels = {path for path in sources if re.search(r"^(import|from) numba", path.read_text(), re.M)}
+    kernels = {
+        path for path in sources if re.search(r"^(import|from) numba", path.read_text(), re.M)
+    }
     assert len(kernels) > 10
     assert all(path.stem.endswith("_kernel") for path in kernels)
     for path in sources:

@@ -1,8 +1,19 @@
-"""Other processors' arithmetic gives the same plans and verdicts."""
+"""Other processors' arithmetic gives the same plans, regions, improvements and verdicts."""
+
+import json
 
 import pytest
 
-from tests.benchmarks.machines import answers, arithmetics, asked, differences
+import grasp_core as gc
+import scenes
+from tests.benchmarks.machines import (
+    answers,
+    arithmetics,
+    asked,
+    differences,
+    improved,
+    regions,
+)
 
 OBJECTS = ["octahedron", "wedge"]
 
@@ -10,9 +21,9 @@ OBJECTS = ["octahedron", "wedge"]
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("name", ["least of all", "OpenBLAS for Haswell"])
-def test_plans_and_verdicts_are_those_of_this_machine(name):
+def test_plans_regions_and_verdicts_are_those_of_this_machine(name):
     own, other = asked({}, OBJECTS), asked(arithmetics()[name], OBJECTS)
-    assert len(own) == len(other) == 9 * len(OBJECTS)
+    assert len(own) == len(other) == 11 * len(OBJECTS)
     assert sum(len(grasps) for grasps in own.values() if isinstance(grasps, list)) > 500
     assert [line for case in own for line in differences(case, own[case], other[case])] == []
 
@@ -31,3 +42,20 @@ def test_differences_are_noticed():
     }
     for field, value in others.items():
         assert differences(case, own, [{**first, field: value}, *own[1:]])
+
+
+def test_other_regions_and_improvements_are_noticed():
+    """Another proof, a corner less, a radius or a corner off by a little more than is allowed."""
+    body = scenes.example_object("tetrahedron")
+    grasp = gc.plan(body, 0.5, limit=1).grasps[0]
+    for own in (regions(body, grasp, 0.5), improved(body, grasp, 0.5)):
+        assert own["exact"][-1] is True
+        assert differences("case", own, json.loads(json.dumps(own))) == []
+        others = {
+            "exact": [*own["exact"][:-1], False],
+            "places": [own["places"][0] + 2e-7, *own["places"][1:]],
+            "figures": [own["figures"][0] * (1.0 + 2e-6), *own["figures"][1:]],
+        }
+        for field, value in others.items():
+            assert len(differences("case", own, {**own, field: value})) == 1
+        assert len(differences("case", own, {**own, "places": own["places"][:-3]})) == 1

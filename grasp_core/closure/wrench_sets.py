@@ -14,7 +14,7 @@ circular cones need no pyramid.
 Source: Ferrari & Canny, "Planning optimal grasps" (ICRA 1992), with circular cones.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, Self, TypeAlias, get_args
 
 import numpy as np
@@ -26,6 +26,7 @@ from grasp_core.closure.contact_arrays import check_spread, contact_arrays, cont
 from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
 from grasp_core.errors import InputError
 from grasp_core.fields import are_frictions, is_a, is_array
+from grasp_core.solvers.ties import on_grid
 from grasp_core.values import Grasp
 
 Norm: TypeAlias = Literal["l1", "linf"]
@@ -35,6 +36,8 @@ NO_SLIDE = 1e-290
 """Less than this along the surface has no direction."""
 SAME_FRAME = 1e-9
 """How far frames may be from orthonormal: normals are unit to nine digits."""
+SAME_DIGITS = 10
+"""Digits after the point that searches are told: frames stay within `SAME_FRAME`."""
 LARGEST_RATIO = 1e6
 """Between the torque scale and the contacts' extent: beyond it, rounding decides."""
 
@@ -98,6 +101,12 @@ class WrenchSet:
         arms = scaled_arms(points, center, torque_scale)
         G = in_frames(grasp_map(arms), contact_frames(units))
         return cls(G, contact_frictions(friction, len(points)), norm)
+
+    def on_grid(self) -> "WrenchSet":
+        """Nearly the same for a search, which is to see no last digits."""
+        return replace(
+            self, G=on_grid(self.G, SAME_DIGITS), friction=on_grid(self.friction, SAME_DIGITS)
+        )
 
     def sound(self) -> bool:
         """Whether this is the wrench set of some contacts, to within `SAME_FRAME`.

@@ -29,6 +29,7 @@ from grasp_core.closure.wrenches import contact_frames, grasp_map, in_frames
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.quality.ferrari_canny import FerrariCanny, InnerPolytope, wrench_set_quality
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
+from grasp_core.solvers.ties import graded, nearest_optimum, on_grid, surpassing
 
 SEARCH_GAP = 1e-3
 """Gap of the quality's bounds during the climb."""
@@ -37,6 +38,12 @@ BAND = 0.2
 MOST_ROWS = 100
 STEEPEST = 20.0
 """Simplices whose foot weighs a corner more than this are too flat to say where it moves."""
+FLAT = 1e-9
+"""Singular values of simplices below this share of the largest are zero, but for rounding."""
+STEP_DIGITS = 6
+"""Digits after the point of a step."""
+LAST_DIGIT = 10.0**-STEP_DIGITS
+"""A step ends so far inside of the limits, in object radii, as rounding moves it."""
 FIRST_REACH, LEAST_REACH = 0.1, 1e-3
 """Trust region at first and at the end, in object radii."""
 MOST_STEPS = 40
@@ -67,9 +74,14 @@ class ContactFaces:
         return np.array([piece.point(at) for piece, at in zip(self.pieces, y, strict=True)])
 
     def quality(self, y: Array, gap: float = SEARCH_GAP) -> FerrariCanny:
-        """The `l1` quality of contacts, torques in units of the object's size."""
+        """The `l1` quality of contacts, torques in units of the object's size.
+
+        Its wrenches are on a grid: a polytope that grows where it is weakest has many equal planes
+        to choose from.
+        """
         G = in_frames(grasp_map(self.positions(y)), self.frames)
-        return wrench_set_quality(WrenchSet(G, np.full(len(y), self.friction), "l1"), gap)
+        wrenches = WrenchSet(G, np.full(len(y), self.friction), "l1")
+        return wrench_set_quality(wrenches.on_grid(), gap)
 
     def climbed(self, y: Array) -> tuple[Array, FerrariCanny]:
         """Contacts (k, 2) of a local optimum, starting from given ones, and their quality."""
@@ -82,7 +94,7 @@ class ContactFaces:
                 break
             trial = self.quality(y + step)
             gained = (trial.lower - found.lower) / predicted
-            if gained > 0.0:
+            if trial.lower > surpassing(found.lower):
                 y, found = y + step, trial
             reach *= GROWTH if gained > GOOD else SHRINKAGE if gained < POOR else 1.0
         return y, found
@@ -99,23 +111,27 @@ class ContactFaces:
             inside = np.zeros((len(limit), n + 1))
             inside[:, 2 * i : 2 * i + 2] = piece.E
             rows.append(inside)
-            room.append(np.maximum(limit - piece.E @ y[i], 0.0))
+            room.append(limit - piece.E @ y[i] - LAST_DIGIT)
         rows += [np.eye(n + 1)[:n], -np.eye(n + 1)[:n]]
         room.append(np.full(2 * n, reach))
-        best = maximize(LinearProgram(np.eye(n + 1)[n], np.vstack(rows), np.hstack(room)))
+        program = LinearProgram(np.eye(n + 1)[n], np.vstack(rows), np.hstack(room) / reach)
+        best = maximize(program)  # in units of the reach, so that data are of order one
         if not isinstance(best, Optimum):
             return np.zeros_like(y), 0.0
-        return best.x[:n].reshape(y.shape), best.value
+        x = reach * nearest_optimum(program, best)
+        return on_grid(x[:n].reshape(y.shape), STEP_DIGITS), float(x[n])
 
     def nearest_planes(self, found: FerrariCanny, polytope: InnerPolytope) -> tuple[Array, Array]:
         """Distances (m,) and slopes (m, 2k) of the planes nearest to zero."""
         points = polytope.forces @ found.wrenches.G.T
-        heights = np.einsum("mcj,mj->mc", points[polytope.corners], polytope.normals).min(axis=1)
-        near = np.argsort(heights, kind="stable")[:MOST_ROWS]
-        near = near[heights[near] <= (1.0 + BAND) * heights[near[0]]]
+        height = np.einsum("mcj,mj->mc", points[polytope.corners], polytope.normals)
+        heights: Array = height.min(axis=1)
+        cells = graded(heights)
+        near = np.argsort(cells, kind="stable")[:MOST_ROWS]
+        near = near[cells[near] <= graded((1.0 + BAND) * float(heights.min()))]
         corners, normals, b = polytope.corners[near], polytope.normals[near], heights[near]
         columns = points[corners].transpose(0, 2, 1)
-        feet = np.asarray(np.linalg.pinv(columns), dtype=np.float64)
+        feet = np.asarray(np.linalg.pinv(columns, rcond=FLAT), dtype=np.float64)
         shares = np.einsum("mcj,mj->mc", feet, b[:, None] * normals)
         sound = np.abs(shares).max(axis=1) < STEEPEST
         frames = self.frames

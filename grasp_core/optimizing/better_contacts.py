@@ -3,8 +3,8 @@
 Contacts stay on the convex pieces of the faces that they are on.
 
 The climb of `quality_ascent` has many local optima, so it starts from the grasp's own contacts and
-from random ones. The best end is certified like any grasp, and replaces the given one only if its
-proved lower bound is larger.
+from random ones. The best end is certified like any grasp, and replaces the given one only if it is
+proved to be better: if its lower bound is above the given one's upper bound.
 
 Moved contacts keep a finger's radius from the edges of their faces, or half the radius of the
 largest disc in the face where that is less. Where no radius is asked for, they may also come as
@@ -25,13 +25,14 @@ from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.constructions import point_region, regions_of
 from grasp_core.families.free import of_general_type
 from grasp_core.families.placements import Placement
+from grasp_core.geometry.polygons import SAME_CORNER
 from grasp_core.objects.face_pieces import FacePiece, inset_piece, unit_pieces
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.ascent import ContactFaces
 from grasp_core.planning.certify import certify, to_grasp
 from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
-from grasp_core.solvers.ties import largest_first, surpassing
+from grasp_core.solvers.ties import coarse, first_best, largest_first, on_grid, surpassing
 from grasp_core.values import FINGERS, ForceCone, Grasp
 
 FINGER_RADIUS = 0.05
@@ -39,6 +40,8 @@ FINGER_RADIUS = 0.05
 RANDOM_STARTS = 3
 """Followed besides the grasp itself: the best of `RANDOM_TRIALS`."""
 RANDOM_TRIALS = 24
+START_DIGITS = 8
+"""Digits after the point of where the climb from the grasp itself begins, at unit size."""
 ROUGH = 2e-2
 """Gap of the quality's bounds while starting points are compared."""
 
@@ -113,7 +116,7 @@ def optimize_contacts(
         if found.lower <= surpassing(before.lower):
             break
         moved = _certified(body, grasp, faces, y, rng)
-        if moved is not None and (after := _quality(body, moved, friction)).lower > before.lower:
+        if moved is not None and ((after := _quality(body, moved, friction)).lower > before.upper):
             return Improvement(moved, before, after, clearances)
     return Improvement(grasp, before, before, clearances)
 
@@ -124,10 +127,11 @@ def _insets(
     """How far contacts stay from the edges of each piece, at unit size."""
     if finger_radius is not None:
         return [finger_radius / body.radius] * FINGERS
-    return [
-        min(FINGER_RADIUS, max(float((piece.b - piece.E @ _in_plane(piece, at)).min()), 0.0))
+    depths = [
+        float((piece.b - piece.E @ _in_plane(piece, at)).min())
         for piece, at in zip(pieces, _unit_points(body, grasp), strict=True)
     ]
+    return [min(FINGER_RADIUS, max(-coarse(-depth, START_DIGITS), 0.0)) for depth in depths]
 
 
 def _quality(body: Polyhedron, grasp: Grasp, friction: float) -> FerrariCanny:
@@ -140,12 +144,15 @@ def pieces_under(body: Polyhedron, grasp: Grasp) -> tuple[FacePiece, ...]:
     """The convex piece that each contact lies on."""
     pieces = unit_pieces(body)
     return tuple(
-        max(
-            (piece for piece in pieces if piece.face == face),
-            key=lambda piece: float((piece.b - piece.E @ _in_plane(piece, point)).min()),
-        )
+        _deepest([piece for piece in pieces if piece.face == face], point)
         for face, point in zip(grasp.faces, _unit_points(body, grasp), strict=True)
     )
+
+
+def _deepest(pieces: Sequence[FacePiece], point: Array) -> FacePiece:
+    """The piece that a point is deepest in, the first one of those on whose common edge it is."""
+    depths = [float((piece.b - piece.E @ _in_plane(piece, point)).min()) for piece in pieces]
+    return pieces[first_best(depths, SAME_CORNER)]
 
 
 def _unit_points(body: Polyhedron, grasp: Grasp) -> Array:
@@ -158,7 +165,7 @@ def _in_plane(piece: FacePiece, point: Array) -> Array:
 
 def _clear_of_edges(room: FacePiece, point: Array) -> Array:
     """A point in the plane of a face, moved towards the middle of its room until inside, (2,)."""
-    y, middle = _in_plane(room, point), room.corners.mean(axis=0)
+    y, middle = on_grid(_in_plane(room, point), START_DIGITS), room.corners.mean(axis=0)
     beyond = room.E @ y - room.b
     inward = room.E @ (y - middle)
     share = float((beyond[beyond > 0.0] / inward[beyond > 0.0]).max(initial=0.0))

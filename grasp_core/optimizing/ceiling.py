@@ -39,6 +39,7 @@ from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
 from grasp_core.quality.ferrari_canny import wrench_set_quality
+from grasp_core.solvers.ties import first_best, graded
 from grasp_core.values import FINGERS, FaceQuadruple
 
 PART_GAP = 0.02
@@ -162,21 +163,22 @@ def quality_ceiling(
             f"parts must be at least {len(choices)}, one per choice of pieces, got {parts}"
         )
     directions: list[Array] = []
-    waiting: list[tuple[float, int, Path, Array]] = []
+    waiting: list[tuple[float, int, Path, float, Array]] = []
     fresh: list[tuple[int, Path]] = [(index, ()) for index in range(len(choices))]
     examined = 0
     target = known * (1.0 + ENOUGH)
     while True:
         for index, path in fresh:
             bound, direction = _bounded(choices[index], path, friction, directions, target)
-            heappush(waiting, (-bound, index, path, direction))
+            heappush(waiting, (-graded(bound), index, path, bound, direction))
             examined += 1
-        if -waiting[0][0] <= target or examined + 2 > parts:
+        if waiting[0][3] <= target or examined + 2 > parts:
             break
-        _, index, path, _ = heappop(waiting)
+        _, index, path, _, _ = heappop(waiting)
         fresh = [(index, (*path, half)) for half in (0, 1)]
-    leaves = [Leaf(index, path, direction) for _, index, path, direction in waiting]
-    return QualityCeiling(max(-waiting[0][0], 0.0), choices, friction, tuple(leaves))
+    leaves = [Leaf(index, path, direction) for _, index, path, _, direction in waiting]
+    upper = max(bound for _, _, _, bound, _ in waiting)
+    return QualityCeiling(max(upper, 0.0), choices, friction, tuple(leaves))
 
 
 def _choices(
@@ -207,14 +209,15 @@ def _bounded(
     best, bounds = None, np.empty(0)
     if directions:
         bounds = corners.supports(np.array(directions))
-        best = int(bounds.argmin())
+        best = first_best(-bounds)
         if bounds[best] <= target:
             return float(bounds[best]), directions[best]
-    found = wrench_set_quality(corners, PART_GAP)
-    directions.append(found.direction)
-    if best is not None and bounds[best] < found.upper:
+    direction = wrench_set_quality(corners.on_grid(), PART_GAP).direction
+    directions.append(direction)
+    upper = corners.support(direction)[0]
+    if best is not None and bounds[best] < upper:
         return float(bounds[best]), directions[best]
-    return found.upper, found.direction
+    return upper, direction
 
 
 def _corner_wrenches(choice: Sequence[FacePiece], path: Path, friction: float) -> WrenchSet:

@@ -24,6 +24,7 @@ from grasp_core.objects.face import Face
 from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
+from grasp_core.solvers.ties import first_best
 from grasp_core.values import (
     FINGERS,
     Contact,
@@ -41,6 +42,9 @@ SURROUNDINGS = 0.05
 """Radius of the face around a contact on a curved surface, relative to the object's size."""
 CORNERS = 16
 """Of such a face."""
+NEARER = 1e-9
+"""A face is nearer to a contact than the ones before it if it is so by this much, relative to the
+object's size: a contact on an edge is on the first of its faces that face alike."""
 LARGEST_MOVE = 0.02
 """How far a contact may be from such a face, relative to the object's size."""
 
@@ -173,7 +177,7 @@ def _nearest(
         part = parts[index]
         at = _nearest_in(part.polygon, part.normal, point)
         distance = float(np.linalg.norm(at - point))
-        if distance <= reach and (best is None or distance < best[0]):
+        if distance <= reach and (best is None or distance < best[0] - NEARER * body.radius):
             best = distance, part, at
     if best is None:
         raise InputError(
@@ -209,4 +213,4 @@ def _nearest_in(polygon: Array, normal: Array, point: Array) -> Array:
     edges = np.roll(polygon, -1, axis=0) - polygon
     share = np.einsum("ki,ki->k", flat - polygon, edges) / np.einsum("ki,ki->k", edges, edges)
     ends = polygon + np.clip(share, 0.0, 1.0)[:, None] * edges
-    return ends[int(np.linalg.norm(ends - flat, axis=1).argmin())]
+    return ends[first_best(-np.linalg.norm(ends - flat, axis=1))]

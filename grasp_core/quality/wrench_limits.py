@@ -26,6 +26,7 @@ from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_fr
 from grasp_core.errors import InputError
 from grasp_core.fields import is_array, is_number
 from grasp_core.solvers.conic import ConicProgram, minimize
+from grasp_core.solvers.ties import first_best, smallest_first
 from grasp_core.values import Grasp
 
 SETTLED = 1e-3
@@ -272,8 +273,10 @@ class WrenchBody:
             The weakest found: a wrench with |(force, torque / torque_scale)| = 1.
         """
         scale = np.array([1.0] * 3 + [torque_scale] * 3)
-        starts = sorted(limits, key=lambda found: found.limit)[:STARTS]
-        return min((self._descend(start, scale) for start in starts), key=lambda w: w.limit)
+        every = list(limits)
+        weak = [every[place] for place in smallest_first([found.limit for found in every])]
+        ends = [self._descend(start, scale) for start in weak[:STARTS]]
+        return ends[first_best([-found.limit for found in ends])]
 
     def _descend(self, start: WrenchLimit, scale: Array) -> WrenchLimit:
         best = start

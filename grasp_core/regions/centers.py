@@ -13,15 +13,16 @@ grows: the paper's own program for concurrent grasps is of this kind, with one f
 """
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
-from grasp_core.arrays import Array, to_digits
+from grasp_core.arrays import Array
 from grasp_core.errors import SolverError
+from grasp_core.geometry.polygons import nearest_point
 from grasp_core.regions.largest_discs import Grounds, Proved, largest_discs
 from grasp_core.regions.proof import power_of
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
+from grasp_core.solvers.ties import first_best, nearest_optimum, on_grid
 
 MOVES = 12
 MOVING = 8
@@ -30,6 +31,8 @@ WORTH = 1.005
 """A move ends the search unless the radius grows by this factor."""
 FARTHEST = 1.0
 """That a centre moves at once, in radii."""
+MOVED_DIGITS = 6
+"""Digits after the point of moved centres."""
 NEAR = 3.0
 """Rays count that allow radii up to this factor of the present one."""
 
@@ -53,7 +56,7 @@ def larger_inside(grounds: Grounds, one: Proved | None, other: Proved | None) ->
     """Those of two sets of discs of which larger ones are inside the faces."""
     if one is None or other is None:
         return other if one is None else one
-    return max(one, other, key=partial(inside_faces, grounds))
+    return (one, other)[first_best([inside_faces(grounds, each) for each in (one, other)])]
 
 
 def inside_faces(grounds: Grounds, proved: Proved) -> float:
@@ -93,11 +96,17 @@ def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
     limits += [np.full(2 * k, FARTHEST * proved.radius)] * 2
     c = np.zeros(2 * k + 1)
     c[-1] = 1.0
+    program = LinearProgram(c, np.vstack(rows), np.concatenate(limits))
     try:
-        best = maximize(LinearProgram(c, np.vstack(rows), np.concatenate(limits)))
+        best = maximize(program)
     except SolverError:
         return None
-    return proved.ys + to_digits(best.x[:-1].reshape(k, 2)) if isinstance(best, Optimum) else None
+    if not isinstance(best, Optimum):
+        return None
+    moved = on_grid(proved.ys + nearest_optimum(program, best)[:-1].reshape(k, 2), MOVED_DIGITS)
+    return np.array([
+        nearest_point(piece.corners, y) for piece, y in zip(grounds.pieces, moved, strict=True)
+    ])  # fmt: skip
 
 
 def _sizes(forces: Array) -> Array:

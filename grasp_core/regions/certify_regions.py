@@ -12,7 +12,6 @@ loses the angle by which the surface leans, so that normals are counted as the p
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -45,6 +44,7 @@ from grasp_core.regions.certificates import PLACED, CertifiedRegions
 from grasp_core.regions.growth import BEGINNINGS, disc_polygons, most_area, shared_out
 from grasp_core.regions.largest_discs import Grounds, Proved, largest_discs
 from grasp_core.regions.proof import TwistCover
+from grasp_core.solvers.ties import coarse, first_best, on_grid
 from grasp_core.values import ContactRegion, Grasp, four
 
 Balance: TypeAlias = Literal["radius", "area"]
@@ -54,6 +54,8 @@ FEWEST = 64
 MOST_CONES = 1_000_000
 CONES = 10_000
 """Cones of one cover at most, unless told otherwise: half a second's work."""
+UNIT_DIGITS, PLACE_DIGITS = 6, 8
+"""Digits after the point of the unit and its origin, in object radii; of centres, in the unit."""
 NARROWED = 1e-3
 """How finely the discs in grown polygons are measured, relative to those proved first."""
 
@@ -104,7 +106,7 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     positions, normals = stacked(grasp.contacts)
     if not force_closure(positions, normals, left).closed:
         raise InputError(f"grasp {grasp.id} is not in force closure at friction {left:.6g}")
-    unit = _Unit.of(positions)
+    unit = _Unit.of(body, positions)
     pieces = _pieces(body, grasp, unit, clearance)
     least = math.atan(left) - max(body.faces[face].spread for face in grasp.faces)
     if pieces is None or least <= 0.0:
@@ -112,7 +114,7 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     leaning = [math.tan(math.atan(left) - p.spread) if p.spread else left for p in pieces]
     grounds = Grounds(pieces, np.array(leaning), cones)
     ys = np.array([
-        nearest_point(piece.corners, piece.frame.T @ (x - piece.origin))
+        nearest_point(piece.corners, on_grid(piece.frame.T @ (x - piece.origin), PLACE_DIGITS))
         for piece, x in zip(pieces, unit.at(positions), strict=True)
     ])  # fmt: skip
     proved = largest_discs(grounds, ys)
@@ -132,15 +134,22 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Unit:
-    """The unit of length, and the origin, in which the contacts' largest lever is one."""
+    """The unit of length, and the origin, in which the contacts' largest lever is about one.
+
+    Both have few digits, so that places in it do not depend on the last digits of the contacts.
+    """
 
     origin: Array
     scale: float
 
     @classmethod
-    def of(cls, positions: Array) -> "_Unit":
-        origin = positions.mean(axis=0)
-        return cls(origin, float(np.linalg.norm(positions - origin, axis=1).max()))
+    def of(cls, body: Polyhedron, positions: Array) -> "_Unit":
+        places = (positions - body.center_of_mass) / body.radius
+        middle = on_grid(places.mean(axis=0), UNIT_DIGITS)
+        lever = float(np.linalg.norm(places - middle, axis=1).max())
+        return cls(
+            body.center_of_mass + body.radius * middle, body.radius * coarse(lever, UNIT_DIGITS)
+        )
 
     def at(self, points: Array) -> Array:
         """Points in this unit, (..., 3)."""
@@ -162,10 +171,9 @@ def _pieces(
     for index, contact in zip(grasp.faces, grasp.contacts, strict=True):
         face = body.faces[index]
         normal = face.normal / np.linalg.norm(face.normal)  # files round them
-        whole = max(
-            (piece_of(index, normal, unit.at(corners)) for corners in face.pieces),
-            key=partial(_room, unit.at(contact.position)),
-        )
+        every = [piece_of(index, normal, unit.at(corners)) for corners in face.pieces]
+        point = unit.at(contact.position)
+        whole = every[first_best([_room(point, piece) for piece in every], SAME_CORNER)]
         corners = tidy(clip(whole.corners, whole.E, whole.b - clearance / unit.scale))
         if len(corners) < 3:  # noqa: PLR2004 - not a polygon
             return None

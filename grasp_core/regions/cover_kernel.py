@@ -76,9 +76,11 @@ def answer(
 
 
 @njit(cache=True, error_model="numpy")
-def together(ids: Indices, motions: Array, sites: Sites, forces: Array) -> float:
-    """Least power of some forces together on the rays of a cone, over all sites."""
-    least = np.inf
+def together(ids: Indices, motions: Array, sites: Sites, forces: Array, clear: Array) -> bool:
+    """Whether some forces have power together on the rays of a cone, over all sites."""
+    least, needed = np.inf, 0.0
+    for i in range(len(forces)):
+        needed += forces[i, 0] * clear[i]
     for place in range(RAYS):
         total = 0.0
         for i in range(len(forces)):
@@ -87,13 +89,22 @@ def together(ids: Indices, motions: Array, sites: Sites, forces: Array) -> float
                 force = (forces[i, 1] / along, forces[i, 2] / along)
                 total += along * lowest(motions[ids[place], i], sites, i, force)[0]
         least = min(least, total)
-    return least
+    return least > needed
+
+
+@njit(cache=True, error_model="numpy")
+def dot(u: Array, v: Array) -> float:
+    """Of the rays' numbers, in one order of sums on all machines, unlike a library's."""
+    total = 0.0
+    for place in range(RAYS):
+        total += u[place] * v[place]
+    return total
 
 
 @njit(cache=True, error_model="numpy")
 def reweigh(regrets: Array, powers: Array, weights: Array) -> None:
     """Put weight on rays by how little power they would have cost so far, the last time twice."""
-    mean, total = weights @ powers, 0.0
+    mean, total = dot(weights, powers), 0.0
     for place in range(RAYS):
         regrets[place] = max(0.0, regrets[place] + mean - powers[place])
         weights[place] = max(0.0, regrets[place] + mean - powers[place])
@@ -105,7 +116,9 @@ def reweigh(regrets: Array, powers: Array, weights: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def find_forces(ids: Indices, motions: Array, sites: Sites, forces: Array, weights: Array) -> bool:
+def find_forces(
+    ids: Indices, motions: Array, sites: Sites, clear: Array, forces: Array, weights: Array
+) -> bool:
     """Fill in forces with power on all rays of a cone, if some are found; else a bad twist in it.
 
     The game of `grasp_core.regions.sites`, which ends at once where no answer has power.
@@ -127,7 +140,7 @@ def find_forces(ids: Indices, motions: Array, sites: Sites, forces: Array, weigh
         forces[contact, 0] += turn + 1.0
         forces[contact, 1] += (turn + 1.0) * f
         forces[contact, 2] += (turn + 1.0) * g
-        if together(ids, motions, sites, forces) > AHEAD:
+        if together(ids, motions, sites, forces, clear):
             return True
         reweigh(regrets, powers, weights)
     return False
@@ -136,8 +149,10 @@ def find_forces(ids: Indices, motions: Array, sites: Sites, forces: Array, weigh
 @njit(cache=True, error_model="numpy")
 def fill_motions(ray: int, rays: Array, sites: Sites, axes: Array, motions: Array) -> None:
     """Fill in how the twist of a ray moves each contact, per length of twist."""
-    twist = rays[ray] @ axes
-    length = math.sqrt(twist @ twist)
+    twist = np.empty(RAYS)
+    for part in range(RAYS):
+        twist[part] = dot(rays[ray], axes[:, part])
+    length = math.sqrt(dot(twist, twist))
     for part in range(RAYS):
         twist[part] /= length
     a0, a1, a2, b0, b1, b2 = twist
@@ -157,7 +172,7 @@ def edge_to_cut(ids: Indices, rays: Array, weights: Array) -> tuple[int, int, in
     longest, chosen, number, first, last = -1.0, 0, 0, 0, 0
     lengths = np.empty(RAYS)
     for i in range(RAYS):
-        lengths[i] = math.sqrt(rays[ids[i]] @ rays[ids[i]])
+        lengths[i] = math.sqrt(dot(rays[ids[i]], rays[ids[i]]))
     for i in range(RAYS):
         for j in range(i + 1, RAYS):
             length = 0.0
@@ -183,18 +198,19 @@ def orthants(rays: Array, sites: Sites, axes: Array, motions: Array, cones: Indi
 
 
 @njit(cache=True, error_model="numpy")
-def search(sites: Sites, axes: Array, most: int, tree: Tree) -> tuple[int, int]:
+def search(sites: Sites, axes: Array, needs: tuple[int, Array], tree: Tree) -> tuple[int, int]:
     """Cut cones until each is covered, one ray is refuted, or there are too many.
 
     Args:
         sites: Where contacts may be.
         axes: Twists of the first rays as rows, (6, 6).
-        most: Cones.
+        needs: Cones at most, and what `Sites.clear` says, (k,).
         tree: Filled with what becomes of each.
 
     Returns:
         How it ended, and the number of cones.
     """
+    most, clear = needs
     rays = np.zeros((2 * RAYS + most, RAYS))
     motions = np.empty((2 * RAYS + most, len(sites.points), MOTIONS))
     cones, weights = np.empty((most, RAYS), dtype=np.int64), np.empty(RAYS)
@@ -203,7 +219,7 @@ def search(sites: Sites, axes: Array, most: int, tree: Tree) -> tuple[int, int]:
     count, made, done = 1 << RAYS, 2 * RAYS, 0
     while done < count:
         tree.codes[done] = LEAF
-        if not find_forces(cones[done], motions, sites, tree.forces[done], weights):
+        if not find_forces(cones[done], motions, sites, clear, tree.forces[done], weights):
             if count + 2 > most:
                 return UNDECIDED, done
             edge, a, b = edge_to_cut(cones[done], rays, weights)
@@ -232,5 +248,5 @@ def try_out() -> None:
     points, corners = np.zeros((k, 3)), np.zeros((k, 1, 2))
     search(
         Sites(points, frames, np.ones(k), corners, np.zeros(k), np.zeros(k)),
-        np.eye(RAYS), most, tree,
+        np.eye(RAYS), (most, np.zeros(k)), tree,
     )  # fmt: skip

@@ -36,13 +36,13 @@ def search_cover(sites: Sites, axes: Array, cones: int) -> Searched:
         axes: Twists to begin with, as rows, (6, 6).
         cones: At most; the orthants are always tried.
     """
-    kernel = compiled(KERNEL)
+    kernel, told = compiled(KERNEL), sites.on_grid()
     if kernel is None:
-        plainly = _by_levels(sites, axes, max(cones, 1 << TWIST))
+        plainly = _by_levels(told, axes, max(cones, 1 << TWIST))
         return Searched() if plainly is None else Searched(_cover(sites, axes, *plainly))
     k, most = len(sites.points), max(cones, 1 << TWIST)
     tree = kernel.Tree(np.zeros(most, np.int64), np.zeros((most, k, 3)), np.zeros((k, 3)))
-    ended, count = kernel.search(sites, axes, most, tree)
+    ended, count = kernel.search(told, axes, (most, told.clear()), tree)
     if ended == kernel.REFUTED:
         return Searched(choice=sites.points + np.einsum("kij,kj->ki", sites.frames, tree.shifts))
     if ended != kernel.COVERED:
@@ -81,6 +81,7 @@ class _Game:
         self.velocity = np.einsum("mrki,kij->mrkj", a + np.cross(b, sites.points), sites.frames)
         self.turning = np.einsum("mri,kij->mrkj", twists[..., 3:], sites.frames)
         self.sites, self.most = sites, sites.friction * (1.0 - TINY)
+        self.clear = sites.clear()
 
     def play(self) -> tuple[NDArray[np.bool_], Array, Array]:
         """Cones on which forces were found, weights of rays (m, r) and forces (m, k, 3)."""
@@ -103,7 +104,7 @@ class _Game:
             along = forces[..., :1]
             tangential = forces[..., 1:] / np.where(along > 0.0, along, 1.0)
             together = np.einsum("mrk,mk->mr", self._least(tangential)[0], along[..., 0])
-            covered |= going & (together.min(axis=1) > AHEAD)
+            covered |= going & (together.min(axis=1) > along[..., 0] @ self.clear)
             regret = (weights * powers).sum(axis=1, keepdims=True) - powers
             regrets = np.where(going[:, None], np.maximum(regrets + regret, 0.0), regrets)
             ahead: Array = np.maximum(regrets + regret, 0.0)

@@ -14,11 +14,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.geometry.polygons import SAME_CORNER, clip, edge_rows, signed_area, tidy
+from grasp_core.geometry.polygons import ON_LINE, SAME_CORNER, clip, edge_rows, signed_area, tidy
 from grasp_core.regions.cover_search import search_cover
 from grasp_core.regions.largest_discs import Grounds, Proved, part_of_disc
 from grasp_core.regions.proof import TwistCover, power_of, slack_of, summed
 from grasp_core.regions.sites import Sites
+from grasp_core.solvers.ties import first_best, surpassing
 
 SHARINGS = 2
 """Times that what is left is given away."""
@@ -84,7 +85,7 @@ def _inside(polygon: Array, rows: Array, limits: Array) -> Array:
     """The part of a convex polygon (c, 2) in half-planes rows @ y <= limits, most idle."""
     while len(rows) and len(polygon):
         beyond = (rows @ polygon.T).max(axis=1) - limits
-        worst = int(beyond.argmax())
+        worst = first_best(beyond, ON_LINE)
         if beyond[worst] <= 0.0:
             break
         polygon = clip(polygon, rows[worst : worst + 1], limits[worst : worst + 1])
@@ -113,7 +114,7 @@ def most_area(
         polygons, cover = _grown(grounds, proved, polygons, cover, axes)
         sites = grounds.around(proved.ys, polygons, np.zeros(len(polygons)))
         polygons = shared_out(grounds, proved.ys, sites, cover)
-        if total_area(polygons) > total_area(best[0]):
+        if total_area(polygons) > surpassing(total_area(best[0])):
             best = polygons, cover
     return best
 

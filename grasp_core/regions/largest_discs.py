@@ -13,11 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
-from grasp_core.geometry.polygons import clip
+from grasp_core.geometry.polygons import SAME_CORNER, clip
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.regions.cover_search import search_cover
 from grasp_core.regions.proof import TwistCover
 from grasp_core.regions.sites import TINY, Sites, stacked_corners
+from grasp_core.solvers.ties import coarse
 
 FINENESS = 0.02
 """The radius is found to this, relative to it."""
@@ -31,6 +32,8 @@ NEAR = 0.04
 """So near to what is proved an open choice is sought, relative to it."""
 REFUTING = 4
 """Attempts to find one take so many times fewer cones."""
+REACH_DIGITS = 10
+"""Digits after the point of the largest radius that is tried."""
 SIDES = 16
 """Of the polygon around a disc that a face's border cuts."""
 
@@ -75,7 +78,7 @@ class Grounds:
         """Sites of what the pieces have of discs around points (k, 2)."""
         radii, polygons = np.zeros(len(ys)), list[Array]()
         for i, (piece, y) in enumerate(zip(self.pieces, ys, strict=True)):
-            if (piece.E @ y + radius <= piece.b).all():
+            if (piece.E @ y + radius <= piece.b - SAME_CORNER).all():  # not if it touches an edge
                 radii[i] = radius
                 polygons.append(y[None])
             else:
@@ -120,11 +123,12 @@ def part_of_disc(piece: FacePiece, y: Array, radius: float) -> Array:
 
 
 def reach_of(grounds: Grounds, ys: Array) -> float:
-    """The least radius of discs that hold whole pieces."""
-    return max(
+    """The least radius of discs that hold whole pieces, or hardly more."""
+    least = max(
         float(np.linalg.norm(piece.corners - y, axis=1).max())
         for piece, y in zip(grounds.pieces, ys, strict=True)
     )
+    return coarse(least, REACH_DIGITS)
 
 
 def largest_discs(grounds: Grounds, ys: Array, first: float = FIRST_RADIUS) -> Proved | None:

@@ -14,6 +14,9 @@ These rules replace it wherever something is chosen.
    second key decides, as a rule the faces, ascending. Of numbers that come one by one, `graded`
    counts the cells of a grid up to each. The grid is shifted by a fraction that no ratio of small
    whole numbers comes near: the numbers of regular objects (0, 1/2, 1/3) are far from borders.
+4. *Searches of many steps*, whose every comparison would need a margin, are told no last digits:
+   compiled loops are given numbers that lie on a grid, see `on_grid`. Their sums have one order on
+   all machines, so that they decide alike. What they find is proved for the exact numbers.
 
 What is left to chance is a number that comes within rounding of a border by accident: with
 fourteen good digits and cells of 1e-7, one in ten million.
@@ -35,6 +38,8 @@ which rounding moves the nearest point farther."""
 FOUND = 1e-7
 """How far the nearest optimum may miss its conditions. They are met by far or not at all: an answer
 near this border would be taken on one machine only."""
+GRID_DIGITS = 9
+"""Digits after the point that searches of many steps are told, at size one."""
 FEASIBLE = 1e-9
 """How far it may be beyond a row."""
 SAME_DIGITS = 7
@@ -59,12 +64,20 @@ def graded(values: float | Array, digits: int = SAME_DIGITS) -> float | Array:
 
 
 @overload
-def coarse(values: float) -> float: ...
+def coarse(values: float, digits: int = SAME_DIGITS) -> float: ...
 @overload
-def coarse(values: Array) -> Array: ...
-def coarse(values: float | Array) -> float | Array:
+def coarse(values: Array, digits: int = SAME_DIGITS) -> Array: ...
+def coarse(values: float | Array, digits: int = SAME_DIGITS) -> float | Array:
     """The upper end of each value's cell: an upper bound that equal values share."""
-    return (graded(values) + (1.0 - SHIFT)) * 10.0**-SAME_DIGITS
+    return (graded(values, digits) + (1.0 - SHIFT)) * 10.0**-digits
+
+
+def on_grid(values: Array, digits: int = GRID_DIGITS) -> Array:
+    """A number of each value's cell, of any shape, so that equal values share all bits.
+
+    It has so many digits after the point, and is at most 0.62 units of the last one away.
+    """
+    return graded(values, digits) * 10.0**-digits
 
 
 def ranks(values: ArrayLike, share: float = SAME_SHARE) -> Indices:

@@ -21,12 +21,7 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array
 from grasp_core.errors import GraspError, InputError
 from grasp_core.files.whole_files import write_parts
-from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.values import Grasp
-from scenes.drawing.canvas import in_style, write_frames
 from scenes.drawing.palette import FINGERS, rgb
-from scenes.drawing.pictures import draw_grasp, empty_picture
-from scenes.drawing.views import View
 from scenes.mjcf import Scene
 
 FORMATS = (".gif", ".webp")
@@ -200,32 +195,3 @@ def _rounded_down(factor: float) -> float:
         return 1.0
     power = 10.0 ** math.floor(math.log10(factor))
     return math.floor(factor / power) * power
-
-
-FRAMES, RATE = 48, 12.0
-"""Of one turn; frames per second."""
-ELEVATION_DEG = 25.0
-
-
-@in_style
-def write_turning_clip(body: Polyhedron, grasp: Grasp, path: Path, friction: float) -> Path:
-    """Draw a grasp from all around.
-
-    Args:
-        body: The object.
-        grasp: On it.
-        path: Of the file to write, gif or webp.
-        friction: Coulomb coefficient, of the friction cones.
-
-    Raises:
-        InputError: The file's name ends otherwise.
-    """
-    require_clip(path)
-    figure, axes = empty_picture()
-    views = [View.of_angles(360.0 * frame / FRAMES, ELEVATION_DEG, body) for frame in range(FRAMES)]
-
-    def draw(frame: int) -> None:
-        axes.clear()
-        draw_grasp(axes, body, grasp, friction, views[frame], steady=True)
-
-    return write_frames(figure, draw, FRAMES, RATE, path)

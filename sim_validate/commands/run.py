@@ -14,6 +14,7 @@ from sim_validate.commands.from_flags import asked_finger, object_to_plan, prepa
 from sim_validate.commands.plan import (
     plan_object,
     say_counts,
+    show_gains,
     with_regions,
 )  # fmt: skip
 from sim_validate.commands.report import shown_report
@@ -21,7 +22,6 @@ from sim_validate.commands.validate import simulate_grasps
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.reading import write_text
 from sim_validate.files.stale_results import REPORT, remove_results, require_report_folder
-from sim_validate.parallel.improving import show_gains
 from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.setup import Agenda, Setup
 

@@ -12,8 +12,9 @@ from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
-from scenes.drawing.clips import GraphicsError, has_display, write_clip, write_turning_clip
+from scenes.drawing.clips import GraphicsError, has_display, write_clip
 from scenes.drawing.pictures import write_picture
+from scenes.drawing.turning_clips import write_turning_clip
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, build_scene
 from sim_validate.cli import showing_flags

@@ -1,11 +1,11 @@
-"""The same plans and verdicts under other arithmetic: BLAS kernels, NumPy features, threads.
+"""The same plans, regions and verdicts under other arithmetic: BLAS, NumPy features, threads.
 
     python -m tests.benchmarks.machines [--quick] [--meshes FOLDER]
 
 Each arithmetic stands for another machine: the environment of a process tells OpenBLAS, NumPy
 and Numba which processor to work for. Every object is planned at every friction in each of them,
 with all methods and a limit, and those of few faces without a limit; the first grasps are
-simulated. All must give what this machine's own arithmetic gives.
+simulated, get regions and are improved. All must give what this machine's own arithmetic gives.
 """
 
 import argparse
@@ -34,7 +34,11 @@ SAME_PLACE = 1e-9
 """Contacts in object radii."""
 SAME_FRICTION = 1e-7
 SAME_FIGURE = 1e-6
-"""Of a simulation, relative."""
+"""Of a simulation, of regions and of improved contacts, relative."""
+SAME_CORNER = 1e-7
+"""Corners of regions, and improved contacts, in object radii."""
+CONES = 2000
+"""Of a proof of regions."""
 
 
 def arithmetics():
@@ -82,7 +86,8 @@ def answers(names):
             plan = gc.plan(body, friction, limit=LIMIT)
             found[f"{name} at {friction:.4f}"] = [as_json(body, grasp) for grasp in plan.grasps]
             if friction == FRICTIONS[2] and plan.grasps:
-                found[f"{name} simulated"] = simulated(body, plan.grasps[0], friction)
+                for kind in (simulated, regions, improved):
+                    found[f"{name} {kind.__name__}"] = kind(body, plan.grasps[0], friction)
             if len(body.faces) <= FEW_FACES:
                 every = gc.plan(body, friction).grasps
                 found[f"all of {name} at {friction:.4f}"] = [as_json(body, g) for g in every]
@@ -94,27 +99,58 @@ def as_json(body, grasp):
         "id": grasp.id,
         "family": grasp.family,
         "faces": list(grasp.faces),
-        "contacts": ((grasp.positions - body.center_of_mass) / body.radius).ravel().tolist(),
+        "contacts": places(body, grasp.positions),
         "friction": grasp.critical_friction,
     }
 
 
 def simulated(body, grasp, friction):
     verdict = sv.validate(body, grasp, friction)
+    trials = [trial.hold.outcome for trial in verdict.wrenches]
+    controls = [trial.failed for trial in verdict.controls]
     return {
-        "outcome": verdict.outcome,
-        "trials": [trial.hold.outcome for trial in verdict.wrenches],
-        "controls": [trial.failed for trial in verdict.controls],
+        "exact": [verdict.outcome, trials, controls],
         "figures": [verdict.critical_friction.simulated],
+        "places": [],
     }
+
+
+def regions(body, grasp, friction):
+    found = gc.certify_regions(body, grasp, friction, cones=CONES)
+    if found is None:
+        return {"exact": None, "figures": [], "places": []}
+    polygons = [region.polygon for region in found.regions]
+    return {
+        "exact": [len(found.cover.codes), found.cover.codes.tolist(), found.verify()],
+        "figures": [found.radius, *(region.inscribed_radius for region in found.regions)],
+        "places": places(body, np.vstack([*polygons, found.centers])),
+    }
+
+
+def improved(body, grasp, friction):
+    found = gc.optimize_contacts(body, grasp, friction)
+    return {
+        "exact": [found.grasp.id, found.after.verify()],
+        "figures": [found.grasp.critical_friction],
+        "places": places(body, found.grasp.positions),
+    }
+
+
+def places(body, points):
+    """Points in object radii about the centre of mass, as numbers in a row."""
+    return ((points - body.center_of_mass) / body.radius).ravel().tolist()
 
 
 def differences(case, own, other):
     """How the answers of two arithmetics to one case differ, as sentences."""
     if isinstance(own, dict):
-        same = all(own[key] == other[key] for key in ("outcome", "trials", "controls"))
+        if own["exact"] != other["exact"] or len(own["places"]) != len(other["places"]):
+            return [f"{case}: {shown(own)} or {shown(other)}"]
+        moved = np.abs(np.subtract(own["places"], other["places"])).max(initial=0.0)
         near = np.allclose(own["figures"], other["figures"], rtol=SAME_FIGURE, atol=0.0)
-        return [] if same and near else [f"{case}: {own} or {other}"]
+        if near and moved <= SAME_CORNER:
+            return []
+        return [f"{case}: {own['figures']} or {other['figures']}, moved by {moved:.1e}"]
     if [g["id"] for g in own] != [g["id"] for g in other]:
         ids, others = ([g["id"] for g in each] for each in (own, other))
         at = next((i for i, (a, b) in enumerate(zip(ids, others, strict=False)) if a != b), None)
@@ -129,6 +165,11 @@ def differences(case, own, other):
         elif not (moved <= SAME_PLACE and off <= SAME_FRICTION):
             found.append(f"{case}: {one['id']} is moved by {moved:.1e}, friction by {off:.1e}")
     return found
+
+
+def shown(answer):
+    """What must be the same in a case, in a line that can be read."""
+    return f"{str(answer['exact'])[:120]} with {len(answer['places'])} coordinates"
 
 
 def asked(environment, names):

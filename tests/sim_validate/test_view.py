@@ -134,7 +134,7 @@ def test_fingers_come_in_along_their_ways_and_stay():
 
 def test_without_graphics_the_picture_turns(planned, tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("MUJOCO_GL", "no-such-library")
-    monkeypatch.setattr("scenes.drawing.clips.FRAMES", 4)
+    monkeypatch.setattr("scenes.drawing.turning_clips.FRAMES", 4)
     path = tmp_path / "a.gif"
     assert main(["view", str(planned), "--clip", str(path)]) == Exit.GOOD
     assert "the picture turns instead" in capsys.readouterr().err

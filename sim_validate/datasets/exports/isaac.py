@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.values import Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
 from scenes.fingertips import FingerSettings, fitting_radius
 from scenes.layout import arrange
 from sim_validate.datasets.columns import Name

@@ -38,6 +38,16 @@ def test_coarse_bounds_are_upper_bounds_shared_by_equals():
     assert ties.coarse(-math.inf) == -math.inf
 
 
+@pytest.mark.parametrize("digits", [6, 9, 10])
+def test_numbers_on_a_grid_share_all_bits_with_their_equals(digits):
+    numbers = np.array([i / j for j in range(1, 33) for i in range(-3 * j, 3 * j + 1)])
+    told = ties.on_grid(numbers, digits)
+    assert np.abs(told - numbers).max() <= 0.62 * 10.0**-digits
+    for shift in (-ROUNDING, ROUNDING):
+        assert ties.on_grid(numbers + shift, digits).tobytes() == told.tobytes()
+    assert ties.coarse(0.25 + 1e-15, digits) == ties.coarse(0.25 - 1e-15, digits) > 0.25
+
+
 @given(st.integers(0, 10**6))
 def test_orders_of_repeated_numbers_do_not_depend_on_their_last_digits(seed):
     rng = np.random.default_rng(seed)

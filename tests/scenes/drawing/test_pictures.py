@@ -12,12 +12,12 @@ import scenes
 from grasp_core.errors import InputError
 from scenes.drawing import pictures
 from scenes.drawing.canvas import FORMATS, encoded
-from scenes.drawing.clips import FRAMES, write_turning_clip
 from scenes.drawing.drawings import BAR_RADIUS, drawing_of
 from scenes.drawing.painting import painted
 from scenes.drawing.palette import BAD, FINGERS, FOCUS, GOOD, INK, LOOKS, SURFACE, rgb
 from scenes.drawing.pictures import draw_grasp, empty_picture, grasp_figure, write_picture
 from scenes.drawing.shapes import Shape
+from scenes.drawing.turning_clips import FRAMES, write_turning_clip
 from scenes.drawing.views import FORESHORTENED, View, best_view
 from tests.sim_validate.rigs import grasps
 
