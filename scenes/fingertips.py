@@ -57,7 +57,7 @@ class FingerSettings:
     drive: Drive = "servo"
     """Rigid fingertips stay where they are put."""
     indentation: float = 0.0
-    """How far a rigid fingertip is put into its face, in grasp sizes."""
+    """How far a fingertip is put into its face, in grasp sizes, if more than just touching."""
 
     def __post_init__(self) -> None:
         positive(self.max_normal_force_n, "max_normal_force_n")

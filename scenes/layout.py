@@ -41,6 +41,10 @@ PAD_DEPTH = 0.1
 FLAT = 1e-6
 """Share added to all moments of inertia: those of coplanar contacts are the limit of what a
 body can have, and rounding must not pass it."""
+TOUCH = 1e-9
+"""How deep fingertips start in their faces at least, in grasp sizes: a ten-thousandth of the finest
+threshold. If they just touched, rounding would decide which of them press in the first step, and
+the blows of the others, a step later, tilt lightly held objects by up to 1e-4 in long steps."""
 RETREAT = 0.5
 """Distance of approach, in grasp sizes: from much farther the fingers would arrive too fast."""
 
@@ -57,7 +61,7 @@ class FingerDrive:
     rigid: bool
     """Whether fingertips stay where they are put, whatever the numbers of the servos."""
     indentation_m: float
-    """How far a rigid fingertip is put into its face."""
+    """How far a fingertip is put into its face at first."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,7 +184,7 @@ def _drive(
         damping_n_s_per_m=2.0 * math.sqrt(stiffness * mass),
         max_normal_force_n=fingers.max_normal_force_n,
         rigid=fingers.drive == "rigid",
-        indentation_m=fingers.indentation * size,
+        indentation_m=max(fingers.indentation, TOUCH) * size,
     )
 
 

@@ -23,7 +23,8 @@ class PhysicsSettings:
     """
 
     timestep: float = 0.002
-    """From 1e-5 to 0.05 [s]."""
+    """From 1e-5 to 0.005 [s]: with twice as long steps objects let go 40 % above their critical
+    friction, and only some of the known cases show it."""
     integrator: str = "discrete"
     cone: str = "elliptic"
     solver: str = "Newton"
@@ -113,7 +114,7 @@ COUNTS = {
     "condim": (1, 6),
 }
 RANGES = {
-    "timestep": (1e-5, 0.05),
+    "timestep": (1e-5, 0.005),
     "impratio": (SMALLEST, LARGEST),
     "tolerance": (0.0, 1.0),
     "ls_tolerance": (0.0, 1.0),

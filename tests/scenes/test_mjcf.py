@@ -6,7 +6,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from scenes.layout import SQUEEZE, arrange, grasp_size
+from scenes.layout import SQUEEZE, TOUCH, arrange, grasp_size
 from scenes.mjcf import quaternion
 from scenes.physics import CHOSEN_FLAGS, ENABLED_FLAGS, UNUSED_FLAGS
 from tests.judges import random_rotation
@@ -73,7 +73,8 @@ def test_fingertips_touch_their_pads_exactly_where_the_grasp_says(held):
     mujoco.mj_kinematics(model, data)
     for finger, contact in enumerate(grasp.contacts):
         tip = data.geom(f"finger{finger}")
-        touch = tip.xpos + scene.layout.drive.radius_m * contact.normal
+        height = scene.layout.drive.radius_m - TOUCH * scene.layout.grasp_size_m
+        touch = tip.xpos + height * contact.normal
         rounded = 1e-9 * body.radius
         np.testing.assert_allclose(touch, contact.position - body.center_of_mass, atol=rounded)
         pad = data.geom(f"pad{finger}")
@@ -81,21 +82,37 @@ def test_fingertips_touch_their_pads_exactly_where_the_grasp_says(held):
         np.testing.assert_allclose(outward, -contact.normal, atol=2e-9)
         np.testing.assert_allclose(outward, -scene.layout.frames[finger, :, 0], atol=1e-14)
         top = pad.xpos + outward * model.geom(f"pad{finger}").size[2]
-        tip_top = tip.xpos - scene.layout.drive.radius_m * outward
+        tip_top = tip.xpos - height * outward
         assert abs((tip_top - top) @ outward) < 1e-15
 
 
 def test_each_finger_meets_its_own_pad_only(held):
-    _, _, _, model = held
+    _, _, scene, model = held
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("grasp").id)
-    data.qpos[7::3] += 1e-5
+    data.qpos[7::3] += 1e-5 - TOUCH * scene.layout.grasp_size_m
     mujoco.mj_forward(model, data)
     pairs = {
         tuple(sorted(model.geom(int(g)).name for g in (c.geom1, c.geom2))) for c in data.contact
     }
     assert pairs == {(f"finger{i}", f"pad{i}") for i in range(4)}
     assert all(c.dist == pytest.approx(-1e-5, rel=1e-6) for c in data.contact)
+
+
+@pytest.mark.parametrize("scale", [0.01, 0.03, 1.0, 7.0, 20.0])
+@pytest.mark.parametrize("name", ["l-bracket", "octahedron", "wedge"])
+def test_all_fingertips_touch_from_the_first_step(name, scale):
+    """If they were put exactly onto their faces, rounding would decide which of them do."""
+    example = scenes.example_object(name)
+    body = gc.Polyhedron.from_mesh(scale * example.vertices, example.triangles, name=name)
+    scene = scenes.build_scene(body, gc.plan(body, 0.5, limit=1).grasps[0], 0.5)
+    model = mujoco.MjModel.from_xml_string(scene.xml)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("grasp").id)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 4
+    depth = TOUCH * scene.layout.grasp_size_m
+    assert all(c.dist == pytest.approx(-depth, rel=1e-3) for c in data.contact)
 
 
 def test_approach_starts_clear_and_ends_in_a_grasp(held):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import scenes
+from scenes.layout import TOUCH
 from scenes.mjcf import quaternion
 from sim_validate.simulation.simulate import Motion
 from sim_validate.simulation.traces import rotated, rotation_angles, trace
@@ -70,9 +71,11 @@ def test_slips_and_gaps_are_those_of_the_contact_frames(layout):
     slides = np.zeros((4, 3))
     slides[0, 0], slides[1, 1], slides[2, 2] = -2e-5, 3e-5, 4e-5
     found = trace(motion([pose(), pose(slides=slides)]), layout, 1)
-    np.testing.assert_allclose(found.gaps_m[0], [2e-5, 0.0, 0.0, 0.0], atol=1e-15)
+    touching = -TOUCH * layout.grasp_size_m
+    np.testing.assert_allclose(found.gaps_m[0] - touching, [2e-5, 0.0, 0.0, 0.0], atol=1e-15)
     np.testing.assert_allclose(found.slips_m[0], [0.0, 3e-5, 4e-5, 0.0], atol=1e-15)
-    np.testing.assert_allclose(found.touched_m[0, 3], layout.contacts[3], atol=1e-15)
+    touched = layout.contacts[3] - touching * layout.frames[3, :, 0]
+    np.testing.assert_allclose(found.touched_m[0, 3], touched, atol=1e-15)
 
 
 def test_fingers_that_move_with_the_object_do_not_slip(layout):
@@ -82,7 +85,7 @@ def test_fingers_that_move_with_the_object_do_not_slip(layout):
     slides = np.einsum("kij,ki->kj", layout.frames, there - layout.tip_centers)
     found = trace(motion([pose(), pose(shift, R, slides, scale=1.1)]), layout, 1)
     assert found.slips_m.max() < 1e-14
-    assert np.abs(found.gaps_m).max() < 1e-14
+    assert np.abs(found.gaps_m + TOUCH * layout.grasp_size_m).max() < 1e-14
 
 
 def test_a_motion_stopped_before_watching_began_has_an_empty_trace(layout):

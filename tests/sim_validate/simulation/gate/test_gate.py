@@ -44,7 +44,7 @@ BROKEN = {
 def test_the_usual_settings_are_faithful_and_every_figure_is_measured():
     gate = require_faithful(Setup())
     assert gate.passed
-    assert len(gate.checks) == 18
+    assert len(gate.checks) == 19
     for check in gate.checks:
         assert check.least <= check.value < check.largest
         assert str(check).endswith("ok")
@@ -60,8 +60,8 @@ def test_broken_settings_are_refused_with_the_figures(name):
 
 def test_a_mesh_is_measured_as_well_as_pads():
     gate = require_faithful(Setup(surface="mesh"))
-    assert len(gate.checks) == 2 * 18 + 2
-    assert sum(check.name.startswith("on a mesh: ") for check in gate.checks) == 18 + 2
+    assert len(gate.checks) == 2 * 19 + 2
+    assert sum(check.name.startswith("on a mesh: ") for check in gate.checks) == 19 + 2
 
 
 def test_contacts_that_a_mesh_does_not_give_are_not_blamed_on_the_grasp():
