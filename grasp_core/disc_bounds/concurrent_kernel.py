@@ -17,7 +17,7 @@ from grasp_core.families.attempts_kernel import (
     room_for,
     tilted_faces,
 )
-from grasp_core.families.tables_kernel import Attempts, Corners, FaceTable
+from grasp_core.families.kernel_tables import Attempts, Corners, FaceTable
 from grasp_core.geometry.vectors_kernel import across
 from grasp_core.solvers.lp_kernel import Rows
 

@@ -30,8 +30,8 @@ from grasp_core.compiled import compiled
 from grasp_core.cones.spanning import balancing_weights
 from grasp_core.families.concurrent import concurrent_radius_bounds
 from grasp_core.families.constructions import PAIRINGS
+from grasp_core.families.kernel_tables import Corners
 from grasp_core.families.pencil import pencil_radius_bounds
-from grasp_core.families.tables_kernel import Corners
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import FINGERS
 

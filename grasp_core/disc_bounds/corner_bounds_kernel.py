@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.families.tables_kernel import Corners
+from grasp_core.families.kernel_tables import Corners
 from grasp_core.geometry.vectors_kernel import balancing_weights, cross, dotted
 
 FINGERS = 4

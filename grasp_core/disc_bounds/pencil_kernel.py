@@ -16,7 +16,7 @@ from grasp_core.families.attempts_kernel import (
     room_for,
     tilted_faces,
 )
-from grasp_core.families.tables_kernel import Attempts, FaceTable
+from grasp_core.families.kernel_tables import Attempts, FaceTable
 from grasp_core.geometry.vectors_kernel import angle_between, dotted, focus_direction
 from grasp_core.solvers.lp_kernel import Rows
 

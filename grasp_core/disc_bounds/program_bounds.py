@@ -18,9 +18,9 @@ from grasp_core.errors import SolverError
 from grasp_core.families.concurrent import PYRAMID_SIDES, facet_turns
 from grasp_core.families.constructions import LEAST_RADIUS, Construction
 from grasp_core.families.face_tables import face_table
+from grasp_core.families.kernel_tables import Attempts, FaceTable
 from grasp_core.families.placements import Placement
 from grasp_core.families.regulus import regulus_bounds
-from grasp_core.families.tables_kernel import Attempts, FaceTable
 from grasp_core.objects.face_pieces import FacePiece, Shapes
 from grasp_core.solvers.lp import RESIDUAL
 from grasp_core.values import Family, ForceCone, four

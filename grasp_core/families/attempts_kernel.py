@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array
-from grasp_core.families.tables_kernel import Attempts, FaceTable
+from grasp_core.families.kernel_tables import Attempts, FaceTable
 from grasp_core.solvers.lp_kernel import LOST, Rows, Vertex, proved_bound, solve
 
 FINGERS = 4

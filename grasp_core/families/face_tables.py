@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from grasp_core.families.tables_kernel import FaceTable
+from grasp_core.families.kernel_tables import FaceTable
 from grasp_core.objects.face_pieces import FacePiece
 
 

@@ -51,13 +51,13 @@ from grasp_core.compiled import compiled
 from grasp_core.cones.spanning import angles_between
 from grasp_core.families.concurrent import PYRAMID_SIDES, facet_turns, inscribed_facets
 from grasp_core.families.face_tables import face_table
+from grasp_core.families.kernel_tables import Attempts, FaceTable, RegulusTerms
 from grasp_core.families.placements import (
     NoPlacement,
     Placement,
     balanced_forces,
     focus_direction,
 )
-from grasp_core.families.tables_kernel import Attempts, FaceTable, RegulusTerms
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.lp import RESIDUAL, LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import nearest_optimum

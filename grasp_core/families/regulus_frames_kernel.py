@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.families.attempts_kernel import facet_sines
-from grasp_core.families.tables_kernel import Attempts, FaceTable, RegulusTerms
+from grasp_core.families.kernel_tables import Attempts, FaceTable, RegulusTerms
 from grasp_core.geometry.vectors_kernel import across, angle_between, cross, dotted, focus_direction
 
 FLAT = 1e-12

@@ -21,8 +21,8 @@ from grasp_core.families.attempts_kernel import (
     tilted_faces,
     vertex_of,
 )
+from grasp_core.families.kernel_tables import Attempts, FaceTable, RegulusTerms
 from grasp_core.families.regulus_frames_kernel import PairFrames, pair_frames
-from grasp_core.families.tables_kernel import Attempts, FaceTable, RegulusTerms
 from grasp_core.geometry.vectors_kernel import dotted
 from grasp_core.solvers.lp_kernel import (
     INFEASIBLE,

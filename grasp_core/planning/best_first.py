@@ -20,7 +20,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.disc_bounds.program_bounds import AttemptBounds
 from grasp_core.families.constructions import Construction
-from grasp_core.families.tables_kernel import Attempts
+from grasp_core.families.kernel_tables import Attempts
 from grasp_core.planning.blocks import Prospects
 from grasp_core.planning.ranking import Outlook, Quadruple, Ranking, outlook
 from grasp_core.solvers.ties import coarse

@@ -22,7 +22,7 @@ from grasp_core.disc_bounds.corner_bounds import (
     widths_apart,
 )
 from grasp_core.families.constructions import LEAST_RADIUS
-from grasp_core.families.tables_kernel import Corners
+from grasp_core.families.kernel_tables import Corners
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import ForceCone, four

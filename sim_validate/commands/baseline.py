@@ -14,7 +14,7 @@ from sim_validate.baselines.source_file import Source, source_of
 from sim_validate.cli import baseline_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.from_flags import noise_of
+from sim_validate.commands.asked_trials import noise_of
 from sim_validate.files.reading import write_text
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.setup_toml import setup_from_file

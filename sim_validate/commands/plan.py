@@ -18,7 +18,7 @@ from grasp_core.values import FaceQuadruple, Grasp
 from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.from_flags import asked_finger, object_to_plan
+from sim_validate.commands.asked_objects import asked_finger, object_to_plan
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.reading import write_text
 from sim_validate.files.stale_results import remove_results

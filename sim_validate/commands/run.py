@@ -10,7 +10,8 @@ from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit, reason_of
 from sim_validate.cli.showing_flags import Report
-from sim_validate.commands.from_flags import asked_finger, object_to_plan, prepared
+from sim_validate.commands.asked_objects import asked_finger, object_to_plan
+from sim_validate.commands.asked_trials import prepared
 from sim_validate.commands.plan import (
     plan_object,
     say_counts,

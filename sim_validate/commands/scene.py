@@ -5,7 +5,7 @@ from scenes.mjcf import build_scene
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.from_flags import finger_settings
+from sim_validate.commands.asked_trials import finger_settings
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.reading import write_text
 from sim_validate.records.grasps import grasp_with_id, read_grasps

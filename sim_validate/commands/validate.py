@@ -10,7 +10,7 @@ from grasp_core.values import Grasp
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.from_flags import prepared
+from sim_validate.commands.asked_trials import prepared
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.reading import write_arrays, write_text
 from sim_validate.files.stale_results import remove_verdicts

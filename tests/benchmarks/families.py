@@ -17,6 +17,7 @@ from grasp_core.families.concurrent import BEFORE, BEHIND, inscribed_facets
 from grasp_core.families.concurrent import _rows as concurrent_rows
 from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS
 from grasp_core.families.free import place_free
+from grasp_core.families.kernel_tables import Attempts
 from grasp_core.families.pencil import CELL_A, CELL_B, _discs, _near_rows
 from grasp_core.families.pencil import _rows as pencil_rows
 from grasp_core.families.placements import focus_direction
@@ -30,7 +31,6 @@ from grasp_core.families.regulus import (
     _slope,
     regulus_bounds,
 )
-from grasp_core.families.tables_kernel import Attempts
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning.blocks import spanning_blocks
 from grasp_core.planning.candidates import NORMAL, PlannedCones

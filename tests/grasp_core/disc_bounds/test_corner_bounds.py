@@ -9,7 +9,7 @@ from grasp_core.cones.spanning import span_sines, spanning_quadruples
 from grasp_core.disc_bounds.corner_bounds import _reaches, _widths, corners_of, disc_limits
 from grasp_core.disc_bounds.program_bounds import AttemptBounds
 from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS, PAIRINGS
-from grasp_core.families.tables_kernel import Attempts
+from grasp_core.families.kernel_tables import Attempts
 from grasp_core.objects.face_pieces import face_shapes
 from scenes.example_objects import example_object
 

@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.disc_bounds.program_bounds import KERNELS, AttemptBounds
 from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS
-from grasp_core.families.tables_kernel import Attempts
+from grasp_core.families.kernel_tables import Attempts
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning.blocks import all_blocks
 from grasp_core.planning.candidates import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones

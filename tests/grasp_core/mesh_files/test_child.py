@@ -108,7 +108,7 @@ def test_the_time_allowed_is_beside_what_was_spent(monkeypatch, spent, seconds, 
 def test_a_reading_that_never_ends_is_ended_by_the_processors_clock():
     """In the reader, with a parser that does nothing but spend time."""
     program = (
-        "import itertools; from grasp_core import mesh_reader\n"
+        "import itertools; from grasp_core.mesh_files import child_main as mesh_reader\n"
         "mesh_reader.parsed_by_trimesh = lambda *_: sum(itertools.repeat(1))\n"
         "mesh_reader.main('2048', '1')\n"
     )
@@ -175,7 +175,7 @@ def test_a_fork_amid_a_reading_has_a_reader_of_its_own(tmp_path):
     path.write_text(obj(CORNERS, TRIANGLES * 40_000))
     program = (
         "import os, sys, threading; from pathlib import Path\n"
-        "from grasp_core import mesh_child, mesh_files\n"
+        "from grasp_core.mesh_files import child as mesh_child, limits as mesh_files\n"
         "def read(): return mesh_child.read_triangles(Path(sys.argv[1]), mesh_files.MeshLimits())\n"
         "asked, answer = threading.Event(), mesh_child._answer\n"
         "def answering(stream): asked.set(); return answer(stream)\n"
@@ -227,7 +227,7 @@ def test_an_interrupt_leaves_no_answer_for_the_next_file(part, monkeypatch):
 def test_the_reader_ends_with_the_program_that_asked(part):
     program = (
         "import sys, os, signal; from pathlib import Path\n"
-        "from grasp_core import mesh_child, mesh_files\n"
+        "from grasp_core.mesh_files import child as mesh_child, limits as mesh_files\n"
         "mesh_child.read_triangles(Path(sys.argv[1]), mesh_files.MeshLimits())\n"
         "print(mesh_child._child(2048).process.pid, flush=True)\n"
         "os.kill(os.getpid(), signal.SIGKILL)\n"
@@ -277,7 +277,7 @@ def test_the_guard_is_up_where_files_are_read():
     """A library that opened a file in the reader would be refused, and the mesh with it."""
     program = (
         "import sys; sys.addaudithook(lambda e, g: print(e, file=sys.stderr))\n"
-        "from grasp_core import mesh_reader\n"
+        "from grasp_core.mesh_files import child_main as mesh_reader\n"
         "mesh_reader.parsed_by_trimesh = lambda *_: open('/etc/hostname')\n"
         "mesh_reader.main('2048', '1')\n"
     )

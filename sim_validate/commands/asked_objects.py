@@ -1,4 +1,4 @@
-"""What the flags of a command ask for, as the values that the pipeline takes."""
+"""The object and the fingers that the flags of a command ask to plan for."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,14 +10,8 @@ from grasp_core.objects.face import PatchLimits
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.reach import Finger
 from scenes.example_objects import example_object
-from scenes.fingertips import FingerSettings
 from sim_validate.cli import flag_groups
 from sim_validate.cli.console import Reporter
-from sim_validate.cli.flag_bounds import FlagsError
-from sim_validate.records.setup_toml import setup_from_file
-from sim_validate.records.wrenches import weights, wrenches_from_file
-from sim_validate.simulation.noise import Noise
-from sim_validate.simulation.setup import Agenda, Setup, with_planned_radius
 
 
 def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
@@ -95,80 +89,3 @@ def asked_finger(planning: flag_groups.Planning) -> Finger | None:
     if planning.finger_radius_m is None:
         raise InputError("--approach-m also needs --finger-radius-m, the radius of the fingertips")
     return Finger(planning.finger_radius_m, planning.approach_m)
-
-
-def finger_settings(given: flag_groups.Fingers) -> FingerSettings:
-    """What the flags say about fingertips."""
-    return FingerSettings(
-        max_normal_force_n=given.max_normal_force,
-        radius_m=given.fingertip_radius_m,
-        mass_kg=given.fingertip_mass_kg,
-        stiffness_n_per_m=given.stiffness_n_per_m,
-        approach=given.approach,
-    )
-
-
-def noise_of(given: flag_groups.Repeats) -> Noise:
-    """What the flags say about noise.
-
-    Raises:
-        InputError: There is noise, but no repeat to put it on.
-    """
-    plain = flag_groups.Repeats()
-    if not given.trials and given != plain:
-        raise FlagsError("--noise-... is for repeats: give --trials, too")
-    return Noise(
-        shift=given.noise_shift,
-        turn_deg=given.noise_turn_deg,
-        normal_deg=given.noise_normal_deg,
-        friction=given.noise_friction,
-        mass=given.noise_mass,
-    )
-
-
-def prepared(
-    testing: flag_groups.Testing, planned: Finger | None, seed: int, folder: Path | None
-) -> tuple[Setup, Agenda]:
-    """What the flags and files say about trials, checked before anything runs.
-
-    Args:
-        testing: The flags.
-        planned: Fingers that the grasps are planned for.
-        seed: Seed of what is drawn.
-        folder: Where results go, if anywhere.
-
-    Raises:
-        InputError: A flag or a file is refused, or flags contradict each other.
-    """
-    return _setup(testing, planned), _agenda(testing, seed, folder)
-
-
-def _setup(testing: flag_groups.Testing, planned: Finger | None) -> Setup:
-    """How the flags, and then a file, say trials are simulated."""
-    setup = Setup(
-        fingers=with_planned_radius(finger_settings(testing.fingers), planned),
-        surface=testing.surface,
-        timeout_s=testing.timeout_s,
-    )
-    return setup if testing.setup is None else setup_from_file(testing.setup, setup)
-
-
-def _agenda(testing: flag_groups.Testing, seed: int, folder: Path | None) -> Agenda:
-    """Which trials the flags ask for."""
-    if testing.down and testing.weight_n is None:
-        raise FlagsError("--down is a direction of the weight: give --weight-n too")
-    if testing.traces and folder is None:
-        raise FlagsError("--traces are written to files: give --out DIR too")
-    own = () if testing.wrenches is None else wrenches_from_file(testing.wrenches)
-    weight = () if testing.weight_n is None else weights(testing.weight_n, testing.down)
-    return Agenda(
-        random_wrenches=testing.random_wrenches,
-        wrenches=(*own, *weight),
-        limits=testing.limits,
-        independent=testing.independent,
-        rules=testing.also_judge_by,
-        trials=testing.repeats.trials,
-        noise=noise_of(testing.repeats),
-        keep_traces=testing.traces,
-        seed=seed,
-    )
