@@ -6,7 +6,6 @@ import matplotlib
 import numpy as np
 import pytest
 from PIL import Image
-from tests.scenes.test_pictures import assert_inside
 
 import grasp_core as gc
 import scenes
@@ -15,6 +14,7 @@ from scenes.drawing.pictures import grasp_figure
 from sim_validate.reports.margin_charts import margin_figure
 from sim_validate.reports.wrench_charts import wrench_figure
 from tests.docs_pictures import FOLDER, FRICTION, PICTURES, best
+from tests.scenes.drawing.test_pictures import assert_inside
 
 BLOCK = 16
 """Pixels on a side of the squares that are compared: a line of text is as high."""

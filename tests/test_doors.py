@@ -128,4 +128,5 @@ def test_every_command_has_its_function():
     actions |= {baseline_flags.Record, baseline_flags.Check}
     named = set(get_args(Command)) - {flags.Dataset, baseline_flags.Baseline} | actions
     assert set(ACTIONS) == named
-    assert all(callable(resolve_name(f"sim_validate.commands.{place}")) for place in ACTIONS.values())
+    places = [f"sim_validate.commands.{place}" for place in ACTIONS.values()]
+    assert all(callable(resolve_name(place)) for place in places)

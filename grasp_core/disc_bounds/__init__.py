@@ -1,1 +1,5 @@
-"""ROOM grasp_core/disc_bounds."""
+"""How large can independent discs be at most, before any grasp is constructed?
+
+Quadruples of faces come in, with force cones. Upper bounds on the radius go out; the search by best
+bound rests on them.
+"""

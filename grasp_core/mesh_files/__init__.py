@@ -1,5 +1,5 @@
-"""What mesh files say, read strictly: one module a format, without libraries.
+"""What triangles does a mesh file hold, or where does it break its format?
 
-Each gives the triangles of a file, or says where it breaks the rules of its format. Nothing is
-guessed, skipped or repaired. Polygons become fans around their first corner.
+The bytes of an OBJ, STL, PLY, OFF or GLB file come in. Triangles go out, polygons as fans around
+their first corner, or a refusal with its reason; nothing is guessed, skipped or repaired.
 """

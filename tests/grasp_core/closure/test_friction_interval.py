@@ -204,7 +204,7 @@ NO_VECTORS = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX2 
 
 def frictions_elsewhere(folder, count, environment):
     """Critical frictions of the same contacts by another process."""
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[3]
     subprocess.run(
         [sys.executable, "-c", ELSEWHERE, str(count), str(folder / "found.npy")],
         check=True, cwd=root, env=os.environ | {"PYTHONPATH": str(root)} | environment,

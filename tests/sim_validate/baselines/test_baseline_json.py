@@ -3,7 +3,6 @@ import json
 import math
 
 import pytest
-from tests.sim_validate.baselines.test_comparing import BEFORE, ENTRY
 
 import grasp_core as gc
 import sim_validate as sv
@@ -17,6 +16,7 @@ from sim_validate.baselines.entries import entry_of
 from sim_validate.baselines.settings import of_settings, settings_of
 from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.setup import Agenda, Setup
+from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY
 from tests.sim_validate.rigs import grasps
 
 

@@ -13,7 +13,6 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
-from tests.sim_validate.datasets.test_verify import forged
 
 import grasp_core as gc
 import sim_validate
@@ -29,6 +28,7 @@ from sim_validate.datasets.rows import SPLITS
 from sim_validate.files.reading import whole_folder
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import Here, silent
+from tests.sim_validate.datasets.verifying.test_verify import forged
 
 pytest.importorskip("pyarrow")
 FORMATS = tuple(EXPORTERS)

@@ -6,7 +6,6 @@ from dataclasses import replace
 import matplotlib
 import numpy as np
 import pytest
-from tests.scenes.test_pictures import assert_inside
 
 import grasp_core as gc
 from grasp_core.closure.wrench_sets import WrenchSet
@@ -25,6 +24,7 @@ from sim_validate.reports.margin_charts import directions_of_map, margin_figure,
 from sim_validate.reports.motion_charts import friction_used, motion_figure
 from sim_validate.reports.wrench_charts import shadow_of, wrench_figure
 from sim_validate.simulation.setup import Agenda, Setup
+from tests.scenes.drawing.test_pictures import assert_inside
 from tests.sim_validate.rigs import grasps
 
 FRICTION = 0.5

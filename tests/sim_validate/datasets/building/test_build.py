@@ -27,7 +27,7 @@ from tests.sim_validate.datasets.engines import Here, WorkerEndedError, contents
 from tests.sim_validate.datasets.pair import CONFIG, all_rows
 
 pytest.importorskip("pyarrow")
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 
 
 class KilledError(BaseException):

@@ -9,7 +9,7 @@ import scenes
 import sim_validate as sv
 from sim_validate.validation.controls import FRICTION_SHARE, LEAST_FRICTION
 
-PIECES = Path(__file__).parents[3] / "shared" / "objects" / "ycb" / "pieces"
+PIECES = Path(__file__).parents[4] / "shared" / "objects" / "ycb" / "pieces"
 NAMES = [n for n in scenes.example_names() if "FACES" not in n] + [
     f"random-{faces}-{seed}" for faces, seed in ((8, 3), (16, 1), (24, 2), (40, 1))
 ]

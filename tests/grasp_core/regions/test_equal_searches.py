@@ -36,7 +36,8 @@ TRIALS = 4
 CONES = 600
 
 needs_kernels = pytest.mark.skipif(
-    compiled("twist_cover") is None, reason="the plain search sums in the order of a library"
+    compiled("grasp_core.regions.cover_kernel") is None,
+    reason="the plain search sums in the order of a library",
 )
 
 

@@ -12,7 +12,7 @@ from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
 
-ROOT = Path(__file__).parent.parent.parent
+ROOT = Path(__file__).parents[3]
 CROSS = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
 """Four contacts that push towards the origin along x and y."""
 

@@ -15,7 +15,7 @@ THETA = math.radians(10.0)
 FRICTION = math.tan(THETA)
 BORDER = 1e-6
 """Friction above that of the force cones: contacts on the borders use their very edge."""
-PIECES = Path(__file__).parents[3] / "shared" / "objects" / "ycb" / "pieces"
+PIECES = Path(__file__).parents[4] / "shared" / "objects" / "ycb" / "pieces"
 RANDOM = [f"random-{faces}-{seed}" for faces in (12, 16, 20, 24, 28, 32) for seed in range(1, 6)]
 FACES_AT_MOST = 34
 
