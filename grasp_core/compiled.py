@@ -1,4 +1,4 @@
-"""Compiled inner loops, and the only place that knows numba.
+"""Compiled inner loops are loaded here; they stand beside their modules as `NAME_kernel.py`.
 
 A kernel is plain arithmetic on arrays of programs, directions or contacts. What makes a claim, such
 as a placement, a closure or a quality, is checked by the module that asks for it, which has a
@@ -28,6 +28,9 @@ SETTINGS = ("on", "off")
 def compiled(name: str) -> Any:
     """A module of kernels after its `try_out`; None where kernels are not wanted or do not work.
 
+    Args:
+        name: The module's full name, `grasp_core.ROOM.NAME_kernel`.
+
     Raises:
         InputError: The environment says what is neither on nor off.
     """
@@ -42,7 +45,9 @@ def compiled(name: str) -> Any:
     try:
         failures: Any = importlib.import_module("numba.core.errors")
         kernel: Any = importlib.import_module(name)
-    except (ImportError, RuntimeError, OSError, ValueError):  # the last of its own settings
+    except (ImportError, RuntimeError, OSError, ValueError) as error:  # the last: numba's settings
+        if str(getattr(error, "name", "")).startswith("grasp_core"):
+            raise
         return None
     try:
         kernel.try_out()

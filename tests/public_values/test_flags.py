@@ -72,15 +72,15 @@ def test_a_number_out_of_range_is_refused_with_the_name_of_its_flag(
 def test_kernels_are_on_or_off(asked, monkeypatch):
     monkeypatch.setenv(SWITCH, asked)
     with pytest.raises(InputError, match=f"{SWITCH}: expected on or off, or none, got '{asked}'"):
-        compiled.__wrapped__("simplex")
+        compiled.__wrapped__("grasp_core.solvers.lp_kernel")
 
 
 @pytest.mark.parametrize("asked", ["on", ""])
 def test_kernels_are_on_unless_they_are_off(asked, monkeypatch):
     monkeypatch.setenv(SWITCH, asked)
-    assert compiled.__wrapped__("simplex") is not None
+    assert compiled.__wrapped__("grasp_core.solvers.lp_kernel") is not None
     monkeypatch.setenv(SWITCH, "off")
-    assert compiled.__wrapped__("simplex") is None
+    assert compiled.__wrapped__("grasp_core.solvers.lp_kernel") is None
 
 
 @pytest.mark.slow
