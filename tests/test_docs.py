@@ -87,7 +87,7 @@ def test_the_examples_print_what_they_say(code, said, tmp_path):
 
 
 def test_every_block_of_code_is_one_that_a_test_runs():
-    kinds = {"sh": 0, "python": 0, "text": 0, "json": 0, "toml": 0, "py": 0}
+    kinds = dict.fromkeys(("sh", "python", "text", "json", "toml", "py", "mermaid"), 0)
     for text in PAGES.values():
         for language in re.findall(r"^```(\w+)$", text, re.MULTILINE):
             kinds[language] += 1
