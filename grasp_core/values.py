@@ -1,18 +1,17 @@
-"""The nouns of the project: faces, polyhedra, contacts and grasps, all frozen.
+"""The nouns of a grasp: contacts, force cones, regions, witnesses, grasps; all frozen.
 
 Every vector is in the object's frame and in SI units. Normals are unit vectors that
 point into the object. Arrays are copied, checked and made read-only on construction.
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
-from typing import Any, Literal, Self, TypeAlias, TypeVar, get_args
+from typing import Any, Literal, TypeAlias, TypeVar, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices, frozen_units
+from grasp_core.arrays import Array, frozen, frozen_units
 from grasp_core.checked import (
     LARGEST,
     instance,
@@ -30,8 +29,6 @@ Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
 """The class of a grasp's witness lines."""
 Method: TypeAlias = Literal["concurrent", "pencil", "regulus", "free"]
 """How grasps are looked for: by one of the paper's constructions, or free of any type."""
-FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
-"""What counts as a face: flat parts, nearly flat patches, or what suits the surface."""
 RegionKind: TypeAlias = Literal["cone", "disc", "point", "certified"]
 FaceQuadruple: TypeAlias = tuple[int, int, int, int]
 """Indices of four faces, in finger order."""
@@ -40,158 +37,6 @@ Item = TypeVar("Item")
 
 FINGERS = 4
 RIGHT_ANGLE = np.pi / 2
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Face:
-    """A planar face: one outer border, perhaps holes, and a split into convex pieces."""
-
-    normal: Array
-    """Unit vector into the object, (3,)."""
-    centroid: Array
-    """Centre of area, on the plane, (3,) [m]."""
-    area: float
-    """[m^2]"""
-    polygon: Array
-    """Outer border, (k, 3) [m], counter-clockwise when `normal` points at the viewer."""
-    holes: tuple[Array, ...]
-    """Borders of the holes, each (k, 3) [m], clockwise in the same view."""
-    pieces: tuple[Array, ...]
-    """Convex polygons that tile the face, each (k, 3) [m], wound as `polygon`."""
-    spread: float = 0.0
-    """Of a curved patch: the most that the surface over it leans from the plane [rad]."""
-    depth: float = 0.0
-    """Of a curved patch: largest distance of the surface over it from the plane [m]."""
-    facets: Indices = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    """Of a curved patch: the triangles that are the surface over the polygon, (f,)."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "facets", frozen_indices(self.facets, (None,), "facets"))
-        object.__setattr__(self, "normal", frozen_units(self.normal, (3,), "normal"))
-        object.__setattr__(self, "centroid", frozen(self.centroid, (3,), "centroid"))
-        object.__setattr__(self, "polygon", frozen(self.polygon, (None, 3), "polygon"))
-        for name in ("holes", "pieces"):
-            each = partial(frozen, shape=(None, 3), name=name)
-            loops = several(getattr(self, name), each, name, "polygons")
-            object.__setattr__(self, name, loops)
-        number(self.area, "area", above=0.0, most=LARGEST)
-        number(self.spread, "spread", least=0.0, below=RIGHT_ANGLE)
-        number(self.depth, "depth", least=0.0, most=LARGEST)
-
-    def __repr__(self) -> str:
-        parts = [counted(len(self.polygon), "corner"), counted(len(self.holes), "hole")]
-        return summary("Face", *parts, area=self.area, centroid=self.centroid, normal=self.normal)
-
-
-@dataclass(frozen=True, slots=True)
-class PatchLimits:
-    """How far a patch may be from flat, and how many there are.
-
-    Raises:
-        InputError: A limit is out of range.
-    """
-
-    spread_deg: float = 10.0
-    """Largest angle between the surface and the patch's plane [deg]; friction loses it."""
-    depth: float = 0.01
-    """Largest distance of the surface from the plane, relative to the object's largest extent."""
-    most: int = 20
-    """So many patches, those with the largest discs."""
-
-    def __post_init__(self) -> None:
-        number(self.spread_deg, "spread_deg", above=0.0, most=45.0)  # above it nothing is flat
-        number(self.depth, "depth", above=0.0, most=0.1)
-        whole(self.most, "most", least=FINGERS, most=200)  # what the planner takes
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Polyhedron:
-    """A solid bounded by planar faces, with the mass properties of uniform density 1."""
-
-    name: str
-    vertices: Array
-    """Welded vertices, (n, 3) [m]."""
-    triangles: Indices
-    """Vertex indices, (t, 3), counter-clockwise seen from outside."""
-    faces: tuple[Face, ...]
-    volume: float
-    """[m^3]"""
-    center_of_mass: Array
-    """(3,) [m]"""
-    inertia: Array
-    """About the centre of mass at density 1 kg/m^3, (3, 3) [kg m^2]."""
-    content_sha256: str
-    """Hash of the canonical mesh: the same for any file name, vertex or triangle order."""
-    source_sha256: str
-    """Hash of the file's bytes; `content_sha256` when there was no file."""
-    patches: PatchLimits | None = None
-    """Of a curved or scanned surface whose faces are patches; None where they are exact."""
-    notes: tuple[str, ...] = ()
-    """What was mended on the way in, for people to read."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "vertices", frozen(self.vertices, (None, 3), "vertices"))
-        triangles = frozen_indices(self.triangles, (None, 3), "triangles")
-        object.__setattr__(self, "triangles", triangles)
-        center = frozen(self.center_of_mass, (3,), "center_of_mass")
-        object.__setattr__(self, "center_of_mass", center)
-        object.__setattr__(self, "inertia", frozen(self.inertia, (3, 3), "inertia"))
-        for name in ("name", "content_sha256", "source_sha256"):
-            text(getattr(self, name), name)
-        number(self.volume, "volume", above=0.0, most=LARGEST)
-        if triangles.max(initial=0) >= max(len(self.vertices), 1):
-            raise InputError(f"triangles must name vertices from 0 to {len(self.vertices) - 1}")
-        several(self.faces, partial(instance, kind=Face, name="faces"), "faces", "Face values")
-        several(self.notes, partial(text, name="notes"), "notes", "texts")
-        if self.patches is not None:
-            instance(self.patches, PatchLimits, "patches")
-
-    @classmethod
-    def from_mesh(
-        cls,
-        vertices: ArrayLike,
-        triangles: ArrayLike,
-        *,
-        name: str = "object",
-        faces: FaceKind = "auto",
-        patches: PatchLimits | None = None,
-        center_of_mass: ArrayLike | None = None,
-    ) -> Self:
-        """Build from a triangle mesh, with the checks and refusals of a mesh file.
-
-        Args:
-            vertices: (n, 3) [m].
-            triangles: Vertex indices, (t, 3).
-            name: What to call the object.
-            faces: As `load_polyhedron`.
-            patches: As `load_polyhedron`.
-            center_of_mass: As `load_polyhedron`.
-
-        Raises:
-            MeshError: The mesh is not a solid; its `reason` says why.
-        """
-        from grasp_core.polyhedra import polyhedron_from_mesh
-
-        return polyhedron_from_mesh(
-            vertices, triangles, name=name, faces=faces, patches=patches,
-            center_of_mass=center_of_mass, kind=cls,
-        )  # fmt: skip
-
-    @property
-    def radius(self) -> float:
-        """Largest distance of a vertex from the centre of mass [m]."""
-        return float(np.linalg.norm(self.vertices - self.center_of_mass, axis=1).max())
-
-    @property
-    def normals(self) -> Array:
-        """The faces' normals, (faces, 3)."""
-        return np.array([face.normal for face in self.faces]).reshape(-1, 3)
-
-    def __repr__(self) -> str:
-        kind = "face" if self.patches is None else "patch"
-        sizes = [(self.vertices, "vertex"), (self.triangles, "triangle"), (self.faces, kind)]
-        parts = [counted(len(things), name) for things, name in sizes]
-        return summary("Polyhedron", shown(self.name), *parts, radius=self.radius)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

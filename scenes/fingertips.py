@@ -17,9 +17,10 @@ import numpy as np
 from grasp_core.arrays import Array, Indices, frozen
 from grasp_core.checked import LARGEST, SMALLEST, number, one_of, positive
 from grasp_core.errors import InputError
-from grasp_core.nearest_points import nearest_on_surface
-from grasp_core.on_faces import ON_FACE, face_under
-from grasp_core.values import Contact, Polyhedron
+from grasp_core.geometry.nearest_points import nearest_on_surface
+from grasp_core.objects.on_faces import ON_FACE, face_under
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact
 
 Drive: TypeAlias = Literal["servo", "rigid"]
 TIP_RADIUS = 0.1

@@ -17,11 +17,12 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, to_digits
 from grasp_core.checked import coefficient, number
-from grasp_core.closure import force_closure
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.closure.wrenches import contact_frames
 from grasp_core.errors import UndecidedError
-from grasp_core.on_faces import face_under
-from grasp_core.values import Contact, Grasp, Polyhedron
-from grasp_core.wrenches import contact_frames
+from grasp_core.objects.on_faces import face_under
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings, fitting_radius
 
 RESPONSE_TIME_S = 0.07

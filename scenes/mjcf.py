@@ -24,15 +24,16 @@ import numpy as np
 
 from grasp_core.arrays import Array, to_digits
 from grasp_core.checked import instance, one_of, path_of, several
-from grasp_core.convexity import is_convex
 from grasp_core.errors import InputError
-from grasp_core.on_faces import check_body
-from grasp_core.ties import first_best
-from grasp_core.values import Contact, Grasp, Polyhedron
+from grasp_core.files.whole_files import write_parts
+from grasp_core.objects.convexity import is_convex
+from grasp_core.objects.on_faces import check_body
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.solvers.ties import first_best
+from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
 from scenes.physics import PhysicsSettings
-from scenes.whole_files import write_parts
 
 Surface = Literal["pads", "mesh"]
 """What fingertips touch: a pad each, or the convex hull of the object's mesh."""

@@ -1,14 +1,16 @@
-from sim_validate.datasets.loading import load_dataset as load_dataset
-from sim_validate.grasp_verdict import Verdict as Verdict
-from sim_validate.noise.draws import Noise as Noise
-from sim_validate.protocol import HoldProtocol as HoldProtocol
-from sim_validate.region_files import read_regions as read_regions
+from sim_validate.datasets.open_dataset import load_dataset as load_dataset
+from sim_validate.records.regions import read_regions as read_regions
 from sim_validate.reports.margin_charts import margin_figure as margin_figure
 from sim_validate.reports.report import write_report as write_report
 from sim_validate.reports.wrench_charts import wrench_figure as wrench_figure
-from sim_validate.setup import Agenda as Agenda
-from sim_validate.setup import NamedWrench as NamedWrench
-from sim_validate.setup import Setup as Setup
-from sim_validate.validation import simulated_critical_friction as simulated_critical_friction
-from sim_validate.validation import validate as validate
-from sim_validate.verdict import Outcome as Outcome
+from sim_validate.simulation.hold_verdict import Outcome as Outcome
+from sim_validate.simulation.noise import Noise as Noise
+from sim_validate.simulation.protocol import HoldProtocol as HoldProtocol
+from sim_validate.simulation.setup import Agenda as Agenda
+from sim_validate.simulation.setup import NamedWrench as NamedWrench
+from sim_validate.simulation.setup import Setup as Setup
+from sim_validate.validation.grasp_verdict import Verdict as Verdict
+from sim_validate.validation.validation import (
+    simulated_critical_friction as simulated_critical_friction,
+)
+from sim_validate.validation.validation import validate as validate

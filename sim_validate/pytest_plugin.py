@@ -11,8 +11,8 @@ import pytest
 
 if TYPE_CHECKING:
     from sim_validate.baselines.source_file import Source
-    from sim_validate.baselines.suite import Suite
-    from sim_validate.grasp_verdict import Verdict
+    from sim_validate.baselines.suite_toml import Suite
+    from sim_validate.validation.grasp_verdict import Verdict
 
     Entries = tuple[dict[str, Any] | None, dict[str, Any] | None]
 
@@ -97,7 +97,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     folder = session.config.getoption("--grasp-report")
     if folder is None or hasattr(session.config, "workerinput"):
         return
-    from sim_validate.baselines.report_page import write_report
+    from sim_validate.reports.stability_page import write_report
 
     write_report(Path(folder), session.config.stash[LINES])
 
@@ -127,7 +127,7 @@ class GraspsFile(pytest.File):
     def collect(self) -> Iterator[pytest.Item]:
         """A test for each grasp; a single one where a baseline is to be written."""
         from grasp_core.errors import GraspError
-        from sim_validate.baselines.suite import suite_from_toml
+        from sim_validate.baselines.suite_toml import suite_from_toml
 
         bless = self.config.getoption("--grasp-bless")
         try:
@@ -164,10 +164,10 @@ class GraspItem(_SuiteItem):
     def runtest(self) -> None:
         """Fail where the grasp is worse, missing or new, or cannot be compared."""
         from grasp_core.errors import GraspError
-        from sim_validate.baselines.comparing import Status, failing
-        from sim_validate.baselines.explaining import explained
+        from sim_validate.baselines.compare import Status, failing
+        from sim_validate.baselines.entries import plain
+        from sim_validate.baselines.explain import explained
         from sim_validate.baselines.source_file import ChangedPartError
-        from sim_validate.baselines.values import plain
 
         suite = self.suite
         try:
@@ -195,7 +195,7 @@ class BlessItem(_SuiteItem):
 
     def runtest(self) -> None:
         """Write the baseline."""
-        from sim_validate.baselines.values import plain
+        from sim_validate.baselines.entries import plain
 
         found = self.suite.bless()
         self.user_properties.append(("grasps", len(found.entries)))
@@ -230,9 +230,9 @@ def assert_stable(
                 less is reached than is asked for.
             InputError: The grasp or what is asked for is refused.
         """
+        from sim_validate.baselines.demands import checked, demands_of
+        from sim_validate.baselines.entries import entry_of, plain
         from sim_validate.baselines.grasp_cases import case_of
-        from sim_validate.baselines.stability import checked, demands_of
-        from sim_validate.baselines.values import entry_of, plain
 
         chosen = case_of(case, friction)
         verdict, why = checked(chosen, demands_of(asked))

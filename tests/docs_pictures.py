@@ -6,17 +6,17 @@ from pathlib import Path
 
 import grasp_core as gc
 import scenes
-from scenes.canvas import Around, entitle, in_style, new_figure, panels, write_figure
-from scenes.pictures import draw_grasp, grasp_figure
-from scenes.views import best_view
-from sim_validate.replaying.bench import replayed
-from sim_validate.replaying.values import Recorded
+from scenes.drawing.canvas import Around, entitle, in_style, new_figure, panels, write_figure
+from scenes.drawing.pictures import draw_grasp, grasp_figure
+from scenes.drawing.views import best_view
+from sim_validate.replaying.recorded import Recorded
+from sim_validate.replaying.replay import replayed
 from sim_validate.reports.drawn_grasps import certified
 from sim_validate.reports.fidelity_charts import Agreement, fidelity_figure
 from sim_validate.reports.margin_charts import margin_figure
 from sim_validate.reports.motion_charts import motion_figure
 from sim_validate.reports.wrench_charts import wrench_figure
-from sim_validate.setup import Agenda, Setup
+from sim_validate.simulation.setup import Agenda, Setup
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures"
 TEN_DEGREES = math.tan(math.radians(10.0))

@@ -10,11 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from sim_validate.baselines.comparing import EXACT, OTHER_VERSIONS, ROUNDING, Status
-from sim_validate.baselines.suite import KINDS, suite_from_toml
-from sim_validate.baselines.values import Entry
-from sim_validate.cli import Exit, main
-from sim_validate.noise.draws import Noise
+from sim_validate.baselines.compare import EXACT, OTHER_VERSIONS, ROUNDING, Status
+from sim_validate.baselines.entries import Entry
+from sim_validate.baselines.suite_toml import KINDS, suite_from_toml
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.main import main
+from sim_validate.simulation.noise import Noise
 from tests.sim_validate.plugin.project import run_pytest
 
 ROOT = Path(__file__).parent.parent

@@ -11,14 +11,16 @@ import pytest
 
 import grasp_core as gc
 from grasp_core import errors
-from sim_validate import cli, commands
-from sim_validate.cli import Exit, main
+from sim_validate import main as commands
+from sim_validate.cli import command_flags
+from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
-from sim_validate.datasets.given import read_given
-from sim_validate.setup import Setup
-from sim_validate.setup_file import setup_from_file
-from sim_validate.verdict import Outcome
-from sim_validate.wrench_file import wrenches_from_file
+from sim_validate.datasets.given_contacts import read_given
+from sim_validate.main import main
+from sim_validate.records.setup_toml import setup_from_file
+from sim_validate.records.wrenches import wrenches_from_file
+from sim_validate.simulation.hold_verdict import Outcome
+from sim_validate.simulation.setup import Setup
 from tests import api_reference
 from tests.sim_validate.datasets.small import build_small
 
@@ -53,7 +55,7 @@ def test_every_command_is_one(line, monkeypatch):
     words, _, code = line.partition("# exit code")
     wanted = Exit.USAGE if code.strip() == "2" else Exit.GOOD
     assert main(shlex.split(words)[1:]) == wanted
-    assert wanted == Exit.USAGE or isinstance(asked[0], cli.Command)
+    assert wanted == Exit.USAGE or isinstance(asked[0], command_flags.Command)
 
 
 @pytest.mark.parametrize("page", [pytest.param("pictures", marks=pytest.mark.slow), "errors"])
@@ -85,7 +87,7 @@ def test_the_examples_print_what_they_say(code, said, tmp_path):
 
 
 def test_every_block_of_code_is_one_that_a_test_runs():
-    kinds = {"sh": 0, "python": 0, "text": 0, "json": 0, "toml": 0, "py": 0}
+    kinds = dict.fromkeys(("sh", "python", "text", "json", "toml", "py", "mermaid"), 0)
     for text in PAGES.values():
         for language in re.findall(r"^```(\w+)$", text, re.MULTILINE):
             kinds[language] += 1

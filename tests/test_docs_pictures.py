@@ -9,12 +9,12 @@ from PIL import Image
 
 import grasp_core as gc
 import scenes
-from scenes.canvas import STYLE, encoded
-from scenes.pictures import grasp_figure
+from scenes.drawing.canvas import STYLE, encoded
+from scenes.drawing.pictures import grasp_figure
 from sim_validate.reports.margin_charts import margin_figure
 from sim_validate.reports.wrench_charts import wrench_figure
 from tests.docs_pictures import FOLDER, FRICTION, PICTURES, best
-from tests.scenes.test_pictures import assert_inside
+from tests.scenes.drawing.test_pictures import assert_inside
 
 BLOCK = 16
 """Pixels on a side of the squares that are compared: a line of text is as high."""

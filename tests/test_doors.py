@@ -10,28 +10,27 @@ from typing import get_args
 
 import pytest
 
-from sim_validate import baseline_flags, dataset_flags
-from sim_validate.cli import Command
-from sim_validate.commands import ACTIONS
+from sim_validate.cli import baseline_flags, dataset_flags
+from sim_validate.cli.command_flags import Command
+from sim_validate.main import ACTIONS
 
 ROOT = Path(__file__).parent.parent
 DOORS = {
-    "trimesh": "grasp_core/mesh.py",
-    "manifold3d": "grasp_core/solids.py",
-    "highspy": "grasp_core/lp.py",
-    "numba": "grasp_core/kernels/",
-    "clarabel": "grasp_core/conic.py",
-    "qpsolvers": "grasp_core/forces.py",
-    "scipy.optimize": "grasp_core/least_distance.py",
-    "mujoco": ("sim_validate/simulate.py", "scenes/frames.py"),
-    "PIL": "scenes/frames.py",
-    "matplotlib": "scenes/canvas.py",
+    "trimesh": "grasp_core/geometry/mesh.py",
+    "manifold3d": "grasp_core/objects/booleans.py",
+    "highspy": "grasp_core/solvers/lp.py",
+    "clarabel": "grasp_core/solvers/conic.py",
+    "qpsolvers": "grasp_core/forces/contact_forces.py",
+    "scipy.optimize": "grasp_core/solvers/nearest_point.py",
+    "mujoco": ("sim_validate/simulation/simulate.py", "scenes/drawing/frames.py"),
+    "PIL": "scenes/drawing/frames.py",
+    "matplotlib": "scenes/drawing/canvas.py",
     "jinja2": "sim_validate/reports/pages.py",
-    "scipy.stats": "sim_validate/noise/proportions.py",
-    "pebble": "sim_validate/engines.py",
-    "ray": "sim_validate/clusters.py",
-    "distributed": "sim_validate/clusters.py",
-    "pyarrow": "sim_validate/datasets/tables.py",
+    "scipy.stats": "sim_validate/validation/repeats.py",
+    "pebble": "sim_validate/parallel/processes.py",
+    "ray": "sim_validate/parallel/clusters.py",
+    "distributed": "sim_validate/parallel/clusters.py",
+    "pyarrow": "sim_validate/datasets/parquet.py",
     "h5py": "sim_validate/datasets/exports/hdf5.py",
 }
 
@@ -56,6 +55,20 @@ def test_a_package_is_imported_at_its_door_only(package):
     assert all(user.startswith(DOORS[package]) for user in users)
 
 
+def test_only_kernels_are_compiled():
+    """A module that imports numba is a kernel; other modules load kernels of their own room."""
+    sources = list((ROOT / "grasp_core").rglob("*.py"))
+    compiled = [
+        path for path in sources if re.search(r"^(import|from) numba", path.read_text(), re.M)
+    ]
+    assert len(compiled) > 10
+    assert all(path.stem.endswith("_kernel") for path in compiled)
+    for path in sources:
+        for room in re.findall(r"\bgrasp_core\.([a-z_]+)\.[a-z_]+_kernel\b", path.read_text()):
+            at_home = room == path.parent.name or path.stem in {"provenance"}
+            assert at_home or path.stem.endswith("_kernel"), f"{path} loads a kernel of {room}"
+
+
 HEAVY = (
     "numpy", "scipy", "numba", "highspy", "clarabel", "qpsolvers", "manifold3d", "trimesh",
     "mujoco", "pydantic", "matplotlib",
@@ -77,7 +90,8 @@ def imported(code, among, **environment):
 
 
 @pytest.mark.parametrize(
-    "module", ["grasp_core", "scenes", "sim_validate", "sim_validate.cli", "sim_validate.flags"]
+    "module",
+    ["grasp_core", "scenes", "sim_validate", "sim_validate.main", "sim_validate.cli.flag_groups"],
 )
 def test_importing_a_package_imports_nothing_heavy(module):
     assert imported(f"import {module}", HEAVY) == ([], "")
@@ -103,7 +117,7 @@ def test_using_a_name_imports_no_more_than_it_needs(name):
     ],
 )  # fmt: skip
 def test_a_command_imports_no_more_than_it_needs(arguments, heavy, said):
-    names, shown = imported(f"from sim_validate.cli import main; main({arguments!r})", heavy)
+    names, shown = imported(f"from sim_validate.main import main; main({arguments!r})", heavy)
     assert names == []
     assert said in shown
 
@@ -114,4 +128,5 @@ def test_every_command_has_its_function():
     actions |= {baseline_flags.Record, baseline_flags.Check}
     named = set(get_args(Command)) - {flags.Dataset, baseline_flags.Baseline} | actions
     assert set(ACTIONS) == named
-    assert all(callable(resolve_name(f"sim_validate.{place}")) for place in ACTIONS.values())
+    places = [f"sim_validate.commands.{place}" for place in ACTIONS.values()]
+    assert all(callable(resolve_name(place)) for place in places)

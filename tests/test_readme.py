@@ -32,7 +32,7 @@ def test_the_examples_print_what_they_say(example):
 def test_every_command_is_described():
     from typing import get_args
 
-    from sim_validate.cli import Command
+    from sim_validate.cli.command_flags import Command
 
     assert len(get_args(Command)) >= 9
     for command in get_args(Command):

@@ -12,9 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from grasp_core.certified_regions import CONES, CertifiedRegions
-from sim_validate import cli
-from sim_validate.region_files import SCHEMA
+from grasp_core.regions.certify_regions import CONES, CertifiedRegions
+from sim_validate.cli import command_flags
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.main import main
+from sim_validate.records.regions import SCHEMA
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "regions.md").read_text()
@@ -31,7 +33,7 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
     for line in block("sh").splitlines():
         words = [word.replace("work", str(folder), 1) for word in shlex.split(line)[1:]]
-        assert cli.main([*words, "-q"]) == cli.Exit.GOOD
+        assert main([*words, "-q"]) == Exit.GOOD
     return folder
 
 
@@ -76,7 +78,7 @@ def small(folder, page, tmp_path_factory):
     """A small proof, which the page confirms."""
     out = tmp_path_factory.mktemp("small")
     asked = ["regions", str(folder / "grasps.json"), "--limit", "1", "--cones", "64"]
-    assert cli.main([*asked, "--out", str(out), "-q"]) == cli.Exit.GOOD
+    assert main([*asked, "--out", str(out), "-q"]) == Exit.GOOD
     with np.load(next((out / "proofs").iterdir()), allow_pickle=False) as kept:
         proof = {key: kept[key] for key in kept.files}
     page["check"](proof)
@@ -127,10 +129,10 @@ def test_the_files_hold_what_the_page_lists(folder):
 
 
 def test_flags_and_arguments_are_those_of_the_page():
-    flags = {each.name.replace("_", "-") for each in dataclasses.fields(cli.Regions)}
+    flags = {each.name.replace("_", "-") for each in dataclasses.fields(command_flags.Regions)}
     for flag in re.findall(r"^\| `--([\w-]+)", PAGE, re.MULTILINE):
         assert flag in flags
-    (cones,) = (each for each in dataclasses.fields(cli.Regions) if each.name == "cones")
+    (cones,) = (each for each in dataclasses.fields(command_flags.Regions) if each.name == "cones")
     assert cones.default == CONES
     kept = {each.name for each in dataclasses.fields(CertifiedRegions)}
     assert {"limit", "open_choice"} <= kept

@@ -1,1 +1,5 @@
-"""Verdicts kept in a repository, so that a change of stability is noticed."""
+"""Is a grasp as stable as it was?
+
+A recorded baseline and fresh verdicts come in. Differences go out, each explained, and whether they
+break what was demanded.
+"""

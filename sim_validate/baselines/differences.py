@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from sim_validate.baselines.values import Entry
+from sim_validate.baselines.entries import Entry
 
 
 @dataclass(frozen=True, slots=True)

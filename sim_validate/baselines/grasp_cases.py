@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError
-from grasp_core.planner import plan
-from grasp_core.polyhedra import load_polyhedron
-from grasp_core.values import Grasp, Polyhedron
-from scenes.objects import example_object
+from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
+from grasp_core.planning.planner import plan
+from grasp_core.values import Grasp
+from scenes.example_objects import example_object
 from sim_validate.baselines.source_file import Source, source_of
-from sim_validate.grasps_file import read_grasps
+from sim_validate.records.grasps import read_grasps
 
 FRICTION = 0.5
 """Unless another is given."""

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from xml.etree import ElementTree
 
-from sim_validate.baselines.comparing import Finding, Status, failing
+from sim_validate.baselines.compare import Finding, Status, failing
 
 
 def junit_text(name: str, findings: Iterable[Finding], *, strict: bool) -> str:

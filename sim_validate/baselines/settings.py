@@ -9,16 +9,21 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
-from grasp_core.complaints import complaint
 from grasp_core.errors import InputError
-from grasp_core.json_text import shown
-from grasp_core.records import SavedGrasps
+from grasp_core.files.complaints import complaint
+from grasp_core.files.strict_json import shown
+from grasp_core.records.grasps_json import SavedGrasps
+from scenes.fingertips import FingerSettings
 from scenes.mjcf import Surface
-from sim_validate.asked_fingers import finger_settings, planned_fingers
-from sim_validate.flags import Fingers
-from sim_validate.noise.draws import Noise
-from sim_validate.setup import Agenda, LimitSearch, NamedWrench, Setup
-from sim_validate.setup_file import setup_from_file, setup_from_tables, tables_of
+from sim_validate.records.setup_toml import setup_from_file, setup_from_tables, tables_of
+from sim_validate.simulation.noise import Noise
+from sim_validate.simulation.setup import (
+    Agenda,
+    LimitSearch,
+    NamedWrench,
+    Setup,
+    with_planned_radius,
+)
 
 Count = Annotated[int, Field(ge=0)]
 
@@ -103,5 +108,5 @@ def setup_for(saved: SavedGrasps, path: Path | None) -> Setup:
     Raises:
         InputError: The file is missing or refused.
     """
-    setup = Setup(fingers=finger_settings(planned_fingers(Fingers(), saved.finger)))
+    setup = Setup(fingers=with_planned_radius(FingerSettings(), saved.finger))
     return setup if path is None else setup_from_file(path, setup)

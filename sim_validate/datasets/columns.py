@@ -9,6 +9,9 @@ from typing import Literal, TypeAlias
 
 Kind: TypeAlias = Literal["text", "bool", "int", "float"]
 Name: TypeAlias = Literal["objects", "grasps", "trials"]
+SplitName: TypeAlias = Literal["train", "validation", "test"]
+ExportFormat: TypeAlias = Literal["csv", "jsonl", "npz", "hdf5", "isaac", "mjcf"]
+"""Formats that `datasets.exports` writes."""
 
 
 @dataclass(frozen=True, slots=True)

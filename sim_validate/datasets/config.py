@@ -14,11 +14,12 @@ from typing import Any, Literal, TypeAlias, cast, get_args
 
 from grasp_core.checked import LARGEST_FRICTION, MOST_RANDOM_WRENCHES
 from grasp_core.errors import InputError
-from grasp_core.json_text import place, shown
-from grasp_core.polyhedra import UNITS_M
-from grasp_core.requests import METHODS, ConeKind
-from grasp_core.values import FaceKind, Method
-from sim_validate.toml_text import read_tables
+from grasp_core.files.strict_json import place, shown
+from grasp_core.objects.face import FaceKind
+from grasp_core.objects.polyhedron import UNITS_M
+from grasp_core.planning.request import METHODS, ConeKind
+from grasp_core.values import Method
+from sim_validate.files.toml_tables import read_tables
 
 LimitsKind: TypeAlias = Literal["none", "ramp", "bisection"]
 KINDS: dict[str, tuple[str, ...]] = {

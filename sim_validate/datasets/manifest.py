@@ -13,12 +13,12 @@ from typing import Annotated
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from grasp_core.complaints import complaint
 from grasp_core.errors import InputError
-from grasp_core.json_text import object_of, place
+from grasp_core.files.complaints import complaint
+from grasp_core.files.strict_json import object_of, place
 from sim_validate.datasets.columns import TABLES, Name
-from sim_validate.files import read_text, write_text
-from sim_validate.inside import require_inside
+from sim_validate.files.paths import require_inside
+from sim_validate.files.reading import read_text, write_text
 
 SCHEMA = 1
 MANIFEST = "manifest.json"

@@ -5,10 +5,11 @@ from pathlib import Path
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
-from grasp_core.mesh_child import read_triangles
-from grasp_core.polyhedra import DEFAULT_LIMITS, content_hash, load_polyhedron
-from grasp_core.values import FaceKind, Polyhedron
-from sim_validate.inside import path_inside
+from grasp_core.mesh_files.child import read_triangles
+from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
+from grasp_core.objects.face import FaceKind
+from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
+from sim_validate.files.paths import path_inside
 
 FOLDER = "meshes"
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
-from grasp_core.complaints import record_of
 from grasp_core.errors import InputError
-from sim_validate.files import read_text
+from grasp_core.files.complaints import record_of
+from sim_validate.files.reading import read_text
 
 
 class LeftOut(BaseModel):

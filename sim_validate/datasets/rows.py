@@ -8,14 +8,15 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from grasp_core.values import FINGERS, Contact, Grasp, Polyhedron
-from sim_validate.control_trials import ControlVerdict
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import FINGERS, Contact, Grasp
 from sim_validate.datasets.columns import Name
-from sim_validate.datasets.given import GivenGrasp
+from sim_validate.datasets.given_contacts import GivenGrasp
 from sim_validate.datasets.units import WorkUnit
-from sim_validate.grasp_verdict import Verdict
-from sim_validate.verdict import HoldVerdict, Outcome
-from sim_validate.wrench_verdict import WrenchVerdict
+from sim_validate.simulation.hold_verdict import HoldVerdict, Outcome
+from sim_validate.validation.control_trials import ControlVerdict
+from sim_validate.validation.grasp_verdict import Verdict
+from sim_validate.validation.wrench_verdict import WrenchVerdict
 
 Row: TypeAlias = Mapping[str, Any]
 Rows: TypeAlias = Mapping[Name, tuple[Row, ...]]

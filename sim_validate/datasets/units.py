@@ -16,13 +16,12 @@ from pathlib import Path
 from types import MappingProxyType
 
 from grasp_core.errors import GraspError, InputError
-from grasp_core.mesh_files import FORMATS
-from grasp_core.polyhedra import load_polyhedron
-from grasp_core.values import Polyhedron
-from grasp_core.versions import versions
-from scenes.objects import example_object
+from grasp_core.mesh_files.reading import FORMATS
+from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
+from grasp_core.provenance import versions
+from scenes.example_objects import example_object
 from sim_validate.datasets.config import CREDITS, DatasetConfig
-from sim_validate.datasets.given import GivenGrasp, given_sha256, read_given
+from sim_validate.datasets.given_contacts import GivenGrasp, given_sha256, read_given
 
 CHUNK = 2**20
 PART = 25

@@ -1,1 +1,5 @@
-"""One trial of a file, simulated again, with all that moved."""
+"""What moved in one recorded trial?
+
+A verdict, a grasp or a dataset row comes in. The trial goes out, simulated again, with its motion
+sample by sample.
+"""

@@ -9,23 +9,23 @@ from pathlib import Path
 from typing import Any, cast
 
 from grasp_core.errors import InputError
-from grasp_core.json_text import value_of
-from sim_validate.baselines.baseline_file import read_baseline
+from grasp_core.files.strict_json import value_of
+from sim_validate.baselines.baseline_json import read_baseline
 from sim_validate.baselines.settings import of_settings, setup_for
 from sim_validate.datasets.manifest import MANIFEST
-from sim_validate.files import read_text
-from sim_validate.grasps_file import grasp_with_id, read_grasps, some
-from sim_validate.replaying.of_dataset import from_dataset
-from sim_validate.replaying.of_grasps import (
+from sim_validate.files.reading import read_text
+from sim_validate.records.grasps import grasp_with_id, read_grasps, some
+from sim_validate.replaying.from_dataset import from_dataset
+from sim_validate.replaying.from_grasps import (
     grasps_behind,
     of_grasp,
     require_contacts,
     require_repeat,
 )
-from sim_validate.replaying.of_verdicts import from_verdicts
-from sim_validate.replaying.values import Recorded, Wanted
-from sim_validate.setup import Agenda
-from sim_validate.verdict import Outcome
+from sim_validate.replaying.from_verdicts import from_verdicts
+from sim_validate.replaying.recorded import Recorded, Wanted
+from sim_validate.simulation.hold_verdict import Outcome
+from sim_validate.simulation.setup import Agenda
 
 VERDICTS = "verdicts.json"
 

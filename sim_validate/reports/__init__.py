@@ -1,1 +1,4 @@
-"""What people see of a run: charts, and a folder of pages that opens from disk."""
+"""What do people see of a run?
+
+The folder of a run comes in. Charts and pages go out that open from disk.
+"""

@@ -7,13 +7,16 @@ loads within `AGREEMENT` of their limit, and trials that say nothing, count as n
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from sim_validate.reports.news import GONE, HELD, Record
-from sim_validate.wrench_verdict import AGREEMENT
+from sim_validate.simulation.hold_verdict import LET_GO, Outcome
+from sim_validate.validation.wrench_verdict import AGREEMENT
+
+Record = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,3 +109,31 @@ def _place(trial: Record, wanted: bool | None) -> str:
         return "neither"
     held = "held" if trial["outcome"] == HELD else "let_go"
     return f"{'resisted' if wanted else 'not_resisted'}_{held}"
+
+
+"""An object of a JSON file."""
+HELD = Outcome.HELD.value
+GONE = tuple(outcome.value for outcome in LET_GO)
+GOOD, BAD, QUIET = "good", "bad", "quiet"
+"""How news is; classes of it in pages."""
+
+
+def said_of(verdict: Record | None) -> tuple[str, str]:
+    """What became of a grasp, and how good that is."""
+    if verdict is None:
+        return "not simulated", QUIET
+    outcome, controls = str(verdict["outcome"]), verdict["controls"].values()
+    if outcome not in (HELD, *GONE):
+        return outcome.replace("_", " "), BAD
+    if verdict["mismatches"]:
+        return "contradicts the analysis", BAD
+    if any(control["held"] for control in controls):
+        return "a control held", BAD
+    if not all(map(let_go, controls)):
+        return "a control is undecided", BAD
+    return outcome.replace("_", " "), GOOD if verdict["held"] else BAD
+
+
+def let_go(control: Record) -> bool:
+    """Whether each of a control's loads moved it, as the analysis says."""
+    return all(trial["outcome"] in GONE for trial in control["wrenches"])

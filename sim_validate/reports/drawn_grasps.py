@@ -10,21 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from grasp_core.closure import force_closure
-from grasp_core.records import SavedGrasps
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import ContactRegion, Grasp, four
-from scenes.canvas import write_figure
-from scenes.clips import GraphicsError, magnified, write_clip
+from scenes.drawing.canvas import write_figure
+from scenes.drawing.clips import GraphicsError, magnified, write_clip
+from scenes.drawing.pictures import grasp_figure
+from scenes.drawing.views import best_view
 from scenes.fingertips import FingerSettings
-from scenes.pictures import grasp_figure
-from scenes.views import best_view
-from sim_validate.old_results import CHARTS, CLIPS, PICTURES
-from sim_validate.replaying.bench import Replayed, replayed
-from sim_validate.replaying.of_verdicts import of_verdict
-from sim_validate.replaying.values import Wanted
+from sim_validate.files.stale_results import CHARTS, CLIPS, PICTURES
+from sim_validate.replaying.from_verdicts import of_verdict
+from sim_validate.replaying.recorded import Wanted
+from sim_validate.replaying.replay import Replayed, replayed
+from sim_validate.reports.agreement import Record
 from sim_validate.reports.margin_charts import margin_figure
 from sim_validate.reports.motion_charts import motion_figure
-from sim_validate.reports.news import Record
 from sim_validate.reports.run_folder import RunFolder
 from sim_validate.reports.wrench_charts import wrench_figure
 

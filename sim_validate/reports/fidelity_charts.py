@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.canvas import Around, entitle, in_style, new_figure, panels
-from scenes.palette import BAD, GOOD, NEUTRAL
+from scenes.drawing.canvas import Around, entitle, in_style, new_figure, panels
+from scenes.drawing.palette import BAD, GOOD, NEUTRAL
 from sim_validate.reports.agreement import Agreement
-from sim_validate.wrench_verdict import AGREEMENT
+from sim_validate.validation.wrench_verdict import AGREEMENT
 
 LONG_RANGE = 300.0
 """Ratio of the ends of an axis from which on it shows powers of ten alone."""

@@ -6,11 +6,18 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from grasp_core.arrays import Array
-from grasp_core.spanning import angles_between
+from grasp_core.cones.spanning import angles_between
 from grasp_core.values import Grasp
-from sim_validate.reports.agreement import as_predicted, wrench_size
+from sim_validate.reports.agreement import (
+    BAD,
+    GOOD,
+    Record,
+    as_predicted,
+    let_go,
+    said_of,
+    wrench_size,
+)
 from sim_validate.reports.drawn_grasps import Drawn, certified, largest_push
-from sim_validate.reports.news import BAD, GOOD, Record, let_go, said_of
 from sim_validate.reports.pages import NOTHING, number, page
 from sim_validate.reports.run_folder import GRASPS, RunFolder
 from sim_validate.reports.turntable import as_text, grasp_data

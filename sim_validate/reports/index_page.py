@@ -4,17 +4,19 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
+from grasp_core.provenance import versions
 from grasp_core.values import Grasp
-from grasp_core.versions import versions
 from sim_validate.reports.agreement import (
     Agreement,
+    Record,
     frictions_in,
+    let_go,
     limits_in,
     quadrants_in,
+    said_of,
     wrench_size,
 )
 from sim_validate.reports.grasp_page import MILLI
-from sim_validate.reports.news import Record, let_go, said_of
 from sim_validate.reports.pages import page
 from sim_validate.reports.run_folder import RunFolder
 

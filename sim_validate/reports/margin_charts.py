@@ -10,14 +10,15 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.checked import positive
-from grasp_core.closure import force_closure
+from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
-from grasp_core.resisted_wrenches import wrench_limits
-from grasp_core.values import Grasp, Polyhedron
-from scenes.canvas import Around, entitle, in_style, new_figure, panels
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.wrench_limits import wrench_limits
+from grasp_core.values import Grasp
+from scenes.drawing.canvas import Around, entitle, in_style, new_figure, panels
+from scenes.drawing.palette import BAD, INK, NEUTRAL
+from scenes.drawing.pictures import check_drawn
 from scenes.fingertips import FingerSettings
-from scenes.palette import BAD, INK, NEUTRAL
-from scenes.pictures import check_drawn
 
 LONGITUDES, LATITUDES = 21, 11
 """Nodes of a map: around, the first also the last, and from pole to pole."""

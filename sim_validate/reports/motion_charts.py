@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.canvas import entitle, in_style, new_figure, panels
-from scenes.palette import BAD, FINGERS, INK, NEUTRAL
-from sim_validate.replaying.bench import Replayed
+from scenes.drawing.canvas import entitle, in_style, new_figure, panels
+from scenes.drawing.palette import BAD, FINGERS, INK, NEUTRAL
+from sim_validate.replaying.replay import Replayed
 
 MICRO = 1e6
 LEAST_UM = 1e-4

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grasp_core.checked import function, path_of, whole
-from scenes.canvas import write_figure
-from sim_validate.engines import available_cores, each
-from sim_validate.files import write_text
-from sim_validate.old_results import (
+from scenes.drawing.canvas import write_figure
+from sim_validate.files.reading import write_text
+from sim_validate.files.stale_results import (
     FIDELITY,
     GRASPS,
     INDEX,
@@ -19,6 +18,7 @@ from sim_validate.old_results import (
     remove_report,
     require_report_folder,
 )  # fmt: skip
+from sim_validate.parallel.processes import available_cores, each
 from sim_validate.reports.drawn_grasps import Drawn, draw, tasks_of
 from sim_validate.reports.fidelity_charts import fidelity_figure
 from sim_validate.reports.grasp_page import Neighbours, grasp_page

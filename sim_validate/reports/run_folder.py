@@ -6,18 +6,18 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-from grasp_core.complaints import record_of
-from grasp_core.contact_hash import contacts_sha256
+from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.errors import InputError
-from grasp_core.records import SavedGrasps
-from sim_validate.files import read_text
-from sim_validate.grasps_file import read_grasps
-from sim_validate.region_files import REGIONS
-from sim_validate.region_files import SCHEMA as REGIONS_SCHEMA
-from sim_validate.reports.files_schema import RegionsFile, VerdictsFile
-from sim_validate.reports.news import BAD, Record, said_of
-from sim_validate.verdict import Outcome
-from sim_validate.verdict_records import SCHEMA as VERDICTS_SCHEMA
+from grasp_core.files.complaints import record_of
+from grasp_core.records.grasps_json import SavedGrasps
+from sim_validate.files.reading import read_text
+from sim_validate.records.grasps import read_grasps
+from sim_validate.records.regions import REGIONS
+from sim_validate.records.regions import SCHEMA as REGIONS_SCHEMA
+from sim_validate.records.verdicts_json import SCHEMA as VERDICTS_SCHEMA
+from sim_validate.records.verdicts_schema import RegionsFile, VerdictsFile
+from sim_validate.reports.agreement import BAD, Record, said_of
+from sim_validate.simulation.hold_verdict import Outcome
 
 GRASPS, VERDICTS = "grasps.json", "verdicts.json"
 SCHEMAS = {VERDICTS: VERDICTS_SCHEMA, REGIONS: REGIONS_SCHEMA}

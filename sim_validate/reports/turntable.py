@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.values import Grasp, Polyhedron
-from scenes.drawings import drawing_of, glass
-from scenes.palette import LOOKS, colour_of
-from scenes.pictures import number_places
-from scenes.shapes import Shape
-from scenes.views import best_view
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Grasp
+from scenes.drawing.drawings import drawing_of, glass
+from scenes.drawing.palette import LOOKS, colour_of
+from scenes.drawing.pictures import number_places
+from scenes.drawing.shapes import Shape
+from scenes.drawing.views import best_view
 from sim_validate.reports.pages import asset, page
 
 UNITS = 1000.0

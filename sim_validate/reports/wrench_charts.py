@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.quality import ferrari_canny
-from grasp_core.values import Grasp, Polyhedron
-from grasp_core.wrench_sets import WrenchSet
-from scenes.canvas import entitle, in_style, new_figure, panels
-from scenes.palette import BAD, GOOD, INK
-from scenes.pictures import check_drawn
-from scenes.views import View, best_view
+from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.ferrari_canny import ferrari_canny
+from grasp_core.values import Grasp
+from scenes.drawing.canvas import entitle, in_style, new_figure, panels
+from scenes.drawing.palette import BAD, GOOD, INK
+from scenes.drawing.pictures import check_drawn
+from scenes.drawing.views import View, best_view
 
 TURNS = 181
 """Points on the border of a shadow, the first also the last."""

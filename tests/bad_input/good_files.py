@@ -6,7 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from sim_validate.cli import main
+from sim_validate.main import main
 
 
 @cache

@@ -87,10 +87,9 @@ def serve() -> None:
     """Answer requests until there are no more."""
     import numpy.linalg
 
-    import sim_validate.cli
-    import sim_validate.commands
-    import sim_validate.plan_command
-    import sim_validate.validate_command  # noqa: F401 - for those that are forked
+    import sim_validate.commands.plan
+    import sim_validate.commands.validate
+    import sim_validate.main  # noqa: F401 - for those that are forked
 
     del numpy
     for line in sys.stdin:
@@ -119,7 +118,7 @@ def _run(asked: dict, out: int, err: int) -> None:
         nothing = os.open(os.devnull, os.O_RDONLY)
         for have, want in ((nothing, 0), (out, 1), (err, 2)):
             os.dup2(have, want)
-        from sim_validate.cli import main
+        from sim_validate.main import main
 
         sys.argv = ["graspproof", *asked["argv"]]
         code = main(asked["argv"])

@@ -18,10 +18,10 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
-from sim_validate.engines import available_cores, each
-from sim_validate.released import released_friction
-from sim_validate.setup import Setup
-from sim_validate.simulate import Bench
+from sim_validate.parallel.processes import available_cores, each
+from sim_validate.simulation.critical_friction import released_friction
+from sim_validate.simulation.setup import Setup
+from sim_validate.simulation.simulate import Bench
 
 WORST = 0.005
 """Largest error of a critical friction, relative to the predicted one."""

@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
-from grasp_core.spanning import SpanningTable, _spanning_by_pairs, span_sines
+from grasp_core.cones.spanning import SpanningTable, _spanning_by_pairs, span_sines
 from tests.benchmarks.timing import compared, once
 
 ANGLE = math.radians(10.0)

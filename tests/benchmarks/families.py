@@ -12,21 +12,16 @@ from itertools import combinations
 
 import numpy as np
 
-from grasp_core.attempt_bounds import KERNELS, AttemptBounds
-from grasp_core.candidates import NORMAL, PlannedCones
-from grasp_core.concurrent_grasps import BEFORE, BEHIND, inscribed_facets
-from grasp_core.concurrent_grasps import _rows as concurrent_rows
-from grasp_core.constructions import CONSTRUCTIONS, LEAST_RADIUS
-from grasp_core.face_pieces import face_shapes
-from grasp_core.kernels.tables import Attempts
-from grasp_core.lp import LinearProgram, Optimum, _by_highs
-from grasp_core.patch import place_free
-from grasp_core.pencil_grasps import CELL_A, CELL_B, _discs, _near_rows
-from grasp_core.pencil_grasps import _rows as pencil_rows
-from grasp_core.placements import focus_direction
-from grasp_core.prospects import spanning_blocks
-from grasp_core.ranking import outlook
-from grasp_core.regulus_grasps import (
+from grasp_core.disc_bounds.program_bounds import KERNELS, AttemptBounds
+from grasp_core.families.concurrent import BEFORE, BEHIND, inscribed_facets
+from grasp_core.families.concurrent import _rows as concurrent_rows
+from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS
+from grasp_core.families.free import place_free
+from grasp_core.families.kernel_tables import Attempts
+from grasp_core.families.pencil import CELL_A, CELL_B, _discs, _near_rows
+from grasp_core.families.pencil import _rows as pencil_rows
+from grasp_core.families.placements import focus_direction
+from grasp_core.families.regulus import (
     CHOICES,
     SIDES,
     SLOPES,
@@ -36,8 +31,13 @@ from grasp_core.regulus_grasps import (
     _slope,
     regulus_bounds,
 )
+from grasp_core.objects.face_pieces import face_shapes
+from grasp_core.planning.blocks import spanning_blocks
+from grasp_core.planning.candidates import NORMAL, PlannedCones
+from grasp_core.planning.ranking import outlook
+from grasp_core.solvers.lp import LinearProgram, Optimum, _by_highs
 from grasp_core.values import ForceCone
-from scenes.objects import example_object
+from scenes.example_objects import example_object
 from tests.benchmarks.planning import sphere_hull
 from tests.benchmarks.programs import COMPILED, CONTENDERS
 from tests.benchmarks.timing import Row, compared, once

@@ -16,24 +16,24 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
-from grasp_core.contact_arrays import contact_frictions
-from grasp_core.resisted_wrenches import WrenchBody
+from grasp_core.closure.contact_arrays import contact_frictions
+from grasp_core.quality.wrench_limits import WrenchBody
 from scenes.mjcf import build_scene
-from sim_validate.control_trials import try_control
-from sim_validate.controls import negative_controls
-from sim_validate.engines import available_cores, each
-from sim_validate.gate import require_faithful
-from sim_validate.independent import independent_bounds
-from sim_validate.limits import part, ramped_limits
-from sim_validate.released import released_friction
-from sim_validate.rig import squeezed
-from sim_validate.rules import RULES
-from sim_validate.schedules import Load
-from sim_validate.setup import Agenda, Setup
-from sim_validate.simulate import Bench
-from sim_validate.validation import validate
-from sim_validate.verdict import Outcome, judge
-from sim_validate.verdict_records import verdicts_to_json
+from sim_validate.parallel.processes import available_cores, each
+from sim_validate.records.verdicts_json import verdicts_to_json
+from sim_validate.simulation.critical_friction import released_friction
+from sim_validate.simulation.gate.gate import require_faithful
+from sim_validate.simulation.hold_verdict import Outcome, judge
+from sim_validate.simulation.other_rules import RULES
+from sim_validate.simulation.rig import squeezed
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.setup import Agenda, Setup
+from sim_validate.simulation.simulate import Bench
+from sim_validate.simulation.unplanned_bounds import independent_bounds
+from sim_validate.simulation.wrench_limits import part, ramped_limits
+from sim_validate.validation.control_trials import try_control
+from sim_validate.validation.controls import negative_controls
+from sim_validate.validation.validation import validate
 
 OBJECTS = (
     "tetrahedron", "octahedron", "wedge", "chamfered-box", "double-wedge-bar", "box", "prism",

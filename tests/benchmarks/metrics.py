@@ -13,7 +13,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
 import grasp_core as gc
-from scenes.objects import example_object
+from scenes.example_objects import example_object
 from tests.benchmarks.timing import compared
 from tests.judges import pyramid_wrenches
 

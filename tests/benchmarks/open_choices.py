@@ -4,8 +4,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 import grasp_core as gc
-from grasp_core.face_pieces import piece_of
-from grasp_core.wrenches import contact_frames
+from grasp_core.closure.wrenches import contact_frames
+from grasp_core.objects.face_pieces import piece_of
 
 STARTS, FINE = 6, 0.02
 FIRST, LAST, GROWTH = 0.05, 4.0, 1.6

@@ -11,7 +11,7 @@ import numpy as np
 import trimesh
 
 import grasp_core as gc
-from scenes.objects import example_object
+from scenes.example_objects import example_object
 from tests.benchmarks.timing import Row, once
 
 LIMIT = 100

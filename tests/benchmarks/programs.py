@@ -21,8 +21,10 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 import grasp_core as gc
-from grasp_core import attempt_bounds, lp, regulus_grasps
-from scenes.objects import example_object
+from grasp_core.disc_bounds import program_bounds as attempt_bounds
+from grasp_core.families import regulus as regulus_grasps
+from grasp_core.solvers import lp
+from scenes.example_objects import example_object
 
 PLANS = [
     (name, friction)

@@ -14,8 +14,8 @@ from pathlib import Path
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.mesh_files import FORMATS
-from sim_validate.engines import available_cores, each
+from grasp_core.mesh_files.reading import FORMATS
+from sim_validate.parallel.processes import available_cores, each
 
 FRICTION = 0.5
 TIP, APPROACH = 0.06, 0.5

@@ -17,8 +17,8 @@ import numpy as np
 import grasp_core as gc
 import scenes
 from grasp_core.errors import UndecidedError
-from grasp_core.requests import FAMILIES
-from sim_validate.engines import available_cores, each
+from grasp_core.planning.request import FAMILIES
+from sim_validate.parallel.processes import available_cores, each
 
 OBJECTS = (
     "tetrahedron", "octahedron", "wedge", "box", "prism", "hexagonal-pyramid", "double-wedge-bar",

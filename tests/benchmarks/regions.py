@@ -20,10 +20,10 @@ import numpy as np
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.certified_regions import CONES, certify_regions
+from grasp_core.regions.certify_regions import CONES, certify_regions
 from grasp_core.values import Contact
-from sim_validate.engines import available_cores, each
-from sim_validate.region_files import area_of
+from sim_validate.parallel.processes import available_cores, each
+from sim_validate.records.regions import area_of
 from tests.benchmarks.open_choices import largest_possible, unit_pieces
 from tests.benchmarks.predecessor import largest_squares
 

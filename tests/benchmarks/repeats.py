@@ -20,10 +20,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from sim_validate.baselines.baseline_file import read_baseline
-from sim_validate.baselines.checking import check, silent
+from sim_validate.baselines.baseline_json import read_baseline
+from sim_validate.baselines.check import check, silent
 from sim_validate.baselines.settings import of_settings
-from sim_validate.grasps_file import read_grasps
+from sim_validate.records.grasps import read_grasps
 
 FOLDER = Path(__file__).parents[1] / "stability"
 WORKERS = 4

@@ -11,8 +11,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from sim_validate.cli import main as graspproof
-from sim_validate.engines import available_cores
+from sim_validate.main import main as graspproof
+from sim_validate.parallel.processes import available_cores
 from sim_validate.reports.report import write_report
 from tests.sim_validate.reports.test_in_a_browser import BROWSER, DRIVER, headless
 

@@ -9,7 +9,7 @@ import pstats
 import numpy as np
 
 import grasp_core as gc
-from scenes.objects import example_object
+from scenes.example_objects import example_object
 from sim_validate import Agenda, validate
 from tests.benchmarks.timing import in_turns, row
 

@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from grasp_core.mesh_child import read_triangles
-from grasp_core.mesh_files import FORMATS
-from grasp_core.mesh_limits import MeshLimits
-from sim_validate.cli import main as graspproof
+from grasp_core.mesh_files.child import read_triangles
+from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.mesh_files.reading import FORMATS
 from sim_validate.datasets.manifest import read_manifest
+from sim_validate.main import main as graspproof
 
 SIZES_M = (1e-3, 3e-2, 0.3, 2.0)
 """Longest sides."""

@@ -9,7 +9,7 @@ import pytest
 from tests.patience import HANGING_S
 
 ROOT = Path(__file__).parent.parent.parent
-CLI = [sys.executable, "-c", "from sim_validate.cli import run_and_exit; run_and_exit()"]
+CLI = [sys.executable, "-c", "from sim_validate.main import run_and_exit; run_and_exit()"]
 
 
 @pytest.fixture(scope="session")

@@ -16,7 +16,7 @@ import signal
 import sys
 from pathlib import Path
 
-from sim_validate.cli import main
+from sim_validate.main import main
 
 NUMBERS = {"full": errno.ENOSPC, "broken": errno.EIO}
 STEPS = {"os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.chmod"}

@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from scenes.whole_files import UNFINISHED, write_parts
-from sim_validate.cli import main
+from grasp_core.files.whole_files import UNFINISHED, write_parts
+from sim_validate.main import main
 from tests.faults.conftest import CLI, ROOT, contents
 
 RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q", "--no-report"]

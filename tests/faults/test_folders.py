@@ -7,8 +7,8 @@ import time
 
 import pytest
 
-from sim_validate.cli import main
-from sim_validate.own_folder import alone_in
+from sim_validate.files.folder_lock import alone_in
+from sim_validate.main import main
 from tests.faults.conftest import contents
 
 PLAN = ["plan", "tetrahedron", "--family", "concurrent", "-q"]

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from sim_validate import engines
-from sim_validate.cli import Exit, main
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.main import main
+from sim_validate.parallel import processes as engines
 from tests.faults.conftest import CLI, ROOT, contents
 from tests.patience import HANGING_S
 

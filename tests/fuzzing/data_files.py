@@ -7,26 +7,26 @@ from pathlib import Path
 from typing import Any
 
 import grasp_core as gc
-from grasp_core.complaints import record_of
-from grasp_core.contact_sets import Overrides, contact_sets_from_json
-from grasp_core.records import SavedGrasps, grasps_from_json, plan_to_json
-from scenes.objects import example_object
-from sim_validate.baselines.baseline_file import baseline_from_json, baseline_to_json
+from grasp_core.files.complaints import record_of
+from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
+from grasp_core.records.grasps_json import SavedGrasps, grasps_from_json, plan_to_json
+from scenes.example_objects import example_object
+from sim_validate.baselines.baseline_json import baseline_from_json, baseline_to_json
 from sim_validate.baselines.settings import of_settings
-from sim_validate.baselines.suite import suite_from_tables
-from sim_validate.config_file import flags_from
+from sim_validate.baselines.suite_toml import suite_from_tables
+from sim_validate.cli.config_file import flags_from
+from sim_validate.datasets.building.staging import UnitRecord
 from sim_validate.datasets.config import DatasetConfig, config_from_settings, config_to_toml
-from sim_validate.datasets.given import given_from_json
+from sim_validate.datasets.given_contacts import given_from_json
 from sim_validate.datasets.manifest import Listed, Manifest, manifest_from_json, manifest_to_json
 from sim_validate.datasets.quarantine import left_out_from
-from sim_validate.datasets.staging import UnitRecord
-from sim_validate.files import text_of
-from sim_validate.replaying.verdicts_schema import VerdictsToReplay
-from sim_validate.reports.files_schema import RegionsFile, VerdictsFile
-from sim_validate.setup import Setup
-from sim_validate.setup_file import setup_from_tables, tables_of
-from sim_validate.toml_text import tables_of_toml
-from sim_validate.wrench_file import wrenches_from_json
+from sim_validate.files.reading import text_of
+from sim_validate.files.toml_tables import tables_of_toml
+from sim_validate.records.replayed_schema import VerdictsToReplay
+from sim_validate.records.setup_toml import setup_from_tables, tables_of
+from sim_validate.records.verdicts_schema import RegionsFile, VerdictsFile
+from sim_validate.records.wrenches import wrenches_from_json
+from sim_validate.simulation.setup import Setup
 from tests.fuzzing.targets import Target
 
 STABILITY = Path(__file__).parents[1] / "stability" / "box"

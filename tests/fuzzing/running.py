@@ -21,7 +21,7 @@ LARGEST_KEPT = 2**16
 """Bytes of an input that is kept in the repository."""
 FIRST_WORDS = 5
 OURS = ("grasp_core", "scenes", "sim_validate")
-COMPILED = ["grasp_core.kernels"]
+COMPILED = ["grasp_core.compiled"]
 """Modules that numba compiles, which cannot be instrumented."""
 
 

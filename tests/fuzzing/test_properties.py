@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 import grasp_core as gc
 from sim_validate.datasets.config import DatasetConfig, config_from_settings, config_to_toml
-from sim_validate.datasets.given import GivenGrasp, given_from_json, given_text
+from sim_validate.datasets.given_contacts import GivenGrasp, given_from_json, given_text
 from sim_validate.datasets.manifest import Listed, manifest_from_json, manifest_to_json
-from sim_validate.toml_text import tables_of_toml
+from sim_validate.files.toml_tables import tables_of_toml
 from tests.fuzzing.data_files import MANIFEST
 from tests.fuzzing.targets import targets
 

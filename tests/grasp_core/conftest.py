@@ -2,7 +2,7 @@
 
 import pytest
 
-from grasp_core.kernels import SWITCH, compiled
+from grasp_core.compiled import SWITCH, compiled
 
 
 @pytest.fixture

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from grasp_core.constructions import PAIRINGS
-from grasp_core.face_pieces import unit_pieces
-from grasp_core.spanning import spanning_quadruples
+from grasp_core.cones.spanning import spanning_quadruples
+from grasp_core.families.constructions import PAIRINGS
+from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.values import ForceCone
-from scenes.objects import example_object
+from scenes.example_objects import example_object
 
 
 def paired_quadruples(name, theta, limit=None):

@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.short_text import counted, summary, vector
-from scenes.objects import example_object
+from scenes.example_objects import example_object
 
 TWO_LINES = 300
 """Characters."""

@@ -52,7 +52,7 @@ CALLS = [
         "path": PATH | {"unknown ending": "a.gif", "no ending": "a"},
         "friction": FRICTION,
         "view": optional(VALUE),
-    }, succeeds_in="tests/scenes/test_pictures.py"),
+    }, succeeds_in="tests/scenes/drawing/test_pictures.py"),
     Call("scenes.FingerSettings", dict, {
         "max_normal_force_n": POSITIVE,
         "radius_m": optional(POSITIVE),
@@ -83,7 +83,7 @@ CALLS = [
     }, succeeds_in="tests/sim_validate/datasets/test_loading.py"),
     Call("sv.read_regions", lambda: {"path": "no/such/file.npz"}, {
         "path": PATH | {"nowhere": "no/such/file.npz"},
-    }, succeeds_in="tests/sim_validate/test_regions_command.py"),
+    }, succeeds_in="tests/sim_validate/commands/test_regions.py"),
     Call("sv.margin_figure", of_grasp(friction=0.5), BODY_AND_GRASP | {
         "friction": FRICTION, "max_normal_force_n": POSITIVE,
     }, slow=True),

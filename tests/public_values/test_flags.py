@@ -7,11 +7,12 @@ import sys
 import pytest
 
 from grasp_core.checked import LARGEST_FRICTION, MOST_EDGES, MOST_SEED
+from grasp_core.compiled import SWITCH, compiled
 from grasp_core.errors import InputError
-from grasp_core.kernels import SWITCH, compiled
-from sim_validate.cli import Exit, main
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.main import main
 
-RUN = "from sim_validate.cli import run_and_exit; run_and_exit()"
+RUN = "from sim_validate.main import run_and_exit; run_and_exit()"
 FRICTIONS = ["0", "-1", "nan", "inf", "1e9", "1e-300", "1e300", f"{LARGEST_FRICTION + 1.0}"]
 WITH_FRICTION = [
     ["plan", "tetrahedron"], ["run", "tetrahedron"], ["validate", "no.json"], ["scene", "no.json"],
@@ -71,15 +72,15 @@ def test_a_number_out_of_range_is_refused_with_the_name_of_its_flag(
 def test_kernels_are_on_or_off(asked, monkeypatch):
     monkeypatch.setenv(SWITCH, asked)
     with pytest.raises(InputError, match=f"{SWITCH}: expected on or off, or none, got '{asked}'"):
-        compiled.__wrapped__("simplex")
+        compiled.__wrapped__("grasp_core.solvers.lp_kernel")
 
 
 @pytest.mark.parametrize("asked", ["on", ""])
 def test_kernels_are_on_unless_they_are_off(asked, monkeypatch):
     monkeypatch.setenv(SWITCH, asked)
-    assert compiled.__wrapped__("simplex") is not None
+    assert compiled.__wrapped__("grasp_core.solvers.lp_kernel") is not None
     monkeypatch.setenv(SWITCH, "off")
-    assert compiled.__wrapped__("simplex") is None
+    assert compiled.__wrapped__("grasp_core.solvers.lp_kernel") is None
 
 
 @pytest.mark.slow

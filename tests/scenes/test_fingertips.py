@@ -6,7 +6,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from grasp_core.nearest_points import nearest_on_surface
+from grasp_core.geometry.nearest_points import nearest_on_surface
 from scenes.fingertips import clashes, fitting_radius
 from scenes.layout import arrange
 

@@ -4,13 +4,13 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
-from grasp_core.contact_arrays import contact_frictions
-from grasp_core.resisted_wrenches import WrenchBody
+from grasp_core.closure.contact_arrays import contact_frictions
+from grasp_core.quality.wrench_limits import WrenchBody
 from scenes.mjcf import build_scene
-from sim_validate.rig import squeezed
-from sim_validate.schedules import Load
-from sim_validate.setup import Setup
-from sim_validate.simulate import Bench
+from sim_validate.simulation.rig import squeezed
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.setup import Setup
+from sim_validate.simulation.simulate import Bench
 
 MAX_FORCE = 10.0
 

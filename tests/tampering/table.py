@@ -12,10 +12,10 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
-from grasp_core.certified_regions import certify_regions
-from grasp_core.face_pieces import unit_pieces
-from grasp_core.patch import Absence, place_free
-from sim_validate.region_files import SHAPES, proof_arrays, regions_of
+from grasp_core.families.free import Absence, place_free
+from grasp_core.objects.face_pieces import unit_pieces
+from grasp_core.regions.certify_regions import certify_regions
+from sim_validate.records.regions import SHAPES, proof_arrays, regions_of
 from tests.judges import random_contacts
 from tests.tampering import exact_closure, on_planes, wrench_bounds
 

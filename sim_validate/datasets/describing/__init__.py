@@ -1,1 +1,4 @@
-"""What a dataset says of itself: its card, and its description for catalogues."""
+"""What does a dataset say about itself?
+
+A finished dataset comes in. Its card and its description for catalogues go out.
+"""

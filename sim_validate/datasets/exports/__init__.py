@@ -1,1 +1,4 @@
-"""The formats of other programs that a dataset is written in."""
+"""How do other programs read a dataset?
+
+A finished dataset, or one split of it, comes in. Files in the formats of other programs go out.
+"""

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from sim_validate.datasets.columns import TABLES, Column, Name
 from sim_validate.datasets.exports.flat_files import write_tables
-from sim_validate.datasets.selection import Selection
-from sim_validate.datasets.tables import Columns, read_columns
-from sim_validate.files import write_arrays
+from sim_validate.datasets.open_dataset import Selection
+from sim_validate.datasets.parquet import Columns, read_columns
+from sim_validate.files.reading import write_arrays
 
 NULLS = {"float": "NaN", "int": "-1", "text": "empty", "bool": "-1"}
 """What stands for null in arrays, by kind of column."""

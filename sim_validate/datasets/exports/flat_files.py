@@ -17,8 +17,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from sim_validate.datasets.columns import TABLES, Column, Name
-from sim_validate.datasets.selection import Selection
-from sim_validate.files import write_lines, write_text
+from sim_validate.datasets.open_dataset import Selection
+from sim_validate.files.reading import write_lines, write_text
 
 Row: TypeAlias = Mapping[str, Any]
 PARTS = {3: tuple("xyz"), 4: tuple("0123"), 6: ("fx", "fy", "fz", "tx", "ty", "tz")}

@@ -6,16 +6,15 @@ from pathlib import Path
 from typing import TypeAlias
 
 from grasp_core.errors import InputError
-from sim_validate.dataset_flags import ExportFormat, SplitName
-from sim_validate.datasets.columns import Name
+from sim_validate.datasets.columns import ExportFormat, Name, SplitName
 from sim_validate.datasets.exports.array_files import write_npz
 from sim_validate.datasets.exports.flat_files import write_csv, write_jsonl
 from sim_validate.datasets.exports.hdf5 import write_hdf5
 from sim_validate.datasets.exports.isaac import write_isaac
-from sim_validate.datasets.exports.scene_files import write_mjcf
-from sim_validate.datasets.selection import Selection, select
-from sim_validate.datasets.tables import require_pyarrow
-from sim_validate.files import whole_folder
+from sim_validate.datasets.exports.mjcf import write_mjcf
+from sim_validate.datasets.open_dataset import Selection, select
+from sim_validate.datasets.parquet import require_pyarrow
+from sim_validate.files.reading import whole_folder
 
 Exporter: TypeAlias = Callable[[Selection, Path, Callable[[int, int], None]], dict[Name, int]]
 EXPORTERS: Mapping[ExportFormat, Exporter] = {

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from grasp_core.errors import InputError
 from sim_validate.datasets.columns import TABLES, Column, Name
 from sim_validate.datasets.exports.array_files import NULLS, plain_columns
-from sim_validate.datasets.selection import Selection
-from sim_validate.files import write_bytes
+from sim_validate.datasets.open_dataset import Selection
+from sim_validate.files.reading import write_bytes
 
 FILE = "dataset.h5"
 

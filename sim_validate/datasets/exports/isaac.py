@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.values import Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
 from scenes.fingertips import FingerSettings, fitting_radius
 from scenes.layout import arrange
 from sim_validate.datasets.columns import Name
@@ -30,9 +30,9 @@ from sim_validate.datasets.exports.stored_grasps import (
     new_path,
 )
 from sim_validate.datasets.meshes import mesh_path
+from sim_validate.datasets.open_dataset import Selection
 from sim_validate.datasets.rows import SHORT
-from sim_validate.datasets.selection import Selection
-from sim_validate.files import write_lines
+from sim_validate.files.reading import write_lines
 
 AXES = "xyz"
 HEAD = """\

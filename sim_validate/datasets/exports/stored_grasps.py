@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError
-from grasp_core.values import Contact, Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact
 from sim_validate.datasets.meshes import stored_body
+from sim_validate.datasets.open_dataset import Selection
 from sim_validate.datasets.rows import GIVEN
-from sim_validate.datasets.selection import Selection
 
 UNSAFE = re.compile(r"[^A-Za-z0-9._-]")
 GRASPS = ("grasp", GIVEN)

@@ -1,5 +1,5 @@
 "use strict";
-// Draws a grasp on a canvas and turns it. As in scenes/painting.py, lines and points become parts
+// Draws a grasp on a canvas and turns it. As in scenes/drawing/painting.py, lines and points become parts
 // with a depth of their own, and the farthest are drawn first.
 (() => {
   const DISTANCE = 9000; // of the camera; lengths are thousandths of the object's radius

@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from sim_validate.datasets.build import build
+from sim_validate.datasets.building.build import build
 from tests.sim_validate.datasets.engines import Here, silent
 from tests.sim_validate.datasets.pair import CONFIG
 

@@ -1,7 +1,7 @@
 """Settings of a dataset of two objects at two frictions, and its rows."""
 
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.tables import read_rows
+from sim_validate.datasets.parquet import read_rows
 
 CONFIG = DatasetConfig(
     objects=("tetrahedron", "wedge"), frictions=(0.4, 0.5), families=("concurrent",), limit=2

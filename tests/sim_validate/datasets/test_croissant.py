@@ -5,7 +5,7 @@ from fnmatch import fnmatch
 
 import pytest
 
-from sim_validate.cli import Exit, main
+from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.columns import KEYS, REFERENCES, TABLES
 from sim_validate.datasets.describing.croissant import (
     ASKED,
@@ -14,7 +14,8 @@ from sim_validate.datasets.describing.croissant import (
     missing_fields,
 )
 from sim_validate.datasets.manifest import read_manifest
-from sim_validate.datasets.tables import read_rows
+from sim_validate.datasets.parquet import read_rows
+from sim_validate.main import main
 from tests.sim_validate.datasets.small import SMALL, build_small
 
 pytest.importorskip("pyarrow")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.objects import example_names, example_object
+from scenes.example_objects import example_names, example_object
 from sim_validate.datasets.meshes import mesh_path, mesh_text, stored_body, stored_surface
 
 SCANS = Path(__file__).parents[4] / "shared" / "objects" / "ycb"

@@ -6,10 +6,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-from sim_validate.baselines.comparing import Status
-from sim_validate.baselines.suite import suite_from_toml
-from sim_validate.cli import Exit, main
-from sim_validate.files import write_text
+from sim_validate.baselines.compare import Status
+from sim_validate.baselines.suite_toml import suite_from_toml
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.files.reading import write_text
+from sim_validate.main import main
 from tests.sim_validate.plugin.project import CODE, copied, run_pytest
 
 

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from grasp_core.records import grasps_from_json
-from sim_validate.files import write_text
+from grasp_core.records.grasps_json import grasps_from_json
+from sim_validate.files.reading import write_text
 from tests.sim_validate.plugin.project import CODE, copied, run_pytest
 
 MARKED = """
@@ -44,7 +44,7 @@ def test_close_to_slipping(grasp_case, assert_stable):
     assert_stable(grasp_case, min_margin=0.49)
 
 def test_often_dropped(grasp_case, assert_stable):
-    from sim_validate.noise.draws import Noise
+    from sim_validate.simulation.noise import Noise
     assert_stable(grasp_case, trials=20, noise=Noise(mass=0.5), min_pass_rate=0.99)
 """
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from sim_validate.cli import Exit, main
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.main import main
 from sim_validate.reports.report import write_report
 
 

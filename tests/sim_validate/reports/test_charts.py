@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.wrench_sets import WrenchSet
-from scenes.canvas import encoded
-from sim_validate.replaying.bench import replayed
-from sim_validate.replaying.values import Recorded
+from grasp_core.closure.wrench_sets import WrenchSet
+from scenes.drawing.canvas import encoded
+from sim_validate.replaying.recorded import Recorded
+from sim_validate.replaying.replay import replayed
 from sim_validate.reports.agreement import (
     Agreement,
     as_predicted,
@@ -23,8 +23,8 @@ from sim_validate.reports.fidelity_charts import fidelity_figure, ticks_between
 from sim_validate.reports.margin_charts import directions_of_map, margin_figure, on_map
 from sim_validate.reports.motion_charts import friction_used, motion_figure
 from sim_validate.reports.wrench_charts import shadow_of, wrench_figure
-from sim_validate.setup import Agenda, Setup
-from tests.scenes.test_pictures import assert_inside
+from sim_validate.simulation.setup import Agenda, Setup
+from tests.scenes.drawing.test_pictures import assert_inside
 from tests.sim_validate.rigs import grasps
 
 FRICTION = 0.5

@@ -5,7 +5,8 @@ import shutil
 
 import pytest
 
-from sim_validate.cli import Exit, main
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.main import main
 from sim_validate.reports.report import write_report
 from tests.sim_validate.reports.test_report import EVIL, changed
 

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
-from scenes.painting import DARKEST, LIGHT
-from scenes.palette import FINGERS
-from scenes.views import DISTANCE
-from sim_validate import commands
-from sim_validate.cli import Exit, main
-from sim_validate.grasps_file import read_grasps
-from sim_validate.reports.news import said_of
+from scenes.drawing.painting import DARKEST, LIGHT
+from scenes.drawing.palette import FINGERS
+from scenes.drawing.views import DISTANCE
+from sim_validate import main as commands
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.main import main
+from sim_validate.records.grasps import read_grasps
+from sim_validate.reports.agreement import said_of
 from sim_validate.reports.pages import asset
 from sim_validate.reports.report import write_report
 from sim_validate.reports.turntable import UNITS

@@ -1,0 +1,202 @@
+"""Equilibrium and force closure with exact circular friction cones, proved either way.
+
+Solved: whether contact forces f_i in the friction cones C_i can balance every wrench.
+
+Contacts are in force closure iff the contact wrenches have rank 6 and some forces in the
+interior of the cones balance each other: a neighbourhood of such forces maps onto a
+neighbourhood of the zero wrench, and scaling does the rest. The margin program
+
+    maximise t  subject to  sum f_i = 0,  sum x_i x f_i = 0,  sum n_i.f_i = 1,
+                            |f_i - (n_i.f_i) n_i| + t <= mu_i n_i.f_i
+
+is therefore positive for force closure. Its dual is a twist y = (a, b): with the contact
+velocities v_i = a + b x x_i, the support of cone i in direction y is
+s_i(y) = n_i.v_i + mu_i |tangential part of v_i|, and t = max_i s_i(y) for the best y. If no
+s_i(y) is positive, then no contact wrench has a positive product with y, and no external
+wrench w with y.w < 0 can be resisted.
+
+Both answers are certificates: `verify` uses sums, norms and one singular value. Both also bound
+the optimum, forces from below and twists from above.
+
+Source: Sudsang & Ponce 1995, Definition 1 and Proposition 1, with the condition on the rank
+made explicit; the cone program is standard.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import SMALLEST_SIZE, Array, real_array
+from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions
+from grasp_core.closure.proofs import decide, margin_ceiling, proved_margin
+from grasp_core.closure.wrenches import normal_and_tangential
+from grasp_core.errors import UndecidedError
+from grasp_core.fields import are_frictions, are_units, is_array, is_number
+from grasp_core.values import Grasp
+
+UNSAFE = 1e-6
+"""A margin larger than this is not itself why nothing can be proved."""
+CAUTION = 1.01
+"""A margin is shown with this multiple of the rounding that `verify` allows for, since sums and
+singular values differ in their last digits from processor to processor."""
+SUMMED = 1e-9
+"""How far the normal parts of closing forces may be from summing to 1, and their wrench at unit
+size from zero."""
+FAR_BELOW = -1e6
+"""Margins proved to be below are told as minus infinity: no forces balance at all, or hardly."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClosureCertificate:
+    """A verdict on force closure with what proves it."""
+
+    closed: bool
+    margin: float
+    """Proved bound of the optimum t of the margin program, dimensionless, unchanged by moving and
+    scaling. If closed, the optimum is no less. If not, it is no more than a negative margin, while
+    zero says only that there is no closure: contacts may balance deep inside their cones, and yet
+    leave the object free. `force_closure` gives the optimum to some 1e-9 where contacts and
+    friction are not nearly degenerate; minus infinity for what is below -1e6."""
+    positions: Array
+    """(k, 3) [m]"""
+    normals: Array
+    """(k, 3), of length 1 to nine digits; their directions count."""
+    friction: Array
+    """Coulomb coefficient of each contact, (k,)."""
+    forces: Array | None
+    """If closed: balancing forces strictly inside the cones, (k, 3), normal parts summing to 1,
+    both to within 1e-9. Torques are about the mean contact, at unit size."""
+    separating_wrench: Array | None
+    """If not: y = (a, b), (6,), about the frame's origin, with y.w <= 0 for every wrench w that
+    the contacts can apply, to within 1e-12 of lengths at unit size; an external wrench w with
+    y.w < 0 is not resisted."""
+
+    def __post_init__(self) -> None:
+        for name in ("positions", "normals", "friction", "forces", "separating_wrench"):
+            array = getattr(self, name)
+            if array is not None:
+                kept = real_array(array, name)
+                kept.setflags(write=False)
+                object.__setattr__(self, name, kept)
+
+    def verify(self) -> bool:
+        """Re-check every field in plain arithmetic, without any solver.
+
+        Returns:
+            Whether the fields prove the verdict and the margin; False for what is no certificate.
+        """
+        with np.errstate(all="ignore"):
+            if not (self._are_contacts() and is_number(self.margin, least=-math.inf)):
+                return False
+            if self.closed is True:
+                return self.separating_wrench is None and 0.0 < self.margin <= self.proved()
+            return (
+                self.closed is False and self.forces is None and 0.0 >= self.margin >= self.proved()
+            )
+
+    def separates(self) -> bool:
+        """Whether the wrench separates, whatever the margin; fields are taken as sound."""
+        return self.forces is None and self.proved() <= 0.0
+
+    def _are_contacts(self) -> bool:
+        count = len(self.normals) if is_array(self.normals, None, 3) else 0
+        placed = is_array(self.positions, count, 3) and are_units(self.normals, count, 3)
+        if count == 0 or not placed:
+            return False
+        spread = float(np.ptp(self.positions, axis=0).max())
+        return (spread == 0.0 or spread >= SMALLEST_SIZE) and are_frictions(self.friction, count)
+
+    def proved(self, caution: float = 1.0) -> float:
+        """What the fields prove of the margin: a lower bound if closed, an upper one if not.
+
+        Args:
+            caution: Multiplies what is allowed for rounding.
+
+        Returns:
+            Minus infinity or infinity where they prove none.
+        """
+        arms, center, size = unit_size(self.positions)
+        normals = self.normals / np.linalg.norm(self.normals, axis=1, keepdims=True)
+        if self.closed:
+            forces = self.forces
+            if not (is_array(forces, *arms.shape) and _balance(forces, arms, normals)):
+                return -math.inf
+            if (normal_and_tangential(forces, normals)[1][self.friction == 0.0] > SUMMED).any():
+                return -math.inf
+            return proved_margin(forces, arms, normals, self.friction, caution)
+        wrench = self.separating_wrench
+        if not is_array(wrench, 6):
+            return math.inf
+        turned = np.asarray(np.cross(wrench[3:], center), dtype=np.float64)
+        twist = np.concatenate([wrench[:3] + turned, wrench[3:] * size])
+        ceiling = margin_ceiling(twist, arms, normals, self.friction, caution)
+        return -math.inf if ceiling <= FAR_BELOW else ceiling
+
+
+def _balance(forces: Array, arms: Array, normals: Array) -> bool:
+    """Whether forces at unit size sum to nothing, and their normal parts to 1."""
+    wrench = np.concatenate([forces.sum(axis=0), np.cross(arms, forces).sum(axis=0)])
+    pushes = float(np.einsum("ki,ki->", forces, normals))
+    return float(np.abs(wrench).max()) <= SUMMED and abs(pushes - 1.0) <= SUMMED
+
+
+def force_closure(
+    positions: ArrayLike | Grasp,
+    normals: ArrayLike | None = None,
+    friction: ArrayLike = 0.5,
+) -> ClosureCertificate:
+    """Decide force closure of hard-finger contacts under Coulomb friction.
+
+    Args:
+        positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
+        normals: Unit vectors into the object, (k, 3).
+        friction: Coulomb coefficient, one for all contacts or one each, (k,).
+
+    Raises:
+        InputError: Shapes, lengths or signs are wrong.
+        UndecidedError: The contacts are within rounding of the boundary of closure.
+        SolverError: The program's answer failed its check.
+    """
+    points, units = contact_arrays(positions, normals)
+    mu = contact_frictions(friction, len(points))
+    arms, center, size = unit_size(points)
+    answer = decide(arms, units, mu)
+    if answer.closed is not None:
+        forces, wrench = None, None
+        if answer.closed:
+            forces = answer.forces / float(np.einsum("ki,ki->", answer.forces, units))
+        else:
+            wrench = _about_origin(answer.twist, center, size)
+        found = ClosureCertificate(answer.closed, answer.margin, points, units, mu, forces, wrench)
+        found = replace(found, margin=found.proved(CAUTION))
+        if found.verify():
+            return found
+    raise UndecidedError(_why_undecided(answer.margin))
+
+
+def _why_undecided(margin: float) -> str:
+    if abs(margin) < UNSAFE:
+        return (
+            f"the closure margin is {margin:.2g}, too close to zero to decide; change the "
+            "friction or the contacts slightly"
+        )
+    return (
+        f"the closure margin is {margin:.2g}, but neither answer can be proved: contacts or "
+        "normals nearly coincide, or lie nearly on a line; move them apart or leave some out"
+    )
+
+
+def unit_size(points: Array) -> tuple[Array, Array, float]:
+    """Arms from the mean contact over the longest one, with that centre and length."""
+    center = points.mean(axis=0)
+    arms = points - center
+    size = float(np.linalg.norm(arms, axis=1).max())
+    size = size if size > 0.0 else 1.0
+    return arms / size, center, size
+
+
+def _about_origin(twist: Array, center: Array, size: float) -> Array:
+    turning = twist[3:] / size
+    return np.concatenate([twist[:3] - np.cross(turning, center), turning])

@@ -1,0 +1,101 @@
+"""The interval that the critical friction of contacts is proved to lie in."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array, real_array
+from grasp_core.checked import LARGEST_FRICTION
+from grasp_core.closure.force_closure import unit_size
+from grasp_core.closure.rational_proofs import closes, separates
+from grasp_core.closure.wrenches import WRENCH
+from grasp_core.fields import are_units, is_array, is_number
+
+FEWEST = 2
+"""Contacts that can balance anything."""
+FRICTIONLESS = 1e-6
+"""Smallest friction at which closure is sought: a contact in a file with six digits is not placed
+better."""
+REPORTED_AS_ZERO = 2.0 * FRICTIONLESS
+"""Up to here a critical friction is reported as zero: where it is zero in truth, a proof may need a
+trifle more than `FRICTIONLESS` on one machine and not on another."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrictionInterval:
+    """Contacts are open at every common friction up to `lower`, closed at all from `upper` on.
+
+    The proof that they are open holds for contacts moved by at most 1e-12 of their size, where
+    their wrenches are dependent but for rounding; the proof that they are closed, as they are.
+    """
+
+    lower: float
+    """Coulomb coefficient; 0 where nothing is claimed, infinite where no friction is enough."""
+    upper: float
+    """Coulomb coefficient, at most `LARGEST_FRICTION`, or infinite where nothing is claimed."""
+    positions: Array
+    """(k, 3) [m]"""
+    normals: Array
+    """Inward, (k, 3)."""
+    forces: Array | None
+    """Balanced strictly inside cones of friction `upper`, once their imbalance, which is rounding,
+    is removed; (k, 3), in any unit of force. None where `upper` is infinite."""
+    twist: Array | None
+    """Velocity of the object at the first contact, and angular velocity, (6,) [m/s, rad/s], along
+    which no force inside cones of friction `lower` has positive power. None where `lower` is 0."""
+
+    def __post_init__(self) -> None:
+        for name in ("positions", "normals", "forces", "twist"):
+            array = getattr(self, name)
+            if array is not None:
+                kept = real_array(array, name)
+                kept.setflags(write=False)
+                object.__setattr__(self, name, kept)
+
+    @property
+    def critical_friction(self) -> float:
+        """The upper end as functions and files report it: 0.0 up to `REPORTED_AS_ZERO`."""
+        return 0.0 if self.upper <= REPORTED_AS_ZERO else self.upper
+
+    def verify(self) -> bool:
+        """Check both ends again, in rational arithmetic and without any solver."""
+        return self._fits() and self._open_below() and self._closed_above()
+
+    def _fits(self) -> bool:
+        count = len(self.normals) if is_array(self.normals, None, 3) else 0
+        return (
+            count >= FEWEST
+            and are_units(self.normals, count, 3)
+            and is_array(self.positions, count, 3)
+            and (self.forces is None or is_array(self.forces, count, 3))
+            and (self.twist is None or is_array(self.twist, WRENCH))
+            and is_number(self.lower, most=math.inf)
+            and is_number(self.upper, most=math.inf)
+        )
+
+    def _open_below(self) -> bool:
+        if not 0.0 <= self.lower <= self.upper:  # nor if one is not a number
+            return False
+        if self.twist is None:
+            return self.lower == 0.0
+        return self.lower > 0.0 and separates(self.twist, self.positions, self.normals, self.lower)
+
+    def _closed_above(self) -> bool:
+        if self.forces is None:
+            return self.upper == math.inf
+        return self.upper <= LARGEST_FRICTION and closes(
+            self.forces, self.positions, self.normals, self.upper
+        )
+
+
+def at_the_first(twist: Array, positions: Array) -> Array:
+    """A twist about the mean contact and at unit size, about the first contact instead, (6,).
+
+    Args:
+        twist: Velocity there and angular velocity, with arms from `unit_size`, (6,).
+        positions: (k, 3) [m]
+    """
+    arms, _, size = unit_size(positions)
+    velocity = twist[:3] + np.asarray(np.cross(twist[3:], arms[0]), dtype=np.float64)
+    return np.concatenate([velocity, twist[3:] / size])

@@ -1,0 +1,289 @@
+"""Search for the critical friction of one set of contacts, program by program.
+
+Solved: a narrow interval with proofs of both of its ends (see `friction_interval`).
+
+The two ends of the scale come first: contacts that no friction closes, and contacts that any
+friction closes (see `extreme_frictions`). Otherwise Newton's method, as `critical` describes it,
+says at which friction to solve the margin program next. What its answers prove is decided in
+rational arithmetic, whatever the program says about itself.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import LARGEST_FRICTION
+from grasp_core.closure.extreme_frictions import hopeless_twist, pushing_forces, rounds
+from grasp_core.closure.force_closure import unit_size
+from grasp_core.closure.friction_interval import FRICTIONLESS, FrictionInterval, at_the_first
+from grasp_core.closure.margin_program import margin_program
+from grasp_core.closure.proofs import Answer, decide, proves_closure
+from grasp_core.closure.rational_proofs import NEARLY_AT_REST, closes, closing_forces, separates
+from grasp_core.closure.wrenches import WRENCH, grasp_map, normal_and_tangential
+from grasp_core.errors import SolverError
+
+FRICTION_ACCURACY = 5e-8
+"""Relative width of the final interval of a critical friction."""
+FIRST_TRIAL = 0.5
+PROOF_SHARES = (0.0, 1e-3, 0.03)
+"""Where closure is proved between the friction that forces need and that of the trial."""
+GROWTH = ((0.1 * FRICTIONLESS, 3.0), (1e-3, 2.0), (math.inf, 10.0))
+"""How much farther from an undecided friction the next trial is, up to which distance: fast where
+proofs are expected, and where they are not."""
+NUDGE = 0.4
+OVERSHOOT = 1.0
+"""Trials pass the expected threshold, to close in from both sides: by this share of the accuracy,
+and by this multiple of the error of Newton's method, the step's square over the friction."""
+HALVING = 6
+"""Every so many trials the interval is halved, whatever Newton's method says."""
+MOST_TRIALS = 80
+"""Nine are usual, and some fifty where contacts are nearly degenerate."""
+LITTLE = 1e-3
+"""Frictions up to this are tried where any friction seems enough."""
+RESTING = (NEARLY_AT_REST, 1e-7, 1e-5, 1e-3)
+"""Speeds below which contacts are put to rest under a unit twist, tried in turn: a solver leaves
+the square root of its accuracy where two contacts carry nearly everything."""
+EVENED = 3
+"""How often a program is solved again in units of the pushes that it found."""
+FAINTEST = 1e-10
+"""Smallest push that has units of its own, in those of the largest."""
+ADDED, SHAVED = 5e-9, 1e-10
+"""Added to the friction that forces need, and taken off the one up to which a twist separates, for
+rounding; relative."""
+STALLED = 1e-3
+"""Unit twists that are this small once contacts are at rest are rounding."""
+
+
+def search_interval(points: Array, units: Array) -> FrictionInterval:
+    """The interval of the critical friction, as narrow as `FRICTION_ACCURACY` or as proofs allow.
+
+    Args:
+        points: (k, 3) [m]
+        units: Inward normals, (k, 3).
+    """
+    for strict in (False, True):
+        found = _searched(Ends.of(points, units, strict=strict)).interval()
+        if found.verify():
+            return found
+    return FrictionInterval(0.0, math.inf, points, units, None, None)
+
+
+def _searched(ends: "Ends") -> "Ends":
+    arms, units = ends.arms, ends.units
+    hopeless = hopeless_twist(arms, units)
+    if hopeless is not None and ends.open_at_all(hopeless):
+        return ends
+    _try_little(ends)
+    trial = max(FIRST_TRIAL, 2.0 * ends.lower)
+    for _ in range(MOST_TRIALS):
+        if ends.settled:
+            break
+        trial = min(trial, LARGEST_FRICTION)
+        answer = _asked(arms, units, trial)
+        ends.learn(trial, answer)
+        if ends.lower < trial < ends.upper:
+            _try_evened(ends, trial, answer.forces)
+        ends.decided(trial)
+        trial = ends.next_trial(trial, answer.margin, _slope(answer, arms, units))
+    if ends.forces is None and ends.lower < LARGEST_FRICTION:
+        pushing = pushing_forces(arms, units)
+        if pushing is not None:
+            ends.close(pushing, LARGEST_FRICTION)
+    return ends
+
+
+def _try_little(ends: "Ends") -> None:
+    """Closure at little friction, or a first lower end."""
+    little, friction = rounds(ends.arms, ends.units), FRICTIONLESS
+    if little.twist is not None:
+        ends.open(little.twist)
+    while little.forces and friction <= LITTLE and ends.forces is None:
+        ends.close(little.at(friction, ends.units), friction, exactly=True)
+        friction *= 2.0
+    if ends.forces is None and ends.lower < FRICTIONLESS:
+        ends.learn(FRICTIONLESS, _asked(ends.arms, ends.units, FRICTIONLESS))
+
+
+def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:
+    """Solve the margin program again in units of the pushes of its own answer.
+
+    At a threshold where some contacts can push but little, as much as others can press or slide
+    beside what they carry, the depth of their forces is below what a solver tells from zero. In
+    units of their own they are as deep as others.
+    """
+    G, alike = grasp_map(ends.arms), np.full(len(ends.arms), friction)
+    for _ in range(EVENED):
+        pushes, _ = normal_and_tangential(forces, ends.units)
+        pushes = np.maximum(pushes, FAINTEST * np.abs(pushes).max())
+        if not pushes.min() > 0.0:
+            return
+        scaled = np.repeat(pushes, 3)
+        rows = np.linalg.qr((G * scaled).T)[0].T
+        try:
+            _, forces, _ = margin_program(rows, ends.units, alike)
+        except SolverError:
+            return
+        forces = pushes[:, None] * forces
+        ends.close(forces, friction)
+        if ends.upper <= friction:
+            return
+
+
+def _asked(arms: Array, units: Array, friction: float) -> Answer:
+    """The margin program's answer; zeros, which prove nothing, where there is none."""
+    try:
+        return decide(arms, units, np.full(len(arms), friction))
+    except SolverError:
+        return Answer(math.nan, np.zeros_like(arms), np.zeros(WRENCH), closed=None)
+
+
+@dataclass(slots=True)
+class Ends:
+    """Proved ends of an interval of friction, and where to try next."""
+
+    points: Array
+    """(k, 3) [m]"""
+    units: Array
+    """Inward normals, (k, 3)."""
+    arms: Array
+    """The same points at unit size."""
+    strict: bool = True
+    """Whether each step is proved in rational arithmetic, or only what rounding may undo."""
+    lower: float = 0.0
+    upper: float = math.inf
+    forces: Array | None = None
+    twist: Array | None = None
+    share: float = 0.5
+    """Of the upper end to try next while nothing is known from below."""
+    trials: int = 0
+    center: float = math.nan
+    """A friction at which neither side could be proved: the threshold, to all appearance."""
+    spread: float = 0.0
+    """How far from there proofs are looked for."""
+
+    @classmethod
+    def of(cls, points: Array, units: Array, *, strict: bool = True) -> "Ends":
+        """Nothing is proved yet."""
+        return cls(points, units, unit_size(points)[0], strict)
+
+    @property
+    def settled(self) -> bool:
+        """Whether the interval is as narrow as asked for, or as proofs allow."""
+        narrow = self.upper - self.lower <= FRICTION_ACCURACY * self.lower
+        around = self.upper <= self.center + self.spread and self.lower >= self.center - self.spread
+        beyond = max(self.lower, self.spread) >= LARGEST_FRICTION
+        return self.upper <= FRICTIONLESS or narrow or around or beyond
+
+    def interval(self) -> FrictionInterval:
+        """What has been proved, by forces that balance as well as floats can."""
+        forces, contacts = self.forces, (self.points, self.units)
+        if forces is not None:
+            exact = closing_forces(forces, *contacts, self.upper)
+            if exact is not None and closes(exact, *contacts, self.upper):
+                forces = exact
+        return FrictionInterval(self.lower, self.upper, *contacts, forces, self.twist)
+
+    def learn(self, friction: float, answer: Answer) -> None:
+        """Take what the answer at a friction proves."""
+        self.close(answer.forces, friction)
+        self.open(answer.twist)
+
+    def decided(self, friction: float) -> None:
+        """Look farther from a friction at which nothing was proved, or look there no longer."""
+        undecided = self.lower < friction < self.upper
+        if undecided and math.isnan(self.center):
+            self.center, self.spread = friction, NUDGE * FRICTION_ACCURACY * friction
+        elif undecided:
+            self.spread *= next(factor for far, factor in GROWTH if self.spread < far)
+        elif self.upper <= self.center or self.lower >= self.center:
+            self.center, self.spread = math.nan, 0.0  # the threshold turned out to be elsewhere
+
+    def close(self, forces: Array, friction: float, *, exactly: bool = False) -> None:
+        """Lower the upper end to what forces need, or to the friction they were found at."""
+        along, across = normal_and_tangential(forces, self.units)
+        if not along.min() > 0.0:
+            return
+        needed = float((across / along).max()) * (1.0 + ADDED)
+        tried = [needed + share * (friction - needed) for share in PROOF_SHARES]
+        for enough in (friction,) if exactly else (*tried, friction):
+            enough = max(enough, FRICTIONLESS)
+            below = enough <= friction and enough < self.upper
+            if below and self._closes(forces, enough):
+                self.upper, self.forces = enough, forces
+                return
+
+    def _closes(self, forces: Array, friction: float) -> bool:
+        alike = np.full(len(self.arms), friction)
+        if not self.strict and proves_closure(forces, self.arms, self.units, alike):
+            return True
+        return closes(forces, self.points, self.units, friction)
+
+    def open(self, twist: Array) -> None:
+        """Raise the lower end to the friction up to which a twist separates."""
+        length = float(np.linalg.norm(twist))
+        if not 0.0 < length < math.inf:
+            return
+        for slow in RESTING:
+            still, friction = _put_to_rest(twist / length, self.arms, self.units, slow)
+            friction *= 1.0 - SHAVED
+            if self.lower < friction < self.upper:
+                self._opened(still, friction)
+
+    def open_at_all(self, twist: Array) -> bool:
+        """Whether a twist separates at every friction; then nothing is left to ask."""
+        self._opened(twist, math.inf)
+        return self.lower == math.inf
+
+    def _opened(self, twist: Array, friction: float) -> None:
+        twist = at_the_first(twist, self.points)
+        easy = not self.strict and friction < math.inf
+        if easy or separates(twist, self.points, self.units, friction):
+            self.lower, self.twist = friction, twist
+
+    def next_trial(self, friction: float, margin: float, slope: float) -> float:
+        """Where the margin vanishes if it goes on like this, a little to the wider side."""
+        if not math.isnan(self.center):
+            above = self.center + self.spread
+            return above if self.upper > above else self.center - self.spread
+        self.trials += 1
+        root = friction - margin / slope if slope > 0.0 and math.isfinite(margin) else math.nan
+        if self.lower < root < self.upper and self.trials % HALVING:
+            past = NUDGE * FRICTION_ACCURACY * root + OVERSHOOT * (root - friction) ** 2 / root
+            if self.upper - root > root - self.lower:
+                return root + min(past, 0.5 * (self.upper - root))
+            return root - min(past, 0.5 * (root - self.lower))
+        if self.lower > 0.0:
+            return _between(self.lower, self.upper)
+        self.share *= self.share
+        return max(2.0 * self.share * self.upper, FRICTIONLESS)
+
+
+def _put_to_rest(twist: Array, arms: Array, normals: Array, slow: float) -> tuple[Array, float]:
+    """A unit twist that leaves slow contacts at rest, and up to which friction it may separate."""
+    rows = grasp_map(arms).T.reshape(-1, 3, WRENCH)
+    slowest = np.linalg.norm(rows @ twist, axis=1) <= slow
+    resting = rows[slowest].reshape(-1, WRENCH)
+    if resting.size:
+        for _ in range(2):  # once more for what rounding leaves
+            twist = twist - np.linalg.lstsq(resting, resting @ twist, rcond=NEARLY_AT_REST)[0]
+    along, across = normal_and_tangential(rows[~slowest] @ twist, normals[~slowest])
+    if not np.linalg.norm(twist) > STALLED:
+        return twist, 0.0
+    with np.errstate(over="ignore"):  # contacts that hardly slide are separated at any friction
+        ratios = -along / np.maximum(across, np.finfo(np.float64).tiny)
+    return twist, float(ratios.min(initial=2.0 * LARGEST_FRICTION))
+
+
+def _between(lower: float, upper: float) -> float:
+    """Halve the interval of cone angles: it treats small and large friction alike."""
+    return math.tan(0.5 * (math.atan(lower) + math.atan(min(upper, 4.0 * LARGEST_FRICTION))))
+
+
+def _slope(answer: Answer, arms: Array, normals: Array) -> float:
+    """By how much the margin over mu grows with the logarithm of mu."""
+    velocities = answer.twist[:3] + np.cross(answer.twist[3:], arms)
+    along = np.einsum("ki,ki->k", answer.forces, normals)
+    slides = answer.forces - along[:, None] * normals
+    return float(np.einsum("ki,ki->", velocities, slides))

@@ -1,0 +1,82 @@
+"""Four lines in space: whether they are linearly dependent, and in which way (P1).
+
+Solved: the Grassmann class of four lines, from the two numbers that decide it.
+
+A line through x with unit direction d has the Pluecker vector (d, x x d). Forces along four
+lines can only balance if the four vectors are dependent, rank at most 3. The lines of their
+span are where the span meets the Klein quadric, the vectors with d.m = 0, so the class is the
+rank of the form <(d, m), (d', m')> = d.m' + d'.m on that span:
+
+    3  regulus: a conic of pairwise skew lines, one family of a hyperboloid or paraboloid
+    2  pencil: two flat pencils that share a line and lie in different planes
+    0  concurrent (in one point, perhaps at infinity) or planar: every two lines meet
+
+Source: Sudsang & Ponce 1995, Proposition 2; Dandurand, "The rigidity of compound spatial
+grids", Structural Topology 10, 1984, for line varieties.
+"""
+
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import SMALLEST_SIZE, Array, frozen
+from grasp_core.closure.contact_arrays import check_spread
+from grasp_core.errors import InputError
+
+LineClass: TypeAlias = Literal["planar", "concurrent", "pencil", "regulus", "independent"]
+
+ON_CLASS = 1e-7
+"""Singular values and eigenvalues below this count as zero, for unit directions and points
+spread over a unit length: ten times what a linear program's answer may be off."""
+ROUNDING = 1e-12
+"""Points closer than this, relative to their coordinates, are one point."""
+REGULUS = 3
+"""Rank of the reciprocal form on the span of a regulus."""
+
+
+def plucker_vectors(points: Array, directions: Array) -> Array:
+    """Pluecker vectors (d, x x d) of lines, (k, 6)."""
+    return np.hstack([directions, np.cross(points, directions)])
+
+
+def classify_lines(points: ArrayLike, directions: ArrayLike) -> LineClass:
+    """Name the smallest line variety of rank 3 that holds four lines.
+
+    Lines that lie in a plane are `planar` even if they also meet; parallel lines are
+    `concurrent`. The spread of the points sets the length against which tolerances count.
+
+    Args:
+        points: One point on each line, (4, 3) [m].
+        directions: Any non-zero vectors along the lines, (4, 3).
+
+    Raises:
+        InputError: A shape is wrong, or a direction is zero.
+    """
+    x = frozen(points, (4, 3), "points")
+    d = frozen(directions, (4, 3), "directions")
+    lengths = np.linalg.norm(d, axis=1, keepdims=True)
+    if lengths.min() < SMALLEST_SIZE:
+        raise InputError(
+            f"directions must not be zero: a line needs a direction of length {SMALLEST_SIZE:g} "
+            f"at least, got {float(lengths.min()):.6g}"
+        )
+    check_spread(np.ptp(x, axis=0), "points")
+    d = d / lengths
+    arms = x - x.mean(axis=0)
+    spread = float(np.linalg.norm(arms, axis=1).max())
+    if spread > ROUNDING * float(np.abs(x).max()):
+        arms = arms / spread
+    _, sizes, basis = np.linalg.svd(plucker_vectors(arms, d))
+    rank = int((sizes > ON_CLASS).sum())
+    if rank == len(d):
+        return "independent"
+    span = basis[:rank]
+    form = span[:, :3] @ span[:, 3:].T
+    meeting = int((np.abs(np.linalg.eigvalsh(form + form.T)) > ON_CLASS).sum())
+    if meeting >= REGULUS:
+        return "regulus"
+    if meeting > 0:
+        return "pencil"
+    flatness = np.linalg.svd(np.vstack([d, arms]), compute_uv=False)[2]
+    return "planar" if flatness <= ON_CLASS else "concurrent"

@@ -1,0 +1,107 @@
+"""The margin program of force closure, solved in compiled code or by the conic solver.
+
+See `closure` for what it says and `kernels.margin` for the compiled method. What a solution claims
+is proved by `closure_margin`.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.arrays import Array
+from grasp_core.closure.wrenches import WRENCH, contact_frames, in_frames
+from grasp_core.compiled import compiled
+from grasp_core.solvers.conic import ConicProgram, minimize
+
+KERNEL = "grasp_core.closure.critical_friction_kernel"
+"""The search for critical friction solves the same programs at many frictions."""
+ROUNDING = 1e-12
+"""Slack of the plain-arithmetic checks, for data scaled to unit size: some thousand
+rounding errors."""
+TINY = float(np.finfo(np.float64).tiny)
+COARSE = 0.1
+"""As in `kernels.margin`: the gap that is left by who only asks for the sign of a margin."""
+
+
+def deepest_forces(
+    arms: Array, normals: Array, friction: Array, share: float = COARSE
+) -> tuple[Array, Array, Array]:
+    """Balanced forces of many sets of contacts as deep in the cones as can be, in compiled code.
+
+    Args:
+        arms: Contacts at unit size, (g, k, 3).
+        normals: (g, k, 3)
+        friction: Of each set, positive, (g,).
+        share: The gap that may be left (see `kernels.margin`).
+
+    Returns:
+        Forces, (g, k, 3), twists (g, 6) on which the supports are at most the margin over the
+        friction, and lower and upper bounds of the margin, (g, 2), where the forces balance. Bounds
+        that have crossed, or are no numbers, are those of a search that broke down, as it does on
+        degenerate contacts. All zeros without kernels.
+    """
+    forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))
+    values = np.ones((len(arms), 2))
+    if kernel := compiled(KERNEL):
+        given = tuple(np.array(each) for each in (arms, normals, friction))  # writable
+        kernel.deepest(given, share, forces, twists, values)
+    contacts = arms.shape[1]
+    return forces, twists / contacts, friction[:, None] / contacts * (1.0 - values)
+
+
+def margin_program(balance: Array, normals: Array, friction: Array) -> tuple[float, Array, Array]:
+    """Margin t, balancing forces (k, 3), and the dual twist in the rows of `balance`.
+
+    The unknowns of a contact are its normal force and its tangential force over mu, so that
+    small coefficients are solved as well as large ones; without friction only the former.
+
+    Args:
+        balance: What must vanish as a matrix on the stacked forces, (m, 3k).
+        normals: (k, 3)
+        friction: (k,)
+    """
+    k, m = len(normals), len(balance)
+    frames = contact_frames(normals) * np.array([np.ones(k), friction, friction]).T[:, None]
+    free = allowed(friction)
+    rows = in_frames(balance, frames)[:, free]
+    pushing = np.tile([True, False, False], k)[free]
+    if (departing := _departing_twist(rows, pushing * 1.0)) is not None:
+        return -math.inf, np.zeros((k, 3)), departing
+    n = int(free.sum())
+    largest = float(friction.max()) or 1.0
+    flat = friction == 0.0
+    A = np.zeros((m + 1 + n, n + 1))
+    A[:m, :n], A[m, :n] = rows, pushing
+    order = np.argsort(~np.repeat(flat, 3)[free], kind="stable")  # frictionless rows first
+    A[m + 1 + np.arange(n), order] = -1.0
+    depths = largest / np.where(flat, 1.0, np.maximum(friction, TINY))
+    A[m + 1 :, n] = np.where(pushing, np.repeat(depths, 3)[free], 0.0)[order]
+    b, q = np.zeros(len(A)), np.zeros(n + 1)
+    b[m], q[-1] = 1.0, -1.0
+    flats = int(flat.sum())
+    solution = minimize(ConicProgram(q, A, b, m + 1, flats, (3,) * (k - flats)))
+    local = np.zeros(3 * k)
+    x = solution.x[:-1]
+    local[free] = x - np.asarray(np.linalg.lstsq(rows, rows @ x, rcond=None)[0], dtype=np.float64)
+    forces = np.einsum("kij,kj->ki", frames, local.reshape(k, 3))
+    return largest * float(solution.x[-1]), forces, -solution.z[:m]
+
+
+def allowed(friction: Array) -> NDArray[np.bool_]:
+    """Which of the local forces (normal, tangent, tangent) of each contact may be non-zero."""
+    sliding = friction > 0.0
+    return np.column_stack([np.ones_like(sliding), sliding, sliding]).ravel()
+
+
+def _departing_twist(rows: Array, share: Array) -> Array | None:
+    """A twist with which every contact leaves along its normal: then no forces balance."""
+    sizes = np.maximum(np.linalg.norm(rows, axis=0), TINY)
+    scaled: Array = (rows / sizes).T
+    twist = -np.asarray(np.linalg.lstsq(scaled, share / sizes, rcond=None)[0], dtype=np.float64)
+    missed = np.abs(rows.T @ twist + share) / np.maximum(sizes, 1.0)
+    if not np.isfinite(missed).all() or missed.max() > ROUNDING * (
+        1.0 + float(np.abs(twist).max())
+    ):
+        return None
+    return twist

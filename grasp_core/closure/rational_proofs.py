@@ -1,0 +1,247 @@
+"""Proofs of force closure, and of its opposite, in rational arithmetic.
+
+Solved: whether numbers that a search found prove what they are meant to prove, for positions and
+normals exactly as they are given: a float is a rational number.
+
+Forces found in floating point balance but for rounding, and a depth in the cones that falls with
+the square of the friction is soon smaller than any bound on that. So the imbalance is removed
+exactly: by least squares first, in units of the depths, and what rounding leaves of it by six
+columns of the grasp map, those of the contacts deepest in their cones first. The corrected forces
+are compared with the cones:
+
+    0 < p = n.f  and  |f|^2 |n|^2 - p^2 < mu^2 p^2.                                     (1)
+
+A twist must leave contacts that balance each other exactly at rest. Contacts that it hardly moves
+are put to rest exactly; the others must depart, steeply enough:
+
+    p = n.v <= 0  and  mu^2 (|v|^2 |n|^2 - p^2) <= p^2.                                 (2)
+
+There is one tolerance, `SAME`, for what has no exact answer: contacts whose wrenches are dependent
+but for the rounding of their coordinates.
+"""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.closure.wrenches import WRENCH, grasp_map, normal_and_tangential
+
+Exact = list[Fraction]
+"""A vector of rational numbers."""
+
+INDEPENDENT = (1e-6, 1e-9)
+"""Distances of a unit-size wrench from the span of others at which it counts as independent of
+them, tried in turn; the last one is the rank that force closure asks for."""
+NEARLY_AT_REST = 1e-9
+"""Speeds that are meant to be none, for twists of unit size."""
+SAME = Fraction(1, 10**12)
+"""Speed of a contact that cannot be put to rest exactly and yet counts as at rest, for twists of
+unit size: it would be at rest if it were moved by this share of the contacts' size."""
+
+
+def closes(forces: Array, positions: Array, normals: Array, friction: float) -> bool:
+    """Whether forces next to these balance exactly, strictly inside cones that span all wrenches.
+
+    Args:
+        forces: (k, 3)
+        positions: (k, 3) [m]
+        normals: Inward, of unit length, (k, 3).
+        friction: Coulomb coefficient of all contacts.
+    """
+    return closing_forces(forces, positions, normals, friction) is not None
+
+
+def closing_forces(
+    forces: Array, positions: Array, normals: Array, friction: float
+) -> Array | None:
+    """The forces that `closes` finds next to the given ones, but for rounding; None without.
+
+    Args:
+        forces: (k, 3)
+        positions: (k, 3) [m]
+        normals: Inward, of unit length, (k, 3).
+        friction: Coulomb coefficient of all contacts.
+    """
+    if not (np.isfinite(forces).all() and 0.0 < friction < math.inf):
+        return None
+    arms, size = _arms(positions)
+    along, across = normal_and_tangential(forces, normals)
+    depths = np.maximum(friction * along - across, 0.0)
+    columns = _columns(arms, np.argsort(-depths, kind="stable"))
+    if columns is None:
+        return None
+    nearly = _vectors(_nearly_balanced(forces, arms, depths))
+    balanced = _balanced(nearly, _exact_arms(positions, size), columns)
+    slope = Fraction(friction) ** 2
+    if balanced is None or not all(
+        _inside(f, n, slope) for f, n in zip(balanced, _vectors(normals), strict=True)
+    ):
+        return None
+    return np.array([[float(x) for x in force] for force in balanced])
+
+
+def separates(twist: Array, positions: Array, normals: Array, friction: float) -> bool:
+    """Whether no force in the friction cones works along a twist next to this one.
+
+    Args:
+        twist: Velocity of the object at the first contact, and angular velocity, (6,) [m/s, rad/s].
+        positions: (k, 3) [m]
+        normals: Inward, of unit length, (k, 3).
+        friction: Coulomb coefficient of all contacts; infinite to ask for every coefficient.
+    """
+    arms, size = _arms(positions)
+    unit = twist * np.repeat([1.0, size], 3)
+    length = float(np.linalg.norm(unit))
+    if not (0.0 < length < math.inf and friction >= 0.0):
+        return False
+    unit /= length
+    rows = grasp_map(arms).T
+    still = np.flatnonzero(np.linalg.norm((rows @ unit).reshape(-1, 3), axis=1) <= NEARLY_AT_REST)
+    wanted = (3 * still[:, None] + np.arange(3)).ravel()
+    exact_arms = _exact_arms(positions, size)
+    resting = [divmod(int(wanted[each]), 3) for each in _independent(rows[wanted], INDEPENDENT[-1])]
+    exact = _at_rest([Fraction(x) for x in unit.tolist()], exact_arms, resting)
+    if exact is None or not any(exact):
+        return False
+    slope = None if friction == math.inf else Fraction(friction) ** 2
+    return all(
+        _departs(_velocity(exact, arm), normal, slope)
+        for arm, normal in zip(exact_arms, _vectors(normals), strict=True)
+    )
+
+
+def _arms(positions: Array) -> tuple[Array, float]:
+    """Arms from the first contact in units of the longest one, (k, 3), and its length."""
+    arms = positions - positions[0]
+    size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
+    return arms / size, size
+
+
+def _vectors(rows: Array) -> list[Exact]:
+    return [[Fraction(x) for x in row] for row in rows.tolist()]
+
+
+def _exact_arms(positions: Array, size: float) -> list[Exact]:
+    exact, unit = _vectors(positions), Fraction(size)
+    return [[(x - o) / unit for x, o in zip(point, exact[0], strict=True)] for point in exact]
+
+
+def _columns(arms: Array, order: Indices) -> list[tuple[int, int]] | None:
+    """Six independent columns of the grasp map, as (contact, axis), from contacts in an order."""
+    wrenches = grasp_map(arms).T.reshape(-1, 3, WRENCH)[order].reshape(-1, WRENCH)
+    for least in INDEPENDENT:
+        found = _independent(wrenches, least)
+        if len(found) == WRENCH:
+            return [(int(order[each // 3]), each % 3) for each in found]
+    return None
+
+
+def _nearly_balanced(forces: Array, arms: Array, depths: Array) -> Array:
+    """Forces changed so that they balance but for rounding, the deeper the more."""
+    G, room = grasp_map(arms), np.repeat(depths, 3)
+    change = np.linalg.lstsq(G * room, G @ forces.ravel(), rcond=INDEPENDENT[-1])[0]
+    return forces - (room * np.asarray(change, dtype=np.float64)).reshape(forces.shape)
+
+
+def _independent(rows: Array, least: float) -> list[int]:
+    """Rows, (n, 6), none of which is nearer than that to the span of those before it."""
+    left, found = rows.copy(), list[int]()
+    for row in range(len(left)):
+        length = float(np.linalg.norm(left[row]))
+        if length > least and len(found) < WRENCH:
+            found.append(row)
+            direction = left[row] / length
+            for _ in range(2):  # once more for what rounding leaves
+                left[row + 1 :] -= np.outer(left[row + 1 :] @ direction, direction)
+    return found
+
+
+def _balanced(
+    forces: list[Exact], arms: list[Exact], columns: list[tuple[int, int]]
+) -> list[Exact] | None:
+    """Forces with components, as (contact, axis), changed so that they balance."""
+    total = [Fraction(0)] * WRENCH
+    for force, arm in zip(forces, arms, strict=True):
+        wrench = [*force, *_cross(arm, force)]
+        total = [sofar + part for sofar, part in zip(total, wrench, strict=True)]
+    wrenches = [_wrench(axis, arms[contact]) for contact, axis in columns]
+    changes = _solution([list(row) for row in zip(*wrenches, strict=True)], total)
+    if changes is None:
+        return None
+    balanced = [list(force) for force in forces]
+    for (contact, axis), change in zip(columns, changes, strict=True):
+        balanced[contact][axis] -= change
+    return balanced
+
+
+def _at_rest(twist: Exact, arms: list[Exact], resting: list[tuple[int, int]]) -> Exact | None:
+    """A twist changed so that velocities of contacts along axes, (contact, axis), are zero."""
+    rows = [_wrench(axis, arms[contact]) for contact, axis in resting]
+    speeds = [sum((a * b for a, b in zip(row, twist, strict=True)), Fraction(0)) for row in rows]
+    changes = _solution(rows, speeds)
+    return changes and [part - change for part, change in zip(twist, changes, strict=True)]
+
+
+def _wrench(axis: int, arm: Exact) -> Exact:
+    """Of a unit force along an axis; also what gives the speed there along it, times a twist."""
+    force = [Fraction(int(axis == each)) for each in range(3)]
+    return [*force, *_cross(arm, force)]
+
+
+def _velocity(twist: Exact, arm: Exact) -> Exact:
+    return [a + b for a, b in zip(twist[:3], _cross(twist[3:], arm), strict=True)]
+
+
+def _solution(rows: list[Exact], right: Exact) -> Exact | None:
+    """One x with rows @ x = right, six numbers, those it leaves free zero; by elimination."""
+    table = [[*row, value] for row, value in zip(rows, right, strict=True)]
+    pivots = list[int]()
+    for i, row in enumerate(table):
+        pivot = max(range(WRENCH), key=lambda column, row=row: abs(row[column]))
+        if not row[pivot]:
+            return None
+        pivots.append(pivot)
+        table[i] = lead = [value / row[pivot] for value in row]
+        for j, other in enumerate(table):
+            if j != i and other[pivot]:
+                share = other[pivot]
+                table[j] = [a - share * b for a, b in zip(other, lead, strict=True)]
+    x = [Fraction(0)] * WRENCH
+    for pivot, row in zip(pivots, table, strict=True):
+        x[pivot] = row[WRENCH]
+    return x
+
+
+def _inside(force: Exact, normal: Exact, slope: Fraction) -> bool:
+    """Inequality (1), `slope` being the square of the friction."""
+    along, across = _squares(force, normal)
+    return _dot(force, normal) > 0 and across < slope * along
+
+
+def _departs(velocity: Exact, normal: Exact, slope: Fraction | None) -> bool:
+    """Inequality (2), for every friction where `slope` is None; or no speed but `SAME`."""
+    if _dot(velocity, velocity) <= SAME**2:
+        return True
+    along, across = _squares(velocity, normal)
+    steep = across <= SAME**2 if slope is None else slope * across <= along
+    return steep and _dot(velocity, normal) <= 0
+
+
+def _squares(vector: Exact, normal: Exact) -> tuple[Fraction, Fraction]:
+    """Squares of the parts along and across a normal, times the square of its length."""
+    along = _dot(vector, normal) ** 2
+    return along, _dot(vector, vector) * _dot(normal, normal) - along
+
+
+def _dot(a: Exact, b: Exact) -> Fraction:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Exact, b: Exact) -> Exact:
+    return [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]

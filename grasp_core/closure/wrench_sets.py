@@ -1,0 +1,184 @@
+"""The wrenches that contacts can apply with bounded forces, by closed-form support points.
+
+Ferrari & Canny bound the contact forces in two ways:
+
+    l1:    the normal forces sum to one; the set is the hull of all single contacts' cones,
+           cut at unit normal force;
+    linf:  each normal force is at most one; the set is the sum of such hulls with zero.
+
+With s_i(y) the support of cone i cut at unit normal force (see `closure`), the support of the
+set in the direction y is max_i s_i(y), or the sum of the positive s_i(y). The force of contact
+i that attains s_i(y) is n_i + mu_i t, with t along the tangential part of its velocity; so the
+circular cones need no pyramid.
+
+Source: Ferrari & Canny, "Planning optimal grasps" (ICRA 1992), with circular cones.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal, Self, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, frozen
+from grasp_core.checked import one_of, positive, shown
+from grasp_core.closure.contact_arrays import check_spread, contact_arrays, contact_frictions
+from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
+from grasp_core.errors import InputError
+from grasp_core.fields import are_frictions, is_a, is_array
+from grasp_core.solvers.ties import on_grid
+from grasp_core.values import Grasp
+
+Norm: TypeAlias = Literal["l1", "linf"]
+"""How contact forces are bounded."""
+
+NO_SLIDE = 1e-290
+"""Less than this along the surface has no direction."""
+SAME_FRAME = 1e-9
+"""How far frames may be from orthonormal: normals are unit to nine digits."""
+SAME_DIGITS = 10
+"""Digits after the point that searches are told: frames stay within `SAME_FRAME`."""
+LARGEST_RATIO = 1e6
+"""Between the torque scale and the contacts' extent: beyond it, rounding decides."""
+
+
+def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
+    """Levers of contacts (k, 3) about a centre, over the torque scale.
+
+    Raises:
+        InputError: The scale or the centre is so far from the contacts' own that rounding decides.
+    """
+    scale = positive(torque_scale, "torque_scale")
+    spread = np.ptp(points, axis=0)
+    check_spread(spread)
+    apart = points - points.mean(axis=0)
+    extent = float(np.linalg.norm(apart, axis=1).max()) if spread.any() else scale
+    if not 1.0 / LARGEST_RATIO <= scale / extent <= LARGEST_RATIO:
+        raise InputError(
+            f"torque_scale must be within a factor {LARGEST_RATIO:g} of the extent of the "
+            f"positions, {extent:.3g}; got {torque_scale}"
+        )
+    arms = (points - frozen(center, (3,), "center")) / scale
+    if float(np.abs(arms).max()) > LARGEST_RATIO:
+        raise InputError(
+            f"center must be within {LARGEST_RATIO:g} times torque_scale of the positions, got "
+            f"{shown(center)}"
+        )
+    return arms
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WrenchSet:
+    """The wrenches of contacts with bounded normal forces.
+
+    Contact forces are local here: (normal, tangent, tangent) of each contact in turn.
+    """
+
+    G: Array
+    """Local contact forces to their wrench, torques over the torque scale, (6, 3k)."""
+    friction: Array
+    """(k,)"""
+    norm: Norm
+
+    @classmethod
+    def of(
+        cls,
+        positions: ArrayLike | Grasp,
+        normals: ArrayLike | None,
+        friction: ArrayLike,
+        *,
+        center: ArrayLike,
+        torque_scale: float,
+        norm: Norm = "l1",
+    ) -> Self:
+        """From contacts, (k, 3) each; torques are about `center`, divided by `torque_scale` [m].
+
+        Raises:
+            InputError: Shapes, lengths or signs are wrong.
+        """
+        points, units = contact_arrays(positions, normals)
+        one_of(norm, get_args(Norm), "norm")
+        arms = scaled_arms(points, center, torque_scale)
+        G = in_frames(grasp_map(arms), contact_frames(units))
+        return cls(G, contact_frictions(friction, len(points)), norm)
+
+    def on_grid(self) -> "WrenchSet":
+        """Nearly the same for a search, which is to see no last digits."""
+        return replace(
+            self, G=on_grid(self.G, SAME_DIGITS), friction=on_grid(self.friction, SAME_DIGITS)
+        )
+
+    def sound(self) -> bool:
+        """Whether this is the wrench set of some contacts, to within `SAME_FRAME`.
+
+        In the columns of `G` each contact has an orthonormal frame, and torques that are those of
+        the frame's vectors at one point: then torque columns times the frame's are skew.
+        """
+        k = len(self.friction) if is_array(self.friction, None) else 0
+        known = is_a(self.norm, str) and self.norm in get_args(Norm)
+        if not (known and k and are_frictions(self.friction, k)):
+            return False
+        if not is_array(self.G, WRENCH, 3 * k):
+            return False
+        frames, turns = self.G.reshape(2, 3, k, 3).transpose(0, 2, 1, 3)
+        square = frames @ frames.transpose(0, 2, 1)
+        levers = turns @ frames.transpose(0, 2, 1)
+        slack = SAME_FRAME * np.maximum(np.abs(levers).max(axis=(1, 2), keepdims=True), 1.0)
+        return (
+            bool((np.abs(square - np.eye(3)) <= SAME_FRAME).all())
+            and bool((np.abs(levers + levers.transpose(0, 2, 1)) <= slack).all())
+            and float(np.abs(self.G).max()) <= LARGEST_RATIO * LARGEST_RATIO
+        )
+
+    @property
+    def size(self) -> float:
+        """Length of the longest wrench of a unit normal force, to within a factor 1.5 [N]."""
+        longest = np.linalg.norm(self.G, axis=0).max()
+        return float(longest * np.sqrt(1.0 + self.friction.max() ** 2))
+
+    def supports(self, directions: Array) -> Array:
+        """Support of the set in each of several directions, (n, 6), without forces, (n,)."""
+        slopes = (directions @ self.G).reshape(len(directions), -1, 3)
+        each = slopes[:, :, 0] + self.friction * np.hypot(slopes[:, :, 1], slopes[:, :, 2])
+        return each.max(axis=1) if self.norm == "l1" else np.maximum(each, 0.0).sum(axis=1)
+
+    def support(self, direction: Array) -> tuple[float, Array]:
+        """Support of the set in a direction, with the local forces that attain it, (3k,)."""
+        slopes = (direction @ self.G).reshape(-1, 3)
+        across = np.hypot(slopes[:, 1], slopes[:, 2])
+        each = slopes[:, 0] + self.friction * across
+        forces = np.zeros_like(slopes)
+        if self.norm == "l1":
+            i = int(each.argmax())
+            forces[i, 0] = 1.0
+            if across[i] > NO_SLIDE:
+                forces[i, 1:] = slopes[i, 1:] * (self.friction[i] / across[i])
+            return float(each[i]), forces.ravel()
+        pushing = each > 0.0
+        forces[pushing, 0] = 1.0
+        sliding = pushing & (across > NO_SLIDE)
+        forces[sliding, 1:] = (
+            slopes[sliding, 1:] * (self.friction[sliding] / across[sliding])[:, None]
+        )
+        return float(each[pushing].sum()), forces.ravel()
+
+    def edges(self) -> Array:
+        """Local forces whose wrenches span what the set spans, (n, 3k)."""
+        k = len(self.friction)
+        frame = np.array([[1.0, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1]])
+        forces = np.zeros((4 * k + 1, k, 3))
+        for i, mu in enumerate(self.friction):
+            forces[4 * i : 4 * i + 4, i] = frame * [1.0, mu, mu]
+        rows = forces.reshape(-1, 3 * k)
+        return rows if self.norm == "linf" else rows[:-1]
+
+    def holds(self, forces: Array, slack: float) -> bool:
+        """Whether local forces, (n, 3k), lie within cones and bounds, up to a slack."""
+        each = forces.reshape(len(forces), -1, 3)
+        pushes, slides = each[:, :, 0], np.hypot(each[:, :, 1], each[:, :, 2])
+        if self.norm == "l1":
+            bounded = np.abs(pushes.sum(axis=1) - 1.0) <= slack
+        else:
+            bounded = pushes.max(axis=1) <= 1.0 + slack
+        in_cones = (slides <= self.friction * pushes + slack).all(axis=1)
+        return bool((bounded & in_cones & (pushes.min(axis=1) >= -slack)).all())

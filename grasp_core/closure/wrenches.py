@@ -1,0 +1,55 @@
+"""Contact forces to wrenches, as matrices.
+
+A wrench is (force, torque), (6,), with the torque about a stated centre. A contact force is
+what the finger applies to the object, in the object's frame.
+"""
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.geometry.polygons import plane_tangents
+
+WRENCH = 6
+"""Dimension of a wrench."""
+
+
+def grasp_map(positions: Array, center: Array | None = None) -> Array:
+    """Matrix from stacked contact forces (3k,) to their wrench about `center`, (..., 6, 3k).
+
+    Args:
+        positions: Contact points, (..., k, 3) [m].
+        center: (3,) [m]; the origin when None.
+    """
+    arms = positions if center is None else positions - center
+    x, y, z = np.moveaxis(arms, -1, 0)
+    G = np.zeros((*arms.shape[:-2], WRENCH, arms.shape[-2], 3))
+    G[..., 0, :, 0] = G[..., 1, :, 1] = G[..., 2, :, 2] = 1.0
+    G[..., 3, :, 1], G[..., 3, :, 2] = -z, y
+    G[..., 4, :, 0], G[..., 4, :, 2] = z, -x
+    G[..., 5, :, 0], G[..., 5, :, 1] = -y, x
+    return G.reshape(*arms.shape[:-2], WRENCH, 3 * arms.shape[-2])
+
+
+def in_frames(G: Array, frames: Array) -> Array:
+    """A matrix on stacked forces (m, 3k), as one on their coordinates in (k, 3, 3) frames."""
+    m, k = len(G), len(frames)
+    return np.einsum("mki,kij->mkj", G.reshape(m, k, 3), frames).reshape(m, 3 * k)
+
+
+def cross_matrix(vector: Array) -> Array:
+    """Matrix C of a cross product: C @ b is vector x b."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def contact_frames(normals: Array) -> Array:
+    """Orthonormal frames with the columns (normal, tangent, tangent), (k, 3, 3)."""
+    columns = [((x, y, z), *plane_tangents(x, y, z)) for x, y, z in normals.tolist()]
+    return np.array(columns).transpose(0, 2, 1)
+
+
+def normal_and_tangential(forces: Array, normals: Array) -> tuple[Array, Array]:
+    """Normal components (..., k) and lengths of the tangential parts (..., k) of (..., k, 3)."""
+    along = np.einsum("...i,...i->...", forces, normals)
+    across = forces - along[..., None] * normals
+    return along, np.sqrt(np.einsum("...i,...i->...", across, across))

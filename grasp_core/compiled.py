@@ -1,0 +1,56 @@
+"""Compiled inner loops are loaded here; they stand beside their modules as `NAME_kernel.py`.
+
+A kernel is plain arithmetic on arrays of programs, directions or contacts. What makes a claim, such
+as a placement, a closure or a quality, is checked by the module that asks for it, which has a
+slower way of its own, the reference, for what fails the check. What only says where to search is
+not: spanning quadruples, tilted cones, and bounds on discs, whose multipliers are checked in
+compiled code. Tests hold these against the reference. The reference does everything where numba
+cannot compile or keep kernels, or the environment says `GRASPPROOF_KERNELS=off`.
+
+Numba keeps a compiled module together with what it calls from others, and looks only at the file
+of that module to see whether it changed: after a change of one kernel remove what it kept of the
+others (`*.nbi` and `*.nbc` in `__pycache__`).
+"""
+
+import importlib
+import os
+from functools import cache
+from typing import Any
+
+from grasp_core.errors import InputError
+
+SWITCH = "GRASPPROOF_KERNELS"
+"""Environment variable; `off` leaves everything to the reference."""
+SETTINGS = ("on", "off")
+
+
+@cache
+def compiled(name: str) -> Any:
+    """A module of kernels after its `try_out`; None where kernels are not wanted or do not work.
+
+    Args:
+        name: The module's full name, `grasp_core.ROOM.NAME_kernel`.
+
+    Raises:
+        InputError: The environment says what is neither on nor off.
+    """
+    asked = os.environ.get(SWITCH) or "on"
+    if asked not in SETTINGS:
+        raise InputError(
+            f"environment variable {SWITCH}: expected {' or '.join(SETTINGS)}, or none, got "
+            f"{asked!r}; unset it"
+        )
+    if asked == "off":
+        return None
+    try:
+        failures: Any = importlib.import_module("numba.core.errors")
+        kernel: Any = importlib.import_module(name)
+    except (ImportError, RuntimeError, OSError, ValueError) as error:  # the last: numba's settings
+        if str(getattr(error, "name", "")).startswith("grasp_core"):
+            raise
+        return None
+    try:
+        kernel.try_out()
+    except (failures.NumbaError, RuntimeError, OSError):
+        return None
+    return kernel

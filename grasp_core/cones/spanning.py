@@ -1,0 +1,299 @@
+"""When four cones of directions positively span space whatever directions they contribute (P3).
+
+Solved: Definition 3 of the paper in closed form, and all face quadruples that satisfy it.
+
+Four vectors theta-positively span R^3 when every choice of one vector from each cone of
+half-angle theta around them positively spans R^3. Let A have the unit axes of three of the
+four cones as rows. If the axes themselves positively span, then by continuity the property
+first fails when some triple of cones admits linearly dependent picks, that is, when a plane
+through the origin with unit normal g meets all three: |A g| <= sin(psi) row by row. With
+y = A g such a g exists iff some y in that box has |A^-1 y| >= 1, and a convex function is
+largest at a corner of the box. So, for equal half-angles,
+
+    sin(theta*) = min over the 4 triples, over signs s in {+-1}^3, of 1 / |A^-1 s|,
+
+and the property holds exactly for theta < theta*. The columns of A^-1 are cross products of
+the axes over det A, which is how the code evaluates it. theta* never exceeds asin(1/3): the
+ball of radius sin(theta*) lies in a tetrahedron inscribed in the unit sphere.
+
+Source: Sudsang & Ponce 1995, Definition 3 and Proposition 4; the closed form is this project's.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from grasp_core.arrays import Array, Indices, frozen, frozen_units
+from grasp_core.compiled import compiled
+from grasp_core.errors import InputError
+
+SIGNS = np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=np.float64)
+LARGEST_SPAN_ANGLE = math.asin(1.0 / 3.0)
+"""Reached by the regular tetrahedron only [rad]."""
+KERNEL = "grasp_core.cones.spanning_kernel"
+FEW = 30
+"""So many directions are enumerated in less time than it takes to load compiled code."""
+GUESS = 2
+"""Room for so many quadruples per pair of directions, before they are counted."""
+OTHERS = ([1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2])
+"""The other three, for each of four."""
+DEPENDENT = 1e-12
+"""Triples of unit vectors with a smaller determinant are coplanar: a few rounding errors."""
+
+
+def span_angle(normals: ArrayLike) -> float:
+    """Largest half-angle below which four cones around unit vectors always positively span.
+
+    Args:
+        normals: Unit vectors, (4, 3).
+
+    Returns:
+        theta* [rad]; 0.0 when the vectors themselves do not positively span R^3.
+    """
+    units = frozen_units(normals, (4, 3), "normals")
+    if not positively_span(units):
+        return 0.0
+    triples = [units[list(triple)] for triple in combinations(range(4), 3)]
+    return math.asin(min(abs(triple_sine(*triple)) for triple in triples))
+
+
+def count_spanning(normals: ArrayLike, least: float) -> int:
+    """How many quadruples of unit vectors (n, 3) span at an angle [rad], without listing them."""
+    units = frozen_units(normals, (None, 3), "normals")
+    kernel = compiled(KERNEL) if len(units) > FEW else None
+    if kernel is None:
+        return len(spanning_quadruples(units, least).indices)
+    table = SpanningTable(units, least)
+    return sum(table.count(newest) for newest in range(len(units)))
+
+
+def span_sines(units: Array) -> Array:
+    """Sine of theta* of many quadruples of unit vectors (q, 4, 3); negative where they do not span.
+
+    The negative value is how far the worst weight of a vanishing combination is from positive.
+
+    As `triple_sine`, from the cosines between the vectors: with (v x w).(w x u) = (v.w)(w.u) - u.v,
+    the largest |+-(v x w) +-(w x u) +-(u x v)| needs no cross products. A few arrays along all
+    quadruples make this ten times as fast as a formula for each.
+    """
+    one, two, three, four = np.ascontiguousarray(np.moveaxis(units, 0, -1))
+    front, back = _crossed(one, two), _crossed(three, four)
+    minors = (_dotted(two, back), _dotted(one, back), _dotted(four, front), _dotted(three, front))
+    signed: Array = np.stack([minors[0], -minors[1], minors[2], -minors[3]])
+    total: Array = np.sum(signed, axis=0)
+    lowest: Array = np.min(signed * np.sign(total), axis=0, initial=np.inf)
+    farthest: Array = np.max(np.abs(signed), axis=0, initial=0.0)
+    sided: NDArray[np.bool_] = np.abs(total) > DEPENDENT  # else none is positive, but for rounding
+    worst: Array = np.where(sided, lowest, -farthest)
+    vectors = (one, two, three, four)
+    cosines = {
+        frozenset(pair): _dotted(vectors[pair[0]], vectors[pair[1]])
+        for pair in combinations(range(4), 2)
+    }
+    least = np.full(len(units), np.inf)
+    for minor, rest in zip(minors, OTHERS, strict=True):
+        g, h, k = (cosines[frozenset(pair)] for pair in combinations(rest, 2))
+        a, b, c = h * k - g, g * k - h, g * h - k
+        most = np.maximum(np.maximum(a + b + c, a - b - c), np.maximum(b - a - c, c - a - b))
+        squared = 3.0 - g * g - h * h - k * k + 2.0 * most
+        size = np.abs(minor)
+        safe = np.where(size > DEPENDENT, squared, np.inf)
+        least = np.minimum(least, size / np.sqrt(safe))
+    return np.where(worst > DEPENDENT, least, np.minimum(worst, 0.0))
+
+
+def _dotted(one: Sequence[Array], two: Sequence[Array]) -> Array:
+    """Dot products of columns, (q,)."""
+    return one[0] * two[0] + one[1] * two[1] + one[2] * two[2]
+
+
+def _crossed(one: Sequence[Array], two: Sequence[Array]) -> tuple[Array, Array, Array]:
+    """Cross products of columns, three of (q,)."""
+    (x, y, z), (u, v, w) = one, two
+    return y * w - z * v, z * u - x * w, x * v - y * u
+
+
+def cones_positively_span(axes: ArrayLike, half_angles: ArrayLike) -> bool:
+    """Whether four circular cones positively span R^3 whatever vector each contributes.
+
+    The generalised P3: cones of different half-angles around any axes.
+
+    Args:
+        axes: Unit vectors, (4, 3).
+        half_angles: (4,) [rad].
+
+    Raises:
+        InputError: Shapes, lengths or angles are wrong.
+    """
+    units = frozen_units(axes, (4, 3), "axes")
+    angles = frozen(half_angles, (4,), "half_angles")
+    if (angles < 0.0).any() or (angles >= np.pi / 2).any():
+        raise InputError(f"half_angles must be in [0, pi/2), got {angles.tolist()}")
+    sines = np.sin(angles)
+    if not positively_span(units):
+        return False
+    for triple in combinations(range(4), 3):
+        corners = np.linalg.solve(units[list(triple)], (SIGNS * sines[list(triple)]).T)
+        if np.linalg.norm(corners, axis=0).max() >= 1.0:
+            return False
+    return True
+
+
+def angles_between(one: Array, other: Array) -> Array:
+    """Angles between vectors (..., 3), as exact for nearly equal ones as for others, (...) [rad].
+
+    The inverse cosine would give up half of the digits there.
+    """
+    along = np.sum(one * other, axis=-1)
+    across: Array = np.arctan2(np.linalg.norm(np.cross(one, other), axis=-1), along)
+    return across
+
+
+def positively_span(vectors: Array) -> bool:
+    """Whether some positive combination of four vectors, (4, 3), vanishes and they span R^3."""
+    signed = _signed_determinants(vectors)
+    return bool(signed.min() > DEPENDENT or signed.max() < -DEPENDENT)
+
+
+def balancing_weights(vectors: Array) -> Array:
+    """The weights of sum w_i v_i = 0, summing to one in absolute value, (..., 4).
+
+    All are positive where the four vectors, (..., 4, 3), positively span R^3.
+    """
+    signed = _signed_determinants(vectors)
+    total = np.maximum(np.abs(signed).sum(axis=-1, keepdims=True), _TINY)
+    return signed / total * np.sign(signed.sum(axis=-1, keepdims=True))
+
+
+def _signed_determinants(vectors: Array) -> Array:
+    """Weights of a vanishing combination, by Cramer's rule, (..., 4)."""
+    minors = np.stack([vectors[..., rest, :] for rest in OTHERS], axis=-3)
+    determinants: Array = np.asarray(np.linalg.det(minors), dtype=np.float64)
+    return determinants * (1.0, -1.0, 1.0, -1.0)
+
+
+def triple_sine(one: Array, two: Array, three: Array) -> Array:
+    """Sine of the half-angle at which three cones first touch one plane, signed by det.
+
+    Args:
+        one: Unit vectors, (..., 3).
+        two: Likewise.
+        three: Likewise.
+
+    Returns:
+        (...): zero where the three are coplanar.
+    """
+    one, two, three = np.broadcast_arrays(one, two, three)
+    crosses = np.stack([np.cross(two, three), np.cross(three, one), np.cross(one, two)], axis=-2)
+    determinant = np.einsum("...i,...i->...", one, crosses[..., 0, :])
+    longest = np.linalg.norm(SIGNS @ crosses, axis=-1).max(axis=-1)
+    safe = np.where(np.abs(determinant) > DEPENDENT, longest, np.inf)
+    return determinant / safe
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpanningQuadruples:
+    """Face quadruples whose normals positively span at some least angle."""
+
+    indices: Indices
+    """(q, 4), ascending in each row, rows in lexicographic order."""
+    span_angles: Array
+    """theta* of each, (q,) [rad]."""
+
+
+def spanning_quadruples(normals: Array, least_angle: float) -> SpanningQuadruples:
+    """All quadruples of directions whose span angle exceeds `least_angle`.
+
+    Args:
+        normals: Unit vectors, (n, 3).
+        least_angle: [rad]
+    """
+    if len(normals) <= FEW:
+        return _spanning_by_pairs(normals, math.sin(least_angle))
+    return SpanningTable(normals, least_angle).quadruples(0, len(normals))
+
+
+class SpanningTable:
+    """Quadruples of directions that span, by the last of their directions."""
+
+    def __init__(self, normals: Array, least_angle: float) -> None:
+        self.units, self.least = np.ascontiguousarray(normals), math.sin(least_angle)
+        self.kernel = compiled(KERNEL)
+        self.size = 0
+        self.bits = None if self.kernel is None else self.kernel.empty_table(len(normals))
+
+    def quadruples(self, start: int, end: int) -> SpanningQuadruples:
+        """Those whose last direction is one of start .. end - 1."""
+        if self.kernel is None:
+            every = _spanning_by_pairs(self.units[:end], self.least)
+            last = every.indices[:, 3] >= start
+            return SpanningQuadruples(every.indices[last], every.span_angles[last])
+        self._extend(end)
+        indices = _sorted([self._ending_in(newest) for newest in range(start, end)], end)
+        sines = np.empty(len(indices))
+        self.kernel.least_sines(self.units, indices, sines)
+        return SpanningQuadruples(indices, np.arcsin(sines))
+
+    def count(self, newest: int) -> int:
+        """How many have this direction for their last one; only with compiled code."""
+        self._extend(newest + 1)
+        return int(self.kernel.quadruples(self.bits, newest, np.empty((0, 4), dtype=np.int64)))
+
+    def _extend(self, end: int) -> None:
+        if self.size < end:
+            self.kernel.extend(self.bits, self.units, self.size, end, self.least)
+            self.size = end
+
+    def _ending_in(self, newest: int) -> Indices:
+        found = np.empty((GUESS * newest * newest, 4), dtype=np.int64)
+        count = self.kernel.quadruples(self.bits, newest, found)
+        if count > len(found):
+            found = np.empty((count, 4), dtype=np.int64)
+            self.kernel.quadruples(self.bits, newest, found)
+        return found[:count].copy()
+
+
+def _sorted(parts: Sequence[Indices], count: int) -> Indices:
+    """Quadruples of `count` directions in lexicographic order, (q, 4)."""
+    places = count ** np.arange(3, -1, -1)
+    keys = np.sort(np.concatenate(parts) @ places)
+    return keys[:, None] // places % count
+
+
+def _spanning_by_pairs(normals: Array, least: float) -> SpanningQuadruples:
+    """All of them, from the least sine, without compiled code.
+
+    A table of signed triple sines decides each quadruple. With i < j fixed, the faces fall
+    into those to the left of the plane (i, j) and those to its right; a positively spanning
+    quadruple takes one of each, so only those pairs are tested, as one array operation.
+    """
+    count = len(normals)
+    table = np.array([triple_sine(normal, normals[:, None], normals[None]) for normal in normals])
+    found: list[Indices] = []
+    sines: list[Array] = []
+    for i, j in combinations(range(count), 2):
+        left = j + 1 + np.flatnonzero(table[i, j, j + 1 :] > least)
+        right = j + 1 + np.flatnonzero(table[i, j, j + 1 :] < -least)
+        if not (left.size and right.size):
+            continue
+        a, b = left[:, None], right[None, :]
+        sine = np.minimum(
+            np.minimum(table[i, a, b], table[j, b, a]),
+            np.minimum(table[i, j, a], table[j, i, b]),
+        )
+        rows, columns = np.nonzero(sine > least)
+        pair = np.sort(np.column_stack([left[rows], right[columns]]), axis=1)
+        found.append(np.column_stack([np.full((len(pair), 2), (i, j)), pair]))
+        sines.append(sine[rows, columns])
+    if not found:
+        return SpanningQuadruples(np.empty((0, 4), dtype=np.int64), np.empty(0))
+    indices, sine = np.concatenate(found), np.concatenate(sines)
+    order = np.lexsort(indices.T[::-1])
+    return SpanningQuadruples(indices[order], np.arcsin(sine[order]))
+
+
+_TINY = float(np.finfo(np.float64).tiny)

@@ -1,0 +1,176 @@
+"""All quadruples of directions that positively span at some least angle, by bit sets of triples.
+
+With s(i, j, k) the signed sine of the angle at which three cones first touch one plane (see
+`spanning`), four directions i, j, k < l span at an angle if the three others go around
+-l in a circle, s(i, j, l), s(j, k, l) and s(k, i, l) of one sign, s(i, j, k) of the other, and all
+larger in size than the sine of that angle. The table keeps for each ordered pair the set of third
+directions with a positive s, one bit each; what completes a pair is common to three of its rows,
+and is found 64 directions at a time.
+"""
+
+import numpy as np
+from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
+from numpy.typing import NDArray
+
+from grasp_core.arrays import Array, Indices
+
+WORD = 64
+DEPENDENT = 1e-12
+"""Triples of unit vectors with a smaller determinant are coplanar."""
+
+
+def try_out() -> None:
+    """Fill a tiny table."""
+    table = empty_table(4)
+    extend(table, np.eye(4, 3), 0, 4, 0.5)
+    found = np.empty((1, 4), dtype=np.int64)
+    quadruples(table, 3, found)
+    least_sines(np.eye(4, 3), np.zeros_like(found), np.empty(1))
+
+
+def empty_table(count: int) -> NDArray[np.uint64]:
+    """A table for so many directions, none of which is in it yet."""
+    return np.zeros((count, count, (count + WORD - 1) // WORD), dtype=np.uint64)
+
+
+@njit(cache=True)
+def extend(table: NDArray[np.uint64], units: Array, start: int, end: int, least: float) -> None:
+    """Put the directions start .. end - 1 into the table.
+
+    Args:
+        table: Holds those before them.
+        units: (n, 3)
+        start: The first new one.
+        end: One after the last one.
+        least: Smallest sine that counts.
+    """
+    for k in range(start, end):
+        to_k = units @ units[k]
+        for j in range(k):
+            to_j = units @ units[j]
+            x, y, z = _crossed(units[j], units[k])
+            for i in range(j):
+                determinant = x * units[i, 0] + y * units[i, 1] + z * units[i, 2]
+                longest = _longest_squared(to_j[i], to_j[k], to_k[i])
+                if determinant * determinant <= least * least * longest:
+                    continue
+                if determinant > DEPENDENT:
+                    _mark(table, i, j, k)
+                elif determinant < -DEPENDENT:
+                    _mark(table, j, i, k)
+
+
+@njit(cache=True)
+def quadruples(table: NDArray[np.uint64], newest: int, found: Indices) -> int:
+    """List the quadruples of one direction and three before it.
+
+    Args:
+        table: Holds all of them.
+        newest: The last one of each quadruple.
+        found: Filled with quadruples, ascending in each row, as far as there is room.
+
+    Returns:
+        How many there are.
+    """
+    count = 0
+    word, bit = newest // WORD, np.uint64(1) << np.uint64(newest % WORD)
+    for i in range(newest):
+        for j in range(i + 1, newest):
+            if table[i, j, word] & bit:  # i, j go around the newest one as in (i, j, newest)
+                count = _completed(table, (i, j), (j, i), newest, found, count)
+            elif table[j, i, word] & bit:
+                count = _completed(table, (j, i), (i, j), newest, found, count)
+    return count
+
+
+@njit(cache=True)
+def least_sines(units: Array, found: Indices, sines: Array) -> None:
+    """Sines of the angles below which quadruples of directions span, (q,)."""
+    for row in range(len(found)):
+        a, b = units[found[row, 0]], units[found[row, 1]]
+        c, d = units[found[row, 2]], units[found[row, 3]]
+        sines[row] = min(min(_sine(a, b, c), _sine(a, b, d)), min(_sine(a, c, d), _sine(b, c, d)))
+
+
+@njit(cache=True)
+def _completed(
+    table: NDArray[np.uint64],
+    pair: tuple[int, int],
+    turned: tuple[int, int],
+    newest: int,
+    found: Indices,
+    count: int,
+) -> int:
+    """Add what completes a pair: with the newest like the pair, and with the pair the other way."""
+    tail, head = pair
+    larger = max(tail, head)
+    for word in range(larger // WORD, (newest + WORD - 1) // WORD):
+        members = (
+            table[turned[0], turned[1], word]
+            & table[newest, head, word]
+            & table[tail, newest, word]
+        )
+        while members:
+            lowest = members & (~members + np.uint64(1))
+            members ^= lowest
+            k = word * WORD + _place(lowest)
+            if k <= larger or k >= newest:
+                continue
+            if count < len(found):
+                found[count, 0], found[count, 1] = min(tail, head), larger
+                found[count, 2], found[count, 3] = k, newest
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def _place(bit: np.uint64) -> int:
+    """Which bit of a word is set."""
+    place, size = 0, 32
+    while size:
+        if bit >> np.uint64(size):
+            bit >>= np.uint64(size)
+            place += size
+        size //= 2
+    return place
+
+
+@njit(cache=True)
+def _mark(table: NDArray[np.uint64], i: int, j: int, k: int) -> None:
+    """Triple (i, j, k) turns this way, and so do (j, k, i) and (k, i, j)."""
+    one = np.uint64(1)
+    table[i, j, k // WORD] |= one << np.uint64(k % WORD)
+    table[j, k, i // WORD] |= one << np.uint64(i % WORD)
+    table[k, i, j // WORD] |= one << np.uint64(j % WORD)
+
+
+@njit(cache=True)
+def _sine(u: Array, v: Array, w: Array) -> float:
+    """Size of `triple_sine` of `spanning`."""
+    x, y, z = _crossed(v, w)
+    determinant = abs(x * u[0] + y * u[1] + z * u[2])
+    if determinant <= DEPENDENT:
+        return 0.0
+    return determinant / np.sqrt(_longest_squared(_dotted(u, v), _dotted(v, w), _dotted(w, u)))
+
+
+@njit(cache=True)
+def _longest_squared(g: float, h: float, k: float) -> float:
+    """Of +-(v x w) +-(w x u) +-(u x v), from the cosines u.v, v.w and w.u of unit vectors."""
+    a, b, c = h * k - g, g * k - h, g * h - k
+    most = max(max(a + b + c, a - b - c), max(b - a - c, c - a - b))
+    return 3.0 - g * g - h * h - k * k + 2.0 * most
+
+
+@njit(cache=True)
+def _dotted(u: Array, v: Array) -> float:
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
+@njit(cache=True)
+def _crossed(u: Array, v: Array) -> tuple[float, float, float]:
+    return (
+        u[1] * v[2] - u[2] * v[1],
+        u[2] * v[0] - u[0] * v[2],
+        u[0] * v[1] - u[1] * v[0],
+    )

@@ -1,0 +1,265 @@
+"""Force cones that positively span although the faces' normals do not.
+
+Solved: for four normals n_i with friction cones of half-angles theta_i, axes a_i and one half-angle
+psi, as large as a search finds, such that the cones around a_i lie inside the friction cones and
+positively span whatever direction each contributes (P3):
+
+    angle(a_i, n_i) + psi <= theta_i,      psi < theta*(a_1, .., a_4).
+
+Solutions exist exactly where four forces, each strictly inside its friction cone, can sum to zero
+without lying in a plane: then their directions positively span, and by continuity so do narrow
+cones around them. So boxes and prisms have them at any friction, though never around the
+normals, and so have all faces at frictions above 0.354, where P3 around the normals is impossible.
+
+With a_i = n_i and psi = theta this is Definition 3 of the paper; its constructions hold word for
+word, since nothing in them uses that an axis is a normal.
+
+Search. The height of the pyramid (theta, theta*) over the axes has one ridge after another, so
+nothing is claimed to be the largest. Axes that balance well are found first: each in turn is
+pointed against the sum of the others, as far as a cap around its normal lets it, for caps of
+several sizes; normals that lie nearly in a plane, as those of a box's sides, are bent out of it.
+Then all four are moved at random, in steps that grow with success and shrink
+without. The moves are the same for any quadruple, in frames that turn with it, so that turned
+objects get turned cones.
+
+Source: this project's; P3 with its closed form is explained in `spanning`.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations, pairwise, product
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.compiled import compiled
+from grasp_core.cones.spanning import OTHERS, angles_between, span_sines
+from grasp_core.values import FINGERS
+
+KERNEL = "grasp_core.cones.tilting_kernel"
+CAPS = (0.3, 0.5, 0.7, 0.9)
+"""How far axes may lean while they are balanced, in friction angles."""
+TOWARD = (0.5, 0.9)
+"""How far axes may lean to meet in a point."""
+SWEEPS = 8
+MOVES = 60
+FIRST_MOVE = 0.2
+"""Of the friction angle."""
+GROWTH, DECAY = 1.3, 0.9
+"""Of the moves, after a success and after a failure."""
+SLIGHT = 1e-6
+"""Improvements and directions below this must not decide anything: vertices that are off by 1e-9
+of an object turn the normals of its small faces by a hundred times that."""
+PACE = (FIRST_MOVE, GROWTH, DECAY, SLIGHT)
+BESIDE = 0.1
+"""Sine of the angle from which on another axis is beside one."""
+FLAT = 0.5
+"""Normals lie nearly in a plane if their spread across it is below this share of the next one."""
+SIDES = [tuple(s * np.array(p)) for s in (1, -1)
+         for p in ((1, 1, -1, -1), (1, -1, 1, -1), (1, -1, -1, 1))]  # fmt: skip
+"""Two fingers to either side of a plane."""
+CHUNK = 20_000
+"""Quadruples that are searched at once: some tens of megabytes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TiltedCones:
+    """Four force cones for each of q quadruples."""
+
+    axes: Array
+    """Unit vectors, (q, 4, 3)."""
+    half_angles: Array
+    """psi, the same for all four, (q,) [rad]; not positive where none was found."""
+
+
+def tilted_cones(normals: Array, thetas: Array) -> TiltedCones:
+    """Force cones with wide half-angles for many quadruples.
+
+    Args:
+        normals: Unit vectors, (q, 4, 3).
+        thetas: Half-angles of the friction cones, (q, 4) [rad].
+    """
+    cuts = [*range(0, len(normals), CHUNK), len(normals)]
+    parts = [_search(normals[i:j], thetas[i:j]) for i, j in pairwise(cuts)]
+    if not parts:
+        return TiltedCones(np.empty((0, FINGERS, 3)), np.empty(0))
+    axes, half_angles = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return TiltedCones(axes, half_angles)
+
+
+def widest_half_angles(normals: Array, thetas: Array, sines: Array) -> Array:
+    """Half-angles psi that no force cones exceed, however they are tilted, (q,) [rad].
+
+    For every unit vector m some axis has a_i.m < -sin(psi), and it is within theta_i - psi of its
+    normal: the largest angle(n_i, m) - 90 deg + theta_i is above 2 psi. Where the normals span, the
+    smallest over m of max angle(n_i, m) - 90 deg is theta*. Else it is negative, and taken where m
+    is in the middle of two normals, or as far from three.
+
+    Args:
+        normals: Unit vectors, (q, 4, 3).
+        thetas: Half-angles of the friction cones, (q, 4) [rad].
+        sines: Those of theta*, not positive where the normals do not span, (q,).
+    """
+    if kernel := compiled(KERNEL):
+        lowest = np.empty(len(normals))
+        kernel.lowest_heights(np.ascontiguousarray(normals), lowest)
+    else:
+        lowest = _lowest_heights(normals)
+    heights = np.where(sines > 0.0, sines, np.minimum(lowest, 0.0))
+    widest = 0.5 * (thetas.max(axis=1) + np.arcsin(np.clip(heights, -1.0, 1.0)))
+    return np.minimum(widest + SLIGHT, thetas.min(axis=1))
+
+
+def _lowest_heights(normals: Array) -> Array:
+    """The least max_i -n_i.m over the middles m of two normals or three, (q,)."""
+    lowest = np.full(len(normals), np.inf)
+    units = np.moveaxis(normals, 1, 0)
+    middles = [one + other for one, other in combinations(units, 2)]
+    for one, two, three in combinations(units, 3):
+        across = np.cross(two - one, three - one)
+        middles += [across, -across]
+    for middle in middles:
+        length = np.linalg.norm(middle, axis=1)
+        heights = -np.einsum("fqi,qi->qf", units, middle).min(axis=1) / np.maximum(length, SLIGHT)
+        lowest = np.where(length > SLIGHT, np.minimum(lowest, heights), lowest)
+    return lowest
+
+
+def widened(directions: Array, normals: Array, thetas: Array) -> TiltedCones:
+    """Force cones whose axes are sought near given directions inside the friction cones.
+
+    Args:
+        directions: Such as those of balanced forces, (q, 4, 3).
+        normals: Unit vectors, (q, 4, 3).
+        thetas: Half-angles of the friction cones, (q, 4) [rad].
+    """
+    axes = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+    return TiltedCones(*_improved(axes, normals, thetas))
+
+
+def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> TiltedCones:
+    """Force cones whose axes lean towards common points, as far as spanning lets them.
+
+    Args:
+        points: One for each quadruple, (q, 3).
+        positions: Where the axes start, (q, 4, 3).
+        normals: Unit vectors, (q, 4, 3).
+        thetas: Half-angles of the friction cones, (q, 4) [rad].
+    """
+    ways = points[:, None] - positions
+    inward = np.einsum("qfi,qfi->qf", ways, normals)
+    ways = ways * np.where(inward < -SLIGHT, -1.0, 1.0)[..., None]  # away from points outside
+    best, half_angles = normals, np.full(len(normals), -np.inf)
+    for cap in TOWARD:
+        axes = [
+            _into_cap(ways[:, finger], normals[:, finger], cap * thetas[:, finger])
+            for finger in range(FINGERS)
+        ]
+        found, reached = _improved(np.stack(axes, axis=1), normals, thetas)
+        better = reached > half_angles + SLIGHT
+        best = np.where(better[:, None, None], found, best)
+        half_angles = np.where(better, reached, half_angles)
+    return TiltedCones(best, half_angles)
+
+
+def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
+    best, half_angles = normals.copy(), half_angle(normals, normals, thetas)
+    for cap in CAPS:
+        axes = _balanced(normals, cap * thetas)
+        reached = half_angle(axes, normals, thetas)
+        better = reached > half_angles + SLIGHT
+        best[better], half_angles[better] = axes[better], reached[better]
+    sizes = np.linalg.svd(normals, compute_uv=False)
+    flat = np.flatnonzero(sizes[:, 2] < FLAT * sizes[:, 1])
+    for axes in _bent(normals[flat], thetas[flat]):
+        reached = half_angle(axes, normals[flat], thetas[flat])
+        better = reached > half_angles[flat] + SLIGHT
+        best[flat[better]], half_angles[flat[better]] = axes[better], reached[better]
+    return _improved(best, normals, thetas)
+
+
+def _bent(normals: Array, thetas: Array) -> Iterator[Array]:
+    """Axes that leave a plane in which the normals nearly lie, two to either side of it."""
+    _, _, directions = np.linalg.svd(normals)
+    across = directions[:, 2]
+    turns = np.cross(normals[:, :1], normals[:, 1:])
+    which = np.argmax(np.linalg.norm(turns, axis=-1) > BESIDE, axis=1)
+    handed = np.einsum("qi,qi->q", turns[np.arange(len(turns)), which], across)
+    across = across * np.where(handed < 0.0, -1.0, 1.0)[:, None]
+    for signs, cap in product(SIDES, CAPS[:-1]):
+        axes = [
+            _into_cap(sign * across, normals[:, finger], cap * thetas[:, finger])
+            for finger, sign in enumerate(signs)
+        ]
+        yield np.stack(axes, axis=1)
+
+
+def half_angle(axes: Array, normals: Array, thetas: Array) -> Array:
+    """The largest psi that axes allow, (q,) [rad]; negative where they do not span."""
+    if kernel := compiled(KERNEL):
+        reached = np.empty(len(axes))
+        kernel.half_angles(*map(np.ascontiguousarray, (axes, normals, thetas)), reached)
+        return reached
+    sines = span_sines(axes)
+    spans = np.where(sines > 0.0, np.arcsin(np.clip(sines, 0.0, 1.0)), sines)
+    return np.minimum(spans, (thetas - angles_between(axes, normals)).min(axis=1))
+
+
+def _balanced(normals: Array, caps: Array) -> Array:
+    """Unit vectors within caps around the normals, each pointed against the sum of the others."""
+    axes = np.array(normals, order="C")
+    if kernel := compiled(KERNEL):
+        kernel.balance(axes, axes.copy(), np.ascontiguousarray(caps), SWEEPS, SLIGHT)
+        return axes
+    for _ in range(SWEEPS):
+        for finger, others in enumerate(OTHERS):
+            against = -axes[:, others].sum(axis=1)
+            axes[:, finger] = _into_cap(against, normals[:, finger], caps[:, finger])
+    return axes
+
+
+def _into_cap(vectors: Array, centers: Array, angles: Array) -> Array:
+    """Unit vectors along vectors (q, 3), or the nearest ones within angles (q,) of unit centers.
+
+    Vectors without a direction across the center leave it where it is.
+    """
+    along = np.einsum("qi,qi->q", vectors, centers)
+    across = vectors - along[:, None] * centers
+    sideways = np.linalg.norm(across, axis=1)
+    turn = np.where(sideways > SLIGHT, np.minimum(np.arctan2(sideways, along), angles), 0.0)[
+        :, None
+    ]
+    aside = across / np.maximum(sideways, SLIGHT)[:, None]
+    return np.cos(turn) * centers + np.sin(turn) * aside
+
+
+def _improved(axes: Array, normals: Array, thetas: Array) -> tuple[Array, Array]:
+    moves = np.random.default_rng(0).normal(size=(MOVES, FINGERS, 2))
+    first, second = _aside(axes)
+    if kernel := compiled(KERNEL):
+        axes, reached = np.array(axes, order="C"), np.empty(len(axes))
+        given = map(np.ascontiguousarray, (normals, thetas, np.stack([first, second])))
+        kernel.improve((axes, reached), *given, moves, np.array(PACE))
+        return axes, reached
+    reached = half_angle(axes, normals, thetas)
+    steps = FIRST_MOVE * thetas.min(axis=1)
+    for move in moves:
+        sideways = move[:, :1] * first + move[:, 1:] * second
+        moved = axes + steps[:, None, None] * sideways
+        moved /= np.linalg.norm(moved, axis=-1, keepdims=True)
+        now = half_angle(moved, normals, thetas)
+        better = now > reached + SLIGHT
+        axes = np.where(better[:, None, None], moved, axes)
+        reached = np.where(better, now, reached)
+        steps = steps * np.where(better, GROWTH, DECAY)
+    return axes, reached
+
+
+def _aside(axes: Array) -> tuple[Array, Array]:
+    """Two directions across each axis, (q, 4, 3), the first also across another one beside it."""
+    first = np.zeros_like(axes)
+    for ahead in range(FINGERS - 1, 0, -1):
+        cross = np.cross(axes, np.roll(axes, -ahead, axis=1))
+        length = np.linalg.norm(cross, axis=-1, keepdims=True)
+        first = np.where(length > BESIDE, cross / np.maximum(length, BESIDE), first)
+    return first, np.cross(axes, first)

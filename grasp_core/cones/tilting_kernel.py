@@ -1,0 +1,208 @@
+"""Force cones that are tilted until they span, for many quadruples (see `tilted_cones`)."""
+
+import numpy as np
+from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
+
+from grasp_core.arrays import Array
+from grasp_core.geometry.vectors_kernel import cross, dotted
+
+FINGERS = 4
+DEPENDENT = 1e-12
+"""As in `grasp_core.cones.spanning`."""
+SLIGHT = 1e-6
+"""As in `grasp_core.cones.tilting`."""
+
+
+def try_out() -> None:
+    """Tilt one quadruple."""
+    axes, thetas = np.ones((1, FINGERS, 3)), np.ones((1, FINGERS))
+    half_angles(axes, axes, thetas, np.empty(1))
+    lowest_heights(axes, np.empty(1))
+    balance(axes.copy(), axes, thetas, 1, 1e-6)
+    frames = np.ones((2, 1, FINGERS, 3))
+    moves, pace = np.ones((1, FINGERS, 2)), np.ones(4)
+    improve((axes.copy(), np.empty(1)), axes, thetas, frames, moves, pace)
+
+
+@njit(cache=True)
+def half_angles(axes: Array, normals: Array, thetas: Array, reached: Array) -> None:
+    """Fill in the largest psi that axes allow, (q,) [rad]; negative where they do not span."""
+    for q in range(len(axes)):
+        reached[q] = _half_angle(axes[q], normals[q], thetas[q], -np.inf)
+
+
+@njit(cache=True)
+def lowest_heights(normals: Array, lowest: Array) -> None:
+    """Fill in the least max_i -n_i.m over the middles m of two normals or three, (q,)."""
+    middle, one, other = np.empty(3), np.empty(3), np.empty(3)
+    for q in range(len(normals)):
+        n, lowest[q] = normals[q], np.inf
+        for i in range(FINGERS):
+            for j in range(i):
+                for d in range(3):
+                    middle[d] = n[i, d] + n[j, d]
+                lowest[q] = min(lowest[q], _height(n, middle, 1.0))
+                for k in range(j):
+                    for d in range(3):
+                        one[d], other[d] = n[i, d] - n[k, d], n[j, d] - n[k, d]
+                    cross(one, other, middle)
+                    lowest[q] = min(lowest[q], _height(n, middle, 1.0), _height(n, middle, -1.0))
+
+
+@njit(cache=True)
+def _height(normals: Array, middle: Array, side: float) -> float:
+    """Largest -n_i.m, for m along a vector or against it; infinite if it has no direction."""
+    length, least = np.sqrt(dotted(middle, middle)), np.inf
+    if length <= SLIGHT:
+        return np.inf
+    for finger in range(FINGERS):
+        least = min(least, side * dotted(normals[finger], middle))
+    return -least / length
+
+
+@njit(cache=True)
+def balance(axes: Array, normals: Array, caps: Array, sweeps: int, slight: float) -> None:
+    """Point each axis in turn against the sum of the others, within a cap around its normal.
+
+    Args:
+        axes: Changed in place, (q, 4, 3).
+        normals: (q, 4, 3)
+        caps: (q, 4) [rad]
+        sweeps: How often.
+        slight: Shorter vectors across a normal have no direction.
+    """
+    against = np.empty(3)
+    for q in range(len(axes)):
+        cosines, sines = np.cos(caps[q]), np.sin(caps[q])
+        for _ in range(sweeps):
+            for finger in range(FINGERS):
+                for d in range(3):
+                    against[d] = axes[q, finger, d]
+                    for other in range(FINGERS):
+                        against[d] -= axes[q, other, d]
+                _into_cap(
+                    against,
+                    normals[q, finger],
+                    cosines[finger],
+                    sines[finger],
+                    slight,
+                    axes[q, finger],
+                )
+
+
+@njit(cache=True)
+def improve(
+    cones: tuple[Array, Array],
+    normals: Array,
+    thetas: Array,
+    frames: Array,
+    moves: Array,
+    pace: Array,
+) -> None:
+    """Move all axes of each quadruple at once, as long as that widens the cones.
+
+    Args:
+        cones: Axes, changed in place, (q, 4, 3); half-angles, filled in, (q,) [rad].
+        normals: (q, 4, 3)
+        thetas: (q, 4) [rad]
+        frames: Two directions across each axis, (2, q, 4, 3).
+        moves: (moves, 4, 2)
+        pace: The first step in friction angles, its growth after a success and its share after
+            a failure, and the least improvement that counts, (4,).
+    """
+    (axes, reached), moved = cones, np.empty((FINGERS, 3))
+    for q in range(len(axes)):
+        reached[q] = _half_angle(axes[q], normals[q], thetas[q], -np.inf)
+        step = pace[0] * thetas[q].min()
+        for m in range(len(moves)):
+            for finger in range(FINGERS):
+                for d in range(3):
+                    sideways = (
+                        moves[m, finger, 0] * frames[0, q, finger, d]
+                        + moves[m, finger, 1] * frames[1, q, finger, d]
+                    )
+                    moved[finger, d] = axes[q, finger, d] + step * sideways
+                length = np.sqrt(_cosine(moved, finger, finger))
+                for d in range(3):
+                    moved[finger, d] /= length
+            floor = reached[q] + pace[3]
+            now = _half_angle(moved, normals[q], thetas[q], floor)
+            if now > floor:
+                axes[q] = moved
+                reached[q] = now
+                step *= pace[1]
+            else:
+                step *= pace[2]
+
+
+@njit(cache=True)
+def _half_angle(axes: Array, normals: Array, thetas: Array, floor: float) -> float:
+    """The largest psi; where that is no larger than a floor, anything up to the floor."""
+    sine, least = _span_sine(axes), np.inf
+    span = np.arcsin(min(sine, 1.0)) if sine > 0.0 else sine
+    if span <= floor:
+        return span
+    for finger in range(FINGERS):
+        square = 0.0
+        for d in range(3):
+            square += (axes[finger, d] - normals[finger, d]) ** 2
+        least = min(least, thetas[finger] - 2.0 * np.arcsin(min(0.5 * np.sqrt(square), 1.0)))
+    return min(least, span)
+
+
+@njit(cache=True)
+def _span_sine(axes: Array) -> float:
+    """As `span_sines` of `grasp_core.cones.spanning`, for one quadruple."""
+    ab, ac, ad = _cosine(axes, 0, 1), _cosine(axes, 0, 2), _cosine(axes, 0, 3)
+    bc, bd, cd = _cosine(axes, 1, 2), _cosine(axes, 1, 3), _cosine(axes, 2, 3)
+    a, b = _determinant(axes, 1, 2, 3), -_determinant(axes, 0, 2, 3)
+    c, d = _determinant(axes, 0, 1, 3), -_determinant(axes, 0, 1, 2)
+    total = a + b + c + d
+    if abs(total) <= DEPENDENT:
+        return -max(max(abs(a), abs(b)), max(abs(c), abs(d)))
+    side = 1.0 if total > 0.0 else -1.0
+    lowest = min(min(side * a, side * b), min(side * c, side * d))
+    if lowest <= DEPENDENT:
+        return min(lowest, 0.0)
+    one, two = _sine(a, bc, bd, cd), _sine(b, ac, ad, cd)
+    three, four = _sine(c, ab, ad, bd), _sine(d, ab, ac, bc)
+    return min(min(one, two), min(three, four))
+
+
+@njit(cache=True)
+def _cosine(axes: Array, i: int, j: int) -> float:
+    return axes[i, 0] * axes[j, 0] + axes[i, 1] * axes[j, 1] + axes[i, 2] * axes[j, 2]
+
+
+@njit(cache=True)
+def _determinant(axes: Array, i: int, j: int, k: int) -> float:
+    x = axes[j, 1] * axes[k, 2] - axes[j, 2] * axes[k, 1]
+    y = axes[j, 2] * axes[k, 0] - axes[j, 0] * axes[k, 2]
+    z = axes[j, 0] * axes[k, 1] - axes[j, 1] * axes[k, 0]
+    return axes[i, 0] * x + axes[i, 1] * y + axes[i, 2] * z
+
+
+@njit(cache=True)
+def _sine(determinant: float, g: float, h: float, k: float) -> float:
+    """Where three cones first touch one plane, from the cosines between their axes."""
+    a, b, c = h * k - g, g * k - h, g * h - k
+    most = max(max(a + b + c, a - b - c), max(b - a - c, c - a - b))
+    return abs(determinant) / np.sqrt(3.0 - g * g - h * h - k * k + 2.0 * most)
+
+
+@njit(cache=True)
+def _into_cap(
+    vector: Array, center: Array, cosine: float, sine: float, slight: float, unit: Array
+) -> None:
+    """Fill in the unit vector along a vector, or the nearest one in a cap around a center."""
+    along, square = dotted(vector, center), 0.0
+    for d in range(3):
+        square += (vector[d] - along * center[d]) ** 2
+    sideways, length = np.sqrt(square), np.sqrt(square + along * along)
+    if sideways <= slight:
+        cosine, sine = 1.0, 0.0
+    elif along >= cosine * length:  # already in it
+        cosine, sine = along / length, sideways / length
+    for d in range(3):
+        aside = (vector[d] - along * center[d]) / max(sideways, slight)
+        unit[d] = cosine * center[d] + sine * aside

@@ -1,0 +1,146 @@
+"""Upper bounds on discs from the faces' corners alone, at next to no cost.
+
+Reach. With positive weights w of sum w_i a_i = 0 for the axes, and contacts c_i on the faces,
+sum w_i a_i.(x0 - c_i) = -sum w_i a_i.c_i wherever the focus x0 is: the weighted mean of the
+distances along the axes is at most -sum w_i min a_i.c_i over the corners of each face, and for a
+focus behind the fingers at most sum w_i max a_i.c_i.
+
+Width. If two axes lead from one focus back to their contacts, c_i = x - s_i a_i and
+c_j = x - s_j a_j, then d = (a_i - a_j) / (1 - a_i.a_j) has d.a_i = 1 and d.a_j = -1, and so
+s_i + s_j = d.(c_j - c_i), which the corners of the two faces bound.
+
+What these mean for discs is said in `concurrent_radius_bounds` and `pencil_radius_bounds`.
+
+Across. Let N be the unit vector across both axes of one pair of a pencil. It is across the line of
+the foci too, so both foci c have the same height h = N.c, and so have the disc centres q_i and q_j
+of that pair. As a disc of radius r reaches r |T'N| to either side, the heights of the corners, from
+lo_i to hi_i, leave r |T_i'N| <= hi_i - h and r |T_j'N| <= h - lo_j, or
+r (|T_i'N| + |T_j'N|) <= hi_i - lo_j. A finger m of the other pair is at
+N.q_m = h - s_m N.a_m with s_m >= r / tan(psi / 2), which makes the left side larger by
+r |N.a_m| / tan(psi / 2). Only compiled code asks for these: they spare programs
+that would find discs below the least radius, or below those already found.
+"""
+
+from itertools import combinations
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import compiled
+from grasp_core.cones.spanning import balancing_weights
+from grasp_core.families.concurrent import concurrent_radius_bounds
+from grasp_core.families.constructions import PAIRINGS
+from grasp_core.families.kernel_tables import Corners
+from grasp_core.families.pencil import pencil_radius_bounds
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import FINGERS
+
+KERNEL = "grasp_core.disc_bounds.corner_bounds_kernel"
+PARALLEL = 1e-6
+"""Axes whose 1 - a_i.a_j is below this bound no width."""
+
+
+def corners_of(body: Polyhedron) -> Corners:
+    """Corners of each face about the centre of mass over the radius, the first one repeated."""
+    corners = [
+        (np.vstack([face.polygon, *face.holes]) - body.center_of_mass) / body.radius
+        for face in body.faces
+    ]
+    counts = np.array([len(each) for each in corners])
+    most = int(counts.max(initial=0))
+    padded = [np.vstack([each, np.repeat(each[:1], most - len(each), axis=0)]) for each in corners]
+    return Corners(np.array(padded), counts)
+
+
+def disc_limits(
+    corners: Corners, normals: Array, faces: Indices, axes: Array, half_angles: Array
+) -> Array:
+    """Limits for many quadruples.
+
+    Args:
+        corners: Of all faces.
+        normals: Likewise, (f, 3).
+        faces: (q, 4)
+        axes: Of force cones that positively span, (q, 4, 3).
+        half_angles: One for all four, (q,) [rad]; not positive where there are no such cones.
+
+    Returns:
+        Upper bounds on the smallest of four discs, (q, 4): in a concurrent grasp, then in a pencil
+        in each of the `PAIRINGS`. In units of the corners.
+    """
+    kernel = compiled(KERNEL)
+    if kernel is None:
+        points, angles = corners.points[faces], np.maximum(half_angles, 0.0)
+        reaches, widths = _reaches(points, axes), _widths(points, axes)
+        concurrent = concurrent_radius_bounds(reaches, widths, angles)
+        return np.hstack([concurrent, pencil_radius_bounds(reaches, widths, angles, PAIRINGS)])
+    limits = np.empty((len(faces), 1 + len(PAIRINGS)))
+    kernel.fill(
+        corners, np.ascontiguousarray(normals), np.ascontiguousarray(faces),
+        np.ascontiguousarray(axes), np.ascontiguousarray(half_angles), limits,
+    )  # fmt: skip
+    return limits
+
+
+def angle_limits(extent: float, widths: Array, half_angles: Array) -> Array:
+    """What is left of the limits where the axes are not known, (q, 4).
+
+    Args:
+        extent: Largest distance of a corner from the centre of mass, which no reach exceeds.
+        widths: Upper bounds on s_i + s_j (see `widths_apart`), (q, 4, 4).
+        half_angles: Upper bounds, (q,) [rad].
+    """
+    reaches = np.full(len(half_angles), extent)
+    concurrent = concurrent_radius_bounds(reaches, widths, half_angles)
+    return np.hstack([concurrent, pencil_radius_bounds(reaches, widths, half_angles, PAIRINGS)])
+
+
+def distances(corners: Corners) -> Array:
+    """Upper bounds on the distance of a point of one face from one of another, (f, f)."""
+    middles = corners.points.mean(axis=1)
+    radii = np.linalg.norm(corners.points - middles[:, None], axis=-1).max(axis=1)
+    between = np.linalg.norm(middles[:, None] - middles, axis=-1)
+    return between + radii[:, None] + radii
+
+
+def widths_apart(faces: Indices, apart: Array, halves: Array, leaning: Array) -> Array:
+    """Upper bounds on s_i + s_j for axes that lean from the normals, (q, 4, 4).
+
+    The vector d above has the length 2 / |a_i - a_j|, and the angle between the axes is that
+    between the normals but for what both lean.
+
+    Args:
+        faces: (q, 4)
+        apart: The `distances` of all faces, (f, f).
+        halves: Half the angles between their normals, (f, f) [rad].
+        leaning: How far an axis leans at most, (q,) [rad].
+    """
+    widths = np.full((len(faces), FINGERS, FINGERS), np.inf)
+    for i, j in combinations(range(FINGERS), 2):
+        pair = faces[:, i], faces[:, j]
+        sines = np.sin(np.maximum(halves[pair] - leaning, 0.0))
+        bound = np.where(sines > PARALLEL, apart[pair] / np.maximum(sines, PARALLEL), np.inf)
+        widths[:, i, j] = widths[:, j, i] = bound
+    return widths
+
+
+def _reaches(corners: Array, axes: Array) -> Array:
+    """Upper bounds on the mean distance of a focus before or behind its contacts, (q,)."""
+    heights = np.einsum("qfki,qfi->qfk", corners, axes)
+    weights = balancing_weights(axes)
+    before = -np.einsum("qf,qf->q", weights, heights.min(axis=2, initial=np.inf))
+    behind = np.einsum("qf,qf->q", weights, heights.max(axis=2, initial=-np.inf))
+    return np.maximum(before, behind)
+
+
+def _widths(corners: Array, axes: Array) -> Array:
+    """Upper bounds on s_i + s_j for contacts i and j of one focus, (q, 4, 4)."""
+    widths = np.full((len(axes), FINGERS, FINGERS), np.inf)
+    for i, j in combinations(range(FINGERS), 2):
+        apart = axes[:, i] - axes[:, j]
+        low = np.einsum("qki,qi->qk", corners[:, i], apart).min(axis=1, initial=np.inf)
+        high = np.einsum("qki,qi->qk", corners[:, j], apart).max(axis=1, initial=-np.inf)
+        share = 0.5 * np.einsum("qi,qi->q", apart, apart)
+        bound = np.where(share > PARALLEL, (high - low) / np.maximum(share, PARALLEL), np.inf)
+        widths[:, i, j] = widths[:, j, i] = bound
+    return widths

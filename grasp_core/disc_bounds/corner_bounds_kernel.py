@@ -1,0 +1,133 @@
+"""Upper bounds on discs from the faces' corners, for many quadruples (see `disc_limits`)."""
+
+import numpy as np
+from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.families.kernel_tables import Corners
+from grasp_core.geometry.vectors_kernel import balancing_weights, cross, dotted
+
+FINGERS = 4
+PAIRINGS = ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2))
+PARALLEL = 1e-6
+"""Axes whose 1 - a_i.a_j, or whose cross product, is below this bound nothing."""
+
+
+def try_out() -> None:
+    """Bound one quadruple."""
+    corners = Corners(np.zeros((4, 1, 3)), np.ones(4, dtype=np.int64))
+    faces, axes = np.arange(4)[None], np.ones((1, 4, 3))
+    fill(corners, np.ones((4, 3)), faces, axes, np.ones(1), np.empty((1, 4)))
+
+
+@njit(cache=True)
+def fill(
+    corners: Corners,
+    normals: Array,
+    faces: Indices,
+    axes: Array,
+    half_angles: Array,
+    limits: Array,
+) -> None:
+    """Bound the discs of quadruples.
+
+    Args:
+        corners: Of all faces.
+        normals: Likewise, (f, 3).
+        faces: (q, 4)
+        axes: Of force cones that positively span, (q, 4, 3).
+        half_angles: (q,) [rad]; not positive where there are no such cones.
+        limits: Filled with upper bounds, (q, 4).
+    """
+    for q in range(len(faces)):
+        if half_angles[q] <= 0.0:
+            limits[q] = 0.0
+            continue
+        before, behind = reaches(corners, faces[q], axes[q])
+        reach, half = max(before, behind), np.tan(0.5 * half_angles[q])
+        limits[q, 0] = reach * np.tan(half_angles[q])
+        for pairing, (i, j, k, m) in enumerate(PAIRINGS):
+            limit = 2.0 * reach * half
+            for first, second, third, fourth in ((i, j, k, m), (k, m, i, j)):
+                width = _width(corners, faces[q], axes[q], (first, second))
+                limit = min(limit, 0.5 * width * half)
+                if limit > 0.0:
+                    places = (first, second, third, fourth)
+                    limit = min(limit, _across(corners, normals, faces[q], axes[q], places, half))
+            limits[q, 1 + pairing] = limit
+
+
+@njit(cache=True)
+def reaches(corners: Corners, faces: Indices, axes: Array) -> tuple[float, float]:
+    """Upper bounds on the mean distance of a focus before, and behind, its contacts."""
+    weights, before, behind = np.empty(FINGERS), 0.0, 0.0
+    balancing_weights(axes, weights)
+    for i in range(FINGERS):
+        low, high = _extent(corners, faces[i], axes[i])
+        before, behind = before - weights[i] * low, behind + weights[i] * high
+    return before, behind
+
+
+@njit(cache=True)
+def _width(corners: Corners, faces: Indices, axes: Array, pair: tuple[int, int]) -> float:
+    """Upper bound on s_i + s_j."""
+    (i, j), apart = pair, np.empty(3)
+    for d in range(3):
+        apart[d] = axes[i, d] - axes[j, d]
+    share = 0.5 * dotted(apart, apart)
+    if share <= PARALLEL:
+        return np.inf
+    return (_extent(corners, faces[j], apart)[1] - _extent(corners, faces[i], apart)[0]) / share
+
+
+@njit(cache=True)
+def _across(
+    corners: Corners,
+    normals: Array,
+    faces: Indices,
+    axes: Array,
+    places: tuple[int, int, int, int],
+    half: float,
+) -> float:
+    """Upper bound from the heights along N, across the axes of the first two fingers."""
+    N, limit, pair = np.empty(3), np.inf, FINGERS // 2
+    cross(axes[places[0]], axes[places[1]], N)
+    length = np.sqrt(dotted(N, N))
+    if length <= PARALLEL:
+        return limit
+    for d in range(3):
+        N[d] /= length
+    for e in range(pair):
+        one = places[e]
+        low, high = _extent(corners, faces[one], N)
+        lean = _lean(normals[faces[one]], N)
+        for f in range(e + 1, FINGERS):
+            other = places[f]
+            lower, higher = _extent(corners, faces[other], N)
+            away = dotted(axes[other], N) / half if f >= pair else 0.0
+            total = lean + _lean(normals[faces[other]], N) + abs(away)
+            if total <= PARALLEL:
+                continue
+            if away >= 0.0:
+                limit = min(limit, (high - lower) / total)
+            if away <= 0.0:
+                limit = min(limit, (higher - low) / total)
+    return limit
+
+
+@njit(cache=True)
+def _lean(normal: Array, N: Array) -> float:
+    """|T'N|, how far a disc of radius one reaches along N."""
+    return np.sqrt(max(1.0 - dotted(normal, N) ** 2, 0.0))
+
+
+@njit(cache=True)
+def _extent(corners: Corners, face: int, direction: Array) -> tuple[float, float]:
+    """Least and largest height of a face's corners along a direction."""
+    low, high = np.inf, -np.inf
+    for k in range(corners.counts[face]):
+        height = 0.0
+        for d in range(3):
+            height += corners.points[face, k, d] * direction[d]
+        low, high = min(low, height), max(high, height)
+    return low, high

@@ -1,0 +1,100 @@
+"""What many attempts can offer at most: small programs, solved in compiled code.
+
+An attempt is four faces in the order of the fingers with a force cone each. Where a construction
+has discs, the bound is the value of the first program of `largest_discs`, which maximises the
+smallest radius, on the convex hulls of the faces: no choice of their pieces offers more. For
+reguli it only says whether any slopes are feasible there. Without kernels the constructions
+themselves are asked for discs, at a hundred times the cost, and reguli are not bounded.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.compiled import compiled
+from grasp_core.errors import SolverError
+from grasp_core.families.concurrent import PYRAMID_SIDES, facet_turns
+from grasp_core.families.constructions import LEAST_RADIUS, Construction
+from grasp_core.families.face_tables import face_table
+from grasp_core.families.kernel_tables import Attempts, FaceTable
+from grasp_core.families.placements import Placement
+from grasp_core.families.regulus import regulus_bounds
+from grasp_core.objects.face_pieces import FacePiece, Shapes
+from grasp_core.solvers.lp import RESIDUAL
+from grasp_core.values import Family, ForceCone, four
+
+KERNELS: dict[Family, str] = {
+    "concurrent": "grasp_core.disc_bounds.concurrent_kernel",
+    "pencil": "grasp_core.disc_bounds.pencil_kernel",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class AttemptBounds:
+    """Those on the faces of one object."""
+
+    shapes: Shapes
+
+    def of(self, construction: Construction, attempts: Attempts, least: float) -> Array:
+        """Upper bounds on the smallest radius, (a,), in object radii; infinite if none is proved.
+
+        Those of reguli are infinite or, where no slopes are feasible, minus infinity.
+
+        Args:
+            construction: Of a family.
+            attempts: On faces with room, in finger order, with cones that positively span (P3).
+            least: Smaller discs do not matter; their bounds are the best ones or this at most.
+        """
+        attempts = Attempts(
+            np.ascontiguousarray(attempts.faces),
+            np.ascontiguousarray(attempts.axes),
+            np.ascontiguousarray(attempts.half_angles),
+        )
+        if construction.limits is None:
+            return self._of_reguli(attempts)
+        kernel = compiled(KERNELS[construction.family])
+        if kernel is None:
+            return self._by_constructions(construction, attempts, least)
+        bounds = np.empty(len(attempts.faces))
+        if construction.family == "pencil":
+            kernel.pencil_bounds(self._table, attempts, LEAST_RADIUS, least, bounds)
+        else:
+            turns = np.array(facet_turns(PYRAMID_SIDES))
+            kernel.concurrent_bounds(self._table, attempts, turns, least, bounds)
+        return bounds + RESIDUAL
+
+    def _of_reguli(self, attempts: Attempts) -> Array:
+        bounds = np.full(len(attempts.faces), np.inf)
+        known = regulus_bounds(self._table, attempts, -np.inf)
+        if known is not None:
+            merits, _ = known
+            bounds[merits == -np.inf] = -np.inf
+        return bounds
+
+    def _by_constructions(
+        self, construction: Construction, attempts: Attempts, least: float
+    ) -> Array:
+        bounds = np.empty(len(attempts.faces))
+        for place, (faces, axes, half_angle) in enumerate(zip(*attempts, strict=True)):
+            hulls = [self._hull(int(face)) for face in faces]
+            cones = four(ForceCone(axis, float(half_angle)) for axis in axes)
+            try:
+                found = construction.place(hulls, cones, least)
+            except SolverError:
+                bounds[place] = np.inf
+                continue
+            bounds[place] = found.merit if isinstance(found, Placement) else found.bound
+        return bounds + RESIDUAL
+
+    def _hull(self, face: int) -> FacePiece:
+        shape = self.shapes[face]
+        if shape is None:
+            raise IndexError(f"face {face} has no room for a contact")
+        return shape.hull
+
+    @cached_property
+    def _table(self) -> FaceTable:
+        """The hulls as kernels want them."""
+        return face_table([shape.hull if shape else None for shape in self.shapes])

@@ -1,0 +1,82 @@
+"""What the programs for discs have in common: the faces, the attempts and the room for rows.
+
+The programs of `concurrent_grasps` and `pencil_grasps` grow four discs and maximise the smallest.
+That smallest radius alone is found with all four equal: rows only get tighter as a radius grows.
+With one radius, the last variable, every program is feasible for small enough ones, so that
+the multipliers alone, checked here, bound every radius.
+"""
+
+import numpy as np
+from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
+
+from grasp_core.arrays import Array
+from grasp_core.families.kernel_tables import Attempts, FaceTable
+from grasp_core.solvers.lp_kernel import LOST, Rows, Vertex, proved_bound, solve
+
+FINGERS = 4
+ACCURACY = 1e-12
+"""How far multipliers may be from giving the objective: even if a focus is a thousand object radii
+away, this is worth less than the accuracy of a program's answer."""
+
+
+def tilted_faces() -> tuple[FaceTable, Attempts]:
+    """Four squares and an attempt on them, to try kernels out."""
+    square = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+    n = np.array([[0.0, 0.0, 1.0], [0.9, 0.0, -0.4], [-0.5, 0.8, -0.4], [-0.5, -0.8, -0.4]])
+    frames = np.repeat(np.eye(3, 2)[None], 4, axis=0)
+    squares, ones = np.repeat(square[None], 4, axis=0), np.ones((4, 4))
+    corners = np.zeros((4, 4, 3))
+    faces = FaceTable(n, -n, frames, squares, ones, np.full(4, 4), corners, np.zeros(4))
+    return faces, Attempts(np.arange(4)[None], n[None].copy(), np.full(1, 0.1))
+
+
+@njit(cache=True)
+def edges_of(faces: FaceTable, attempts: Attempts, a: int) -> int:
+    """How many edges the faces of an attempt have."""
+    count = 0
+    for finger in range(FINGERS):
+        count += int(faces.edges[attempts.faces[a, finger]])
+    return count
+
+
+@njit(cache=True)
+def facet_sines(half_angle: float, sides: int) -> tuple[float, float]:
+    """Sine and cosine of the half-angle of the cone that an inscribed pyramid's facets touch."""
+    tangent = np.tan(half_angle) * np.cos(np.pi / sides)
+    return tangent / np.hypot(1.0, tangent), 1.0 / np.hypot(1.0, tangent)
+
+
+@njit(cache=True)
+def room_for(room: Array, n: int, count: int) -> Rows:
+    """So many empty rows, in memory that is used again and again."""
+    At = room[: n * count].reshape(n, count)
+    At[:] = 0.0
+    b, norms = room[n * count : (n + 1) * count], room[(n + 1) * count : (n + 2) * count]
+    return Rows(At, b, norms, 0)
+
+
+@njit(cache=True)
+def bounded(rows: Rows, least: float) -> float:
+    """An upper bound on the radius; the best one where it is above the least."""
+    c, vertex = np.zeros(len(rows.At)), vertex_of(len(rows.At))
+    c[-1] = 1.0
+    measure(rows)
+    status, _ = solve(c, rows, least, vertex)
+    return np.inf if status == LOST else proved_bound(c, rows, vertex, ACCURACY)
+
+
+@njit(cache=True)
+def vertex_of(n: int) -> Vertex:
+    """Room for one of a program with so many variables."""
+    return Vertex(np.empty(n, dtype=np.int64), np.empty(n), np.empty(n))
+
+
+@njit(cache=True)
+def measure(rows: Rows) -> None:
+    """Fill in the lengths of the rows."""
+    rows.norms[:] = 0.0
+    for i in range(len(rows.At)):
+        for k in range(len(rows.norms)):
+            rows.norms[k] += rows.At[i, k] * rows.At[i, k]
+    for k in range(len(rows.norms)):
+        rows.norms[k] = np.sqrt(rows.norms[k])

@@ -1,0 +1,233 @@
+"""Concurrent grasps: four lines of force that meet in one focus point.
+
+Solved: for four convex faces and a force cone at each, the focus point x0 and four discs of
+the largest common radius r, one inside each face, such that x0 lies in the force cone of
+every point of every disc. When the four force cones positively span R^3 whatever direction
+each contributes (P3), any four contacts in the discs are then in equilibrium.
+
+Derivation. On face i the points are c_i + T_i y. Let g run over the inward unit normals of
+the facets of a pyramid inscribed in force cone i. A contact at y can aim at x0 iff
+g.(x0 - c_i - T_i y) >= 0 for all g. Over a disc of radius r around y_i the worst case is
+g.(x0 - c_i - T_i y_i) - r |T_i'g|, and the disc lies inside the face iff e.y_i + r <= b for
+its edges. All of it is linear in (x0, y_1..y_4, r):
+
+    maximise r  subject to  g.x0 - (T_i'g).y_i - r |T_i'g| >= g.c_i    for all i, g
+                            e.y_i + r <= b                             for all i, edges
+
+A curved patch has its surface at c_i + T_i y + h n_i, |h| <= eps: each left side loses eps |g.n_i|.
+
+The disc centres stay variables: eliminating them by shrinking the face over-estimates r as
+soon as an edge of the shrunk face vanishes.
+
+The lines of force, not the forces, have to meet: fingers may also push away from a focus behind
+them, as from inside a hole. With side = -1 for such a finger, side (x0 - c_i - T_i y) has to be in
+its cone; as P3 makes the weights of the force directions positive, nothing else changes. All four
+on one side and all on the other are tried first; mixed sides on faces that would have no regions.
+
+With axis = normal, half-angle = theta and all sides +1 this is section 3.1 of the paper.
+
+Source: Sudsang & Ponce 1995, section 3.1 and Proposition 5; the far side is this project's.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from functools import cache
+from itertools import product
+from typing import TypeAlias
+
+import numpy as np
+
+from grasp_core.arrays import Array, frozen
+from grasp_core.cones.spanning import balancing_weights
+from grasp_core.families.discs import largest_discs
+from grasp_core.families.placements import NoPlacement, Placement, balanced_forces
+from grasp_core.geometry.polygons import clip
+from grasp_core.objects.face_pieces import FacePiece
+from grasp_core.solvers.ties import surpassing
+from grasp_core.values import FINGERS, ForceCone, four
+
+PYRAMID_SIDES = 16
+"""An inscribed 16-sided pyramid loses 1.9 % of the cone's tangent, on the safe side."""
+RADII, SMALLEST = slice(11, 15), 15
+"""Where the radii and their lower bound are among the variables."""
+
+
+Sides: TypeAlias = tuple[float, float, float, float]
+BEFORE, BEHIND = (1.0, 1.0, 1.0, 1.0), (-1.0, -1.0, -1.0, -1.0)
+MIXED_SIDES: tuple[Sides, ...] = tuple(
+    four(sides) for sides in product((1.0, -1.0), repeat=FINGERS) if abs(sum(sides)) < FINGERS
+)
+
+
+def place_concurrent(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], *, least: float
+) -> Placement | NoPlacement:
+    """Place a focus point and four discs of the largest common radius, on the better side.
+
+    Args:
+        pieces: Four convex pieces, in finger order, in units where the object has size one.
+        cones: The force cones, in the same order; they must satisfy the generalised P3.
+        least: Smaller discs count as none.
+
+    Raises:
+        SolverError: A program's answer failed its check.
+    """
+    widest = math.tan(max(cone.half_angle for cone in cones))
+    limits = [reach * widest for reach in _reaches(pieces, cones)]
+    return _best(pieces, cones, zip((BEFORE, BEHIND), limits, strict=True), least)
+
+
+def place_on_mixed_sides(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], *, least: float
+) -> Placement | NoPlacement:
+    """As `place_concurrent`, with the focus before some fingers and behind the others.
+
+    Fourteen patterns of sides, each with discs larger than those before: for faces on which
+    nothing else was found. On convex objects it hardly ever finds anything.
+    """
+    return _best(pieces, cones, ((sides, math.inf) for sides in MIXED_SIDES), least)
+
+
+def _best(
+    pieces: Sequence[FacePiece],
+    cones: Sequence[ForceCone],
+    patterns: Iterable[tuple[Sides, float]],
+    least: float,
+) -> Placement | NoPlacement:
+    """The largest discs over patterns of sides, each with an upper bound on its discs."""
+    best: Placement | None = None
+    bound = -math.inf
+    for sides, limit in patterns:
+        if limit < least:
+            bound = max(bound, limit)
+            continue
+        found = place_on_sides(pieces, cones, sides, least=least)
+        if isinstance(found, Placement):
+            best, least = found, surpassing(found.merit)
+        else:
+            bound = max(bound, found.bound)
+    return best or NoPlacement(bound)
+
+
+def _reaches(pieces: Sequence[FacePiece], cones: Sequence[ForceCone]) -> tuple[float, float]:
+    """How far a focus before, or behind, all fingers may be in the mean (see `disc_limits`)."""
+    heights = [
+        cone.axis @ (piece.origin[:, None] + piece.frame @ piece.corners.T)
+        for piece, cone in zip(pieces, cones, strict=True)
+    ]
+    weights = balancing_weights(np.array([cone.axis for cone in cones]))
+    lowest = weights @ np.array([float(each.min()) for each in heights])
+    highest = weights @ np.array([float(each.max()) for each in heights])
+    return -float(lowest), float(highest)
+
+
+def place_on_sides(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], sides: Sides = BEFORE, *, least: float
+) -> Placement | NoPlacement:
+    """Place a focus point and four discs of the largest common radius.
+
+    Args:
+        pieces: Four convex pieces, in finger order, in units where the object has size one.
+        cones: The force cones, in the same order; together they must satisfy the
+            generalised P3 for the result to mean equilibrium.
+        sides: Of each finger: 1 where it pushes towards the focus, -1 where away from it.
+        least: Smaller discs count as none.
+
+    Raises:
+        SolverError: A program's answer failed its check.
+    """
+    A, b = _rows(pieces, cones, sides)
+    discs = largest_discs(A, b, RADII, SMALLEST, least)
+    if isinstance(discs, NoPlacement):
+        return discs
+    x = discs.x
+    y = x[3:11].reshape(FINGERS, 2)
+    positions = np.array([piece.point(at) for piece, at in zip(pieces, y, strict=True)])
+    focus, radii = x[:3], x[RADII]
+    forces = balanced_forces(pieces, np.array(sides)[:, None] * (focus - positions))
+    return Placement(positions, forces, focus[None], radii, discs.merit)
+
+
+def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array, contact: Array) -> Array:
+    """Where on a piece a line in its force cone meets the focus, on the focus's side, (k, 3).
+
+    The inverted cone of section 3.1, inscribed by the same pyramid as in the program.
+    """
+    side = 1.0 if float(cone.axis @ (focus - contact)) > 0.0 else -1.0
+    G = side * inscribed_facets(cone, piece.frame[:, 0])
+    limits = G @ (focus - piece.origin) - piece.depth * np.abs(G @ piece.normal)
+    flat = clip(piece.corners, G @ piece.frame, limits)
+    return piece.origin + flat @ piece.frame.T
+
+
+def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES) -> Array:
+    """Inward unit normals g of a pyramid inscribed in a circular cone, (sides, 3).
+
+    The pyramid's edges lie on the cone, so {v : g.v >= 0 for all g} is inside the cone. Its
+    facets touch a cone of half-angle psi with tan(psi) = tan(half_angle) cos(pi / sides).
+
+    Args:
+        cone: The circular cone.
+        toward: Across the axis, the direction in which the pyramid's first edge leans, (3,).
+        sides: Number of facets.
+    """
+    return pyramid_facets(cone.axis, cone.half_angle, toward, sides)
+
+
+def pyramid_facets(axes: Array, half_angle: float, toward: Array, sides: int) -> Array:
+    """As `inscribed_facets`, of equally wide cones around many axes, (..., sides, 3).
+
+    Args:
+        axes: Unit vectors, (..., 3).
+        half_angle: [rad]
+        toward: (..., 3)
+        sides: Number of facets.
+    """
+    first = toward - np.sum(toward * axes, axis=-1, keepdims=True) * axes
+    first = first / np.linalg.norm(first, axis=-1, keepdims=True)
+    across = facet_turns(sides) @ np.stack([first, np.cross(axes, first)], axis=-2)
+    psi = float(np.arctan(np.tan(half_angle) * np.cos(np.pi / sides)))
+    return np.sin(psi) * axes[..., None, :] - np.cos(psi) * across
+
+
+@cache
+def facet_turns(sides: int) -> Array:
+    """Cosines and sines of the directions in which a pyramid's facets lean, (sides, 2)."""
+    turns = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
+    return frozen(np.column_stack([np.cos(turns), np.sin(turns)]), (sides, 2), "turns")
+
+
+def concurrent_radius_bounds(reaches: Array, _: Array, half_angles: Array) -> Array:
+    """Upper bounds on the discs of quadruples, (..., 1).
+
+    A disc needs r <= s_i tan(half_angle), s_i the distance along the axis between the planes
+    across it through the focus and through the disc's centre: the two points of its border across
+    the axis see the focus at no less than r. The least s_i is at most the weighted mean.
+
+    Args:
+        reaches: Upper bounds of the mean distance along the axes, of any shape.
+        half_angles: Likewise [rad].
+    """
+    bounds: Array = reaches * np.tan(half_angles)
+    return bounds[..., None]
+
+
+def _rows(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], sides: Sides
+) -> tuple[Array, Array]:
+    """Rows over (x0 (3), y (4 x 2), radii (4), smallest radius)."""
+    rows: list[Array] = []
+    limits: list[Array] = []
+    for i, (piece, cone, side) in enumerate(zip(pieces, cones, sides, strict=True)):
+        G = side * inscribed_facets(cone, piece.frame[:, 0])
+        flat = G @ piece.frame
+        aim = np.zeros((len(G), 16))
+        aim[:, :3], aim[:, 3 + 2 * i : 5 + 2 * i] = -G, flat
+        aim[:, 11 + i] = np.linalg.norm(flat, axis=1)
+        inside = np.zeros((len(piece.E), 16))
+        inside[:, 3 + 2 * i : 5 + 2 * i], inside[:, 11 + i] = piece.E, 1.0
+        smallest = np.zeros((1, 16))
+        smallest[0, 15], smallest[0, 11 + i] = 1.0, -1.0
+        rows += [aim, inside, smallest]
+        limits += [-G @ piece.origin - piece.depth * np.abs(G @ piece.normal), piece.b, np.zeros(1)]
+    return np.vstack(rows), np.concatenate(limits)

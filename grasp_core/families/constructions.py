@@ -1,0 +1,126 @@
+"""The paper's three constructions behind one interface, so that the planner treats them alike."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.arrays import Array
+from grasp_core.families.concurrent import (
+    cone_footprint,
+    place_concurrent,
+    place_on_mixed_sides,
+)
+from grasp_core.families.pencil import place_pencil
+from grasp_core.families.placements import NoPlacement, Placement
+from grasp_core.families.regulus import nearly_symmetric, place_regulus
+from grasp_core.objects.face_pieces import FacePiece, inscribed_disc_radius
+from grasp_core.values import ContactRegion, Family, ForceCone
+
+FingerOrder: TypeAlias = tuple[int, int, int, int]
+Region: TypeAlias = Callable[[FacePiece, ForceCone, Placement, int], ContactRegion]
+
+AS_LISTED: tuple[FingerOrder, ...] = ((0, 1, 2, 3),)
+PAIRINGS: tuple[FingerOrder, ...] = ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2))
+"""The three ways to group four faces into the pairs (first, second) and (third, fourth)."""
+LEAST_RADIUS = 1e-3
+"""Smaller discs, relative to the object's radius, do not count as a region to stand in; pencils'
+foci closer than this count as one point."""
+DISC_CORNERS = 64
+"""How many points of a disc's border are listed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Construction:
+    """How one family is built on a quadruple of face pieces."""
+
+    family: Family
+    orders: tuple[FingerOrder, ...]
+    """Finger orders that give different grasps of the same faces."""
+    place: Callable[[Sequence[FacePiece], Sequence[ForceCone], float], Placement | NoPlacement]
+    """From pieces, force cones and the least merit worth having."""
+    limits: slice | None
+    """Which of a quadruple's `disc_limits` are those of its finger orders; None where no disc is
+    claimed."""
+    admits: Callable[[Array, Array], NDArray[np.bool_]]
+    """Whether quadruples are worth a program, from their normals in finger order, (q, 4, 3), and
+    half-angles (q,): False only where none can be feasible."""
+    region: Region
+    """The region of one finger, in the pieces' units."""
+
+    @property
+    def least(self) -> float:
+        """The merit above which a placement counts."""
+        return LEAST_RADIUS if self.limits else -math.inf
+
+
+def _always_admitted(_: Array, half_angles: Array) -> NDArray[np.bool_]:
+    return np.ones(len(half_angles), dtype=np.bool_)
+
+
+def _cone_region(
+    piece: FacePiece, cone: ForceCone, placed: Placement, finger: int
+) -> ContactRegion:
+    polygon = cone_footprint(piece, cone, placed.foci[0], placed.positions[finger])
+    return ContactRegion("cone", polygon, inscribed_disc_radius(polygon, piece))
+
+
+def _disc_region(piece: FacePiece, _: ForceCone, placed: Placement, finger: int) -> ContactRegion:
+    turns = 2.0 * np.pi * np.arange(DISC_CORNERS) / DISC_CORNERS
+    ring = np.column_stack([np.cos(turns), np.sin(turns)]) @ piece.frame.T
+    radius = float(placed.radii[finger])
+    return ContactRegion("disc", placed.positions[finger] + radius * ring, radius)
+
+
+def regions_of(
+    region: Region, pieces: Sequence[FacePiece], cones: Sequence[ForceCone], placed: Placement
+) -> tuple[ContactRegion, ...]:
+    """The regions of all fingers, in the pieces' units."""
+    return tuple(
+        region(piece, cone, placed, finger)
+        for finger, (piece, cone) in enumerate(zip(pieces, cones, strict=True))
+    )
+
+
+def point_region(_: FacePiece, __: ForceCone, placed: Placement, finger: int) -> ContactRegion:
+    """Nothing but the contact."""
+    return ContactRegion("point", placed.positions[finger][None], 0.0)
+
+
+MIXED = Construction(
+    "concurrent",
+    AS_LISTED,
+    lambda pieces, cones, least: place_on_mixed_sides(pieces, cones, least=least),
+    slice(0, 1),
+    _always_admitted,
+    _cone_region,
+)
+"""Concurrent grasps with the focus before some fingers and behind the others."""
+
+CONSTRUCTIONS: dict[Family, Construction] = {
+    "concurrent": Construction(
+        "concurrent",
+        AS_LISTED,
+        lambda pieces, cones, least: place_concurrent(pieces, cones, least=least),
+        slice(0, 1),
+        _always_admitted,
+        _cone_region,
+    ),
+    "pencil": Construction(
+        "pencil",
+        PAIRINGS,
+        lambda pieces, cones, least: place_pencil(
+            pieces, cones, least=least, least_gap=LEAST_RADIUS
+        ),
+        slice(1, 4),
+        _always_admitted,
+        _disc_region,
+    ),
+    "regulus": Construction(
+        "regulus", PAIRINGS, lambda pieces, cones, _: place_regulus(pieces, cones), None,
+        nearly_symmetric, point_region,
+    ),
+}  # fmt: skip

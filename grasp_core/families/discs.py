@@ -1,0 +1,82 @@
+"""Four discs of the largest common radius, and then each as large as it can be.
+
+The first program maximises the smallest radius. It is free in sign, so that the program is
+always feasible and the sign of its optimum, with the multipliers that prove it, decides. The
+second keeps the smallest radius and maximises the sum of the four, so that contacts whose discs
+have room do not end up against an arbitrary edge. Of all that is best so far, the point nearest to
+the origin of the variables is taken (see `ties`).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.errors import SolverError
+from grasp_core.families.placements import NoPlacement
+from grasp_core.solvers.lp import (
+    RESIDUAL,
+    Below,
+    Infeasible,
+    LinearProgram,
+    Optimum,
+    maximize,
+    maximize_above,
+)
+from grasp_core.solvers.ties import nearest_optimum
+
+KEPT = 1e-6
+"""Share of the smallest radius that the second program may give up. With less, its optima would be
+slivers, in which rounding moves the nearest point a thousand times as far."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LargestDiscs:
+    """The variables of the discs' program, and what it maximised."""
+
+    x: Array
+    """With the radii reduced by what a program's answer may be off, (n,)."""
+    merit: float
+    """Optimum of the smallest radius: the same on every machine but for the last digits."""
+
+
+def largest_discs(
+    A: Array, b: Array, radii: slice, smallest: int, least: float
+) -> LargestDiscs | NoPlacement:
+    """Solve both programs over the variables x with A x <= b.
+
+    Args:
+        A: (rows, n); rows must keep the smallest radius below each of the four.
+        b: (rows,)
+        radii: Where the four radii are in x.
+        smallest: Where their lower bound is.
+        least: Smaller discs count as none.
+
+    Returns:
+        The discs; or, if the common radius is below `least`, the proof.
+
+    Raises:
+        SolverError: A program's answer failed its check.
+    """
+    n = A.shape[1]
+    common = np.eye(n)[smallest]
+    first = maximize_above(LinearProgram(common, A, b), least)
+    if isinstance(first, Infeasible):
+        raise SolverError("a program that is feasible for small enough radii was called infeasible")
+    if isinstance(first, Below):
+        return NoPlacement(first.bound)
+    if first.value < least:
+        return NoPlacement(first.value)
+    kept = LinearProgram(
+        np.eye(n)[radii].sum(axis=0),
+        np.vstack([A, -common]),
+        np.append(b, -first.value * (1.0 - KEPT)),
+    )
+    try:
+        second = maximize(kept)
+    except SolverError:
+        second = first  # within rounding of infeasible where discs are tiny
+    x = nearest_optimum(kept, second) if isinstance(second, Optimum) else first.x
+    x = np.array(x)
+    x[radii] = np.maximum(x[radii] - RESIDUAL, 0.0)
+    return LargestDiscs(x, first.value - RESIDUAL)

@@ -1,0 +1,329 @@
+"""Grasps of four convex faces without a type fixed in advance, or a proof that there is none.
+
+Solved: whether any four contacts, one on each of four convex faces, are in force closure at a
+given friction, at any friction and for any normals.
+
+Derivation. Put a contact at every corner of the four faces: the patch. A force at any point of
+a convex face is a convex combination of the same force at its corners, so if four contacts on
+the faces were in force closure, the patch would be too. A separating twist of the patch is
+therefore a proof of absence; by convexity of the supports it separates every grasp on these
+faces.
+
+If the patch is closed, take the smallest forces that show it and add them face by face. The sums
+F_i lie inside the cones and balance as forces. With these forces fixed, equilibrium is linear in
+the positions x_i = o_i + T_i y_i:
+
+    maximise t  subject to  sum_i (o_i + T_i y_i) x F_i = 0,    e.y_i + t <= b for all edges.
+
+Any solution inside the faces, unless all on one line, is in force closure. Of those nearly as far
+from the edges as these forces allow, the one nearest to the middles of the faces is taken.
+If there is none, the centres of pressure of the patch are tried as contacts, then patches of
+smaller random pieces of the faces, which give other forces. What is still open can be split:
+each face quadruple is cut through its longest face, parts are dropped with their proof of
+absence, until a grasp is found, nothing is left, or the budget is spent.
+
+Nothing here depends on P3. The lines of force are of the most general type, as a rule a
+regulus, with u, slopes and pitch free; so this also answers the freedom that the paper leaves
+unused when it fixes the direction u (its section 4).
+
+Source: Sudsang & Ponce 1995, Propositions 1 and 3; the relaxation by many contacts on a face
+is that of Omata's virtual fingers (1991), the rest is this project's.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from heapq import heappop, heappush
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.closure.lines import classify_lines
+from grasp_core.closure.wrenches import cross_matrix, grasp_map, normal_and_tangential
+from grasp_core.errors import InputError, UndecidedError
+from grasp_core.families.face_parts import (
+    Corners,
+    Path,
+    corner_contacts,
+    cover_everything,
+    is_path,
+    part_at,
+    random_parts,
+)
+from grasp_core.families.free_forces import smallest_forces
+from grasp_core.families.placements import Placement
+from grasp_core.fields import are_frictions, is_a, is_tuple_of
+from grasp_core.objects.face_pieces import FacePiece
+from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
+from grasp_core.solvers.nearest_point import least_distance
+from grasp_core.solvers.ties import graded
+from grasp_core.values import FINGERS
+
+RESTARTS = 12
+"""Smaller random patches that are tried, unless told otherwise."""
+LEAST_INSET = 1e-4
+"""Least distance of a contact from the edges of its face, in object radii."""
+DEPTH_KEPT = 0.5
+"""Share of the patch's margin that its forces keep inside their cones."""
+ROUNDED = 1e-12
+"""Least weight of a corner."""
+INSET_KEPT = 0.9
+"""Share of the largest distance from the edges that contacts keep when they move to the middles."""
+SAME_PLANE = 1e-6
+"""Smaller moments, relative to the largest, are those of forces in a plane, but for rounding."""
+LEAST_SPREAD = 1e-3
+"""Least extent of the contacts across the line they are closest to, in object radii."""
+
+
+SAME_CORNERS = 1e-12
+"""How far contacts of a proof may be from the corners of its part: thousands of roundings."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Absence:
+    """Proof that no four contacts on four convex pieces are in force closure."""
+
+    pieces: tuple[FacePiece, ...]
+    friction: float
+    leaves: tuple[tuple[Path, ClosureCertificate], ...]
+    """Parts that together cover the pieces, each with a twist that separates its patch."""
+
+    def verify(self) -> bool:
+        """Re-check every field in plain arithmetic.
+
+        That the pieces are convex polygons, and that the parts cover them and are all separated.
+        That the pieces are those of an object's faces is for who has the object.
+        """
+        with np.errstate(all="ignore"):
+            return (
+                are_frictions(np.array([self.friction]), 1)
+                and is_tuple_of(self.pieces, FacePiece, FINGERS)
+                and all(piece.sound() for piece in self.pieces)
+                and is_tuple_of(self.leaves, tuple)
+                and all(len(leaf) == len(("path", "proof")) for leaf in self.leaves)
+                and all(is_path(path) for path, _ in self.leaves)
+                and cover_everything([path for path, _ in self.leaves])
+                and all(self._separated(path, proof) for path, proof in self.leaves)
+            )
+
+    def _separated(self, path: Path, proof: ClosureCertificate) -> bool:
+        if not is_a(proof, ClosureCertificate) or proof.closed is not False:
+            return False
+        if not proof.verify() or float(proof.friction.min()) < self.friction:
+            return False
+        points, normals = corner_contacts(self.pieces, part_at(self.pieces, path))
+        return (
+            proof.positions.shape == points.shape
+            and float(np.abs(proof.positions - points).max()) <= SAME_CORNERS
+            and float(np.abs(proof.normals - normals).max()) <= SAME_CORNERS
+            and replace(proof, positions=points, normals=normals).separates()
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Undecided:
+    """Neither a grasp nor a proof of absence within the budget."""
+
+    open_parts: int
+    open_share: float
+    """Of all choices of contacts, where each cut counts for half."""
+
+
+def place_free(
+    pieces: Sequence[FacePiece],
+    friction: float,
+    *,
+    rng: np.random.Generator,
+    cells: int = 1,
+    restarts: int = RESTARTS,
+) -> Placement | Absence | Undecided:
+    """Find a grasp of four convex pieces, or prove that there is none.
+
+    Args:
+        pieces: Four convex pieces, in finger order, in units where the object has size one.
+        friction: Coulomb coefficient at every contact, positive.
+        rng: Chooses the restarts.
+        cells: How many parts of the pieces to examine at most: with 1 there is no splitting.
+        restarts: How many smaller random patches to try before giving up or splitting.
+
+    Raises:
+        InputError: The friction is not positive.
+        SolverError: A program's answer failed its check.
+    """
+    if not friction > 0.0:
+        raise InputError(f"friction must be positive, got {friction}")
+    leaves: list[tuple[Path, ClosureCertificate]] = []
+    waiting: list[tuple[float, Path]] = [(0.0, ())]
+    examined = 0
+    while waiting and examined < cells:
+        _, path = heappop(waiting)
+        part = part_at(pieces, path)
+        patch = close_patch(pieces, part, friction)
+        examined += 1
+        if patch is not None and not patch.closed:
+            leaves.append((path, patch))
+            continue
+        found = _grasp(pieces, part, patch, friction) if patch is not None else None
+        if found is None and not path:
+            found = _restarted(pieces, friction, rng, restarts)
+        if found is not None:
+            general = of_general_type(pieces, found, friction, rng)
+            return general or Undecided(len(waiting) + 1, _share([*waiting, (0.0, path)]))
+        margin = patch.margin if patch is not None else 0.0
+        for half in (0, 1):
+            heappush(waiting, (-graded(margin), (*path, half)))
+    if waiting:
+        return Undecided(len(waiting), _share(waiting))
+    return Absence(tuple(pieces), friction, tuple(leaves))
+
+
+def _share(waiting: Sequence[tuple[float, Path]]) -> float:
+    return sum(0.5 ** len(path) for _, path in waiting)
+
+
+def close_patch(
+    pieces: Sequence[FacePiece], part: Corners, friction: float
+) -> ClosureCertificate | None:
+    """Force closure of contacts at all corners of a part; None too close to the boundary."""
+    try:
+        return force_closure(*corner_contacts(pieces, part), friction)
+    except UndecidedError:
+        return None
+
+
+def place_by_forces(pieces: Sequence[FacePiece], forces: Array) -> Placement | None:
+    """Contacts at which given forces balance, as far from the edges as possible.
+
+    Args:
+        pieces: Four convex pieces.
+        forces: One for each, summing to zero, (4, 3).
+    """
+    A_eq = np.zeros((3, 2 * FINGERS + 1))
+    b_eq = np.zeros(3)
+    rows: list[Array] = []
+    limits: list[Array] = []
+    for i, (piece, force) in enumerate(zip(pieces, forces, strict=True)):
+        turn = -cross_matrix(force)
+        A_eq[:, 2 * i : 2 * i + 2] = turn @ piece.frame
+        b_eq -= turn @ piece.origin
+        inside = np.zeros((len(piece.E), 2 * FINGERS + 1))
+        inside[:, 2 * i : 2 * i + 2], inside[:, -1] = piece.E, 1.0
+        rows.append(inside)
+        limits.append(piece.b)
+    objective = np.eye(2 * FINGERS + 1)[-1]
+    scale = float(np.abs(forces).max())
+    found = maximize(
+        LinearProgram(objective, np.vstack(rows), np.hstack(limits), A_eq / scale, b_eq / scale)
+    )
+    if not isinstance(found, Optimum) or INSET_KEPT * found.value < LEAST_INSET:
+        return None
+    edges, ends = np.vstack(rows)[:, :-1], np.hstack(limits)
+    inside = ends - INSET_KEPT * found.value
+    y = _nearest_to_middles(pieces, found.x[:-1], A_eq[:, :-1], edges, inside)
+    positions = np.array(
+        [piece.point(at) for piece, at in zip(pieces, y.reshape(FINGERS, 2), strict=True)]
+    )
+    if _on_one_line(positions):
+        return None
+    inset = float((ends - edges @ y).min())
+    return Placement(positions, forces, np.empty((0, 3)), np.zeros(FINGERS), inset)
+
+
+def _nearest_to_middles(
+    pieces: Sequence[FacePiece], start: Array, A_eq: Array, rows: Array, limits: Array
+) -> Array:
+    """Of all balanced contacts with rows @ y <= limits those nearest to the pieces' middles, (8,).
+
+    They are unique, unlike those farthest from the edges: an object that is turned keeps them.
+    """
+    _, sizes, right = np.linalg.svd(A_eq)
+    free = right[int((sizes > SAME_PLANE * sizes[0]).sum()) :].T
+    middles = np.concatenate([piece.corners.mean(axis=0) for piece in pieces])
+    y = start + free @ (free.T @ (middles - start))
+    (step,) = least_distance(rows @ free, (limits - rows @ y)[None])
+    return start if np.isnan(step).any() else y + free @ step
+
+
+def _grasp(
+    pieces: Sequence[FacePiece], part: Corners, patch: ClosureCertificate, friction: float
+) -> Placement | None:
+    """A grasp made from the forces of a closed patch."""
+    if patch.forces is None:
+        return None
+    owner = np.repeat(np.arange(FINGERS), [len(corners) for corners in part])
+    at_corners = smallest_forces(
+        [pieces[int(i)] for i in owner], patch.positions, patch.normals, friction,
+        DEPTH_KEPT * patch.margin,
+    )  # fmt: skip
+    at_corners = patch.forces if at_corners is None else at_corners
+    forces = np.array([at_corners[owner == i].sum(axis=0) for i in range(FINGERS)])
+    if found := place_by_forces(pieces, forces - forces.mean(axis=0)):
+        return found
+    pushes, _ = normal_and_tangential(at_corners, patch.normals)
+    weights = np.maximum(pushes, ROUNDED)
+    centers = np.array(
+        [
+            np.average(patch.positions[owner == i], axis=0, weights=weights[owner == i])
+            for i in range(FINGERS)
+        ]
+    )
+    return _held_at(pieces, centers, friction)
+
+
+def of_general_type(
+    pieces: Sequence[FacePiece], found: Placement, friction: float, rng: np.random.Generator
+) -> Placement | None:
+    """The same contacts with forces that form a regulus.
+
+    On symmetric faces the patch's forces may all meet, or lie in one plane. Adding internal
+    forces, half as large as the cones have room for, makes the lines skew; None where that room
+    is too small to tell.
+    """
+    if classify_lines(found.positions, found.forces) == "regulus":
+        return found
+    normals = np.array([piece.normal for piece in pieces])
+    G = grasp_map(found.positions)
+    drawn = np.concatenate(
+        [np.column_stack([piece.normal, piece.frame]) @ rng.normal(size=3) for piece in pieces]
+    )
+    internal = (drawn - np.linalg.pinv(G) @ (G @ drawn)).reshape(FINGERS, 3)
+    along, across = normal_and_tangential(found.forces, normals)
+    inward, sideways = normal_and_tangential(internal, normals)
+    room = (friction * along - across) / (sideways + friction * np.abs(inward))
+    forces = found.forces + 0.5 * float(room.min()) * internal
+    pushes = float(np.einsum("ki,ki->", forces, normals))
+    if classify_lines(found.positions, forces) != "regulus":
+        return None
+    return replace(found, forces=forces / pushes, planned=found.forces)
+
+
+def _held_at(pieces: Sequence[FacePiece], positions: Array, friction: float) -> Placement | None:
+    """The placement at given contacts, if they are in force closure."""
+    inset = min(
+        float((piece.b - piece.E @ (piece.frame.T @ (at - piece.origin))).min())
+        for piece, at in zip(pieces, positions, strict=True)
+    )
+    normals = np.array([piece.normal for piece in pieces])
+    try:
+        certificate = force_closure(positions, normals, friction)
+    except UndecidedError:
+        return None
+    if certificate.forces is None or inset < LEAST_INSET or _on_one_line(positions):
+        return None
+    return Placement(positions, certificate.forces, np.empty((0, 3)), np.zeros(FINGERS), inset)
+
+
+def _on_one_line(positions: Array) -> bool:
+    """Whether contacts can do next to nothing against turning about the line through them."""
+    spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
+    return bool(spread[1] < LEAST_SPREAD)
+
+
+def _restarted(
+    pieces: Sequence[FacePiece], friction: float, rng: np.random.Generator, restarts: int
+) -> Placement | None:
+    for part in random_parts(pieces, rng, restarts):
+        patch = close_patch(pieces, part, friction)
+        if patch is not None and (found := _grasp(pieces, part, patch, friction)):
+            return found
+    return None

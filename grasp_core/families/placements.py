@@ -1,0 +1,64 @@
+"""What a construction returns: contacts with the forces that witness them, or a bound.
+
+Everything is in the pieces' units, where the object has size one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.cones.spanning import balancing_weights
+from grasp_core.objects.face_pieces import FacePiece
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """Four contacts, one on each piece, and the forces that hold them."""
+
+    positions: Array
+    """(4, 3)"""
+    forces: Array
+    """Balanced forces along the witness lines, normal parts summing to one, (4, 3)."""
+    foci: Array
+    """Where witness lines meet, (k, 3): one point for a concurrent grasp, two for a pencil; for
+    a regulus the point midway between the two lines of each pair, or nothing."""
+    radii: Array
+    """Radius of the independent disc around each contact, (4,); zeros where none is claimed."""
+    merit: float
+    """What the construction maximised."""
+    planned: Array | None = None
+    """Forces for which the contacts were chosen, where those of the witness are others, (4, 3)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NoPlacement:
+    """The construction offers nothing on these pieces.
+
+    `bound` is the largest merit that its programs' multipliers allow; minus infinity where only a
+    sample of slopes was tried.
+    """
+
+    bound: float
+
+
+def balanced_forces(pieces: Sequence[FacePiece], directions: Array) -> Array:
+    """Forces along four positively spanning directions that balance as vectors, (4, 3)."""
+    forces = balancing_weights(directions)[:, None] * directions
+    normals = np.array([piece.normal for piece in pieces])
+    return forces / float(np.einsum("ki,ki->", forces, normals))
+
+
+def focus_direction(axes: Array) -> Array:
+    """Direction u of the line between the foci of pairs (0, 1) and (2, 3), (..., 3).
+
+    It lies in the planes of both pairs, and the first pair pushes along it: with positive
+    weights lam of sum lam a = 0, it is that of w = lam_0 a_0 + lam_1 a_1 = -lam_2 a_2 - lam_3 a_3.
+
+    Args:
+        axes: Of four force cones that positively span, in finger order, (..., 4, 3).
+    """
+    first = np.einsum("...i,...ij->...j", balancing_weights(axes)[..., :2], axes[..., :2, :])
+    w = np.asarray(first, dtype=np.float64)
+    return w / np.linalg.norm(w, axis=-1, keepdims=True)

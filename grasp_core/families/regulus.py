@@ -1,0 +1,312 @@
+"""Regulus grasps: two pairs of lines of force that pass each other at equal pitch.
+
+Solved: for four convex faces with a force cone each, grouped into the pairs (0, 1) and
+(2, 3), four contacts near the middle of their faces and forces in the cones whose lines lie
+on one regulus. The cones must positively span whatever direction each contributes (P3).
+
+Derivation. With axes a_ij, planes P_i, and u along both planes as for pencils, let N_i be the
+unit normal of P_i and v_i = N_i x u. The two lines of pair i pass the focus line on either side
+of c_i = x0 +- k u, at d_i1 = c_i + l_i N_i and d_i2 = c_i - l_i N_i, along
+
+    f_i1 = x_i u + y_i v_i + z_i N_i,      f_i2 = x_i u - y_i v_i - z_i N_i,
+
+and the contacts are x_ij = d_ij - f_ij. With equal weights the two forces of a pair amount to
+the force 2 x_i u with the moment 2 x_i (x0 x u) - 2 l_i y_i u, so pairs 1 and 2 cancel iff
+
+    l_1 y_1 / x_1 = l_2 y_2 / x_2                                      (equal pitch).
+
+The paper calls the lines "clearly linearly dependent", but without this equation they are
+independent in general, and of the grasps its program returns on random polyhedra two in five
+are not in equilibrium.
+The equation is bilinear. Fixing both slopes tau_i = y_i / x_i makes it linear: l_1 = p tau_2 and
+l_2 = p tau_1 with one free p. The projection of f_ij into P_i stays within psi of a_ij, so if
+phi_ij is the angle of a_ij from the resultant of its pair, +u or -u, then
+
+    max_j phi_ij - psi <= atan|tau_i| <= min(min_j phi_ij + psi, pi / 2),
+
+an interval of which a few values are tried; tau_i has the sign of x_i. It is empty unless the
+pair is nearly symmetric about u, |phi_i1 - phi_i2| <= 2 psi. In (x0, k, p, x_i, z_i, t) the
+program is linear:
+
+    minimise t  subject to  x_ij inside its face, |x_ij - centre| <= t along both axes of the face,
+                            f_ij in an inscribed pyramid, n_ij.f_ij >= a least depth,
+                            p beyond a least gap, on either side.
+
+The last two keep out the zero force, and lines that meet: those are pencils.
+
+Source: Sudsang & Ponce 1995, section 3.3; the pitch equation and its use are this project's.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import compiled
+from grasp_core.cones.spanning import angles_between
+from grasp_core.families.concurrent import PYRAMID_SIDES, facet_turns, inscribed_facets
+from grasp_core.families.face_tables import face_table
+from grasp_core.families.kernel_tables import Attempts, FaceTable, RegulusTerms
+from grasp_core.families.placements import (
+    NoPlacement,
+    Placement,
+    balanced_forces,
+    focus_direction,
+)
+from grasp_core.objects.face_pieces import FacePiece
+from grasp_core.solvers.lp import RESIDUAL, LinearProgram, Optimum, maximize
+from grasp_core.solvers.ties import nearest_optimum
+from grasp_core.values import FINGERS, ForceCone
+
+SLOPES = (0.5, 0.2, 0.8)
+"""Where in its interval each slope's angle is tried."""
+LEAST_DEPTH = 0.02
+"""Least height of the passing points over their faces, in object radii."""
+LEAST_INSET = 1e-3
+"""Least distance of a contact from the edges of its face, in object radii."""
+LEAST_GAP = 0.01
+"""Least distance l_i, along N_i, at which a line passes the focus line, in object radii."""
+SAME_OFFSET = 1e-9
+"""Offsets that differ by no more are equal: the slopes tried first win."""
+GIVEN_UP = 1e-9
+"""Of an offset, in favour of the least variables: less than makes the contacts of two pairings
+others than each other's."""
+X0, K, P, X, Z, T = slice(0, 3), 3, 4, slice(5, 7), slice(7, 9), 9
+"""Where the variables are."""
+VARIABLES = 10
+
+RESULTANTS = np.array([1.0, 1.0, -1.0, -1.0])
+"""Signs of the resultants of the fingers' pairs along u."""
+KERNEL = "grasp_core.families.regulus_kernel"
+SIDES = (1.0, -1.0)
+"""Of the focus line, on which the lines of the first finger pass it."""
+Choice: TypeAlias = tuple[int, int, int]
+"""Which of the `SLOPES` the pairs have, and on which of the `SIDES` the lines pass."""
+CHOICES: tuple[Choice, ...] = tuple(
+    product(range(len(SLOPES)), range(len(SLOPES)), range(len(SIDES)))
+)
+
+
+def place_regulus(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone]
+) -> Placement | NoPlacement:
+    """Place four contacts on the lines of one regulus, as near to the faces' centres as can be.
+
+    Args:
+        pieces: Four convex pieces; the pairs are (0, 1) and (2, 3).
+        cones: The force cones, in the same order; they must satisfy the generalised P3.
+
+    Returns:
+        The placement, with minus the largest offset t as its merit, or that there is none for
+        the slopes tried.
+
+    Raises:
+        SolverError: A program's answer failed its check.
+    """
+    known = _best_choice(pieces, cones)
+    if known is not None:
+        merit, choices = known
+        best = _best_of(pieces, cones, choices)
+        if _merit(best) == merit or abs(_merit(best) - merit) <= RESIDUAL:
+            return best
+    return _best_of(pieces, cones, CHOICES)
+
+
+def regulus_bounds(
+    table: FaceTable, attempts: Attempts, enough: float = -SAME_OFFSET
+) -> tuple[Array, Indices] | None:
+    """How good reguli can be, in compiled code, or None where there is none.
+
+    Args:
+        table: Of the faces.
+        attempts: Which of them, in finger order, with cones that positively span (P3).
+        enough: Merit above which to be content; no offset is below zero.
+
+    Returns:
+        The merits of the best choices, (a,): minus infinity where a proof excludes each, infinity
+        where one was not decided; and these choices, (a, 3), -1 where there is none.
+    """
+    kernel = compiled(KERNEL)
+    if kernel is None:
+        return None
+    turns, shares = np.array(facet_turns(PYRAMID_SIDES)), np.array(SLOPES)
+    terms = RegulusTerms(turns, shares, LEAST_DEPTH, LEAST_INSET, LEAST_GAP, SAME_OFFSET, enough)
+    bounds = np.empty(len(attempts.faces))
+    chosen = np.empty((len(bounds), 3), dtype=np.int64)
+    kernel.regulus_bounds(table, attempts, terms, bounds, chosen)
+    return bounds, chosen
+
+
+def _best_choice(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone]
+) -> tuple[float, tuple[Choice, ...]] | None:
+    """The best choice, if there is any, and its merit; None where this is not known."""
+    half_angle = cones[0].half_angle
+    if any(cone.half_angle != half_angle for cone in cones):
+        return None
+    attempt = Attempts(
+        np.arange(FINGERS)[None], np.array([[cone.axis for cone in cones]]), np.array([half_angle])
+    )
+    known = regulus_bounds(face_table(pieces), attempt)
+    if known is None:
+        return None
+    (merit,), (chosen,) = known
+    first, second, side = (int(each) for each in chosen)
+    return float(merit), ((first, second, side),) if first >= 0 else ()
+
+
+def _best_of(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], choices: Iterable[Choice]
+) -> Placement | NoPlacement:
+    pairs = _pairs(cones)
+    best: Placement | NoPlacement = NoPlacement(-math.inf)
+    if any(pair.largest_angle <= pair.least_angle for pair in pairs):
+        return best  # too far from symmetric
+    facets = [inscribed_facets(c, p.frame[:, 0]) for c, p in zip(cones, pieces, strict=True)]
+    for *which, side in choices:
+        slopes = [_slope(pair, SLOPES[each]) for pair, each in zip(pairs, which, strict=True)]
+        lines = [_line(pairs, slopes, finger) for finger in range(FINGERS)]
+        program = _program(pieces, facets, lines, slopes, SIDES[side])
+        found = maximize(program)
+        if isinstance(found, Optimum) and found.value > _merit(best) + SAME_OFFSET:
+            best = _placement(pieces, lines, nearest_optimum(program, found, GIVEN_UP), found.value)
+    return best
+
+
+def nearly_symmetric(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
+    """Whether both pairs of many quadruples leave their slope an interval, (q,).
+
+    Args:
+        axes: Of the force cones in finger order, (q, 4, 3).
+        half_angles: (q,) [rad].
+    """
+    least, largest = _slope_angles(axes, half_angles[:, None])
+    return np.all(least < largest, axis=1)
+
+
+def _slope_angles(axes: Array, half_angles: Array) -> tuple[Array, Array]:
+    """Least and largest angle of each pair's forces from its resultant, each (..., 2).
+
+    Args:
+        axes: (..., 4, 3)
+        half_angles: One for all fingers, (..., 1), or one each, (..., 4).
+    """
+    resultants = focus_direction(axes)[..., None, :] * RESULTANTS[:, None]
+    phi = angles_between(axes, resultants)
+    in_pairs = (*phi.shape[:-1], 2, 2)
+    least = (phi - half_angles).reshape(in_pairs).max(axis=-1)
+    largest = (phi + half_angles).reshape(in_pairs).min(axis=-1)
+    return least, np.minimum(largest, np.pi / 2.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pair:
+    """Frame of one pair, and the angles its slope may have."""
+
+    u: Array
+    v: Array
+    N: Array
+    resultant: float
+    """+1 where the pair pushes along u, -1 where against it."""
+    least_angle: float
+    largest_angle: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Line:
+    """Force direction F v and contact D v - F v as functions of the variables v."""
+
+    D: Array
+    F: Array
+
+
+def _pairs(cones: Sequence[ForceCone]) -> list[_Pair]:
+    axes = np.array([cone.axis for cone in cones])
+    u = focus_direction(axes)
+    least, largest = _slope_angles(axes, np.array([cone.half_angle for cone in cones]))
+    pairs: list[_Pair] = []
+    for pair, resultant in enumerate((1.0, -1.0)):
+        a, c = axes[2 * pair], axes[2 * pair + 1]
+        across = np.cross(a, c) * np.sign(np.cross(np.cross(a, c), u) @ a)
+        N = np.asarray(across / np.linalg.norm(across), dtype=np.float64)
+        angles = float(least[pair]), float(largest[pair])
+        pairs.append(_Pair(u, np.asarray(np.cross(N, u)), N, resultant, *angles))
+    return pairs
+
+
+def _slope(pair: _Pair, share: float) -> float:
+    """Value of y / x somewhere in its interval."""
+    width = pair.largest_angle - pair.least_angle
+    return pair.resultant * math.tan(pair.least_angle + share * width)
+
+
+def _line(pairs: Sequence[_Pair], slopes: Sequence[float], finger: int) -> _Line:
+    i, side = finger // 2, 1.0 if finger % 2 == 0 else -1.0
+    pair = pairs[i]
+    D = np.zeros((3, VARIABLES))
+    D[:, X0], D[:, K] = np.eye(3), pair.resultant * pair.u
+    D[:, P] = side * slopes[1 - i] * pair.N
+    F = np.zeros((3, VARIABLES))
+    F[:, X.start + i] = pair.u + side * slopes[i] * pair.v
+    F[:, Z.start + i] = side * pair.N
+    return _Line(D, F)
+
+
+def _program(
+    pieces: Sequence[FacePiece],
+    facets: Sequence[Array],
+    lines: Sequence[_Line],
+    slopes: Sequence[float],
+    side: float,
+) -> LinearProgram:
+    """The least offset t for given slopes, with the lines on one side of the focus line."""
+    offset = np.eye(VARIABLES)[T]
+    gap = -side * np.eye(VARIABLES)[P]
+    rows: list[Array] = [gap[None]]
+    limits: list[Array | float] = [-LEAST_GAP / min(abs(slope) for slope in slopes)]
+    for piece, G, line in zip(pieces, facets, lines, strict=True):
+        flat, middle = piece.frame.T @ (line.D - line.F), piece.frame.T @ piece.origin
+        rows += [
+            piece.E @ flat,
+            flat - offset,
+            -flat - offset,
+            -G @ line.F,
+            -piece.normal @ line.F,
+        ]
+        limits += [
+            piece.b - LEAST_INSET + piece.E @ middle,
+            middle,
+            -middle,
+            np.zeros(len(G)),
+            -LEAST_DEPTH,
+        ]
+    normals = np.array([piece.normal for piece in pieces])
+    A_eq = np.array([n @ (line.D - line.F) for n, line in zip(normals, lines, strict=True)])
+    b_eq = np.array([piece.normal @ piece.origin for piece in pieces])
+    return LinearProgram(-offset, np.vstack(rows), np.hstack(limits), A_eq, b_eq)
+
+
+def _placement(
+    pieces: Sequence[FacePiece], lines: Sequence[_Line], x: Array, merit: float
+) -> Placement:
+    positions: list[Array] = []
+    for piece, line in zip(pieces, lines, strict=True):
+        contact = (line.D - line.F) @ x
+        positions.append(contact - piece.normal * (piece.normal @ (contact - piece.origin)))
+    passing = np.array([line.D @ x for line in lines])
+    return Placement(
+        positions=np.array(positions),
+        forces=balanced_forces(pieces, np.array([line.F @ x for line in lines])),
+        foci=np.array([passing[:2].mean(axis=0), passing[2:].mean(axis=0)]),
+        radii=np.zeros(FINGERS),
+        merit=merit,
+    )
+
+
+def _merit(found: Placement | NoPlacement) -> float:
+    return found.merit if isinstance(found, Placement) else -math.inf

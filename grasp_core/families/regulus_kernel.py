@@ -1,0 +1,218 @@
+"""Which slopes suit a regulus best: the programs of `regulus_grasps` for all slopes tried.
+
+A program, over (x0, k, p, x_1, x_2, z_1, z_2, t), is solved without its gap first: where p keeps
+beyond the gap anyway, that was the better side. As the cones span (P3), x_i is on the side of its
+pair's resultant; there the rows that keep the forces of a pair in their pyramids are bounds on
+z_i / x_i, of which the tightest imply the others. `regulus_grasps` builds the same programs whole
+and solves the best one again. See `kernels.attempts`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.families.attempts_kernel import (
+    FINGERS,
+    edges_of,
+    measure,
+    room_for,
+    tilted_faces,
+    vertex_of,
+)
+from grasp_core.families.kernel_tables import Attempts, FaceTable, RegulusTerms
+from grasp_core.families.regulus_frames_kernel import PairFrames, pair_frames
+from grasp_core.geometry.vectors_kernel import dotted
+from grasp_core.solvers.lp_kernel import (
+    INFEASIBLE,
+    LOST,
+    Rows,
+    Vertex,
+    proved_bound,
+    proved_empty,
+    solve,
+)
+
+VARIABLES, K, P, X, Z, T = 10, 3, 4, 5, 7, 9
+"""How many there are, and where they are."""
+ACCURACY, FARTHEST = 1e-11, 1e4
+"""How far multipliers may be from giving the objective, and from which points a proof that there
+are none may not keep away."""
+NONE, PLUS, MINUS = -1, 0, 1
+"""No slopes; those of p > 0 and of p < 0."""
+
+
+class _Line(NamedTuple):
+    """Through D along F, as functions of the variables."""
+
+    pair: int
+    k: Array
+    """What D gains with k, (3,)."""
+    p: Array
+    """What D gains with p, (3,)."""
+    x: Array
+    """What F gains with x of its pair, (3,)."""
+    z: Array
+    """What F gains with z of its pair, (3,)."""
+
+
+def try_out() -> None:
+    """Decide one attempt."""
+    terms = RegulusTerms(np.ones((16, 2)), np.ones(1), 0.0, 0.0, 0.0, 0.0, 0.0)
+    regulus_bounds(*tilted_faces(), terms, np.empty(1), np.empty((1, 3), dtype=np.int64))
+
+
+@njit(cache=True)
+def regulus_bounds(
+    faces: FaceTable,
+    attempts: Attempts,
+    terms: RegulusTerms,
+    bounds: Array,
+    chosen: Indices,
+) -> None:
+    """Bound the merit, minus the largest offset t, over the slopes tried until one is enough.
+
+    Args:
+        faces: Of the object.
+        attempts: In finger order; the pairs are (0, 1) and (2, 3).
+        terms: What counts as a regulus.
+        bounds: Filled with the bounds, (a,): minus infinity where no slopes are feasible, and
+            infinity where a program was not decided.
+        chosen: Filled with which slopes of the pairs are best, and the side, (a, 3); -1 if none.
+    """
+    others = 1 + FINGERS * (4 + 1 + 1) + 4  # gap; offsets, depth, equality; bounds on z / x
+    room = np.empty((VARIABLES + 2) * (others + FINGERS * faces.E.shape[1]))
+    slopes, vertex = len(terms.shares), vertex_of(VARIABLES)
+    for a in range(len(bounds)):
+        frames = pair_frames(faces, attempts, a, terms)
+        count = others + edges_of(faces, attempts, a)
+        bounds[a], chosen[a] = -np.inf, NONE
+        for i in range(slopes):
+            for j in range(slopes):
+                if not (frames.usable[0, i] and frames.usable[1, j]) or bounds[a] > terms.enough:
+                    continue
+                rows = room_for(room, VARIABLES, count)
+                rows = Rows(rows.At, rows.b, rows.norms, FINGERS)
+                _fill(faces, attempts.faces[a], frames, (i, j), terms, rows)
+                gap = terms.gap / min(abs(frames.tau[0, i]), abs(frames.tau[1, j]))
+                worth = bounds[a] + terms.tie
+                best, side = _best_side(rows, gap, terms.tie, worth, vertex)
+                if best > worth:
+                    bounds[a] = best
+                    chosen[a, 0], chosen[a, 1], chosen[a, 2] = i, j, side
+
+
+@njit(cache=True)
+def _best_side(
+    rows: Rows, gap: float, tie: float, worth: float, vertex: Vertex
+) -> tuple[float, int]:
+    """The better of the programs for p > gap and p < -gap: a bound on its value, and the side."""
+    either = _bounded(rows, worth, vertex)
+    p = vertex.x[P]  # anything where `either` is infinite: the sides decide then, or nothing does
+    if either <= worth or p >= gap:
+        return either, PLUS
+    rows.At[P, 0], rows.b[0] = -1.0, -gap
+    plus = _bounded(rows, worth, vertex)
+    if plus >= either - tie:
+        return plus, PLUS
+    if p <= -gap:
+        return either, MINUS
+    worth = max(worth, plus + tie)
+    rows.At[P, 0] = 1.0
+    minus = _bounded(rows, worth, vertex)
+    return (minus, MINUS) if minus > worth else (plus, PLUS)
+
+
+@njit(cache=True)
+def _bounded(rows: Rows, worth: float, vertex: Vertex) -> float:
+    """An upper bound of a program: minus infinity if it is infeasible, infinity if not decided."""
+    c = np.zeros(VARIABLES)
+    c[T] = -1.0
+    measure(rows)
+    status, against = solve(c, rows, worth, vertex)
+    if status == INFEASIBLE:
+        return -np.inf if proved_empty(rows, vertex, against, FARTHEST) else np.inf
+    return np.inf if status == LOST else proved_bound(c, rows, vertex, ACCURACY)
+
+
+@njit(cache=True)
+def _fill(
+    faces: FaceTable,
+    quadruple: Indices,
+    frames: PairFrames,
+    slopes: tuple[int, int],
+    terms: RegulusTerms,
+    rows: Rows,
+) -> None:
+    """All rows but the first, which is left for the gap; equalities last."""
+    row, equality = 1, len(rows.b) - FINGERS
+    rows.b[0] = 0.0
+    for finger in range(FINGERS):
+        face, line = quadruple[finger], _line(frames, slopes, finger)
+        row = _edge_rows(faces, face, line, terms.inset, rows, row)
+        row = _offset_rows(faces, face, line, rows, row)
+        n = faces.normals[face]
+        _add(line, n, (0.0, -1.0), rows, row)
+        rows.b[row] = -terms.depth
+        _add(line, n, (1.0, -1.0), rows, equality + finger)
+        rows.b[equality + finger] = dotted(n, faces.origins[face])
+        row += 1
+    for pair in range(2):
+        for bound in range(2):
+            tight = frames.tight[pair, slopes[pair], bound]
+            rows.At[X + pair, row], rows.At[Z + pair, row] = -tight[0], -tight[1]
+            rows.b[row] = 0.0
+            row += 1
+
+
+@njit(cache=True)
+def _edge_rows(faces: FaceTable, face: int, line: _Line, inset: float, rows: Rows, row: int) -> int:
+    """What keeps the contact D - F of a line inside its face."""
+    edge, frame = np.empty(3), faces.frames[face]
+    for e in range(faces.edges[face]):
+        for j in range(3):
+            edge[j] = frame[j, 0] * faces.E[face, e, 0] + frame[j, 1] * faces.E[face, e, 1]
+        _add(line, edge, (1.0, -1.0), rows, row)
+        rows.b[row] = faces.b[face, e] - inset + dotted(edge, faces.origins[face])
+        row += 1
+    return row
+
+
+@njit(cache=True)
+def _offset_rows(faces: FaceTable, face: int, line: _Line, rows: Rows, row: int) -> int:
+    """What makes t the largest offset from the middle of the face."""
+    along = np.empty(3)
+    for axis in range(2):
+        for sign in (1.0, -1.0):
+            for j in range(3):
+                along[j] = sign * faces.frames[face][j, axis]
+            _add(line, along, (1.0, -1.0), rows, row)
+            rows.At[T, row], rows.b[row] = -1.0, dotted(along, faces.origins[face])
+            row += 1
+    return row
+
+
+@njit(cache=True)
+def _line(frames: PairFrames, slopes: tuple[int, int], finger: int) -> _Line:
+    pair, side = finger // 2, 1.0 if finger % 2 == 0 else -1.0
+    resultant, other = (1.0 if pair == 0 else -1.0), 1 - pair
+    tau, tau_other = frames.tau[pair, slopes[pair]], frames.tau[other, slopes[other]]
+    line = _Line(pair, np.empty(3), np.empty(3), np.empty(3), np.empty(3))
+    for j in range(3):
+        line.k[j] = resultant * frames.u[j]
+        line.p[j] = side * tau_other * frames.N[pair, j]
+        line.x[j] = frames.u[j] + side * tau * frames.v[pair, j]
+        line.z[j] = side * frames.N[pair, j]
+    return line
+
+
+@njit(cache=True)
+def _add(line: _Line, d: Array, shares: tuple[float, float], rows: Rows, row: int) -> None:
+    """Fill in d.(share D + other share F)."""
+    passing, force = shares
+    for j in range(3):
+        rows.At[j, row] = passing * d[j]
+    rows.At[K, row], rows.At[P, row] = passing * dotted(d, line.k), passing * dotted(d, line.p)
+    rows.At[X + line.pair, row] = force * dotted(d, line.x)
+    rows.At[Z + line.pair, row] = force * dotted(d, line.z)

@@ -1,0 +1,135 @@
+"""Contacts on curved patches move from the plane they were planned on to the true surface.
+
+Solved: for a placement on the planes of patches, one with the same force cones on the triangles
+that the surface is made of over the contacts, each within the region of its finger.
+
+Why there is one. The planes were planned with friction cones that fit inside those of every
+triangle over them, and with contacts anywhere within `depth` of the planes. So a concurrent grasp's
+contacts on the surface can aim at the planned focus. Otherwise the construction is run again on the
+triangles. Either way the contacts are on the surface, and are certified with the true normals.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.families.placements import Placement, balanced_forces
+from grasp_core.geometry.polygons import clip, edge_rows, tidy
+from grasp_core.objects.face_pieces import FacePiece, FaceShape, piece_of
+from grasp_core.solvers.ties import graded
+from grasp_core.values import ContactRegion, ForceCone
+
+LEAST_FACET = 1e-5
+"""Parts of triangles without room for a disc of this radius (object size one) are left."""
+ON_EDGE = 1e-12
+"""A line that passes an edge no farther out meets both triangles beside it, of which the first
+one with room counts: lengths and volumes of an object of size one, a thousand rounding errors."""
+
+OnFacets = Callable[[tuple[FacePiece, ...]], Placement | None]
+
+
+def on_true_surface(
+    shapes: Sequence[FaceShape],
+    pieces: tuple[FacePiece, ...],
+    cones: Sequence[ForceCone],
+    planned: Placement,
+    regions: Sequence[ContactRegion],
+    place: OnFacets,
+) -> tuple[tuple[FacePiece, ...], Placement] | None:
+    """The same grasp with contacts on the surface, None if that fails.
+
+    Args:
+        shapes: Of the four faces, in finger order.
+        pieces: On which it is planned.
+        cones: The force cones.
+        planned: The placement on the planes; its radii and merit are kept.
+        regions: Of the fingers, in the pieces' units.
+        place: The construction, as a function of pieces.
+    """
+    if all(shape.facets is None for shape in shapes):
+        return pieces, planned
+    along = [np.array([piece.normal for piece in pieces]), np.array([c.axis for c in cones])]
+    for directions in along:
+        facets = [
+            _facet(shape, piece, at, direction, region)
+            for shape, piece, at, direction, region in zip(
+                shapes, pieces, planned.positions, directions, regions, strict=True
+            )
+        ]
+        if any(facet is None for facet in facets):
+            continue
+        chosen = tuple(facet for facet in facets if facet is not None)
+        found = _aimed(chosen, cones, planned, directions) or place(chosen)
+        if found is not None:
+            return chosen, replace(found, radii=planned.radii, merit=planned.merit)
+    return None
+
+
+def _aimed(
+    facets: Sequence[FacePiece],
+    cones: Sequence[ForceCone],
+    planned: Placement,
+    directions: Array,
+) -> Placement | None:
+    """Contacts straight over or under the planned ones whose lines meet in the planned focus."""
+    if len(planned.foci) != 1:
+        return None
+    heights = [
+        float(facet.normal @ (facet.origin - at)) / float(facet.normal @ along)
+        for facet, at, along in zip(facets, planned.positions, directions, strict=True)
+    ]
+    positions = planned.positions + np.array(heights)[:, None] * directions
+    ways = planned.foci[0] - positions
+    axes = np.array([cone.axis for cone in cones])
+    inward = np.einsum("ki,ki->k", ways, axes)
+    cosines = np.abs(inward) / np.linalg.norm(ways, axis=1)
+    if (cosines < np.cos([cone.half_angle for cone in cones])).any() or not all(
+        _holds(facet, at) for facet, at in zip(facets, positions, strict=True)
+    ):
+        return None
+    forces = balanced_forces(facets, np.sign(inward)[:, None] * ways)
+    return replace(planned, positions=positions, forces=forces)
+
+
+def _holds(facet: FacePiece, point: Array) -> bool:
+    beyond = facet.E @ (facet.frame.T @ (point - facet.origin)) - facet.b
+    return bool(beyond.max() <= ON_EDGE)
+
+
+def _facet(
+    shape: FaceShape, piece: FacePiece, at: Array, along: Array, region: ContactRegion
+) -> FacePiece | None:
+    """The part of the surface's triangle on the line through a point that is over a region."""
+    if shape.facets is None:
+        return piece
+    parts = (_part(piece, triangle, region) for triangle in _hit(shape.facets, at, along))
+    return next((part for part in parts if part is not None), None)
+
+
+def _part(piece: FacePiece, triangle: Array, region: ContactRegion) -> FacePiece | None:
+    """The part of a triangle that is over a region, if there is room on it."""
+    cross = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
+    facet = piece_of(piece.face, cross / np.linalg.norm(cross), triangle)
+    claimed = (region.polygon - piece.origin) @ piece.frame
+    E, b = edge_rows(claimed) if len(claimed) > 1 else (piece.E, piece.b)
+    rows = E @ piece.frame.T
+    inside = clip(facet.corners, rows @ facet.frame, b - rows @ (facet.origin - piece.origin))
+    inside = tidy(inside)
+    if len(inside) < 3:  # noqa: PLR2004 - not a polygon
+        return None
+    part = piece_of(piece.face, facet.normal, facet.origin + inside @ facet.frame.T)
+    return part if part.inradius > LEAST_FACET else None
+
+
+def _hit(triangles: Array, point: Array, along: Array) -> Array:
+    """The triangles that a line meets, those nearest to the line's point first, (k, 3, 3)."""
+    edges = np.roll(triangles, -1, axis=1) - triangles
+    sides = np.cross(edges, point - triangles) @ along
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    met = np.flatnonzero((sides >= -ON_EDGE).all(axis=1) & (normals @ along > 0.0))
+    heights: Array = ((triangles[met, 0] - point) * normals[met]).sum(axis=1)
+    heights = heights / (normals[met] @ along)
+    nearest_first = sorted(range(len(met)), key=graded(np.abs(heights)).__getitem__)
+    return triangles[met[nearest_first]]

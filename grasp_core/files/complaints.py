@@ -1,0 +1,103 @@
+"""What pydantic finds wrong with a file -> a sentence: the field, what was expected, what came."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
+
+from grasp_core.errors import InputError
+from grasp_core.files.strict_json import object_of, place, shown
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel, ValidationError
+
+Model = TypeVar("Model", bound="BaseModel")
+BOUNDS = {"too_short": ("at least", "min_length"), "too_long": ("at most", "max_length")}
+"""How errors about the number of items say it."""
+UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+OURS = {
+    "float_type": "a number", "int_type": "a whole number", "int_from_float": "a whole number",
+    "string_type": "text", "bool_type": "true or false", "list_type": "a list",
+    "tuple_type": "a list", "dict_type": "an object", "model_type": "an object",
+    "dataclass_type": "an object", "finite_number": "a finite number",
+    "greater_than": "more than {gt}", "greater_than_equal": "at least {ge}",
+    "less_than": "less than {lt}", "less_than_equal": "at most {le}",
+}  # fmt: skip
+"""Kinds and ranges of values, in the words of people who write JSON or TOML."""
+
+
+def record_of(
+    kind: type[Model], text: str, wanted: str, *, schema: int | None = None, nulls: bool = True
+) -> Model:
+    """A checked record from the text of a JSON file.
+
+    Args:
+        kind: Its fields.
+        text: Of the file.
+        wanted: What the file should be, for messages.
+        schema: The version that it must have; None for files that have none.
+        nulls: Whether a value may be null.
+
+    Raises:
+        InputError: It is no such file; the message names the field.
+    """
+    from pydantic import ValidationError
+
+    object_of(text, wanted, schema=schema, nulls=nulls)
+    try:
+        return kind.model_validate_json(text)
+    except ValidationError as error:
+        raise InputError(complaint(error, kind)) from error
+
+
+def complaint(error: "ValidationError", kind: Any, inside: Sequence[str] = ()) -> str:
+    """The first thing that is wrong.
+
+    Args:
+        error: What pydantic found.
+        kind: The fields that were expected: a model, or a dataclass.
+        inside: Where in the file they are.
+    """
+    first = error.errors(include_url=False)[0]
+    loc, fault, came = first["loc"], first["type"], first["input"]
+    where = place([*inside, *loc])
+    if fault in UNKNOWN:
+        return f"{where}: unknown key; expected are {', '.join(_fields_at(kind, loc[:-1]))}"
+    if fault == "missing":
+        return f"{where}: missing"
+    limits: Mapping[str, Any] = first.get("ctx", {})
+    if fault in BOUNDS:
+        side, key = BOUNDS[fault]
+        return f"{where}: expected {side} {limits[key]} items, got {limits['actual_length']}"
+    if fault == "value_error":
+        return f"{where}: {limits['error']}"
+    expected = OURS[fault].format(**limits) if fault in OURS else _expected(first["msg"])
+    return f"{where}: expected {expected}, got {shown(came)}"
+
+
+def _expected(said: str) -> str:
+    """What a message of pydantic says was expected."""
+    for beginning, ours in (("Input should be ", ""), ("String should ", "text to ")):
+        if said.startswith(beginning):
+            return ours + said.removeprefix(beginning)
+    return f"something else ({said})"
+
+
+def _fields_at(kind: Any, loc: Sequence[int | str]) -> list[str]:
+    """The keys that a record inside another one may have."""
+    for part in loc:
+        if isinstance(part, str):
+            inner = next((f for key, f in _fields(kind).items() if key == part), None)
+            kind = None if inner is None else _record_in(inner.annotation)
+    return list(_fields(kind))
+
+
+def _fields(kind: Any) -> dict[str, Any]:
+    listed: Mapping[str, Any] = getattr(kind, "__pydantic_fields__", {})
+    return {field.alias or name: field for name, field in listed.items()}
+
+
+def _record_in(annotation: Any) -> Any:
+    """The record that a type is about: of its items, or where it may be null."""
+    if hasattr(annotation, "__pydantic_fields__"):
+        return annotation
+    inner = (_record_in(part) for part in get_args(annotation))
+    return next((kind for kind in inner if kind is not None), None)

@@ -1,0 +1,85 @@
+"""Regular files, read up to a bound, and files that are written whole or not at all.
+
+A file is complete before it is renamed into place.
+"""
+
+import os
+import stat
+import tempfile
+from collections.abc import Generator, Iterable
+from contextlib import contextmanager
+from pathlib import Path
+
+UNFINISHED = ".unfinished-"
+"""In the names of files that are being written, or were when their writer was killed."""
+SHOWN = 40
+"""Characters of a file's name in that of its unfinished one, which must not get too long."""
+
+
+def write_parts(path: Path, parts: Iterable[bytes]) -> Path:
+    """Write a file; folders are made as needed.
+
+    Raises:
+        OSError: It cannot be written; the error names the file.
+    """
+    with replacing(path) as temporary, temporary.open("wb") as stream:
+        stream.writelines(parts)
+        stream.flush()
+        os.fsync(stream.fileno())
+    return path
+
+
+@contextmanager
+def replacing(path: Path) -> Generator[Path]:
+    """Another path of the same ending to write to, which is put in the place of the file.
+
+    Raises:
+        OSError: It cannot be written; the error names the file, not the other path.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        with _beside(path) as temporary:
+            yield temporary
+            temporary.chmod(0o644)
+            temporary.replace(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+
+
+@contextmanager
+def _beside(path: Path) -> Generator[Path]:
+    """An empty file in the same folder, which is not there afterwards."""
+    prefix = f".{path.name[:SHOWN]}{UNFINISHED}"
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=path.suffix)
+    try:
+        os.close(handle)
+        yield Path(name)
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Remove what killed writers have left in a folder that nobody writes to."""
+    for path in folder.glob(f".*{UNFINISHED}*"):
+        path.unlink(missing_ok=True)
+
+
+def bounded_bytes(path: Path, most: int) -> bytes:
+    """The bytes of a file, or its first `most + 1` where there are more; pipes never block.
+
+    Raises:
+        OSError: It cannot be read, or is a folder, a pipe or a device.
+    """
+    try:
+        handle = os.open(
+            path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+        )
+    except ValueError as error:
+        raise OSError(None, f"no name of a file ({error})", str(path)) from error
+    try:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise OSError(None, "a folder, a pipe or a device", str(path))
+        with os.fdopen(handle, "rb", closefd=False) as stream:
+            return stream.read(most + 1)
+    finally:
+        os.close(handle)

@@ -1,0 +1,359 @@
+"""Contact forces that balance wrenches, by strictly convex programs; the door to ProxQP.
+
+Forces are sought in pyramids inscribed in the friction cones, so that every answer lies in
+the true cones. Two objectives for balanced forces: the least norm, and the least friction,
+that is, the smallest coefficient max_i |tangential part| / normal part. The latter is found
+by Dinkelbach's iteration: with r the current coefficient, forces that minimise the largest
+tangential part minus r times the normal part have a smaller one, until they do not; the last
+2 % that pyramids give away come from `least_friction`. Where pyramids hold no forces that balance,
+as just above the critical friction, exact cones may (`cone_forces`). Where nothing balances,
+`closest_forces` leaves the least imbalance.
+
+Both objectives ask for the nearest point of a polyhedron (`least_distance`), once the balance
+is solved (`balance`). Where that point is not found, ProxQP decides. It calls some of these
+feasible programs infeasible, so it is asked for the closest feasible point, and its status is
+not read: an answer counts when its own residuals are small.
+"""
+
+import importlib
+import math
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import SMALLEST_SIZE, Array, frozen
+from grasp_core.checked import LARGEST, SMALLEST, number, one_of, several, shown
+from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions
+from grasp_core.errors import InputError, NoForcesError, SolverError
+from grasp_core.forces.balance import RESIDUAL, Balance, needed_friction
+from grasp_core.forces.cone_forces import least_norm_in_cones
+from grasp_core.forces.least_friction import lower_friction
+from grasp_core.solvers.nearest_point import least_distance
+from grasp_core.values import Grasp
+
+REQUESTED = 1e-8
+MAX_ITERATIONS = 300
+"""Feasible programs of this size take about twenty; infeasible ones would go on for minutes."""
+REGULAR = 1e-3
+"""Weight of the forces' own size that keeps the least-friction programs strictly convex."""
+IMPROVEMENT = 1e-2
+"""Iteration ends when the coefficient falls by less than this share."""
+MAX_ROUNDS = 20
+ACTIVE = (1e-6, 1e-5, 1e-7, 1e-8)
+"""Slacks below which a constraint may count as active, tried in turn."""
+LEAST_CHARGE = 1e-3
+"""Weight of the forces' own size against the imbalance in `closest_forces`."""
+
+
+def contact_forces(  # noqa: PLR0913 - the contract's arguments
+    positions: ArrayLike | Grasp,
+    normals: ArrayLike | None,
+    friction: ArrayLike,
+    wrench: ArrayLike,
+    *,
+    objective: Literal["least_norm", "least_friction"] = "least_norm",
+    normal_force: tuple[float, float] = (0.0, math.inf),
+    center: ArrayLike = (0.0, 0.0, 0.0),
+) -> Array:
+    """Forces at the contacts that balance an external wrench, or each of many.
+
+    Args:
+        positions: Contact points, (k, 3) [m]; or a Grasp, with `normals` None.
+        normals: Unit vectors into the object, (k, 3).
+        friction: Coulomb coefficient that the forces must respect, one for all contacts or one
+            each, (k,).
+        wrench: External (force, torque), (6,), or n of them, (n, 6) [N, N m], torque about
+            `center`.
+        objective: What to make least: the norm of all forces, in pyramids of 16 sides inside the
+            cones or, where these hold no forces, in the cones; or the largest share that a contact
+            needs of its friction. The latter is found by iteration: where limits on the forces are
+            far above the load it may stop early.
+        normal_force: Least and largest normal force of each contact [N].
+        center: (3,) [m]
+
+    Returns:
+        Forces on the object, (k, 3), or (n, k, 3) [N], in the frame of `positions`. Those for one
+        of many wrenches are the same as for that wrench alone, but for rounding.
+
+    Raises:
+        InputError: Shapes, limits or coefficients are wrong.
+        NoForcesError: No forces found that meet the limits and the friction; the text gives the
+            index of the first of many wrenches for which there are none.
+    """
+    _objective(objective)
+    loads, single = _rows(wrench)
+    balance = _balance(positions, normals, loads, normal_force, center, by_load=True)
+    mu = contact_frictions(friction, len(balance.frames))
+    F = _objective(objective)(balance, mu)
+    missing = np.flatnonzero([not _in_cones(f, mu) for f in F])
+    if missing.size:
+        which = "this wrench" if single else f"wrench {missing[0]}, counting from 0"
+        raise NoForcesError(
+            f"no forces found with friction {_text(mu)} and normal forces in "
+            f"{normal_force} N that balance {which}; {_remedy(normal_force)}"
+        )
+    forces = balance.in_space(F)
+    return forces[0] if single else forces
+
+
+def least_friction_forces(
+    positions: Array, normals: Array, friction: float, wrench: Array, *,
+    normal_force: tuple[float, float], center: Array,
+) -> tuple[Array, float] | None:  # fmt: skip
+    """Balancing forces (k, 3) of least friction, with that coefficient, whatever it is.
+
+    `friction` is where the search starts; forces are found above it if they must be.
+
+    None when the limits on the normal forces leave no balance.
+    """
+    load = frozen(wrench, (6,), "wrench")[None]
+    balance = _balance(positions, normals, load, normal_force, center)
+    alike = np.ones(len(balance.frames))
+    f = _least_friction(balance, friction, alike)
+    if f is None:
+        return None
+    return balance.in_space(f[None])[0], float(needed_friction(f[None], alike)[0])
+
+
+def closest_forces(
+    positions: Array, normals: Array, friction: float, wrench: Array, *,
+    normal_force: tuple[float, float], center: Array,
+) -> Array:  # fmt: skip
+    """Forces in the friction cones that leave the least imbalance, (k, 3)."""
+    load = frozen(wrench, (6,), "wrench")[None]
+    balance = _balance(positions, normals, load, normal_force, center)
+    rows = balance.pyramids(np.full(len(balance.frames), friction))
+    P = balance.G.T @ balance.G + LEAST_CHARGE * np.eye(balance.G.shape[1])
+    q = balance.G.T @ balance.W[0]
+    f = _least_imbalance(P, q, rows, balance)
+    if np.isnan(f[0]):
+        f = _solve(P, q, rows, balance, balanced=False)
+    if f is None:
+        raise SolverError("no forces in the cones were found, though a pure push is one")
+    return balance.in_space(balance.into_cones(f[None], friction))[0]
+
+
+def _least_imbalance(P: Array, q: Array, rows: Array, balance: Balance) -> Array:
+    """Minimise f'Pf/2 + q'f in the cones and limits: with P = L L', the least |L'f + inv(L) q|."""
+    L = np.linalg.cholesky(P)
+    back, shift = np.linalg.inv(L).T, np.linalg.solve(L, q)
+    along = np.eye(len(q))[0::3]
+    C, d = [rows, -along], [np.zeros(len(rows)), -np.broadcast_to(balance.least, len(along))]
+    if np.isfinite(balance.largest).all():
+        C.append(along)
+        d.append(np.broadcast_to(balance.largest, len(along)))
+    turned = np.vstack(C) @ back
+    z = least_distance(turned, (np.concatenate(d) + turned @ shift)[None])[0]
+    return back @ (z - shift)
+
+
+def _objective(name: str) -> Callable[[Balance, Array], Array]:
+    known = {"least_norm": _least_norm, "least_friction": _least_friction_each}
+    one_of(name, known, "objective")
+    return known[name]
+
+
+def _least_norm(balance: Balance, friction: Array) -> Array:
+    """Balanced forces of least norm, (n, 3k); NaN from the first wrench on that has none."""
+    rows = balance.pyramids(friction)
+    Z = least_distance(*balance.polyhedra(rows))
+    F = balance.checked(balance.F0 + Z @ balance.null.T)
+    P, hopeless = np.eye(F.shape[1]), balance.beyond(friction)
+    for i in np.flatnonzero(np.isnan(F[:, 0])):
+        one = balance.one(int(i))
+        if hopeless[i]:
+            break
+        f = _solve(P, 0.0 * P[0], rows, one, balanced=True)
+        if f is not None:
+            F[i] = one.checked(f[None])[0]
+        if not _in_cones(F[i], friction):
+            f = least_norm_in_cones(one, friction)
+            if f is None:
+                break
+            F[i] = f
+    return F
+
+
+def _least_friction_each(balance: Balance, friction: Array) -> Array:
+    """Balanced forces of least friction, (n, 3k); NaN from the first wrench on that has none."""
+    largest = float(friction.max())
+    weights = friction / largest if largest > 0.0 else np.ones(len(friction))
+    F = np.full(balance.F0.shape, np.nan)
+    hopeless = balance.beyond(friction)
+    for i in range(len(F)):
+        if hopeless[i]:
+            break
+        one = balance.one(i)
+        f = _least_friction(one, largest, weights)
+        if f is None or not _in_cones(f, friction):
+            start = least_norm_in_cones(one, friction)
+            f = f if start is None else lower_friction(one, weights, start)
+        if f is None:
+            break
+        F[i] = f
+    return F
+
+
+def _in_cones(f: Array, friction: Array) -> bool:
+    """Whether local forces (3k,) are there and need no more than the friction."""
+    return bool(needed_friction(f[None], friction)[0] <= 1.0 + RESIDUAL)
+
+
+def _least_friction(balance: Balance, start: float, weights: Array) -> Array | None:
+    """Forces (3k,) that need the least r, where the friction of each contact is r times its weight.
+
+    The iteration starts from a coefficient on the way there.
+    """
+    best, friction = None, start
+    for _ in range(MAX_ROUNDS):
+        better = _toward_less_friction(balance, friction, weights)
+        if np.isnan(better[0]):
+            break
+        needed = float(needed_friction(better[None], weights)[0])
+        if best is not None and needed > friction * (1.0 - IMPROVEMENT):
+            break
+        best, friction = better, needed
+    if best is None:
+        return None
+    return lower_friction(balance, weights, best)
+
+
+def _toward_less_friction(balance: Balance, friction: float, weights: Array) -> Array:
+    """Balanced forces whose largest excess over `friction`, a further variable, is least.
+
+    With the forces F0 + null @ z and the excess t, what is minimised is, but for a constant,
+    half the square of (sqrt(REGULAR) z, t + 1).
+    """
+    rows = balance.pyramids(friction * weights)
+    allowance = np.repeat(weights, len(rows) // len(weights))
+    C, D = balance.polyhedra(rows)
+    excess = np.zeros((len(C), 1))
+    excess[: len(rows), 0] = -allowance
+    D[:, : len(rows)] -= allowance
+    root = math.sqrt(REGULAR)
+    z = least_distance(np.hstack([C / root, excess]), D)[:, :-1] / root
+    f = balance.checked(balance.F0 + z @ balance.null.T)[0]
+    if not np.isnan(f[0]):
+        return f
+    n = balance.G.shape[1]
+    P, q = np.diag([REGULAR] * n + [1.0]), np.array([0.0] * n + [1.0])
+    x = _solve(P, q, np.hstack([rows, -allowance[:, None]]), balance, balanced=True)
+    return f if x is None else balance.checked(x[None, :n])[0]
+
+
+def _balance(
+    positions: ArrayLike | Grasp, normals: ArrayLike | None, wrenches: Array,
+    normal_force: tuple[float, float], center: ArrayLike, *, by_load: bool = False,
+) -> Balance:  # fmt: skip
+    points, units = contact_arrays(positions, normals)
+    _check_limits(normal_force)
+    arms = points - frozen(center, (3,), "center")
+    return Balance.of(arms, units, wrenches, normal_force, by_load=by_load)
+
+
+def _check_limits(normal_force: tuple[float, float]) -> None:
+    each = partial(number, name="normal_force", least=0.0, most=math.inf)
+    limits = several(normal_force, each, "normal_force", "limits")
+    if len(limits) != len(("least", "largest")) or not limits[0] < limits[1]:
+        raise InputError(f"normal_force must be (least, largest), got {shown(normal_force)}")
+    if not (SMALLEST <= limits[1] <= LARGEST or (limits[1] == math.inf and limits[0] <= LARGEST)):
+        raise InputError(
+            f"normal_force: largest must be from {SMALLEST:g} to {LARGEST:g} N, or infinite, got "
+            f"{shown(normal_force)}"
+        )
+
+
+def _rows(wrench: ArrayLike) -> tuple[Array, bool]:
+    """Wrenches as rows, and whether there is but one that is no row."""
+    try:
+        single = np.ndim(wrench) != 2  # noqa: PLR2004 - rows and columns
+    except ValueError:  # ragged, which `frozen` explains
+        single = True
+    loads = np.atleast_2d(frozen(wrench, (6,) if single else (None, 6), "wrench"))
+    sizes: Array = np.abs(loads).max(axis=1, initial=0.0)
+    if ((sizes > 0.0) & (sizes < SMALLEST_SIZE)).any():
+        raise InputError(
+            f"wrench: the largest part must be 0 or from {SMALLEST_SIZE:g} on, got "
+            f"{float(sizes[sizes > 0.0].min()):.3g}"
+        )
+    return loads, single
+
+
+def _remedy(normal_force: tuple[float, float]) -> str:
+    """What may help: without limits, forces for one load are forces for it at any size."""
+    if math.isfinite(normal_force[1]):
+        return "lower the load or raise the limits"
+    return "use more friction or place the contacts otherwise"
+
+
+def _text(friction: Array) -> str:
+    return f"{friction[0]:.6g}" if np.ptp(friction) == 0.0 else str(friction)
+
+
+def _solve(P: Array, q: Array, rows: Array, balance: Balance, *, balanced: bool) -> Array | None:
+    """Minimise x'Px/2 + q'x with rows @ x <= 0 by ProxQP, for the first wrench.
+
+    The variables are its forces, and perhaps a last one that is free.
+    """
+    solver = _qpsolvers()
+    forces = balance.G.shape[1]
+    lower, upper = np.full(len(q), -np.inf), np.full(len(q), np.inf)
+    lower[0:forces:3], upper[0:forces:3] = balance.least, balance.largest
+    map_of_all = np.hstack([balance.G, np.zeros((6, len(q) - forces))])
+    equations = (map_of_all, -balance.W[0]) if balanced else (None, None)
+    program = solver.Problem(P, q, rows, np.zeros(len(rows)), *equations, lb=lower, ub=upper)
+    answer = solver.solve_problem(
+        program, solver="proxqp", eps_abs=REQUESTED, max_iter=MAX_ITERATIONS,
+        primal_infeasibility_solving=balanced,
+    )  # fmt: skip
+    if answer.x is None or not np.isfinite(answer.x).all():
+        return None
+    return _polished(program, np.asarray(answer.x, dtype=np.float64))
+
+
+@cache
+def _qpsolvers() -> Any:
+    module: Any = importlib.import_module("qpsolvers")
+    if "proxqp" not in module.available_solvers:
+        raise SolverError(
+            "ProxQP cannot be loaded; it needs the package proxsuite and the system library "
+            "libgomp (on Debian: apt-get install libgomp1)"
+        )
+    return module
+
+
+def _polished(program: Any, x: Array) -> Array:
+    """The exact optimum on the constraints that are active at x, if it is feasible and as good.
+
+    The solver stops anywhere within its tolerance, at a point that depends on where its numbers
+    lie in memory. The conditions of optimality on the active constraints are linear equations
+    with one answer.
+    """
+    P, q, C, d, A, b = _as_rows(program)
+    for slack in ACTIVE:
+        active = d - C @ x < slack
+        E, e = np.vstack([A, C[active]]), np.concatenate([b, d[active]])
+        conditions = np.block([[P, E.T], [E, np.zeros((len(e), len(e)))]])
+        targets = np.concatenate([-q, e])
+        solved = np.linalg.lstsq(conditions, targets, rcond=None)[0]
+        exact = np.asarray(solved, dtype=np.float64)[: len(q)]
+        unmet = float(np.abs(conditions @ solved - targets).max())
+        outside = float((C @ exact - d).max())
+        worse = float(0.5 * (exact @ P @ exact - x @ P @ x) + q @ (exact - x))
+        if max(unmet, outside, worse) < RESIDUAL:
+            return exact
+    return x
+
+
+def _as_rows(program: Any) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """P, q, then C x <= d with the bounds among the rows, then A x = b."""
+    n = len(program.q)
+    above, below = np.isfinite(program.ub), np.isfinite(program.lb)
+    C = np.vstack([program.G, np.eye(n)[above], -np.eye(n)[below]])
+    d = np.concatenate([program.h, program.ub[above], -program.lb[below]])
+    none = program.A is None
+    A, b = (np.empty((0, n)), np.empty(0)) if none else (program.A, program.b)
+    return program.P, program.q, C, d, A, b

@@ -1,0 +1,65 @@
+"""Balanced contact forces in which the finger that pushes least pushes as much as it can.
+
+Solved, with the pushes f_n = n.f and the tangential parts f_t of the contact forces f:
+
+    maximise t  subject to  sum f_i = 0,  sum x_i x f_i = 0,
+                            t <= f_n <= 1,  |f_t| <= mu f_n   for all contacts
+
+Zero forces are always allowed, so t is never negative. It is positive iff balanced forces in the
+cones exist with which every finger pushes. The largest push is 1 then: scaling would raise t.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array
+from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions
+from grasp_core.closure.force_closure import unit_size
+from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
+from grasp_core.errors import NoForcesError, SolverError
+from grasp_core.solvers.conic import ConicProgram, minimize
+
+NO_PUSH = 1e-9
+"""A least push below this is none, in largest pushes: a hundred times what the solver leaves."""
+IMBALANCE = 1e-9
+"""Largest imbalance of the answer, in largest pushes, for contacts of unit size."""
+
+
+def even_forces(positions: ArrayLike, normals: ArrayLike, friction: ArrayLike) -> Array:
+    """Balanced forces whose least push is as large as it can be, the largest push being 1 N.
+
+    Args:
+        positions: Contact points, (k, 3) [m].
+        normals: Unit vectors into the object, (k, 3).
+        friction: Coulomb coefficient, positive, one for all contacts or one each.
+
+    Returns:
+        Forces on the object, (k, 3) [N], balanced to `IMBALANCE`.
+
+    Raises:
+        InputError: Shapes, lengths or signs are wrong.
+        NoForcesError: No balanced forces were found with which every finger pushes.
+        SolverError: The program's answer failed its check.
+    """
+    points, units = contact_arrays(positions, normals)
+    mu = contact_frictions(friction, len(points))
+    arms, _, _ = unit_size(points)
+    k = len(points)
+    # tangential unknowns over mu, so that small coefficients are solved as well as large ones
+    frames = contact_frames(units) * np.column_stack([np.ones(k), mu, mu])[:, None]
+    pushes, least = np.eye(3 * k, 3 * k + 1)[0::3], np.eye(3 * k + 1)[-1]
+    balance = np.hstack([in_frames(grasp_map(arms), frames), np.zeros((WRENCH, 1))])
+    A = np.vstack([balance, pushes, least - pushes, -np.eye(3 * k, 3 * k + 1)])
+    b = np.concatenate([np.zeros(WRENCH), np.ones(k), np.zeros(4 * k)])
+    x = minimize(ConicProgram(-least, A, b, WRENCH, 2 * k, (3,) * k)).x[:-1]
+    along = x[0::3]
+    if not along.min() > NO_PUSH:
+        raise NoForcesError(
+            f"no balanced forces were found with which every finger pushes, with friction {mu}; "
+            "more friction may allow them"
+        )
+    forces = np.einsum("kij,kj->ki", frames, x.reshape(k, 3)) / along.max()
+    imbalance = float(np.abs(grasp_map(arms) @ forces.ravel()).max())
+    if not imbalance <= IMBALANCE:
+        raise SolverError(f"forces are out of balance by {imbalance:.3g} of the largest push")
+    return forces

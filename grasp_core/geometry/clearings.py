@@ -1,0 +1,91 @@
+"""Large convex polygons that no segment of a plane enters, as clearings between obstacles.
+
+Each segment is kept out by a half-plane through its point nearest to the middle, across the way
+there: as a segment is convex, all of it is beyond. What "nearest" means is measured by an ellipse
+around the clearing, so that long clearings grow long; the largest of a few rounds is kept.
+
+The idea is that of IRIS (Deits & Tedrake, "Computing large convex regions of obstacle-free space
+through semidefinite programming", 2015), with the ellipse of the polygon's second moments.
+"""
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.geometry.polygons import area_and_centroid, clip, signed_area
+from grasp_core.solvers.ties import first_best, surpassing
+
+ROUNDS = 5
+CANDIDATES = 400
+"""Points that are tried as the middle."""
+
+
+def clearest_point(points: Array, segments: Array) -> tuple[Array, float]:
+    """The point farthest from all segments, and how far that is.
+
+    Args:
+        points: Candidates, (n, 2); of many only some are tried.
+        segments: (m, 2, 2)
+    """
+    tried = points[:: 1 + len(points) // CANDIDATES]
+    room = np.array([_nearest(point, segments)[1].min() for point in tried])
+    best = first_best(room)
+    return tried[best], float(room[best])
+
+
+def clearing(start: Array, segments: Array, gap: float) -> Array | None:
+    """A convex polygon around a point that no segment enters, (k, 2), counter-clockwise.
+
+    Args:
+        start: Inside, (2,).
+        segments: Obstacles all around, (m, 2, 2).
+        gap: How far to stay from them.
+    """
+    low, high = segments.min(axis=(0, 1)), segments.max(axis=(0, 1))
+    box = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
+    best, middle, stretch = None, start, np.eye(2)
+    for _ in range(ROUNDS):
+        polygon = _cut(box, middle, segments, stretch, gap)
+        least = 0.0 if best is None else surpassing(signed_area(best))
+        if len(polygon) < 3 or signed_area(polygon) <= least:  # noqa: PLR2004
+            break
+        best = polygon
+        middle, stretch = _ellipse(polygon)
+    return best
+
+
+def _cut(box: Array, middle: Array, segments: Array, stretch: Array, gap: float) -> Array:
+    """The box without what half-planes cut off for the segments, nearest first."""
+    left = (segments - middle) @ stretch.T
+    polygon = box
+    while len(left):
+        points, distances = _nearest(np.zeros(2), left)
+        nearest = first_best(-distances)
+        if distances[nearest] <= 0.0:
+            return np.empty((0, 2))
+        away = points[nearest] / distances[nearest]
+        limit = distances[nearest]
+        row = away @ stretch
+        length = float(np.linalg.norm(row))
+        polygon = clip(
+            polygon, row[None] / length, np.array([(limit + row @ middle) / length - gap])
+        )
+        left = left[(left @ away < limit * (1.0 - 1e-12)).any(axis=1)]
+    return polygon
+
+
+def _nearest(point: Array, segments: Array) -> tuple[Array, Array]:
+    """Points of segments nearest to a point, (m, 2), and their distances, (m,)."""
+    tails, along = segments[:, 0], segments[:, 1] - segments[:, 0]
+    squared = np.einsum("mi,mi->m", along, along)
+    share = np.einsum("mi,mi->m", point - tails, along) / np.where(squared > 0.0, squared, 1.0)
+    points = tails + np.clip(share, 0.0, 1.0)[:, None] * along
+    return points, np.linalg.norm(points - point, axis=1)
+
+
+def _ellipse(polygon: Array) -> tuple[Array, Array]:
+    """Centre of a polygon, and the map that makes its second moments those of a disc."""
+    _, centre = area_and_centroid([polygon])
+    after = np.roll(polygon, -1, axis=0)
+    corners = np.concatenate([polygon, 0.5 * (polygon + after)]) - centre
+    values, axes = np.linalg.eigh(corners.T @ corners)
+    return centre, (axes / np.sqrt(values)) @ axes.T

@@ -1,0 +1,82 @@
+"""Convex polygons of certificates, checked in plain arithmetic: shape, width, and discs in them.
+
+Coordinates are in the polygon's plane and at about unit size.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.geometry.polygons import clip, edge_rows, plane_frame, signed_area, tidy
+
+FEWEST_CORNERS, MOST_CORNERS = 3, 5000
+WIDTH, FINE = 1e-6, 1e-9
+"""How far a radius may be from that of the largest disc: relative to it, and in unit size."""
+LEFT_OUT = 2e-3
+"""Share of a polygon's area that it may lack of a disc: half of it is what corners are saved for,
+the rest is for `SIDES`."""
+SIDES = 64
+"""Of the polygon around a disc, whose area is larger by 8e-4 of it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlatPolygon:
+    """A convex polygon in its plane."""
+
+    corners: Array
+    """Counter-clockwise, (k, 2)."""
+    E: Array
+    """Unit outward edge normals, (k, 2)."""
+    b: Array
+    """Inside is E y <= b, (k,)."""
+
+    def holds(self, points: Array, slack: float) -> bool:
+        """Whether points (n, 2) are inside, or outside by a slack at most."""
+        return bool((points @ self.E.T <= self.b + slack).all())
+
+
+def flat_polygon(arms: Array, normal: Array, slack: float) -> FlatPolygon | None:
+    """Points (k, 3) of the plane through zero as a convex polygon, wound about its normal.
+
+    Returns:
+        None if the points are off the plane, or not corners of a convex polygon in order.
+    """
+    if float(np.abs(arms @ normal).max()) > slack:
+        return None
+    return convex_polygon(arms @ plane_frame(normal), slack)
+
+
+def convex_polygon(corners: Array, slack: float) -> FlatPolygon | None:
+    """Corners (k, 2) as a convex polygon; None if they are not its corners in order.
+
+    Corners that coincide with the one before, as cutting leaves them, count once.
+    """
+    corners = tidy(corners)
+    if len(corners) < FEWEST_CORNERS:
+        return None
+    E, b = edge_rows(corners)
+    found = FlatPolygon(corners, E, b)
+    turning = np.isfinite(E).all() and signed_area(corners) > 0.0
+    return found if turning and found.holds(corners, slack) else None
+
+
+def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:
+    """Whether a polygon whose edges move inwards just vanishes when they have moved by a radius."""
+    inner, outer = (
+        clip(polygon.corners, polygon.E, polygon.b - radius - sign * (WIDTH * radius + FINE))
+        for sign in (-1.0, 1.0)
+    )
+    return radius > 0.0 and len(inner) > 0 and len(outer) == 0
+
+
+def holds_disc(polygon: FlatPolygon, border: FlatPolygon, center: Array, radius: float) -> bool:
+    """Whether a polygon holds what a border has of a disc, but for `LEFT_OUT` of its area."""
+    turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    rows = np.column_stack([np.cos(turns), np.sin(turns)])
+    disc = clip(border.corners, rows, rows @ center + radius)
+    if len(disc) == 0:
+        return radius == 0.0
+    held = clip(disc, polygon.E, polygon.b)
+    lacking = signed_area(disc) - (signed_area(held) if len(held) else 0.0)
+    return lacking <= LEFT_OUT * signed_area(polygon.corners)

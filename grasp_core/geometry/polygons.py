@@ -1,0 +1,229 @@
+"""Figures in a plane: frames, edges, clipping, and convex pieces of a polygon with holes.
+
+A polygon is an (k, 2) array of corners, counter-clockwise unless it is a hole. A convex
+polygon is also the set {y : E y <= b}, with the rows of E unit outward edge normals.
+"""
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.solvers.ties import first_best
+
+MERGE_ORDERS = 16
+"""How many orders of removing diagonals are tried."""
+CONVEX_SLACK = 1e-9
+"""How far a corner may turn inwards and still count as straight, relative to the two edge
+lengths' product: well above the rounding of coordinates, well below a visible notch."""
+
+SAME_PART = 1e-3
+"""Of the slack within which corners are straight: heights closer than this are equal."""
+SAME_CORNER = 1e-9
+"""Corners closer than this are one, at unit size."""
+ON_LINE = 1e-12
+"""Corners closer than this to a line, relative to their coordinates, are on it: a thousand rounding
+errors. Else a cut through a corner leaves a second corner beside it on some machines."""
+TRIMMED = 1e-3
+"""Share of a polygon's area that fewer corners may cost."""
+
+Row: TypeAlias = tuple[float, float, float]
+
+
+def plane_frame(normal: Array) -> Array:
+    """Two orthonormal columns spanning the plane with this normal, (3, 2).
+
+    (column 0, column 1, normal) is right-handed. The choice is deterministic and
+    depends on the normal only, so that all figures on one face share it.
+    """
+    return np.array(plane_tangents(*normal.tolist())).T
+
+
+def plane_tangents(x: float, y: float, z: float) -> tuple[Row, Row]:
+    """The columns of `plane_frame`, of the normal (x, y, z)."""
+    smallest = min(abs(x), abs(y), abs(z))
+    if abs(x) == smallest:
+        u, v, w = 0.0, -z, y
+    elif abs(y) == smallest:
+        u, v, w = z, 0.0, -x
+    else:
+        u, v, w = -y, x, 0.0
+    length = math.sqrt(u * u + v * v + w * w)
+    u, v, w = u / length, v / length, w / length
+    return (u, v, w), (y * w - z * v, z * u - x * w, x * v - y * u)
+
+
+def signed_area(polygon: Array) -> float:
+    """Area of a polygon, positive when counter-clockwise."""
+    x, y = polygon.T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def area_and_centroid(loops: list[Array]) -> tuple[float, Array]:
+    """Area and centre of area (2,) of an outer border with holes (holes clockwise)."""
+    area, moment = 0.0, np.zeros(2)
+    for loop in loops:
+        following = np.roll(loop, -1, axis=0)
+        cross = loop[:, 0] * following[:, 1] - loop[:, 1] * following[:, 0]
+        area += 0.5 * float(cross.sum())
+        moment += ((loop + following) * cross[:, None]).sum(axis=0) / 6.0
+    return area, moment / area
+
+
+def edge_rows(polygon: Array) -> tuple[Array, Array]:
+    """Half-planes (E, b) of a convex counter-clockwise polygon: inside is E y <= b."""
+    along = np.roll(polygon, -1, axis=0) - polygon
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    E = np.column_stack([along[:, 1], -along[:, 0]])
+    return E, np.einsum("kj,kj->k", E, polygon)
+
+
+def clip(polygon: Array, rows: Array, limits: Array) -> Array:
+    """The part of a convex polygon where rows @ y <= limits; (0, 2) when nothing is left."""
+    for row, limit in zip(rows, limits, strict=True):
+        height = polygon @ row - limit
+        height[np.abs(height) <= ON_LINE * np.abs(polygon).max(initial=0.0)] = 0.0
+        kept: list[Array] = []
+        for here in range(len(polygon)):
+            after = (here + 1) % len(polygon)
+            if height[here] <= 0.0:
+                kept.append(polygon[here])
+            if height[here] * height[after] < 0.0:
+                share = height[here] / (height[here] - height[after])
+                kept.append(polygon[here] + share * (polygon[after] - polygon[here]))
+        polygon = np.array(kept).reshape(-1, 2)
+    return polygon
+
+
+def tidy(polygon: Array) -> Array:
+    """A polygon (k, 2) at unit size without corners that coincide with the one before."""
+    return polygon[np.linalg.norm(polygon - np.roll(polygon, 1, axis=0), axis=1) > SAME_CORNER]
+
+
+def with_fewer_corners(polygon: Array) -> Array:
+    """A convex polygon inside of a convex one (k, 2), without corners that cut hardly any area."""
+    left = TRIMMED * signed_area(polygon)
+    while len(polygon) > 3:  # noqa: PLR2004 - a triangle has no corner to spare
+        before, after = (
+            np.roll(polygon, 1, axis=0) - polygon,
+            np.roll(polygon, -1, axis=0) - polygon,
+        )
+        areas = 0.5 * np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
+        least = first_best(-areas, ON_LINE)
+        left -= areas[least]
+        if left < 0.0:
+            break
+        polygon = np.delete(polygon, least, axis=0)
+    return polygon
+
+
+def nearest_point(polygon: Array, point: Array) -> Array:
+    """The point of a convex counter-clockwise polygon (k, 2) that is nearest to a point (2,)."""
+    E, b = edge_rows(polygon)
+    if (E @ point <= b).all():
+        return point
+    along = np.roll(polygon, -1, axis=0) - polygon
+    shares = ((point - polygon) * along).sum(axis=1) / (along**2).sum(axis=1)
+    feet = polygon + np.clip(shares, 0.0, 1.0)[:, None] * along
+    return feet[first_best(-np.linalg.norm(feet - point, axis=1))]
+
+
+def convex_hull(points: Array) -> Array:
+    """Corners of the convex hull of points (n, 2), counter-clockwise, (k, 2).
+
+    They begin with the one that comes first among the points, however the figure is turned.
+    """
+    ordered = points[np.lexsort(points.T[::-1])]
+
+    def lower(run: Array) -> list[Array]:
+        chain: list[Array] = []
+        for point in run:
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0.0:
+                chain.pop()
+            chain.append(point)
+        return chain[:-1]
+
+    hull = np.array(lower(ordered) + lower(ordered[::-1]))
+    hull = without_straight_corners(hull, SAME_CORNER * float(np.ptp(points, axis=0).max()))
+    places = (points[None] == hull[:, None]).all(axis=2).argmax(axis=1)
+    return np.roll(hull, -int(places.argmin()), axis=0)
+
+
+def _turn(one: Array, two: Array, three: Array) -> float:
+    """Twice the area of a triangle, positive if it turns left."""
+    (x, y), (u, v) = two - one, three - one
+    return float(x * v - y * u)
+
+
+def without_straight_corners(polygon: Array, slack: float) -> Array:
+    """Drop corners that lie within `slack` of the line through their two neighbours."""
+    kept = polygon
+    while len(kept) > 3:  # noqa: PLR2004 - a triangle has no corner to spare
+        before, after = np.roll(kept, 1, axis=0), np.roll(kept, -1, axis=0)
+        chord = after - before
+        cross = chord[:, 0] * (kept - before)[:, 1] - chord[:, 1] * (kept - before)[:, 0]
+        height = np.abs(cross) / np.maximum(np.linalg.norm(chord, axis=1), slack)
+        straightest = first_best(-height, SAME_PART * slack)
+        if height[straightest] > slack:
+            break
+        kept = np.delete(kept, straightest, axis=0)
+    return kept
+
+
+def is_convex(polygon: Array) -> bool:
+    """Whether a counter-clockwise polygon turns left (or goes straight) at every corner."""
+    edge = np.roll(polygon, -1, axis=0) - polygon
+    following = np.roll(edge, -1, axis=0)
+    turn = edge[:, 0] * following[:, 1] - edge[:, 1] * following[:, 0]
+    lengths = np.linalg.norm(edge, axis=1) * np.linalg.norm(following, axis=1)
+    return bool((turn >= -CONVEX_SLACK * lengths).all())
+
+
+def merge_into_convex_pieces(points: Array, triangles: Indices) -> list[Array]:
+    """Join the triangles of a polygon into few convex pieces.
+
+    Diagonals are removed one by one as long as the two pieces beside them form a convex
+    piece; the result has at most four times the least possible number of pieces. The order
+    matters, so a few are tried and the one with the fewest pieces is kept.
+
+    Args:
+        points: Corners, (n, 2).
+        triangles: A triangulation without further points, (t, 3), counter-clockwise.
+
+    Source:
+        Hertel & Mehlhorn, "Fast triangulation of the plane with respect to simple
+        polygons", Information and Control 64, 1985.
+    """
+    edges = {edge for triangle in triangles.tolist() for edge in _edges(triangle)}
+    diagonals = sorted(edge for edge in edges if edge[0] < edge[1] and edge[::-1] in edges)
+    starts = range(0, len(diagonals), 1 + len(diagonals) // MERGE_ORDERS)
+    orders = [diagonals[start:] + diagonals[:start] for start in starts] or [diagonals]
+    return min((_merged(points, triangles, order) for order in orders), key=len)
+
+
+def _merged(points: Array, triangles: Indices, diagonals: list[tuple[int, int]]) -> list[Array]:
+    pieces = {index: [int(v) for v in triangle] for index, triangle in enumerate(triangles)}
+    owner = {edge: key for key, loop in pieces.items() for edge in _edges(loop)}
+    for tail, head in diagonals:
+        one, two = owner[tail, head], owner[head, tail]
+        if one == two:
+            continue
+        joined = _join(pieces[one], pieces[two], tail, head)
+        if len(set(joined)) == len(joined) and is_convex(points[joined]):
+            pieces[one] = joined
+            del pieces[two]
+            owner.update(dict.fromkeys(_edges(joined), one))
+    return [points[loop] for _, loop in sorted(pieces.items())]
+
+
+def _edges(loop: list[int]) -> list[tuple[int, int]]:
+    return list(zip(loop, loop[1:] + loop[:1], strict=True))
+
+
+def _join(one: list[int], two: list[int], tail: int, head: int) -> list[int]:
+    """Walk `one` from head round to tail, then `two` from tail round to head."""
+    start, other = one.index(head), two.index(tail)
+    first = one[start:] + one[:start]
+    second = two[other:] + two[:other]
+    return first + second[1:-1]

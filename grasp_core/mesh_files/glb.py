@@ -1,0 +1,245 @@
+"""GLB: a JSON tree of nodes and meshes whose numbers lie in one binary chunk.
+
+The frame of a mesh is the product of the matrices from the root of its scene to its node; a mirror
+turns its triangles, so that outside stays outside. What
+would change shapes and is not read - compression, sparse numbers, skins, morphs, other files - is
+refused.
+"""
+
+import json
+import struct
+from collections.abc import Iterator
+from typing import Any, cast
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.errors import MeshError, MeshRefusal
+from grasp_core.mesh_files.polygon_soup import CORNERS, check_corners, too_many
+from grasp_core.mesh_files.refusals import broken, shown, unsupported
+
+MAGIC, VERSION = b"glTF", 2
+HEAD, CHUNK_HEAD = 12, 8
+JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
+INDEX_TYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4"}
+FLOAT_TYPE = 5126
+TRIANGLES, STRIP = 4, 5
+MOST_NODES = 10_000
+PLAIN_EXTENSIONS = ("KHR_materials", "KHR_texture", "KHR_lights", "EXT_texture", "KHR_xmp")
+"""They change looks only."""
+Tree = dict[str, Any]
+
+
+def read(data: bytes, most: int) -> tuple[Array, Indices]:
+    """Vertices (n, 3) and triangles (t, 3) of the scene of a GLB file.
+
+    Raises:
+        MeshError: It breaks a rule, or has more than `most` triangles.
+    """
+    tree, binary = _chunks(data)
+    try:
+        return _scene(tree, binary, most)
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        message = f"the JSON part is no glTF ({type(error).__name__}: {shown(error)})"
+        raise MeshError(MeshRefusal.UNREADABLE, f"{message}; export it again") from error
+
+
+def _chunks(data: bytes) -> tuple[Tree, bytes]:
+    """The tree, and the binary chunk, empty where there is none."""
+    if len(data) < HEAD:
+        broken("the head", f"expected {HEAD} bytes")
+    magic, version, length = struct.unpack_from("<4sII", data)
+    if magic != MAGIC or version != VERSION or length != len(data):
+        broken("the head", f"expected glTF 2 of {len(data)} bytes, got {version} of {length}")
+    chunks, place = list[tuple[int, bytes]](), HEAD
+    while place < len(data):
+        if place + CHUNK_HEAD > len(data):
+            broken("the end", "half of a chunk's head")
+        size, kind = struct.unpack_from("<II", data, place)
+        place += CHUNK_HEAD + size
+        if place > len(data):
+            broken("the end", f"a chunk of {size} bytes is cut off")
+        chunks.append((kind, data[place - size : place]))
+    if [kind for kind, _ in chunks] not in ([JSON_CHUNK], [JSON_CHUNK, BINARY_CHUNK]):
+        broken("the chunks", "expected one of JSON, and one binary")
+    return _tree(chunks[0][1]), chunks[1][1] if len(chunks) > 1 else b""
+
+
+def _tree(text: bytes) -> Tree:
+    try:
+        tree: object = json.loads(text.decode("utf-8"))
+    except (ValueError, RecursionError) as error:
+        message = f"the first chunk is not JSON ({shown(error)}); export it again"
+        raise MeshError(MeshRefusal.UNREADABLE, message) from error
+    if not isinstance(tree, dict):
+        broken("the first chunk", "expected a JSON object")
+    return cast("Tree", tree)
+
+
+def _scene(tree: Tree, binary: bytes, most: int) -> tuple[Array, Indices]:
+    _check_features(tree)
+    points, triangles = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)]
+    before = count = 0
+    for matrix, mesh in _placed(tree):
+        for primitive in tree["meshes"][mesh]["primitives"]:
+            corners, local = _primitive(tree, binary, primitive)
+            count += len(corners)
+            if count > most:
+                too_many(count, most)
+            points.append(local @ matrix[:3, :3].T + matrix[:3, 3])
+            mirrored = np.linalg.det(matrix[:3, :3]) < 0.0
+            triangles.append(before + (corners[:, ::-1] if mirrored else corners))
+            before += len(local)
+    moved = np.vstack(points)
+    if not np.isfinite(moved).all():
+        message = "a coordinate of the scene is not finite; repair it"
+        raise MeshError(MeshRefusal.NON_FINITE, message)
+    return moved, np.vstack(triangles)
+
+
+def _check_features(tree: Tree) -> None:
+    buffers = tree.get("buffers", [])
+    if len(buffers) > 1 or any("uri" in buffer for buffer in buffers):
+        unsupported("numbers lie in other files or texts", "export one GLB that holds them")
+    used = [*tree.get("extensionsRequired", ()), *tree.get("extensionsUsed", ())]
+    for name in used:
+        if not str(name).startswith(PLAIN_EXTENSIONS):
+            unsupported(f"extension {shown(name)!r}", "export plain glTF, without compression")
+    if any("skin" in node or "weights" in node for node in tree.get("nodes", [])):
+        unsupported("skins and morphs move vertices", "export the mesh as it stands")
+
+
+def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
+    """Each mesh of the scene with its matrix (4, 4).
+
+    Raises:
+        MeshError: Nodes form no tree, or there are too many.
+    """
+    scenes = tree.get("scenes", [])
+    if not scenes:
+        return
+    place = tree.get("scene", 0)
+    _check_place(place, scenes)
+    waiting = [(np.eye(4), root) for root in scenes[place].get("nodes", [])]
+    seen = set[int]()
+    while waiting:
+        parent, number = waiting.pop()
+        _check_place(number, tree["nodes"])
+        if number in seen or len(seen) >= MOST_NODES:
+            broken(f"node {number}", f"nodes must form a tree, of {MOST_NODES} at most")
+        seen.add(number)
+        node = tree["nodes"][number]
+        matrix = parent @ _matrix(node)
+        waiting += [(matrix, child) for child in node.get("children", [])]
+        if "mesh" in node:
+            _check_place(node["mesh"], tree["meshes"])
+            if "camera" in node:
+                unsupported(f"node {number} is a mesh and a camera", "export the mesh alone")
+            yield matrix, node["mesh"]
+
+
+def _check_place(place: object, listed: list[Any]) -> None:
+    if type(place) is not int or not 0 <= place < len(listed):
+        broken("the JSON part", f"names number {shown(place)} of {len(listed)}")
+
+
+def _matrix(node: Tree) -> Array:
+    matrix = np.eye(4)
+    if "matrix" in node:
+        if {"translation", "rotation", "scale"} & node.keys():
+            broken("a node", "has a matrix and parts of one")
+        matrix = _floats(node, "matrix", 16).reshape(4, 4).T
+        if (matrix[3] != (0.0, 0.0, 0.0, 1.0)).any():
+            unsupported("a node with a projective matrix", "export it without")
+        return matrix
+    if "rotation" in node:
+        matrix[:3, :3] = _rotation(_floats(node, "rotation", 4))
+    if "scale" in node:
+        matrix[:3, :3] *= _floats(node, "scale", 3)
+    if "translation" in node:
+        matrix[:3, 3] = _floats(node, "translation", 3)
+    return matrix
+
+
+def _floats(node: Tree, name: str, count: int) -> Array:
+    given = node[name]
+    if len(given) != count or any(type(each) not in (int, float) for each in given):
+        broken("a node", f"its {name} must be {count} numbers, got {shown(given)}")
+    values = np.array([float(each) for each in given])
+    if not np.isfinite(values).all():
+        message = f"a node: its {name} must be finite, got {shown(given)}; repair it"
+        raise MeshError(MeshRefusal.NON_FINITE, message)
+    return values
+
+
+def _rotation(quaternion: Array) -> Array:
+    """The matrix of a quaternion (x, y, z, w), whose length does not matter."""
+    size = float(np.linalg.norm(quaternion))
+    if not 0.5 < size < 2.0:  # noqa: PLR2004 - rounding does not get there
+        broken("a node", f"its rotation is a quaternion of length {size:.3g}, expected 1")
+    x, y, z, w = quaternion / size
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _primitive(tree: Tree, binary: bytes, primitive: Tree) -> tuple[Indices, Array]:
+    """Triangles (t, 3) and vertices (n, 3) of a part of a mesh."""
+    mode = primitive.get("mode", TRIANGLES)
+    if "targets" in primitive or primitive.get("extensions"):
+        unsupported("a part with morphs or compression", "export plain triangles")
+    if mode not in (TRIANGLES, STRIP):
+        unsupported(f"a part of mode {shown(mode)}, not of triangles", "export triangles only")
+    points = _numbers(tree, binary, primitive["attributes"]["POSITION"], "VEC3").astype(np.float64)
+    if "indices" in primitive:
+        flat = _numbers(tree, binary, primitive["indices"], "SCALAR").ravel().astype(np.int64)
+    else:
+        flat = np.arange(len(points))
+    if mode == STRIP:
+        rows = np.stack([flat[:-2], flat[1:-1], flat[2:]], axis=1)
+        rows[1::2] = rows[1::2, [1, 0, 2]]
+    elif len(flat) % CORNERS:
+        broken("a part", f"{len(flat)} corners make no whole triangles")
+    else:
+        rows = flat.reshape(-1, 3)
+    check_corners(rows, len(points))
+    return rows, points
+
+
+def _numbers(tree: Tree, binary: bytes, number: int, shape: str) -> Any:
+    """The numbers of an accessor, a row for each of its elements."""
+    _check_place(number, tree["accessors"])
+    accessor = tree["accessors"][number]
+    kind = accessor["componentType"]
+    wanted = {FLOAT_TYPE: "<f4"} if shape == "VEC3" else INDEX_TYPES
+    if accessor["type"] != shape or kind not in wanted or accessor.get("normalized"):
+        unsupported(
+            f"accessor {number} is {shown(accessor['type'])} of {shown(kind)}",
+            "export plain triangles",
+        )
+    if "sparse" in accessor or "bufferView" not in accessor:
+        unsupported(f"accessor {number} is sparse or empty", "export plain triangles")
+    _check_place(accessor["bufferView"], tree["bufferViews"])
+    view = tree["bufferViews"][accessor["bufferView"]]
+    _check_place(view["buffer"], tree["buffers"])
+    item, columns = np.dtype(wanted[kind]), CORNERS if shape == "VEC3" else 1
+    row = item.itemsize * columns
+    stride = view.get("byteStride", row)
+    inside, start, count = (
+        accessor.get("byteOffset", 0),
+        view.get("byteOffset", 0),
+        accessor["count"],
+    )
+    sizes = (stride, inside, start, count, view["byteLength"])
+    if any(type(size) is not int or size < 0 for size in sizes) or stride < row:
+        broken(f"accessor {number}", f"sizes must be whole numbers, rows at least {row} bytes")
+    length = (count - 1) * stride + row if count else 0
+    if inside + length > view["byteLength"] or start + view["byteLength"] > len(binary):
+        broken(f"accessor {number}", f"{count} numbers do not fit into their {len(binary)} bytes")
+    raw = np.frombuffer(binary, dtype=np.uint8, offset=start + inside, count=length)
+    rows = np.lib.stride_tricks.as_strided(raw, (count, row), (stride, 1)).copy()
+    return rows.view(item).reshape(count, columns)

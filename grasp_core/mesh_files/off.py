@@ -1,0 +1,63 @@
+"""OFF text: the word OFF, three counts, so many vertices, so many polygons, and nothing else."""
+
+from collections.abc import Iterator
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.mesh_files.polygon_soup import Surface
+from grasp_core.mesh_files.refusals import broken
+from grasp_core.mesh_files.words import numbers, whole, worded_lines
+
+Lines = Iterator[tuple[int, list[bytes]]]
+COLOURED = b"COFF"
+COUNTS = (2, 3)
+FLOATS = 3
+
+
+def read(text: bytes, most: int) -> tuple[Array, Indices]:
+    """Vertices (n, 3) and triangles (t, 3) of an OFF text.
+
+    Raises:
+        MeshError: It breaks a rule, with the line, or has more than `most` triangles.
+    """
+    lines = worded_lines(text)
+    vertices, faces = _counts(lines)
+    surface = Surface(most)
+    for _ in range(vertices):
+        number, words = _next(lines, "a vertex")
+        values = numbers(words, f"line {number}")
+        if len(values) < FLOATS:
+            broken(f"line {number}", f"a vertex needs three numbers, got {len(values)}")
+        surface.points.append(values[:FLOATS])
+    for _ in range(faces):
+        number, words = _next(lines, "a face")
+        where = f"line {number}"
+        corners = whole(words[0], where)
+        if not 0 <= corners < len(words):
+            broken(where, f"a face of {corners} corners lists {len(words) - 1}")
+        surface.add([whole(word, where) for word in words[1 : corners + 1]], where)
+    if (after := next(lines, None)) is not None:
+        broken(f"line {after[0]}", f"comes after the {vertices} vertices and {faces} faces counted")
+    return surface.arrays()
+
+
+def _counts(lines: Lines) -> tuple[int, int]:
+    number, words = _next(lines, "OFF")
+    if words[0] not in {b"OFF", COLOURED}:
+        broken(f"line {number}", "expected the word OFF")
+    if len(words) == 1:
+        number, counts = _next(lines, "the counts")
+    else:
+        counts = words[1:]
+    if len(counts) not in COUNTS:
+        broken(f"line {number}", f"expected counts of vertices, faces and edges, got {len(counts)}")
+    vertices, faces = (whole(count, f"line {number}") for count in counts[:2])
+    if vertices < 0 or faces < 0:
+        broken(f"line {number}", "a count is negative")
+    return vertices, faces
+
+
+def _next(lines: Lines, expected: str) -> tuple[int, list[bytes]]:
+    line = next(lines, None)
+    if line is None:
+        broken("the end", f"expected {expected}")
+    return line

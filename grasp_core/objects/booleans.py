@@ -1,0 +1,131 @@
+"""Solids as triangle meshes: hulls, extrusions and booleans; the only door to manifold3d."""
+
+import importlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.errors import InputError
+from grasp_core.geometry.polygons import signed_area
+from grasp_core.solvers.ties import graded, largest_first
+
+GRID_DIGITS = 9
+"""Corners that are triangulated are on a grid of so many digits, relative to the figure."""
+GRID = 4e-8
+"""Figures of size one are inset by so much more: the kernel rounds coordinates to 1e-8."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solid:
+    """A closed triangle mesh, wound counter-clockwise seen from outside."""
+
+    vertices: Array
+    """(n, 3) [m]"""
+    triangles: Indices
+    """(t, 3)"""
+
+    def __add__(self, other: "Solid") -> "Solid":
+        """The union of two solids."""
+        return _solid(_manifold(self) + _manifold(other))
+
+    def __sub__(self, other: "Solid") -> "Solid":
+        """What remains of this solid when the other is cut away."""
+        return _solid(_manifold(self) - _manifold(other))
+
+    @property
+    def volume(self) -> float:
+        """[m^3]; negative when the mesh is inside out."""
+        corners = self.vertices[self.triangles] - self.vertices.mean(axis=0)
+        return float(np.linalg.det(corners).sum()) / 6.0
+
+    def moved(self, offset: ArrayLike) -> "Solid":
+        """The same solid somewhere else."""
+        return Solid(self.vertices + np.asarray(offset, dtype=np.float64), self.triangles)
+
+
+def hull(points: ArrayLike) -> Solid:
+    """Convex hull of points, (n, 3)."""
+    return _solid(_kernel().Manifold.hull_points(np.asarray(points, dtype=np.float64)))
+
+
+def extrusion(outline: ArrayLike, height: float, holes: Sequence[ArrayLike] = ()) -> Solid:
+    """A plane figure (k, 2) in z = 0 drawn out to z = height, with straight holes."""
+    loops = [np.asarray(loop, dtype=np.float64) for loop in (outline, *holes)]
+    kernel = _kernel()
+    figure = kernel.CrossSection(loops, kernel.FillRule.EvenOdd)
+    return _solid(kernel.Manifold.extrude(figure, height))
+
+
+def triangulate(loops: Sequence[Array]) -> Indices:
+    """Triangles between an outer border and its holes, as indices into all corners in order.
+
+    Corners are put on a grid first, on which those of regular figures are truly on one line or
+    circle, so that rounding does not choose between triangulations.
+    """
+    size = float(np.ptp(np.vstack(loops), axis=0).max())
+    on_grid = [graded(loop / size, GRID_DIGITS) for loop in loops]
+    return np.asarray(_kernel().triangulate(on_grid), dtype=np.int64)
+
+
+def inset_figure(loops: Sequence[Array], margin: float) -> list[list[Array]]:
+    """The parts of a plane figure that are at least a margin away from its border.
+
+    At corners that turn inwards somewhat more is cut off, so that what is left has few corners.
+
+    Args:
+        loops: Outer border and holes, each (k, 2).
+        margin: In the same unit.
+
+    Returns:
+        Outer border and holes of each part; nothing if the figure is too narrow.
+    """
+    kernel = _kernel()
+    size = float(np.ptp(np.vstack(loops), axis=0).max())
+    figure = kernel.CrossSection([loop / size for loop in loops], kernel.FillRule.EvenOdd)
+    inset = figure.offset(-(margin / size + GRID), kernel.JoinType.Miter)
+    parts = [[np.asarray(loop) * size for loop in part.to_polygons()] for part in inset.decompose()]
+    return [_outer_first(part) for part in parts if part]
+
+
+def _outer_first(loops: Sequence[Array]) -> list[Array]:
+    """The largest loop, then the others in the order in which they come."""
+    return [loops[place] for place in largest_first([signed_area(loop) for loop in loops])]
+
+
+def intersection_volume(one: Solid, two: Solid) -> float:
+    """Volume that two solids share [m^3]."""
+    return float((_manifold(one) ^ _manifold(two)).volume())
+
+
+def union_volume(solids: Sequence[Solid]) -> float:
+    """Volume of the union of solids [m^3]."""
+    kernel = _kernel()
+    parts = [_manifold(solid) for solid in solids]
+    return float(kernel.Manifold.batch_boolean(parts, kernel.OpType.Add).volume())
+
+
+def _kernel() -> Any:
+    return importlib.import_module("manifold3d")
+
+
+def _manifold(solid: Solid) -> Any:
+    kernel = _kernel()
+    mesh = kernel.Mesh64(
+        np.array(solid.vertices, order="C"), np.array(solid.triangles, dtype=np.uint64, order="C")
+    )
+    body = kernel.Manifold(mesh)
+    if body.status() != kernel.Error.NoError:
+        raise InputError(f"not a closed, orientable mesh: {body.status().name}")
+    return body
+
+
+def _solid(body: Any) -> Solid:
+    mesh = body.to_mesh64()
+    return Solid(
+        np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3],
+        np.asarray(mesh.tri_verts, dtype=np.int64),
+    )

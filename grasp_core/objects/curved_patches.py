@@ -1,0 +1,225 @@
+"""Curved and scanned surfaces as patches: nearly flat parts, each with how far it is from flat.
+
+Solved: planes and convex polygons in them such that over each point of a polygon, along the plane's
+normal, there is exactly one point of a connected group of triangles, at most `depth` from the
+plane, where the surface leans from the plane by at most `spread`.
+
+Derivation. Take a group of triangles that all lean from a plane by less than a right angle, and a
+convex polygon in the plane that no edge on the group's border projects into. Over the polygon the
+projection then has no folds and no ends: the number of triangles over a point is the same
+everywhere. It is one at the point that the polygon grew from, so it is one everywhere. Spread and
+depth are measured on all triangles that may reach over the polygon.
+
+Groups grow across shared edges from the flattest triangles on, measured against a plane of
+their own, never from neighbour to neighbour; the plane is fitted again to what has grown. Edges of
+holes in the surface, or of more than two triangles, are borders.
+"""
+
+import math
+from bisect import insort
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.cones.spanning import angles_between
+from grasp_core.geometry.clearings import clearest_point, clearing
+from grasp_core.geometry.polygons import area_and_centroid, edge_rows, plane_frame
+from grasp_core.objects.face import Face, PatchLimits
+from grasp_core.objects.planar_faces import triangle_neighbours
+from grasp_core.solvers.ties import first_best, graded, largest_first, ranks
+
+SMOOTHING = 10
+"""Rounds in which normals are averaged with those of neighbours, to find where it is flat."""
+FITS = 3
+"""How often a group is grown, and its plane fitted again."""
+FLATNESS_DIGITS = 9
+"""Cosines between normals and their averages that are equal to so many digits are ties."""
+BORDER_GAP = 1e-9
+"""How far polygons stay from the borders of their groups, relative to the object's extent."""
+
+
+def flat_patches(vertices: Array, triangles: Indices, limits: PatchLimits) -> tuple[Face, ...]:
+    """The largest nearly flat parts of a surface, those with the largest discs first.
+
+    Args:
+        vertices: (n, 3) [m]
+        triangles: (t, 3), counter-clockwise seen from outside.
+        limits: How flat, and how many.
+    """
+    surface = _Surface.of(vertices, triangles)
+    depth = limits.depth * surface.extent
+    found: list[tuple[float, Face]] = []
+    radii: list[float] = []
+    for group in _groups(surface, math.radians(limits.spread_deg), depth):
+        enough = len(radii) >= limits.most
+        if enough and math.pi * radii[-limits.most] ** 2 >= group.area:
+            break
+        if patch := _patch(surface, group.triangles, -group.outward):
+            found.append(patch)
+            insort(radii, patch[0])
+    return _largest_apart(found, limits.most, surface.extent)
+
+
+def _largest_apart(found: list[tuple[float, Face]], most: int, extent: float) -> tuple[Face, ...]:
+    """The patches with the largest discs; of equal ones each next as far from all as can be.
+
+    A ring has dozens of equal patches, and the first ones of its list are all on one side.
+
+    Args:
+        found: Radii of the largest discs, and patches.
+        most: How many to keep.
+        extent: Of the object [m].
+    """
+    sizes = ranks([-radius for radius, _ in found])
+    places = np.array([[*face.normal, *(face.centroid / extent)] for _, face in found])
+    nearest, left = np.full(len(found), np.inf), np.ones(len(found), dtype=np.bool_)
+    kept: list[int] = []
+    while left.any() and len(kept) < most:
+        largest = left & (sizes == sizes[left].min())
+        kept.append(first_best(np.where(largest, nearest, -1.0)))
+        left[kept[-1]] = False
+        nearest = np.minimum(nearest, np.linalg.norm(places - places[kept[-1]], axis=1))
+    return tuple(found[place][1] for place in kept)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Surface:
+    """A triangle mesh with what growing needs."""
+
+    corners: Array
+    """(t, 3, 3) [m]"""
+    normals: Array
+    """Outward unit normals, zero for triangles without area, (t, 3)."""
+    areas: Array
+    """(t,) [m^2]"""
+    across: Indices
+    """The triangle across each edge (k, k+1), -1 at borders, (t, 3)."""
+    extent: float
+    """[m]"""
+
+    @classmethod
+    def of(cls, vertices: Array, triangles: Indices) -> "_Surface":
+        corners = vertices[triangles]
+        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        lengths = np.linalg.norm(cross, axis=1)
+        normals = cross / np.where(lengths > 0.0, lengths, 1.0)[:, None]
+        extent = float(np.ptp(vertices, axis=0).max())
+        return cls(corners, normals, 0.5 * lengths, triangle_neighbours(triangles), extent)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Group:
+    """Connected triangles, the outward normal of the plane they grew along, and their area."""
+
+    triangles: Indices
+    outward: Array
+    area: float
+
+
+def _groups(surface: _Surface, spread: float, depth: float) -> list[_Group]:
+    """Groups of triangles, none in two of them, largest first."""
+    smooth = _smoothed(surface)
+    flatness: Array = np.einsum("ti,ti->t", smooth, surface.normals)
+    flat_first = np.argsort(-graded(flatness, FLATNESS_DIGITS), kind="stable")
+    free = np.ones(len(surface.areas), dtype=np.bool_)
+    groups: list[_Group] = []
+    for seed in flat_first:
+        if not free[seed]:
+            continue
+        level = float(smooth[seed] @ surface.normals[seed]) >= math.cos(0.5 * spread)
+        plane = (smooth if level else surface.normals)[seed], surface.corners[seed].mean(axis=0)
+        group = _Group(np.array([seed]), plane[0], 0.0)
+        for _ in range(FITS):
+            members = _grown(surface, int(seed), plane, spread, depth, free)
+            if not len(members):
+                break
+            weights = surface.areas[members]
+            group = _Group(members, plane[0], float(weights.sum()))
+            mean = weights @ surface.normals[members]
+            middle = weights @ surface.corners[members].mean(axis=1) / weights.sum()
+            plane = mean / np.linalg.norm(mean), middle
+        free[group.triangles] = False
+        groups.append(group)
+    return [groups[place] for place in largest_first([group.area for group in groups])]
+
+
+def _grown(
+    surface: _Surface,
+    seed: int,
+    plane: tuple[Array, Array],
+    spread: float,
+    depth: float,
+    free: NDArray[np.bool_],
+) -> Indices:
+    """The free triangles near a plane that are reached from one across edges, (g,)."""
+    normal, origin = plane
+    seen = ~free
+    seen[seed] = True
+    front, members = np.array([seed]), list[Indices]()
+    while len(front):
+        upright = surface.normals[front] @ normal >= math.cos(spread)
+        heights = np.abs((surface.corners[front] - origin) @ normal).max(axis=1)
+        front = front[upright & (heights <= depth)]
+        members.append(front)
+        after = np.unique(surface.across[front])
+        front = after[(after >= 0) & ~seen[after]]
+        seen[front] = True
+    return np.concatenate(members)
+
+
+def _smoothed(surface: _Surface) -> Array:
+    """Normals averaged over neighbourhoods, weighted by area, (t, 3)."""
+    weighted = surface.normals * surface.areas[:, None]
+    inner = surface.across >= 0
+    for _ in range(SMOOTHING):
+        around = np.where(inner[..., None], weighted[surface.across], 0.0).sum(axis=1)
+        mean = weighted + around
+        length = np.linalg.norm(mean, axis=1, keepdims=True)
+        weighted = mean / np.where(length > 0.0, length, 1.0) * surface.areas[:, None]
+    return weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), 1e-300)
+
+
+def _patch(surface: _Surface, group: Indices, normal: Array) -> tuple[float, Face] | None:
+    """The convex polygon that a group covers once, and the radius of its largest disc."""
+    frame = plane_frame(normal)
+    origin = surface.corners[group].mean(axis=(0, 1))
+    flat = (surface.corners[group] - origin) @ frame
+    inside = np.isin(surface.across[group], group)
+    tails, heads = flat, np.roll(flat, -1, axis=1)
+    border = np.stack([tails[~inside], heads[~inside]], axis=1)
+    start, room = clearest_point(flat.mean(axis=1), border)
+    if room <= 0.0 or _sheets(flat, start) != 1:
+        return None
+    polygon = clearing(start, border, BORDER_GAP * surface.extent)
+    if polygon is None:
+        return None
+    E, b = edge_rows(polygon)
+    beyond = (np.einsum("tkj,ej->tke", flat, E) > b).all(axis=1).any(axis=1)
+    facets = group[~beyond]
+    heights = (surface.corners[facets] - origin) @ normal
+    middle = 0.5 * float(heights.min() + heights.max())
+    leans = angles_between(-surface.normals[facets], normal)
+    area, centroid = area_and_centroid([polygon])
+    plane = origin + middle * normal
+    face = Face(
+        normal=normal,
+        centroid=plane + frame @ centroid,
+        area=area,
+        polygon=plane + polygon @ frame.T,
+        holes=(),
+        pieces=(plane + polygon @ frame.T,),
+        spread=float(leans.max()),
+        depth=0.5 * float(np.ptp(heights)),
+        facets=facets,
+    )
+    return float((b - E @ centroid).min()), face
+
+
+def _sheets(flat: Array, point: Array) -> int:
+    """How many triangles (t, 3, 2) cover a point."""
+    tails, heads = flat, np.roll(flat, -1, axis=1)
+    along, away = heads - tails, point - tails
+    turns = along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0]
+    return int(((turns > 0.0).all(axis=1) | (turns < 0.0).all(axis=1)).sum())

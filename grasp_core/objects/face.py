@@ -1,0 +1,77 @@
+"""The face of a polyhedron, and how flat a patch must be to count as one."""
+
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices, frozen, frozen_indices, frozen_units
+from grasp_core.checked import LARGEST, number, several, whole
+from grasp_core.short_text import counted, summary
+from grasp_core.values import FINGERS, RIGHT_ANGLE
+
+FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
+"""What counts as a face: flat parts, nearly flat patches, or what suits the surface."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Face:
+    """A planar face: one outer border, perhaps holes, and a split into convex pieces."""
+
+    normal: Array
+    """Unit vector into the object, (3,)."""
+    centroid: Array
+    """Centre of area, on the plane, (3,) [m]."""
+    area: float
+    """[m^2]"""
+    polygon: Array
+    """Outer border, (k, 3) [m], counter-clockwise when `normal` points at the viewer."""
+    holes: tuple[Array, ...]
+    """Borders of the holes, each (k, 3) [m], clockwise in the same view."""
+    pieces: tuple[Array, ...]
+    """Convex polygons that tile the face, each (k, 3) [m], wound as `polygon`."""
+    spread: float = 0.0
+    """Of a curved patch: the most that the surface over it leans from the plane [rad]."""
+    depth: float = 0.0
+    """Of a curved patch: largest distance of the surface over it from the plane [m]."""
+    facets: Indices = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    """Of a curved patch: the triangles that are the surface over the polygon, (f,)."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "facets", frozen_indices(self.facets, (None,), "facets"))
+        object.__setattr__(self, "normal", frozen_units(self.normal, (3,), "normal"))
+        object.__setattr__(self, "centroid", frozen(self.centroid, (3,), "centroid"))
+        object.__setattr__(self, "polygon", frozen(self.polygon, (None, 3), "polygon"))
+        for name in ("holes", "pieces"):
+            each = partial(frozen, shape=(None, 3), name=name)
+            loops = several(getattr(self, name), each, name, "polygons")
+            object.__setattr__(self, name, loops)
+        number(self.area, "area", above=0.0, most=LARGEST)
+        number(self.spread, "spread", least=0.0, below=RIGHT_ANGLE)
+        number(self.depth, "depth", least=0.0, most=LARGEST)
+
+    def __repr__(self) -> str:
+        parts = [counted(len(self.polygon), "corner"), counted(len(self.holes), "hole")]
+        return summary("Face", *parts, area=self.area, centroid=self.centroid, normal=self.normal)
+
+
+@dataclass(frozen=True, slots=True)
+class PatchLimits:
+    """How far a patch may be from flat, and how many there are.
+
+    Raises:
+        InputError: A limit is out of range.
+    """
+
+    spread_deg: float = 10.0
+    """Largest angle between the surface and the patch's plane [deg]; friction loses it."""
+    depth: float = 0.01
+    """Largest distance of the surface from the plane, relative to the object's largest extent."""
+    most: int = 20
+    """So many patches, those with the largest discs."""
+
+    def __post_init__(self) -> None:
+        number(self.spread_deg, "spread_deg", above=0.0, most=45.0)  # above it nothing is flat
+        number(self.depth, "depth", above=0.0, most=0.1)
+        whole(self.most, "most", least=FINGERS, most=200)  # what the planner takes

@@ -1,0 +1,239 @@
+"""Convex pieces of an object's faces, moved and scaled so that the object has size one.
+
+The programs work on these: their tolerances then mean the same for every object.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import TypeAlias
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.fields import are_units, is_array, is_number
+from grasp_core.geometry.flat_polygons import (
+    FEWEST_CORNERS,
+    MOST_CORNERS,
+    convex_polygon,
+    has_inscribed_radius,
+)
+from grasp_core.geometry.polygons import clip, convex_hull, edge_rows, plane_frame
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
+from grasp_core.solvers.ties import graded
+
+THINNEST = 1e-6
+"""Pieces without room for a disc of this radius (object size one) hold no contact."""
+SOUND = 1e-9
+"""How far the parts of a piece may disagree (object size one)."""
+
+SAME_PLACE = 6
+"""Distances equal to so many digits (object size one) are ties, broken by the pieces' order."""
+LARGEST_INSET = 0.5
+"""Most that edges are kept clear of, in radii of the piece's largest disc."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FacePiece:
+    """One convex piece: the points origin + frame @ y with E y <= b."""
+
+    face: int
+    """Index of its face in the polyhedron."""
+    normal: Array
+    """Unit vector into the object, (3,)."""
+    origin: Array
+    """A point of the plane, (3,)."""
+    frame: Array
+    """Orthonormal columns spanning the plane, the first along an edge, (3, 2).
+
+    Tied to the object, so that turning it turns the pyramids inscribed in force cones too.
+    """
+    corners: Array
+    """(k, 2), counter-clockwise in the frame, which is a mirror image where the piece is one."""
+    E: Array
+    """Unit outward edge normals, (k, 2)."""
+    b: Array
+    """(k,)"""
+    inradius: float
+    """Radius of the largest disc inside."""
+    spread: float = 0.0
+    """How far the true surface leans from the plane at most [rad]."""
+    depth: float = 0.0
+    """How far the true surface is from the plane at most."""
+
+    def sound(self) -> bool:
+        """Whether the fields describe one convex polygon, at about unit size.
+
+        `face`, `spread` and `depth` say where a piece is from, which no polygon tells.
+        """
+        with np.errstate(all="ignore"):
+            count = len(self.corners) if is_array(self.corners, None, 2) else 0
+            rows = len(self.E) if are_units(self.E, None, 2) else 0
+            if not (
+                are_units(self.normal, 3)
+                and is_array(self.origin, 3)
+                and is_array(self.frame, 3, 2)
+                and min(count, rows) >= FEWEST_CORNERS
+                and max(count, rows) <= MOST_CORNERS
+                and is_array(self.b, rows)
+                and is_number(self.inradius, least=0.0)
+            ):
+                return False
+            axes = np.column_stack([self.frame, self.normal])
+            return bool(np.abs(axes.T @ axes - np.eye(3)).max() <= SOUND) and self._is_polygon()
+
+    def _is_polygon(self) -> bool:
+        """Whether `corners` are those of {y : E y <= b}, and `inradius` is that of its discs."""
+        polygon = convex_polygon(self.corners, SOUND)
+        if polygon is None:
+            return False
+        below = polygon.corners @ self.E.T - self.b
+        bordered = (np.abs(below) <= SOUND) & (np.abs(np.roll(below, -1, axis=0)) <= SOUND)
+        within = float(below.max()) <= SOUND and bool(bordered.any(axis=1).all())
+        return within and has_inscribed_radius(polygon, self.inradius)
+
+    def point(self, y: Array) -> Array:
+        """The point in space of plane coordinates, (3,)."""
+        return self.origin + self.frame @ y
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FaceShape:
+    """A face as convex pieces with room for a contact, and as their convex hull."""
+
+    pieces: tuple[FacePiece, ...]
+    hull: FacePiece
+    """What is impossible here is impossible on every piece."""
+    facets: Array | None = None
+    """Of a curved patch: corners of the triangles over it, wound as the piece, (f, 3, 3)."""
+
+
+Shapes: TypeAlias = Sequence[FaceShape | None]
+"""The faces of an object as the programs see them; None for those without room."""
+
+
+def face_shapes(body: Polyhedron) -> tuple[FaceShape | None, ...]:
+    """The faces of an object as the programs see them."""
+    by_face: list[list[FacePiece]] = [[] for _ in body.faces]
+    for piece in unit_pieces(body):
+        by_face[piece.face].append(piece)
+    corners = (body.vertices - body.center_of_mass)[body.triangles[:, ::-1]] / body.radius
+    return tuple(
+        replace(shape_of(pieces), facets=corners[face.facets] if len(face.facets) else None)
+        if pieces
+        else None
+        for face, pieces in zip(body.faces, by_face, strict=True)
+    )
+
+
+def shape_of(pieces: Sequence[FacePiece]) -> FaceShape:
+    """Convex pieces of one plane, together."""
+    first = pieces[0]
+    if len(pieces) == 1:
+        return FaceShape((first,), first)
+    points = np.vstack([piece.origin + piece.corners @ piece.frame.T for piece in pieces])
+    corners = convex_hull((points - first.origin) @ first.frame)
+    E, b = edge_rows(corners)
+    inradius = inscribed_radius(E, b)
+    hull = replace(first, corners=corners, E=E, b=b, inradius=inradius)
+    return FaceShape(tuple(pieces), hull)
+
+
+def choices_near(
+    shapes: Sequence[FaceShape], positions: Array, most: int
+) -> list[tuple[FacePiece, ...]]:
+    """Choices of one piece per face, those nearest to given points of the planes first.
+
+    Args:
+        shapes: Of k faces.
+        positions: A point of each plane, (k, 3).
+        most: At most so many.
+    """
+    ranked = [
+        _nearest_first(shape.pieces, at)[:most] for shape, at in zip(shapes, positions, strict=True)
+    ]
+    every = product(*(range(len(each)) for each in ranked))
+    ranks = sorted(every, key=lambda rank: (sum(rank), rank))[:most]
+    return [tuple(each[place] for each, place in zip(ranked, rank, strict=True)) for rank in ranks]
+
+
+def _nearest_first(pieces: Sequence[FacePiece], at: Array) -> list[FacePiece]:
+    """Pieces of a face, the nearest to a point of its plane first."""
+    apart = [graded(_outside(piece, at), SAME_PLACE) for piece in pieces]
+    return [pieces[place] for place in sorted(range(len(pieces)), key=apart.__getitem__)]
+
+
+def _outside(piece: FacePiece, point: Array) -> float:
+    """How far a point of the plane is beyond the farthest edge line of a piece."""
+    return float((piece.E @ (piece.frame.T @ (point - piece.origin)) - piece.b).max())
+
+
+def inset_piece(piece: FacePiece, inset: float) -> FacePiece:
+    """The part of a piece that keeps clear of its edges.
+
+    Args:
+        piece: Any convex piece.
+        inset: How far to stay from the edges; at most half the radius of the largest disc counts.
+    """
+    away = min(inset, LARGEST_INSET * piece.inradius)
+    b = piece.b - away
+    corners = clip(piece.corners, piece.E, b)
+    return replace(piece, corners=corners, b=b, inradius=piece.inradius - away)
+
+
+def unit_pieces(body: Polyhedron) -> tuple[FacePiece, ...]:
+    """All convex pieces with room for a contact, about the centre of mass over the radius."""
+    pieces = [
+        replace(
+            piece_of(index, face.normal, (polygon - body.center_of_mass) / body.radius),
+            spread=face.spread,
+            depth=face.depth / body.radius,
+        )
+        for index, face in enumerate(body.faces)
+        for polygon in face.pieces
+    ]
+    return tuple(piece for piece in pieces if piece.inradius > THINNEST)
+
+
+def piece_of(face: int, normal: Array, polygon: Array) -> FacePiece:
+    """A convex polygon as a piece.
+
+    Args:
+        face: Index of its face.
+        normal: Unit vector into the object, (3,).
+        polygon: (k, 3), counter-clockwise about the normal.
+    """
+    edge = polygon[1] - polygon[0]
+    along = np.asarray(edge / np.linalg.norm(edge), dtype=np.float64)
+    frame = np.column_stack([along, np.cross(normal, along)])
+    origin = polygon.mean(axis=0)
+    corners = (polygon - origin) @ frame
+    E, b = edge_rows(corners)
+    return FacePiece(
+        face=face,
+        normal=normal,
+        origin=origin,
+        frame=frame,
+        corners=corners,
+        E=E,
+        b=b,
+        inradius=inscribed_radius(E, b),
+    )
+
+
+def inscribed_disc_radius(polygon: Array, piece: FacePiece) -> float:
+    """Radius of the largest disc in a convex polygon (k, 3) that lies on a piece."""
+    return inscribed_radius(*edge_rows((polygon - piece.origin) @ piece.frame))
+
+
+def inscribed_disc_radius_of(polygon: Array, normal: Array) -> float:
+    """Radius of the largest disc in a convex polygon (k, 3), counter-clockwise about a normal."""
+    return inscribed_radius(*edge_rows((polygon - polygon[0]) @ plane_frame(normal)))
+
+
+def inscribed_radius(E: Array, b: Array) -> float:
+    """Radius of the largest disc in {y : E y <= b}."""
+    rows = np.column_stack([E, np.ones(len(E))])
+    best = maximize(LinearProgram(np.array([0.0, 0.0, 1.0]), rows, b))
+    return best.value if isinstance(best, Optimum) else 0.0

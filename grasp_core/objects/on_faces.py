@@ -1,0 +1,85 @@
+"""Where contacts are on an object: the face, and on curved patches the triangle, under each."""
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import instance
+from grasp_core.errors import InputError
+from grasp_core.objects.face import Face
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact, Grasp
+
+ON_FACE = 1e-6
+"""How far a contact may be off its face, in object radii: what six digits in a file keep."""
+
+
+def check_body(body: Polyhedron) -> None:
+    """Refuse what is no object.
+
+    Raises:
+        InputError: It is none.
+    """
+    instance(body, Polyhedron, "body", "gc.load_polyhedron reads one from a mesh file")
+
+
+def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
+    """Refuse a grasp whose contacts are not on the faces it names.
+
+    Raises:
+        InputError: One of them is no object or no grasp, a face does not exist, or a contact is off
+            its surface or outside its border.
+    """
+    check_body(body)
+    instance(grasp, Grasp, "grasp", "gc.plan finds them")
+    slack = ON_FACE * body.radius
+    for finger, (face, contact) in enumerate(zip(grasp.faces, grasp.contacts, strict=True)):
+        where = f"grasp {grasp.id}: contact {finger}"
+        if not 0 <= face < len(body.faces):
+            raise InputError(f"{where} names face {face}; there are 0..{len(body.faces) - 1}")
+        if not _on_surface(body, body.faces[face], contact):
+            raise InputError(f"{where} does not lie on face {face} with that face's normal")
+        plane = body.faces[face]
+        if not any(within(contact.position, piece, plane.normal, slack) for piece in plane.pieces):
+            raise InputError(f"{where} lies outside the border of face {face}")
+
+
+def face_under(body: Polyhedron, contact: Contact) -> Face | None:
+    """The face on which a contact lies, with its surface's normal, if there is one."""
+    slack = ON_FACE * body.radius
+    for face in body.faces:
+        if _on_surface(body, face, contact) and any(
+            within(contact.position, piece, face.normal, slack) for piece in face.pieces
+        ):
+            return face
+    return None
+
+
+def _on_surface(body: Polyhedron, face: Face, contact: Contact) -> bool:
+    """Whether a contact is in the plane of a face, or on a triangle of a curved patch."""
+    slack = ON_FACE * body.radius
+    if not len(face.facets):
+        off = abs(float(face.normal @ (contact.position - face.centroid)))
+        return off <= slack and float(np.abs(contact.normal - face.normal).max()) <= ON_FACE
+    corners = body.vertices[body.triangles[face.facets][:, ::-1]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    heights = np.abs(np.einsum("fi,fi->f", normals, contact.position - corners[:, 0]))
+    turned = np.abs(normals - contact.normal).max(axis=1)
+    return any(
+        within(contact.position, corners[facet], normals[facet], slack)
+        for facet in np.flatnonzero((heights <= slack) & (turned <= ON_FACE))
+    )
+
+
+def within(point: Array, polygon: Array, normal: Array, slack: float) -> bool:
+    """Whether a point in the plane of a convex polygon is inside it, or outside by a slack at most.
+
+    Args:
+        point: (3,) [m]
+        polygon: Corners in order about `normal`, (n, 3) [m].
+        normal: (3,)
+        slack: [m]
+    """
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    inward = np.cross(normal, edges) / np.linalg.norm(edges, axis=1, keepdims=True)
+    return bool((np.einsum("ki,ki->k", inward, point - polygon) >= -slack).all())

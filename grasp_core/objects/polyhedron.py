@@ -1,0 +1,212 @@
+"""The polyhedron: a solid bounded by planar faces, from a mesh file or from triangles."""
+
+import hashlib
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Self, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, Indices, frozen, frozen_indices
+from grasp_core.checked import LARGEST, instance, number, one_of, path_of, several, shown, text
+from grasp_core.errors import InputError, MeshError
+from grasp_core.mesh_files.child import read_triangles
+from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.objects.build import DEFAULT_FLATNESS, DEFAULT_LIMITS, build, check_choices
+from grasp_core.objects.face import Face, FaceKind, PatchLimits
+from grasp_core.objects.planar_faces import FlatnessLimits
+from grasp_core.short_text import counted, summary
+
+UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Polyhedron:
+    """A solid bounded by planar faces, with the mass properties of uniform density 1."""
+
+    name: str
+    vertices: Array
+    """Welded vertices, (n, 3) [m]."""
+    triangles: Indices
+    """Vertex indices, (t, 3), counter-clockwise seen from outside."""
+    faces: tuple[Face, ...]
+    volume: float
+    """[m^3]"""
+    center_of_mass: Array
+    """(3,) [m]"""
+    inertia: Array
+    """About the centre of mass at density 1 kg/m^3, (3, 3) [kg m^2]."""
+    content_sha256: str
+    """Hash of the canonical mesh: the same for any file name, vertex or triangle order."""
+    source_sha256: str
+    """Hash of the file's bytes; `content_sha256` when there was no file."""
+    patches: PatchLimits | None = None
+    """Of a curved or scanned surface whose faces are patches; None where they are exact."""
+    notes: tuple[str, ...] = ()
+    """What was mended on the way in, for people to read."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vertices", frozen(self.vertices, (None, 3), "vertices"))
+        triangles = frozen_indices(self.triangles, (None, 3), "triangles")
+        object.__setattr__(self, "triangles", triangles)
+        center = frozen(self.center_of_mass, (3,), "center_of_mass")
+        object.__setattr__(self, "center_of_mass", center)
+        object.__setattr__(self, "inertia", frozen(self.inertia, (3, 3), "inertia"))
+        for name in ("name", "content_sha256", "source_sha256"):
+            text(getattr(self, name), name)
+        number(self.volume, "volume", above=0.0, most=LARGEST)
+        if triangles.max(initial=0) >= max(len(self.vertices), 1):
+            raise InputError(f"triangles must name vertices from 0 to {len(self.vertices) - 1}")
+        several(self.faces, partial(instance, kind=Face, name="faces"), "faces", "Face values")
+        several(self.notes, partial(text, name="notes"), "notes", "texts")
+        if self.patches is not None:
+            instance(self.patches, PatchLimits, "patches")
+
+    @classmethod
+    def from_mesh(
+        cls,
+        vertices: ArrayLike,
+        triangles: ArrayLike,
+        *,
+        name: str = "object",
+        faces: FaceKind = "auto",
+        patches: PatchLimits | None = None,
+        center_of_mass: ArrayLike | None = None,
+    ) -> Self:
+        """Build from a triangle mesh, with the checks and refusals of a mesh file.
+
+        Args:
+            vertices: (n, 3) [m].
+            triangles: Vertex indices, (t, 3).
+            name: What to call the object.
+            faces: As `load_polyhedron`.
+            patches: As `load_polyhedron`.
+            center_of_mass: As `load_polyhedron`.
+
+        Raises:
+            MeshError: The mesh is not a solid; its `reason` says why.
+        """
+        return polyhedron_from_mesh(
+            vertices, triangles, name=name, faces=faces, patches=patches,
+            center_of_mass=center_of_mass, kind=cls,
+        )  # fmt: skip
+
+    @property
+    def radius(self) -> float:
+        """Largest distance of a vertex from the centre of mass [m]."""
+        return float(np.linalg.norm(self.vertices - self.center_of_mass, axis=1).max())
+
+    @property
+    def normals(self) -> Array:
+        """The faces' normals, (faces, 3)."""
+        return np.array([face.normal for face in self.faces]).reshape(-1, 3)
+
+    def __repr__(self) -> str:
+        kind = "face" if self.patches is None else "patch"
+        sizes = [(self.vertices, "vertex"), (self.triangles, "triangle"), (self.faces, kind)]
+        parts = [counted(len(things), name) for things, name in sizes]
+        return summary("Polyhedron", shown(self.name), *parts, radius=self.radius)
+
+
+AnyPolyhedron = TypeVar("AnyPolyhedron", bound=Polyhedron)
+
+
+def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
+    path: str | Path,
+    *,
+    unit: str = "m",
+    flatness: FlatnessLimits = DEFAULT_FLATNESS,
+    faces: FaceKind = "auto",
+    patches: PatchLimits | None = None,
+    center_of_mass: ArrayLike | None = None,
+    limits: MeshLimits = DEFAULT_LIMITS,
+) -> Polyhedron:
+    """Read a solid from a mesh file.
+
+    Args:
+        path: An OBJ, STL, PLY, OFF or GLB file.
+        unit: What one unit in the file is: "m", "cm", "mm" or "in".
+        flatness: How far triangles may deviate and still be one planar face.
+        faces: `planar` for exact planar faces; `patches` for the nearly flat parts of a curved or
+            scanned surface, which may have holes; `auto` takes patches where there are more than
+            `MAX_FACES` planar faces.
+        patches: How flat patches are, and how many.
+        center_of_mass: (3,) [m], in the file's frame; that of uniform density if not given,
+            estimated from the convex hull where the surface has holes.
+        limits: How large the file may be, and what reading it may cost.
+
+    Raises:
+        InputError: The unit is unknown.
+        MeshError: The file is not a solid; its `reason` says why.
+    """
+    one_of(unit, UNITS_M, "unit")
+    check_choices(faces, patches, flatness)
+    path = path_of(path, "path")
+    instance(limits, MeshLimits, "limits")
+    vertices, triangles, data = read_triangles(path, limits)
+    try:
+        return polyhedron_from_mesh(
+            vertices * UNITS_M[unit],
+            triangles,
+            name=path.stem,
+            source_sha256=hashlib.sha256(data).hexdigest(),
+            flatness=flatness,
+            faces=faces,
+            patches=patches,
+            center_of_mass=center_of_mass,
+            limits=limits,
+        )
+    except MeshError as error:
+        raise MeshError(error.reason, f"{path}: {error.message}") from error
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    *,
+    name: str = "object",
+    source_sha256: str | None = None,
+    flatness: FlatnessLimits = DEFAULT_FLATNESS,
+    faces: FaceKind = "auto",
+    patches: PatchLimits | None = None,
+    center_of_mass: ArrayLike | None = None,
+    limits: MeshLimits = DEFAULT_LIMITS,
+    kind: type[AnyPolyhedron] = Polyhedron,
+) -> AnyPolyhedron:
+    """Check a triangle mesh and build the polyhedron of its faces.
+
+    Args:
+        vertices: (n, 3) [m].
+        triangles: Vertex indices, (t, 3).
+        name: What to call the object.
+        source_sha256: Hash of the file it came from, if any.
+        flatness: As `load_polyhedron`.
+        faces: As `load_polyhedron`.
+        patches: As `load_polyhedron`.
+        center_of_mass: As `load_polyhedron`.
+        limits: As `load_polyhedron`.
+        kind: The class to build.
+
+    Raises:
+        InputError: The centre of mass is not a point.
+        MeshError: The mesh is not a solid; its `reason` says why.
+    """
+    text(name, "name")
+    parts = build(vertices, triangles, flatness, faces, patches, center_of_mass, limits)
+    return kind(
+        name=name,
+        vertices=parts.vertices,
+        triangles=parts.triangles,
+        faces=parts.faces,
+        volume=parts.mass.volume,
+        center_of_mass=parts.mass.center,
+        inertia=parts.mass.inertia,
+        content_sha256=parts.content_sha256,
+        source_sha256=source_sha256 or parts.content_sha256,
+        patches=parts.patches,
+        notes=parts.notes,
+    )

@@ -1,0 +1,210 @@
+"""A grasp moved on its four faces to where its Ferrari-Canny quality is larger.
+
+Contacts stay on the convex pieces of the faces that they are on.
+
+The climb of `quality_ascent` has many local optima, so it starts from the grasp's own contacts and
+from random ones. The best end is certified like any grasp, and replaces the given one only if it is
+proved to be better: if its lower bound is above the given one's upper bound.
+
+Moved contacts keep a finger's radius from the edges of their faces, or half the radius of the
+largest disc in the face where that is less. Where no radius is asked for, they may also come as
+near to an edge as the given contact on that face is. With a radius, a grasp nearer to an edge
+starts from where it comes clear of it, and stays as it is if no contacts that are clear are better.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import SMALLEST, coefficient, number, seed_of
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.errors import InputError, UndecidedError
+from grasp_core.families.constructions import point_region, regions_of
+from grasp_core.families.free import of_general_type
+from grasp_core.families.placements import Placement
+from grasp_core.geometry.polygons import SAME_CORNER
+from grasp_core.objects.face_pieces import FacePiece, inset_piece, unit_pieces
+from grasp_core.objects.on_faces import check_on_faces
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.optimizing.ascent import ContactFaces
+from grasp_core.planning.certify import certify, to_grasp
+from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
+from grasp_core.solvers.ties import coarse, first_best, largest_first, on_grid, surpassing
+from grasp_core.values import FINGERS, ForceCone, Grasp
+
+FINGER_RADIUS = 0.05
+"""In object radii, where none is given: half the radius of a fingertip in the scenes."""
+RANDOM_STARTS = 3
+"""Followed besides the grasp itself: the best of `RANDOM_TRIALS`."""
+RANDOM_TRIALS = 24
+START_DIGITS = 8
+"""Digits after the point of where the climb from the grasp itself begins, at unit size."""
+ROUGH = 2e-2
+"""Gap of the quality's bounds while starting points are compared."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Improvement:
+    """A grasp moved on its faces, with the proved bounds before and after."""
+
+    grasp: Grasp
+    """The moved grasp; the given one where no better one was found."""
+    before: FerrariCanny
+    after: FerrariCanny
+    clearances: tuple[float, ...]
+    """How far the contacts, if moved, had to stay from the edges of their faces [m]."""
+
+    @property
+    def gain(self) -> float:
+        """How many times larger the quality has become: the ratio of lower bounds."""
+        return self.after.lower / self.before.lower
+
+
+def optimize_contacts(
+    body: Polyhedron,
+    grasp: Grasp,
+    friction: float = 0.5,
+    *,
+    finger_radius: float | None = None,
+    seed: int = 0,
+) -> Improvement:
+    """Move a grasp's contacts on their faces to raise its Ferrari-Canny quality (`l1`).
+
+    Torques are taken about the centre of mass and divided by the object's radius.
+
+    Args:
+        body: The object.
+        grasp: A grasp of it in force closure at this friction.
+        friction: Coulomb coefficient at every contact.
+        finger_radius: How far moved contacts stay from edges [m], or half the radius of the
+            largest disc in a face if that is less. If None a twentieth of the object's radius or,
+            where that is less, as far as the given contact on that face.
+        seed: For the random starting points.
+
+    Returns:
+        A certified grasp of quality no lower than the given one's. If moved, its witness is of the
+        general type, a regulus, and it claims no regions.
+
+    Raises:
+        InputError: An argument is out of range, or the grasp is not one of the body at this
+            friction.
+        SolverError: A program's answer failed its check.
+    """
+    check_on_faces(body, grasp)
+    coefficient(friction)
+    seed = seed_of(seed)
+    if finger_radius is not None:
+        where = ", the object's radius in m, or None"
+        number(finger_radius, "finger_radius", least=SMALLEST, most=body.radius, where=where)
+    before = _quality(body, grasp, friction)
+    if before.lower <= 0.0:
+        raise InputError(f"grasp {grasp.id} is not in force closure at friction {friction}")
+    pieces = pieces_under(body, grasp)
+    insets = _insets(body, grasp, pieces, finger_radius)
+    clearances = tuple(float(body.radius * inset) for inset in insets)
+    rooms = [inset_piece(*chosen) for chosen in zip(pieces, insets, strict=True)]
+    faces = ContactFaces(pieces, tuple(room.b for room in rooms), friction)
+    here = [_clear_of_edges(*on) for on in zip(rooms, _unit_points(body, grasp), strict=True)]
+    rng = np.random.default_rng([seed, *grasp.faces])
+    starts = [np.array(here), *_random_starts(faces, rooms, rng)]
+    ends = [faces.climbed(y) for y in starts]
+    for place in largest_first([found.lower for _, found in ends]):
+        y, found = ends[place]
+        if found.lower <= surpassing(before.lower):
+            break
+        moved = _certified(body, grasp, faces, y, rng)
+        if moved is not None and ((after := _quality(body, moved, friction)).lower > before.upper):
+            return Improvement(moved, before, after, clearances)
+    return Improvement(grasp, before, before, clearances)
+
+
+def _insets(
+    body: Polyhedron, grasp: Grasp, pieces: Sequence[FacePiece], finger_radius: float | None
+) -> list[float]:
+    """How far contacts stay from the edges of each piece, at unit size."""
+    if finger_radius is not None:
+        return [finger_radius / body.radius] * FINGERS
+    depths = [
+        float((piece.b - piece.E @ _in_plane(piece, at)).min())
+        for piece, at in zip(pieces, _unit_points(body, grasp), strict=True)
+    ]
+    return [min(FINGER_RADIUS, max(-coarse(-depth, START_DIGITS), 0.0)) for depth in depths]
+
+
+def _quality(body: Polyhedron, grasp: Grasp, friction: float) -> FerrariCanny:
+    return ferrari_canny(
+        grasp, friction=friction, center=body.center_of_mass, torque_scale=body.radius
+    )
+
+
+def pieces_under(body: Polyhedron, grasp: Grasp) -> tuple[FacePiece, ...]:
+    """The convex piece that each contact lies on."""
+    pieces = unit_pieces(body)
+    return tuple(
+        _deepest([piece for piece in pieces if piece.face == face], point)
+        for face, point in zip(grasp.faces, _unit_points(body, grasp), strict=True)
+    )
+
+
+def _deepest(pieces: Sequence[FacePiece], point: Array) -> FacePiece:
+    """The piece that a point is deepest in, the first one of those on whose common edge it is."""
+    depths = [float((piece.b - piece.E @ _in_plane(piece, point)).min()) for piece in pieces]
+    return pieces[first_best(depths, SAME_CORNER)]
+
+
+def _unit_points(body: Polyhedron, grasp: Grasp) -> Array:
+    return (grasp.positions - body.center_of_mass) / body.radius
+
+
+def _in_plane(piece: FacePiece, point: Array) -> Array:
+    return piece.frame.T @ (point - piece.origin)
+
+
+def _clear_of_edges(room: FacePiece, point: Array) -> Array:
+    """A point in the plane of a face, moved towards the middle of its room until inside, (2,)."""
+    y, middle = on_grid(_in_plane(room, point), START_DIGITS), room.corners.mean(axis=0)
+    beyond = room.E @ y - room.b
+    inward = room.E @ (y - middle)
+    share = float((beyond[beyond > 0.0] / inward[beyond > 0.0]).max(initial=0.0))
+    return y + min(share, 1.0) * (middle - y)
+
+
+def _random_starts(
+    faces: ContactFaces, rooms: Sequence[FacePiece], rng: np.random.Generator
+) -> Iterator[Array]:
+    """The best of some random contacts that are in closure, (4, 2) each."""
+    trials = [
+        np.array([rng.dirichlet(np.ones(len(room.corners))) @ room.corners for room in rooms])
+        for _ in range(RANDOM_TRIALS)
+    ]
+    rated = np.array([faces.quality(y, ROUGH).lower for y in trials])
+    best = largest_first(rated)
+    return (trials[i] for i in best[:RANDOM_STARTS] if rated[i] > 0.0)
+
+
+def _certified(
+    body: Polyhedron, grasp: Grasp, faces: ContactFaces, y: Array, rng: np.random.Generator
+) -> Grasp | None:
+    """The grasp at these contacts, if closure and a witness of the general type confirm it."""
+    positions = faces.positions(y)
+    normals = np.array([piece.normal for piece in faces.pieces])
+    try:
+        closed = force_closure(positions, normals, faces.friction)
+    except UndecidedError:
+        return None
+    if closed.forces is None:
+        return None
+    plain = Placement(positions, closed.forces, np.empty((0, 3)), np.zeros(FINGERS), 0.0)
+    placement = of_general_type(faces.pieces, plain, faces.friction, rng)
+    if placement is None:
+        return None
+    theta = math.atan(faces.friction)
+    cones = tuple(ForceCone(piece.normal, theta) for piece in faces.pieces)
+    found = certify(
+        f"o-{grasp.id}", grasp.faces, "regulus", faces.pieces, cones, placement,
+        faces.friction, regions_of(point_region, faces.pieces, cones, placement),
+    )  # fmt: skip
+    return None if found is None else to_grasp(body, faces.friction, found)

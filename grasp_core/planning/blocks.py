@@ -1,0 +1,149 @@
+"""Face quadruples in blocks, those of faces with more room first, before cones are chosen for them.
+
+Four numbers i < j < k < l of faces in the order of their room are counted like this: all with
+smaller l first, then all with smaller k, then j, then i. So the quadruple number is
+C(l, 4) + C(k, 3) + C(j, 2) + i, a block is a range of numbers, and no disc of this block or a later
+one is larger than the room of its first l.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.cones.spanning import SpanningTable
+from grasp_core.planning.candidates import LEAST_SPAN_ANGLE, Candidates, PlannedCones
+from grasp_core.solvers.ties import coarse, graded
+from grasp_core.values import FINGERS
+
+FIRST_FACES = 14
+"""Faces of the first block: 1,001 quadruples."""
+LARGEST_BLOCK = 30_000
+"""Quadruples of one block."""
+SPANNING_SHARE = 0.125
+"""Of four random directions, the share that positively spans."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prospects:
+    """Quadruples of faces, and how wide their cones can be."""
+
+    cones: PlannedCones
+    faces: Indices
+    """(q, 4)"""
+    widest: Array
+    """No choice of force cones is wider, (q,) [rad]."""
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+    @property
+    def rooms(self) -> Array:
+        """Radius of the largest disc that fits in each of the four faces, (q,)."""
+        return self.cones.rooms[self.faces].min(axis=1, initial=np.inf)
+
+    def some(self, places: Indices) -> "Prospects":
+        """The quadruples at some places, in that order."""
+        return Prospects(self.cones, self.faces[places], self.widest[places])
+
+    def candidates(self, rows: slice) -> Candidates:
+        """Some of them with their cones."""
+        return self.cones.candidates(self.faces[rows])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Blocks:
+    """Blocks of quadruples, made on request."""
+
+    rooms: Array
+    """No disc of each block is larger, (blocks,)."""
+    make: Callable[[int], Prospects]
+
+    def __len__(self) -> int:
+        return len(self.rooms)
+
+
+def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
+    """All quadruples of an object.
+
+    Args:
+        cones: How force cones are chosen.
+        whole: How many of the faces count by themselves; the others are parts of them.
+        shared: Quadruples with such parts, (s, 4), which come last.
+    """
+    order = _by_room(cones, whole)
+    order = order[cones.rooms[order] > 0.0]
+    ends = _range_ends(math.comb(len(order), FINGERS))
+    starts = np.append(0, ends)[:-1]
+    with_room = shared[(cones.rooms[shared] > 0.0).all(axis=1)]
+    parts = [with_room[i : i + LARGEST_BLOCK] for i in range(0, len(with_room), LARGEST_BLOCK)]
+    rooms = [
+        coarse(cones.rooms)[order][_unranked(starts, len(order))[:, -1]],
+        coarse(np.array([cones.rooms[part].min(axis=1).max() for part in parts])),
+    ]
+
+    def make(place: int) -> Prospects:
+        if place >= len(ends):
+            return _prospects(cones, parts[place - len(ends)])
+        numbers = np.arange(int(starts[place]), int(ends[place]), dtype=np.int64)
+        return _prospects(cones, order[_unranked(numbers, len(order))])
+
+    return Blocks(np.concatenate(rooms), make)
+
+
+def spanning_blocks(cones: PlannedCones, whole: int) -> Blocks:
+    """Those whose normals span (P3), whether there is room on their faces or not."""
+    order = _by_room(cones, whole)
+    table = SpanningTable(cones.body.normals[order], LEAST_SPAN_ANGLE)
+    cuts = _face_ends(len(order), int(LARGEST_BLOCK / SPANNING_SHARE))
+    pairs = [pair for pair in zip([0, *cuts], cuts, strict=False) if pair[1] >= FINGERS]
+    firsts = [max(start, FINGERS - 1) for start, _ in pairs]
+
+    def make(place: int) -> Prospects:
+        return _prospects(cones, order[table.quadruples(*pairs[place]).indices])
+
+    return Blocks(coarse(cones.rooms)[order][firsts], make)
+
+
+def _by_room(cones: PlannedCones, whole: int) -> Indices:
+    return np.argsort(-graded(cones.rooms[:whole]), kind="stable")
+
+
+def _prospects(cones: PlannedCones, quads: Indices) -> Prospects:
+    quads = np.sort(quads.reshape(-1, FINGERS), axis=1)
+    quads = quads[np.lexsort(quads.T[::-1])]
+    return Prospects(cones, quads, cones.widest(quads))
+
+
+def _range_ends(count: int) -> Indices:
+    """Where blocks of so many quadruples end: each as large as all before, up to a size."""
+    ends = [min(math.comb(FIRST_FACES, FINGERS), count)]
+    while ends[-1] < min(LARGEST_BLOCK, count):
+        ends.append(min(2 * ends[-1], count))
+    rest = np.arange(ends[-1], count, LARGEST_BLOCK)[1:]
+    return np.unique([*ends, *rest.tolist(), count]) if count else np.empty(0, dtype=np.int64)
+
+
+def _unranked(numbers: Indices, count: int) -> Indices:
+    """The quadruples of so many faces with some numbers, ascending in each, (q, 4)."""
+    found = np.empty((len(numbers), FINGERS), dtype=np.int64)
+    left = numbers.copy()
+    for size in range(FINGERS, 0, -1):
+        before = np.array([math.comb(face, size) for face in range(count)], dtype=np.int64)
+        found[:, size - 1] = np.searchsorted(before, left, side="right") - 1
+        left -= before[found[:, size - 1]]
+    return found
+
+
+def _face_ends(count: int, largest: int) -> Sequence[int]:
+    """How many faces each block reaches to: as many new quadruples as before, up to a size."""
+    ends = [min(FIRST_FACES, count)]
+    while ends[-1] < count:
+        before = math.comb(ends[-1], FINGERS)
+        size, end = min(before, largest), ends[-1] + 1
+        while end < count and math.comb(end + 1, FINGERS) - before <= size:
+            end += 1
+        ends.append(end)
+    return ends

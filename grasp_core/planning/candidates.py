@@ -1,0 +1,185 @@
+"""Force cones for face quadruples, and what bounds their discs.
+
+Around the normals, as in the paper, each is planned at theta_plan = min(theta, just below its span
+angle theta*): the smaller cones lie inside the real ones, so what holds there holds at the friction
+asked for. Tilted cones are an alternative, and for most quadruples the only one.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.cones.spanning import span_sines
+from grasp_core.cones.tilting import tilted_cones, widest_half_angles
+from grasp_core.disc_bounds.corner_bounds import (
+    angle_limits,
+    corners_of,
+    disc_limits,
+    distances,
+    widths_apart,
+)
+from grasp_core.families.constructions import LEAST_RADIUS
+from grasp_core.families.kernel_tables import Corners
+from grasp_core.objects.face_pieces import Shapes
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import ForceCone, four
+
+LEAST_SPAN_ANGLE = math.atan(LEAST_RADIUS)
+"""With narrower cones no disc at a depth of one object radius would count."""
+BELOW_SPAN_ANGLE = 0.999
+"""Share of theta* to plan with: P3 is strict."""
+INSIDE_FRICTION = 1.0 - 1e-6
+"""Share of the friction angle to plan with, so that equilibrium is not marginal."""
+NORMAL, TILTED = 0, 1
+"""The two choices of force cones."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """Quadruples of faces with two choices of force cones, and what bounds their grasps."""
+
+    faces: Indices
+    """(q, 4)"""
+    normals: Array
+    """(q, 4, 3)"""
+    axes: Array
+    """Of both choices, around the normals and tilted, (q, 2, 4, 3)."""
+    half_angles: Array
+    """(q, 2) [rad]; not positive where there is no such choice."""
+    limits: Array
+    """Upper bounds on the discs of each choice (see `disc_limits`), (q, 2, 4), in object radii."""
+    rooms: Array
+    """Radius of the largest disc that fits in each of the four faces, (q,)."""
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+    def some(self, places: Indices) -> "Candidates":
+        """The quadruples at some places, in that order."""
+        return Candidates(*(getattr(self, each.name)[places] for each in fields(self)))
+
+    def cones(self, place: int, kind: int) -> tuple[ForceCone, ForceCone, ForceCone, ForceCone]:
+        """One choice of force cones of one quadruple."""
+        half_angle = float(self.half_angles[place, kind])
+        return four(ForceCone(axis, half_angle) for axis in self.axes[place, kind])
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedCones:
+    """How the force cones of one object's quadruples are chosen."""
+
+    body: Polyhedron
+    shapes: Shapes
+    theta: float
+    """Half-angle of the friction cones to plan with [rad]."""
+    tilted: bool
+    """Whether cones may be tilted, not only around the normals."""
+
+    @cached_property
+    def rooms(self) -> Array:
+        """Radius of the largest disc in each face, zero without room, (f,)."""
+        return np.array(
+            [max(p.inradius for p in shape.pieces) if shape else 0.0 for shape in self.shapes]
+        )
+
+    def widest(self, quads: Indices) -> Array:
+        """Half-angles that no choice of cones exceeds, (q,) [rad].
+
+        Args:
+            quads: Faces, (q, 4).
+        """
+        normals, thetas = self._normals[quads], self._thetas[quads]
+        sines = span_sines(normals)
+        around = _around(sines, thetas)
+        if not self.tilted:
+            return around
+        return np.maximum(around, widest_half_angles(normals, thetas, sines))
+
+    def limits(self, quads: Indices, widest: Array) -> Array:
+        """Upper bounds on discs of cones that are no wider (see `disc_limits`), (q, 4).
+
+        With psi the half-angle, theta the friction angle and h half the angle between two normals,
+        narrower cones may lean more, and the bound tan(psi / 2) / sin(h - theta + psi) of a pair is
+        to hold for all psi up to the widest w. Where h >= theta it grows with psi, as
+        1 / sin(psi) is above cot(h - theta + psi). Where h < theta cones that positively span (P3)
+        still never overlap: half the angle between their axes is above psi, so that the true bound
+        is below tan(psi / 2) / sin(psi) = 1 / (2 cos^2(psi / 2)), and that of w above this.
+
+        Args:
+            quads: Faces, (q, 4).
+            widest: Half-angles, (q,) [rad].
+
+        Returns:
+            In object radii, for cones that positively span.
+        """
+        extent = float(np.linalg.norm(self._corners.points, axis=-1).max(initial=0.0))
+        leaning = np.maximum(self._thetas[quads].max(axis=1, initial=0.0) - widest, 0.0)
+        widths = widths_apart(quads, self._distances, self._halves, leaning)
+        return angle_limits(extent, widths, widest)
+
+    def candidates(self, quads: Indices) -> Candidates:
+        """Quadruples of faces (q, 4) with their cones."""
+        normals, thetas = self._normals[quads], self._thetas[quads]
+        axes = [normals, normals]
+        half_angles = [_around(span_sines(normals), thetas), np.zeros(len(quads))]
+        if self.tilted:
+            leaning = tilted_cones(normals, thetas)
+            axes[TILTED] = leaning.axes
+            half_angles[TILTED] = BELOW_SPAN_ANGLE * leaning.half_angles
+        limits = [
+            disc_limits(self._corners, self._normals, quads, *choice)
+            for choice in list(zip(axes, half_angles, strict=True))[: 1 + self.tilted]
+        ]
+        return Candidates(
+            faces=quads,
+            normals=normals,
+            axes=np.stack(axes, axis=1),
+            half_angles=np.stack(half_angles, axis=1),
+            limits=np.stack([limits[NORMAL], limits[-1]], axis=1),
+            rooms=self.rooms[quads].min(axis=1, initial=np.inf),
+        )
+
+    @cached_property
+    def _normals(self) -> Array:
+        return self.body.normals
+
+    @cached_property
+    def _distances(self) -> Array:
+        return distances(self._corners)
+
+    @cached_property
+    def _halves(self) -> Array:
+        """Half the angles between normals, (f, f) [rad]."""
+        apart = np.linalg.norm(self._normals[:, None] - self._normals, axis=-1)
+        return np.arcsin(np.minimum(0.5 * apart, 1.0))
+
+    @cached_property
+    def _thetas(self) -> Array:
+        spreads = np.array([face.spread for face in self.body.faces])
+        return usable_half_angles(self.theta, spreads)
+
+    @cached_property
+    def _corners(self) -> Corners:
+        return corners_of(self.body)
+
+
+def usable_half_angles(theta: float, spreads: Array) -> Array:
+    """Half-angles that fit inside the friction cones wherever a curved patch leans to [rad].
+
+    Args:
+        theta: Half-angle of the friction cones to plan with [rad].
+        spreads: How far each patch leans from its plane [rad].
+
+    Returns:
+        Like `spreads`; a trifle, of no use to any construction, where nothing is left.
+    """
+    return np.maximum(INSIDE_FRICTION * theta - spreads, 0.5 * LEAST_SPAN_ANGLE)
+
+
+def _around(sines: Array, thetas: Array) -> Array:
+    """Half-angles of cones around normals, (q,), from the sines of their span angles."""
+    spanned = BELOW_SPAN_ANGLE * np.arcsin(np.maximum(sines, 0.0))
+    return np.minimum(thetas.min(axis=1, initial=np.inf), spanned)

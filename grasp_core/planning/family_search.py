@@ -1,0 +1,279 @@
+"""One method over the face quadruples of one object: what it finds, best first, and counts."""
+
+import math
+from bisect import insort
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import takewhile
+from typing import TypeAlias
+
+import numpy as np
+
+from grasp_core.cones.spanning import cones_positively_span
+from grasp_core.disc_bounds.program_bounds import AttemptBounds
+from grasp_core.errors import SolverError
+from grasp_core.families.constructions import Construction, regions_of
+from grasp_core.families.free import Absence
+from grasp_core.families.placements import Placement
+from grasp_core.families.true_surface import on_true_surface
+from grasp_core.objects.face_pieces import FacePiece, FaceShape, Shapes, choices_near
+from grasp_core.planning.best_first import Block, in_rows, promising
+from grasp_core.planning.blocks import Blocks
+from grasp_core.planning.certify import Certified, certify, named
+from grasp_core.planning.ranking import Attempt, Quadruple, outlook
+from grasp_core.planning.reach import Reach
+from grasp_core.planning.result import MethodCounts
+from grasp_core.solvers.ties import graded, surpassing
+from grasp_core.values import ContactRegion, FaceQuadruple, ForceCone, four
+
+Cones: TypeAlias = tuple[ForceCone, ForceCone, ForceCone, ForceCone]
+Found: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement]
+"""Pieces, force cones and the placement on them."""
+
+MOST_CHOICES = 8
+"""Choices of pieces that are tried on faces that are not convex; times the cells allowed."""
+TOGETHER = 32
+"""Blocks that are open at once: a million quadruples, some hundred megabytes."""
+SAME_MERIT = 1e-5
+"""What cannot be better than the worst kept by more than this share is not looked at: symmetric
+objects hold thousands of equal grasps."""
+SAME_CONTACTS = 1e-6
+"""Contacts closer than this, in object radii, are the same grasp found twice."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Case:
+    """A construction on four faces."""
+
+    construction: Construction
+    faces: FaceQuadruple
+    shapes: Sequence[FaceShape]
+    """Of the four faces."""
+    friction: float
+    """Coulomb coefficient at every contact."""
+
+
+@dataclass(slots=True, eq=False)
+class Search:
+    """What one method has found so far."""
+
+    limit: int | None
+    reach: Callable[[Certified], Reach]
+    """How fingers get to the contacts of a grasp, or why they do not."""
+    best: list[Certified] = field(default_factory=list[Certified])
+    """At most `limit` grasps, best first."""
+    held: set[FaceQuadruple] = field(default_factory=set[FaceQuadruple])
+    """Faces, ascending, on which a grasp was found, kept or not."""
+    tally: Counter[str] = field(default_factory=Counter[str])
+    absences: dict[FaceQuadruple, tuple[Absence, ...]] = field(
+        default_factory=dict[FaceQuadruple, tuple[Absence, ...]]
+    )
+    undecided: dict[FaceQuadruple, float] = field(default_factory=dict[FaceQuadruple, float])
+    unreached: dict[FaceQuadruple, str] = field(default_factory=dict[FaceQuadruple, str])
+    seconds: float = 0.0
+
+    @property
+    def counts(self) -> MethodCounts:
+        """The tally as a frozen value."""
+        return MethodCounts(**self.tally)
+
+    @property
+    def full(self) -> bool:
+        """Whether another grasp would push one out."""
+        return self.limit is not None and len(self.best) == self.limit
+
+    def least(self, construction: Construction) -> float:
+        """Above which merit a placement counts, and may still enter the best."""
+        if self.full and (construction.limits is None or not self.best):
+            return math.inf
+        worst = self.best[-1].placement.merit if self.full else -math.inf
+        return max(worst * (1.0 + SAME_MERIT), construction.least)
+
+    def may_gain(self, construction: Construction, room: float) -> bool:
+        """Whether discs up to a radius may still enter the best."""
+        return room > self.least(construction)
+
+    def keep(self, found: Certified) -> list[Certified]:
+        """Count a grasp and, if fingers reach it, sort it in: as it was kept, or nothing."""
+        faces = four(sorted(found.faces))
+        way = self.reach(found)
+        if way.reason:
+            self.tally["unreachable"] += 1
+            self.unreached[faces] = way.reason
+            return []
+        found = replace(found, ways_out=way.directions)
+        self.tally["found"] += 1
+        self.held.add(faces)
+        insort(self.best, found, key=best_first)
+        if self.limit is not None:
+            del self.best[self.limit :]
+        return [found]
+
+
+def best_first(found: Certified) -> tuple[float, FaceQuadruple, FaceQuadruple]:
+    """Largest merit first; ties are broken by the faces, then by the fingers, not by rounding."""
+    return -graded(found.placement.merit), four(sorted(found.faces)), found.faces
+
+
+def search_construction(
+    construction: Construction,
+    shapes: Shapes,
+    friction: float,
+    blocks: Blocks,
+    search: Search,
+) -> Iterator[list[Certified]]:
+    """Go through blocks of quadruples, yielding what each promising one gave.
+
+    With a limit the search ends when no bound reaches the worst grasp kept; a construction
+    without bounds ends as soon as the limit is reached.
+    """
+    for quadruple in _in_order(construction, AttemptBounds(shapes), blocks, search):
+        faces = quadruple.faces
+        case = Case(construction, faces, chosen_shapes(shapes, faces), friction)
+        found: list[Certified] = []
+        for attempt in quadruple.attempts:
+            if not search.may_gain(construction, attempt.bound):
+                continue
+            one = tried(case, attempt, search.least(construction), search.tally)
+            found += [one] if one else []
+        found = _without_duplicates(found, search.tally)
+        yield [kept for one in found for kept in search.keep(one)]
+
+
+def _in_order(
+    construction: Construction, bounded: AttemptBounds, blocks: Blocks, search: Search
+) -> Iterator[Quadruple]:
+    """Quadruples to try: with a limit best first over many blocks, else block by block."""
+    if construction.limits is not None:
+        size = 1 if search.limit is None else TOGETHER
+        for start in range(0, len(blocks), size):
+            places = range(start, min(start + size, len(blocks)))
+            if not search.may_gain(construction, float(blocks.rooms[places].max())):
+                continue
+            some = [Block(float(blocks.rooms[at]), partial(blocks.make, at)) for at in places]
+            yield from promising(construction, some, bounded, search.least, search.tally)
+        return
+    for place in range(len(blocks)):
+        if search.full:
+            return
+        listed = outlook(blocks.make(place), construction, construction.least)
+        some = in_rows(listed, bounded, construction.least, search.tally)
+        yield from takewhile(lambda _: not search.full, some)
+
+
+def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]:
+    """The shapes of four faces with room."""
+    return tuple(shape for face in faces if (shape := shapes[face]) is not None)
+
+
+def tried(case: Case, attempt: Attempt, least: float, tally: Counter[str]) -> Certified | None:
+    """What a construction makes of four faces in one order of the fingers.
+
+    Args:
+        case: The construction and the faces.
+        attempt: Which of the faces each finger touches, and with which force cones.
+        least: Placements of no larger merit are not worth having.
+        tally: Where to count.
+    """
+    faces = four(case.faces[finger] for finger in attempt.order)
+    ordered = [case.shapes[finger] for finger in attempt.order]
+    tally["tried"] += 1
+    try:
+        settled = _settled(case.construction, ordered, attempt, tally, least)
+    except SolverError:
+        tally["undecided"] += 1
+        return None
+    if settled is None:
+        tally["infeasible"] += 1
+        return None
+    chosen, cones, placement, regions = settled
+    family = case.construction.family
+    certified = certify(
+        named(family[0], faces), faces, family, chosen, cones, placement, case.friction, regions
+    )
+    if certified is None or not cones_positively_span(
+        [cone.axis for cone in cones], [cone.half_angle for cone in cones]
+    ):
+        tally["rejected"] += 1
+        return None
+    return certified
+
+
+def _settled(
+    construction: Construction,
+    shapes: Sequence[FaceShape],
+    attempt: Attempt,
+    tally: Counter[str],
+    least: float,
+) -> tuple[tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...]] | None:
+    """The best placement over the choices of cones, with its regions, on the true surface."""
+    placed = None
+    for choice in attempt.choices:
+        if choice.bound <= least:
+            break
+        cones = four(choice.cones[finger] for finger in attempt.order)
+        if found := _best_placement(construction, cones, shapes, least, tally):
+            placed, least = found, surpassing(found[2].merit)
+    if placed is None:
+        return None
+    chosen, cones, planned = placed
+    regions = regions_of(construction.region, chosen, cones, planned)
+    found = on_true_surface(
+        shapes, chosen, cones, planned, regions, partial(_placed_on, construction, cones)
+    )
+    return None if found is None else (found[0], cones, found[1], regions)
+
+
+def _placed_on(
+    construction: Construction, cones: Cones, pieces: tuple[FacePiece, ...]
+) -> Placement | None:
+    """Any placement on pieces, however small its discs."""
+    placed = construction.place(pieces, cones, 0.0 if construction.limits else -math.inf)
+    return placed if isinstance(placed, Placement) else None
+
+
+def _best_placement(
+    construction: Construction,
+    cones: Cones,
+    shapes: Sequence[FaceShape],
+    least: float,
+    tally: Counter[str],
+) -> Found | None:
+    """The best over choices of one convex piece per face, if better than `least`.
+
+    Where faces have several pieces, their hulls are asked first: what they do not offer, no piece
+    does, and where they place the contacts the best pieces are likely to be.
+    """
+    hulls = tuple(shape.hull for shape in shapes)
+    tally["solved"] += 1
+    whole = construction.place(hulls, cones, least)
+    if not (isinstance(whole, Placement) and whole.merit > least):
+        return None
+    if all(len(shape.pieces) == 1 for shape in shapes):
+        return hulls, cones, whole
+    best = None
+    for chosen in choices_near(shapes, whole.positions, MOST_CHOICES):
+        tally["solved"] += 1
+        if construction.limits is not None and min(piece.inradius for piece in chosen) < least:
+            continue
+        placed = construction.place(chosen, cones, least)
+        if isinstance(placed, Placement) and placed.merit > least:
+            best, least = (chosen, cones, placed), surpassing(placed.merit)
+    return best
+
+
+def _without_duplicates(found: list[Certified], tally: Counter[str]) -> list[Certified]:
+    """Grasps of the same faces with different contacts, the best of each."""
+    kept: list[Certified] = []
+    for one in sorted(found, key=best_first):
+        here = one.placement.positions[np.argsort(one.faces)]
+        if any(
+            np.abs(here - other.placement.positions[np.argsort(other.faces)]).max() < SAME_CONTACTS
+            for other in kept
+        ):
+            tally["duplicates"] += 1
+        else:
+            kept.append(one)
+    return kept

@@ -1,0 +1,216 @@
+"""Contacts from elsewhere, put on an object's faces and made a grasp where they are closed.
+
+Contacts of other tools lie beside the surface by what rounding, sampling or a simulator's give
+leave. Each is moved to the nearest point of the surface whose normal leans little from the given
+one, and takes the surface's normal there: what is judged is what fingers touch. On planar faces
+that is a face; a curved surface gets a face of its own around each contact, as patches need not
+cover it.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, frozen, frozen_units
+from grasp_core.closure.critical_friction import critical_friction
+from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.cones.spanning import span_angle
+from grasp_core.errors import InputError
+from grasp_core.geometry.polygons import plane_frame
+from grasp_core.objects.face import Face
+from grasp_core.objects.on_faces import within
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.ferrari_canny import ferrari_canny
+from grasp_core.solvers.ties import first_best
+from grasp_core.values import (
+    FINGERS,
+    Contact,
+    ContactRegion,
+    FaceQuadruple,
+    ForceCone,
+    Grasp,
+    Witness,
+    four,
+)
+
+LARGEST_LEAN = math.radians(20.0)
+"""Between a given normal and that of the face the contact is put on [rad]."""
+SURROUNDINGS = 0.05
+"""Radius of the face around a contact on a curved surface, relative to the object's size."""
+CORNERS = 16
+"""Of such a face."""
+NEARER = 1e-9
+"""A face is nearer to a contact than the ones before it if it is so by this much, relative to the
+object's size: a contact on an edge is on the first of its faces that face alike."""
+LARGEST_MOVE = 0.02
+"""How far a contact may be from such a face, relative to the object's size."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seated:
+    """Contacts on the faces of an object."""
+
+    body: Polyhedron
+    """The object; where it is curved, with four more faces, around the contacts."""
+    faces: FaceQuadruple
+    contacts: tuple[Contact, Contact, Contact, Contact]
+    moved_m: float
+    """Largest distance of a contact from where it was given."""
+
+
+def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
+    """Put four contacts on the faces of an object.
+
+    Args:
+        body: The object.
+        positions: In its frame, (4, 3) [m].
+        normals: Into the object, unit vectors, (4, 3).
+
+    Raises:
+        InputError: The numbers are not those of four contacts, or one is near no face.
+    """
+    points = frozen(positions, (FINGERS, 3), "positions")
+    inward = frozen_units(normals, (FINGERS, 3), "normals")
+    parts = _parts(body)
+    found = [
+        _nearest(body, parts, i, p, n) for i, (p, n) in enumerate(zip(points, inward, strict=True))
+    ]
+    faces = [part.face for part, _, _ in found]
+    if body.patches is not None:
+        around = [_around(body, part, contact) for part, contact, _ in found]
+        faces = [len(body.faces) + finger for finger in range(FINGERS)]
+        body = replace(body, faces=(*body.faces, *around))
+    a, b, c, d = faces
+    contacts = four(contact for _, contact, _ in found)
+    return Seated(body, (a, b, c, d), contacts, max(distance for *_, distance in found))
+
+
+def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCertificate:
+    """Four contacts as a grasp, or the proof that they are not in force closure.
+
+    The grasp claims no regions, and its lines of force no class but the general one.
+
+    Args:
+        seated: Contacts on an object's faces.
+        friction: Coulomb coefficient.
+        name: What to call the grasp.
+
+    Raises:
+        UndecidedError: Closure is too close to call.
+    """
+    body = seated.body
+    positions = np.array([contact.position for contact in seated.contacts])
+    normals = np.array([contact.normal for contact in seated.contacts])
+    certificate = force_closure(positions, normals, friction)
+    if certificate.forces is None:
+        return certificate
+    quality = ferrari_canny(
+        positions, normals, friction, center=body.center_of_mass, torque_scale=body.radius
+    )
+    theta = math.atan(friction)
+    return Grasp(
+        id=name,
+        family="regulus",
+        faces=seated.faces,
+        contacts=seated.contacts,
+        focus_points=np.empty((0, 3)),
+        force_cones=four(ForceCone(normal, theta) for normal in normals),
+        regions=four(ContactRegion("point", point[None], 0.0) for point in positions),
+        radius=0.0,
+        span_angle=span_angle(normals),
+        critical_friction=min(critical_friction(positions, normals), friction),
+        closure_margin=certificate.margin,
+        ferrari_canny=(quality.lower, quality.upper),
+        witness=Witness(positions, certificate.forces),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """A flat convex part of a surface."""
+
+    face: int
+    """Index of its face, or of its triangle where the object is curved."""
+    normal: Array
+    """Into the object, (3,)."""
+    polygon: Array
+    """Counter-clockwise about the normal, (k, 3) [m]."""
+
+
+def _parts(body: Polyhedron) -> tuple[_Part, ...]:
+    """What the surface of an object consists of."""
+    if body.patches is None:
+        return tuple(
+            _Part(index, face.normal, piece)
+            for index, face in enumerate(body.faces)
+            for piece in face.pieces
+        )
+    corners = body.vertices[body.triangles[:, ::-1]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    return tuple(
+        _Part(index, normals[index] / lengths[index], corners[index])
+        for index in np.flatnonzero(lengths > 0.0).tolist()
+    )
+
+
+def _nearest(
+    body: Polyhedron, parts: Sequence[_Part], finger: int, point: Array, normal: Array
+) -> tuple[_Part, Contact, float]:
+    """The part, the contact on it, and how far away it was.
+
+    Raises:
+        InputError: None is near.
+    """
+    reach = LARGEST_MOVE * body.radius
+    normals = np.array([part.normal for part in parts])
+    firsts = np.array([part.polygon[0] for part in parts])
+    heights = np.einsum("ti,ti->t", normals, point - firsts)
+    likely = np.flatnonzero(
+        (normals @ normal >= math.cos(LARGEST_LEAN)) & (np.abs(heights) <= reach)
+    )
+    best: tuple[float, _Part, Array] | None = None
+    for index in likely.tolist():
+        part = parts[index]
+        at = _nearest_in(part.polygon, part.normal, point)
+        distance = float(np.linalg.norm(at - point))
+        if distance <= reach and (best is None or distance < best[0] - NEARER * body.radius):
+            best = distance, part, at
+    if best is None:
+        raise InputError(
+            f"contact {finger} is on no face: expected one within {reach:.3g} m whose inward "
+            f"normal is within {math.degrees(LARGEST_LEAN):.0f} deg of the given one"
+        )
+    distance, part, at = best
+    return part, Contact(at, part.normal), distance
+
+
+def _around(body: Polyhedron, part: _Part, contact: Contact) -> Face:
+    """A face around a contact on a triangle, in the triangle's plane."""
+    turns = np.linspace(0.0, 2.0 * math.pi, CORNERS, endpoint=False)
+    radius = SURROUNDINGS * body.radius
+    ring = radius * np.column_stack([np.cos(turns), np.sin(turns)])
+    polygon = contact.position + ring @ plane_frame(part.normal).T
+    return Face(
+        normal=part.normal,
+        centroid=contact.position,
+        area=math.pi * radius**2,
+        polygon=polygon,
+        holes=(),
+        pieces=(polygon,),
+        facets=np.array([part.face]),
+    )
+
+
+def _nearest_in(polygon: Array, normal: Array, point: Array) -> Array:
+    """The point of a convex polygon nearest to a point, (3,)."""
+    flat = point - float(normal @ (point - polygon[0])) * normal
+    if within(flat, polygon, normal, 0.0):
+        return flat
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    share = np.einsum("ki,ki->k", flat - polygon, edges) / np.einsum("ki,ki->k", edges, edges)
+    ends = polygon + np.clip(share, 0.0, 1.0)[:, None] * edges
+    return ends[first_best(-np.linalg.norm(ends - flat, axis=1))]

@@ -1,0 +1,213 @@
+"""Whether four fingers can come to their contacts: balls on straight free lines to their places.
+
+Solved: for each finger a direction in which its ball of radius r, and the rod behind it, reach the
+place p - r n where the ball touches at p, from a given distance, without touching anything else.
+A rod is all points within r of a segment, so it is free of the object iff no triangle is nearer to
+the segment than r, and free of another rod iff the segments are 2 r apart.
+
+A segment and a triangle are nearest where they cross, at an end of the segment above the
+triangle, or at an edge of the triangle. The surface of the curved patch that is touched does not
+count: it is not exactly the plane that the finger is thought to touch.
+
+Directions tried are the normal and a ring or two around it; that none of them is free does not
+prove that no other is.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations, islice, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.arrays import Array
+from grasp_core.checked import positive
+from grasp_core.geometry.polygons import plane_frame
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import FaceQuadruple
+
+TOUCHING = 1e-6
+"""Overlap that does not count, in object radii: what six digits in a file keep."""
+RINGS_DEG = (30.0, 60.0)
+"""How far from the normal fingers may come, beside straight along it."""
+RING_DIRECTIONS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Finger:
+    """What has to get to a contact.
+
+    Raises:
+        InputError: A length is not positive.
+    """
+
+    radius_m: float
+    """Of the spherical tip, and of the rod behind it."""
+    approach_m: float
+    """How long the free line is on which it comes."""
+
+    def __post_init__(self) -> None:
+        positive(self.radius_m, "radius_m")
+        positive(self.approach_m, "approach_m")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reach:
+    """How fingers get to their contacts, or why they do not."""
+
+    directions: Array | None
+    """Unit vectors from each tip along its rod, (k, 3); None if no choice is free, or none was
+    sought."""
+    reason: str = ""
+
+
+def reach(
+    body: Polyhedron, faces: FaceQuadruple, positions: Array, normals: Array, finger: Finger
+) -> Reach:
+    """Find free straight lines for all fingers.
+
+    Args:
+        body: The object.
+        faces: Which each finger touches.
+        positions: Contacts, (k, 3) [m].
+        normals: Unit vectors into the object, (k, 3).
+        finger: What has to get there.
+    """
+    slack = TOUCHING * body.radius
+    tips = positions - finger.radius_m * normals
+    for i, j in combinations(range(len(tips)), 2):
+        if np.linalg.norm(tips[i] - tips[j]) < 2.0 * finger.radius_m - slack:
+            return Reach(None, f"fingertips {i} and {j} overlap")
+    surroundings = [_Surroundings.of(body, face) for face in faces]
+    for place, (others, tip) in enumerate(zip(surroundings, tips, strict=True)):
+        if others.distance(tip, tip, finger.radius_m) < finger.radius_m - slack:
+            return Reach(None, f"fingertip {place} meets the object beside its contact")
+    free: list[list[Array]] = []
+    for most in (1, None):  # most fingers come along their normals
+        free = [
+            [
+                way
+                for way in islice(_directions(-normal), most)
+                if others.distance(tip, tip + finger.approach_m * way, finger.radius_m)
+                >= finger.radius_m - slack
+            ]
+            for others, tip, normal in zip(surroundings, tips, normals, strict=True)
+        ]
+        if all(free) and (chosen := _apart(tips, free, finger, slack)) is not None:
+            return Reach(chosen)
+    blocked = [place for place, ways in enumerate(free) if not ways]
+    if blocked:
+        return Reach(None, f"finger {blocked[0]} has no free line to its contact")
+    return Reach(None, "the fingers' lines cross")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Surroundings:
+    """The triangles that a finger may meet, each in a ball."""
+
+    corners: Array
+    """(t, 3, 3)"""
+    middles: Array
+    """(t, 3)"""
+    extents: Array
+    """Radii of the balls, (t,)."""
+
+    @classmethod
+    def of(cls, body: Polyhedron, face: int) -> "_Surroundings":
+        """All triangles but those of the curved patch that is touched."""
+        keep = np.ones(len(body.triangles), dtype=np.bool_)
+        keep[body.faces[face].facets] = False
+        corners = body.vertices[body.triangles[keep]]
+        middles = corners.mean(axis=1)
+        extents = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
+        return cls(corners, middles, extents)
+
+    def distance(self, start: Array, end: Array, within: float) -> float:
+        """Distance of a segment from the nearest triangle, if less than `within`."""
+        along = end - start
+        squared = float(along @ along)
+        shares = np.clip((self.middles - start) @ along / squared, 0.0, 1.0) if squared else 0.0
+        away = self.middles - start - np.multiply.outer(shares, along)
+        near = np.einsum("ti,ti->t", away, away) <= (within + self.extents) ** 2
+        if not near.any():
+            return math.inf
+        return float(segment_distances(start, end, self.corners[near]).min())
+
+
+def _directions(outward: Array) -> Iterator[Array]:
+    """The direction along a normal, then those around it."""
+    yield outward
+    frame = plane_frame(outward)
+    for lean in np.radians(RINGS_DEG):
+        for turn in 2.0 * math.pi * np.arange(RING_DIRECTIONS) / RING_DIRECTIONS:
+            across = frame @ np.array([math.cos(turn), math.sin(turn)])
+            yield math.cos(lean) * outward + math.sin(lean) * across
+
+
+def _apart(tips: Array, ways: list[list[Array]], finger: Finger, slack: float) -> Array | None:
+    """The first choice of directions in which no two rods overlap, straight ones first."""
+    ends = [
+        [tip + finger.approach_m * way for way in each]
+        for tip, each in zip(tips, ways, strict=True)
+    ]
+    clear = {
+        (i, j): np.array(
+            [
+                [_between(tips[i], one, tips[j][None], other[None])[0] for other in ends[j]]
+                for one in ends[i]
+            ]
+        )
+        >= 2.0 * finger.radius_m - slack
+        for i, j in combinations(range(len(tips)), 2)
+    }
+    choices = sorted(product(*(range(len(each)) for each in ways)), key=lambda c: (sum(c), c))
+    for choice in choices:
+        if all(free[choice[i], choice[j]] for (i, j), free in clear.items()):
+            return np.array([ways[finger][way] for finger, way in enumerate(choice)])
+    return None
+
+
+def segment_distances(start: Array, end: Array, triangles: Array) -> Array:
+    """Distances of a segment from triangles, (t,).
+
+    Args:
+        start: (3,)
+        end: (3,)
+        triangles: (t, 3, 3)
+    """
+    after = np.roll(triangles, -1, axis=1)
+    edges = [_between(start, end, triangles[:, k], after[:, k]) for k in range(3)]
+    found = np.minimum(np.minimum(edges[0], edges[1]), edges[2])
+    normals = np.cross(after[:, 0] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    normals = normals / np.where(lengths > 0.0, lengths, 1.0)[:, None]
+    heights = [np.einsum("ti,ti->t", normals, point - triangles[:, 0]) for point in (start, end)]
+    for point, height in zip((start, end), heights, strict=True):
+        over = _inside(point - height[:, None] * normals, triangles, after, normals)
+        found = np.where(over, np.minimum(found, np.abs(height)), found)
+    crossing = heights[0] * heights[1] < 0.0
+    share = np.where(crossing, heights[0], 0.0) / np.where(crossing, heights[0] - heights[1], 1.0)
+    at = start + share[:, None] * (end - start)
+    return np.where(crossing & _inside(at, triangles, after, normals), 0.0, found)
+
+
+def _inside(points: Array, triangles: Array, after: Array, normals: Array) -> NDArray[np.bool_]:
+    turns = np.cross(after - triangles, points[:, None] - triangles)
+    sides = np.einsum("tki,ti->tk", turns, normals)
+    return (sides >= 0.0).all(axis=1) & normals.any(axis=1)
+
+
+def _between(start: Array, end: Array, tails: Array, heads: Array) -> Array:
+    """Distances of one segment from others, (t,): the least over the square of both shares."""
+    one, others, apart = end - start, heads - tails, start - tails
+    a, e = float(one @ one), np.einsum("ti,ti->t", others, others)
+    b, c, f = others @ one, apart @ one, np.einsum("ti,ti->t", others, apart)
+    safe_a, safe_e = max(a, 1e-300), np.where(e > 0.0, e, 1.0)
+    det = a * e - b * b
+    skew = det > 1e-14 * a * e  # else parallel: any share of one is as good
+    share = np.where(skew, np.clip((b * f - c * e) / np.where(skew, det, 1.0), 0.0, 1.0), 0.0)
+    other = np.clip(np.where(e > 0.0, (b * share + f) / safe_e, 0.0), 0.0, 1.0)
+    share = np.clip((b * other - c) / safe_a, 0.0, 1.0) if a > 0.0 else np.zeros_like(other)
+    gaps = apart + share[:, None] * one - other[:, None] * others
+    return np.linalg.norm(gaps, axis=1)

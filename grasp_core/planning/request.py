@@ -1,0 +1,154 @@
+"""What is asked of the planner, checked."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias, get_args
+
+from grasp_core.arrays import UNIT_SLACK
+from grasp_core.checked import (
+    SMALLEST,
+    coefficient,
+    instance,
+    number,
+    one_of,
+    seed_of,
+    shown,
+    switch,
+    whole,
+)
+from grasp_core.errors import InputError
+from grasp_core.objects.on_faces import check_body
+from grasp_core.objects.planar_faces import MAX_FACES
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.reach import Finger
+from grasp_core.values import Family, Method
+
+FAMILIES: tuple[Family, ...] = get_args(Family)
+"""The families of the paper, each with its construction."""
+METHODS: tuple[Method, ...] = get_args(Method)
+"""Everything that `families` may name: the three constructions and `free`."""
+ConeKind: TypeAlias = Literal["tilted", "normal"]
+RankBy: TypeAlias = Literal["radius", "friction-margin", "ferrari-canny", "diverse"]
+"""What makes one grasp better than another."""
+ITS_RADIUS = ", the object's radius in m"
+FARTHEST_APPROACH = 1e3
+"""Longest free line of a finger, in object radii."""
+COMPLETE_CELLS = 20_000
+"""Parts into which `complete` may cut the faces of one quadruple."""
+MOST_FACES = 1000
+"""Tables of all pairs and, of those whose normals span, triples of faces take some hundred
+megabytes."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRequest:
+    """The keywords of `plan`."""
+
+    friction: float
+    families: tuple[Method, ...]
+    theta_deg: float | None = None
+    cones: ConeKind = "tilted"
+    limit: int | None = None
+    rank_by: RankBy = "radius"
+    seed: int = 0
+    cells: int = 1
+    complete: bool = False
+    finger: Finger | None = None
+    clearance: float = 0.0
+    share_faces: float | None = None
+
+    @property
+    def theta(self) -> float:
+        """Half-angle of the friction cones to plan with [rad]."""
+        theta = math.atan(self.friction)
+        return theta if self.theta_deg is None else min(math.radians(self.theta_deg), theta)
+
+    @property
+    def searched(self) -> int | None:
+        """How many grasps of each family need to be kept while searching."""
+        return self.limit if self.rank_by == "radius" and not self.complete else None
+
+
+def methods_for(body: Polyhedron) -> tuple[Method, ...]:
+    """What a command tries unless told otherwise: on many faces not the free method."""
+    return METHODS if len(body.faces) <= MAX_FACES else FAMILIES
+
+
+def check_request(body: Polyhedron, request: PlanRequest) -> None:
+    """Refuse what cannot be planned.
+
+    Raises:
+        InputError: A keyword is out of range, or the object has too many faces.
+    """
+    check_body(body)
+    coefficient(request.friction)
+    _check_angle(request)
+    _check_kinds(request)
+    _check_counts(request)
+    _check_lengths(body, request)
+    _check_size(body, request)
+
+
+def _check_counts(request: PlanRequest) -> None:
+    if request.limit is not None:
+        whole(request.limit, "limit", least=1)
+    whole(request.cells, "cells", least=1)
+    seed_of(request.seed)
+    switch(request.complete, "complete")
+
+
+def _check_lengths(body: Polyhedron, request: PlanRequest) -> None:
+    number(request.clearance, "clearance", least=0.0, below=body.radius, where=ITS_RADIUS)
+    if request.share_faces is not None:
+        size, where = 2.0 * body.radius, ", the object's size, or None"
+        number(request.share_faces, "share_faces", least=0.0, below=size, where=where)
+    if request.finger is not None:
+        instance(request.finger, Finger, "finger", "gc.Finger(radius_m, approach_m)")
+        radius, approach = request.finger.radius_m, request.finger.approach_m
+        number(radius, "finger.radius_m", most=body.radius, where=ITS_RADIUS)
+        farthest = FARTHEST_APPROACH * body.radius
+        number(approach, "finger.approach_m", most=farthest, where=", a thousand radii")
+
+
+def _check_size(body: Polyhedron, request: PlanRequest) -> None:
+    faces = len(body.faces)
+    if faces > MOST_FACES:
+        raise InputError(
+            f"{body.name} has {faces} planar faces, over the limit of {MOST_FACES}; load it with "
+            "patches for faces (--faces patches)"
+        )
+    needed = {
+        "a limit (--limit)": request.limit is None,
+        "families without the free method (--family)": "free" in request.families,
+        "radius to rank by (--rank-by)": request.rank_by != "radius",
+        "no share_faces (--share-faces-m)": request.share_faces is not None,
+    }
+    missing = [what for what, lacks in needed.items() if lacks]
+    if faces > MAX_FACES and missing:
+        raise InputError(
+            f"{body.name} has {faces} planar faces: above {MAX_FACES} only the largest grasps of "
+            f"{', '.join(FAMILIES)} are planned. Give {' and '.join(missing)}, or load it with "
+            "patches for faces (--faces patches)"
+        )
+
+
+def _check_kinds(request: PlanRequest) -> None:
+    families: tuple[Any, ...] = request.families
+    unknown = [family for family in families if family not in METHODS]
+    if unknown or not families:
+        raise InputError(f"families must be among {', '.join(METHODS)}; got {shown(families)}")
+    if request.complete and "free" not in request.families:
+        raise InputError("complete decides all faces, which takes the free method; add it")
+    one_of(request.cones, get_args(ConeKind), "cones")
+    one_of(request.rank_by, get_args(RankBy), "rank_by")
+
+
+def _check_angle(request: PlanRequest) -> None:
+    if request.theta_deg is None:
+        return
+    widest = math.degrees(math.atan(request.friction))
+    most, where = (
+        widest * (1.0 + UNIT_SLACK),
+        f", the angle of friction {request.friction}, or None",
+    )
+    number(request.theta_deg, "theta_deg", least=SMALLEST, most=most, where=where)

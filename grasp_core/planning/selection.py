@@ -1,0 +1,82 @@
+"""Which of the grasps found are kept, and in which order."""
+
+from collections.abc import Callable, Iterable, Sequence
+from itertools import chain, zip_longest
+
+import numpy as np
+
+from grasp_core.closure.critical_friction import critical_friction
+from grasp_core.planning.certify import Certified
+from grasp_core.planning.request import FAMILIES, PlanRequest
+from grasp_core.quality.ferrari_canny import ferrari_canny
+from grasp_core.solvers.ties import first_best, smallest_first
+
+
+def chosen(lists: Sequence[Sequence[Certified]], request: PlanRequest) -> list[Certified]:
+    """The grasps to return, best first.
+
+    By radius, families take turns: the best of each, then the second of each, and so on. By another
+    measure all grasps compete. `diverse` begins with the largest discs and goes on with the grasp
+    that is farthest from all before it.
+
+    Args:
+        lists: What each method found, best first.
+        request: How many are wanted, and what makes one better.
+    """
+    every = _largest_first(chain.from_iterable(lists))
+    if request.rank_by == "radius":
+        families = [[one for one in every if one.family == family] for family in FAMILIES]
+        turns = [one for one in chain.from_iterable(zip_longest(*families)) if one is not None]
+        return _largest_first(turns[: request.limit])
+    if request.rank_by == "diverse":
+        return _far_apart(every, request.limit)
+    measure = _critical if request.rank_by == "friction-margin" else _weakness(request.friction)
+    return _in_order(every, [measure(found) for found in every])[: request.limit]
+
+
+def _largest_first(found: Iterable[Certified]) -> list[Certified]:
+    """Grasps by their smallest discs; those without discs come last."""
+    listed = list(found)
+    # the merit of a grasp with discs is that radius, as reproducible as a program's optimum
+    return _in_order(
+        listed, [-one.placement.merit if one.placement.radii.min() > 0.0 else 0.0 for one in listed]
+    )
+
+
+def _in_order(found: Sequence[Certified], figures: Sequence[float]) -> list[Certified]:
+    """Smallest figure first; equal ones stay in the order in which they come."""
+    return [found[place] for place in smallest_first(figures)]
+
+
+def _critical(found: Certified) -> float:
+    """Least friction at which the contacts are in force closure."""
+    return critical_friction(found.placement.positions, found.normals)
+
+
+def _weakness(friction: float) -> Callable[[Certified], float]:
+    """Minus the Ferrari-Canny quality."""
+
+    def measure(found: Certified) -> float:
+        contacts = found.placement.positions, found.normals
+        return -ferrari_canny(*contacts, friction, torque_scale=1.0).lower
+
+    return measure
+
+
+def _far_apart(every: Sequence[Certified], limit: int | None) -> list[Certified]:
+    """Each next one as far as possible from the nearest before it.
+
+    The distance of two grasps is the largest of a contact of one from the nearest of the other.
+    """
+    if not every:
+        return []
+    places = np.array([found.placement.positions for found in every])
+    nearest = np.full(len(every), np.inf)
+    kept = [0]
+    while len(kept) < min(len(every), limit or len(every)):
+        gaps = np.linalg.norm(places[:, :, None] - places[kept[-1]][None, None], axis=-1)
+        there = np.maximum(gaps.min(axis=1).max(axis=1), gaps.min(axis=2).max(axis=1))
+        nearest = np.minimum(nearest, there)
+        nearest[kept] = -np.inf
+        kept.append(first_best(nearest))
+    return [every[place] for place in kept]

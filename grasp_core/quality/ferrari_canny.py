@@ -1,0 +1,221 @@
+"""Ferrari-Canny quality with exact circular cones: proved lower and upper bounds.
+
+Solved: Q, the radius of the largest ball around the zero wrench inside the set W of wrenches
+that bounded contact forces can apply (see `wrench_sets`); if zero lies outside W, minus its
+distance from W.
+
+Q is the least support of W over unit directions y, so any direction bounds it from above. A
+polytope inside W bounds it from below: no plane of its boundary is nearer to zero. The polytope is
+grown where it is weakest: the point of W farthest along the normal of the nearest plane is added,
+until that plane and its support agree. If zero is outside, the nearest point of W is found by
+a cone program; its forces bound the distance from above, its direction from below.
+
+Without closure, Q of `l1` is negative; that of `linf` is zero, since fingers may then rest.
+
+Both proofs are kept and can be checked again in plain arithmetic; how, `inner_polytope` says for
+the lower bound. Polytopes are grown by a compiled kernel, and those that it leaves, or whose proof
+does not check, by `growing_hull`; so are all where there are no kernels (`GRASPPROOF_KERNELS=off`).
+
+Source: Ferrari & Canny 1992; the growing polytope is the expanding-polytope algorithm of
+collision detection in six dimensions (also Zheng 2013 for this metric).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array
+from grasp_core.checked import number
+from grasp_core.closure.nearest_wrench import nearest_wrench
+from grasp_core.closure.wrench_sets import Norm, WrenchSet
+from grasp_core.closure.wrenches import WRENCH
+from grasp_core.compiled import compiled
+from grasp_core.errors import SolverError
+from grasp_core.fields import are_units, is_a, is_array, is_number
+from grasp_core.quality.growing_hull import ABOVE, FLAT, MOST_POINTS, GrowingHull, spread_simplex
+from grasp_core.quality.inner_polytope import InnerPolytope
+from grasp_core.values import Grasp
+
+GAP = 1e-4
+"""Default of the largest (upper - lower) / upper."""
+FINEST_GAP = 1e-7
+"""Below this, simplices become so small that rounding of their planes costs more than they gain."""
+MOST_SIMPLICES = 60_000
+"""The polytope stops growing here; its bounds hold all the same, a little farther apart."""
+ROUNDING = 1e-12
+"""Slack of the plain-arithmetic checks, relative to the longest wrench."""
+KERNEL = "grasp_core.quality.ferrari_canny_kernel"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FerrariCanny:
+    """Bounds of a quality with what proves them."""
+
+    lower: float
+    """No larger than the quality [N]."""
+    upper: float
+    """No smaller than the quality [N]."""
+    wrenches: WrenchSet
+    direction: Array
+    """Unit twist, (6,), torque scale applied, in which the support is at most `upper`."""
+    polytope: InnerPolytope | None
+    """If zero is inside: what proves `lower`. None otherwise."""
+    forces: Array | None
+    """If not: local forces, (3k,), whose wrench is no longer than -`lower`. None otherwise."""
+
+    def verify(self) -> bool:
+        """Re-check every field in plain arithmetic, without any solver.
+
+        Bounds hold for the set of `wrenches`, which is that of some contacts, to within 1e-12 of
+        its longest wrench.
+        """
+        with np.errstate(all="ignore"):
+            sound = is_a(self.wrenches, WrenchSet) and self.wrenches.sound()
+            ordered = is_number(self.lower) and is_number(self.upper) and self.lower <= self.upper
+            if not (sound and ordered and are_units(self.direction, WRENCH, slack=ROUNDING)):
+                return False
+            slack = ROUNDING * self.wrenches.size
+            support, _ = self.wrenches.support(self.direction)
+            return support <= self.upper + slack and self._proves_lower(slack)
+
+    def _proves_lower(self, slack: float) -> bool:
+        width = self.wrenches.G.shape[1]
+        if self.polytope is not None:
+            return (
+                self.forces is None
+                and is_a(self.polytope, InnerPolytope)
+                and self.polytope.sound(width)
+                and self.wrenches.holds(self.polytope.forces, ROUNDING)
+                and self.polytope.proved_radius(self.wrenches) >= self.lower - slack
+            )
+        return (
+            is_array(self.forces, width)
+            and self.wrenches.holds(self.forces[None], ROUNDING)
+            and float(np.linalg.norm(self.wrenches.G @ self.forces)) <= -self.lower + slack
+        )
+
+
+def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
+    positions: ArrayLike | Grasp,
+    normals: ArrayLike | None = None,
+    friction: ArrayLike = 0.5,
+    *,
+    center: ArrayLike = (0.0, 0.0, 0.0),
+    torque_scale: float,
+    norm: Norm = "l1",
+    gap: float = GAP,
+) -> FerrariCanny:
+    """Largest wrench resisted in every direction with bounded contact forces.
+
+    Args:
+        positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
+        normals: Unit vectors into the object, (k, 3).
+        friction: Coulomb coefficient, one for all contacts or one each, (k,).
+        center: About which torques are taken, (3,) [m].
+        torque_scale: Length that makes a torque comparable with a force [m], such as the
+            object's radius. Values with different scales cannot be compared.
+        norm: `l1`, normal forces sum to 1 N, or `linf`, each is at most 1 N.
+        gap: Wanted (upper - lower) / upper, from 1e-7. Where more simplices would be needed than
+            are kept, for very symmetric or many contacts, the bounds are some per cent apart.
+
+    Returns:
+        Bounds in newtons. Without closure: of `l1`, minus the distance of the zero wrench from the
+        set; of `linf`, zero.
+
+    Raises:
+        InputError: Shapes, lengths or signs are wrong.
+        SolverError: The cone program's answer failed its check.
+    """
+    number(gap, "gap", least=FINEST_GAP, below=1.0)
+    wrenches = WrenchSet.of(
+        positions, normals, friction, center=center, torque_scale=torque_scale, norm=norm
+    )
+    return wrench_set_quality(wrenches, gap)
+
+
+def wrench_set_quality(wrenches: WrenchSet, gap: float = GAP) -> FerrariCanny:
+    """Signed distance of zero from the boundary of a wrench set, with its proof."""
+    found = _by_kernel(wrenches, gap) if compiled(KERNEL) is not None else None
+    if found is not None:
+        return found
+    direction, polytope = _grown(wrenches, gap)
+    if direction is not None and polytope is not None:
+        radius = polytope.radius(wrenches)
+        if radius > ROUNDING * wrenches.size:
+            return _inside(wrenches, direction, polytope, radius)
+    return _outside(wrenches, direction)
+
+
+def _inside(
+    wrenches: WrenchSet, direction: Array, polytope: InnerPolytope, radius: float
+) -> FerrariCanny:
+    upper = wrenches.support(direction)[0]
+    lower = min(radius - ROUNDING * wrenches.size, upper)
+    return FerrariCanny(lower, upper, wrenches, direction, polytope, None)
+
+
+def _by_kernel(wrenches: WrenchSet, gap: float) -> FerrariCanny | None:
+    """Bounds by the compiled polytope; None where they are not proved."""
+    kernel = compiled(KERNEL)
+    linf = wrenches.norm == "linf"
+    cones = kernel.Cones(np.array(wrenches.G, order="C"), np.array(wrenches.friction), linf)
+    limits = kernel.Limits(gap, MOST_SIMPLICES, MOST_POINTS, FLAT, ABOVE)
+    status, forces, corners, normals, weakest = kernel.grow(cones, wrenches.edges(), limits)
+    slack = ROUNDING * wrenches.size
+    if status == kernel.GROWN:
+        polytope = InnerPolytope(forces, corners, normals)
+        radius = polytope.proved_radius(wrenches)
+        if radius > slack:
+            return _inside(wrenches, weakest, polytope, radius)
+    try:
+        outside = _outside(wrenches, weakest if weakest.any() else None)
+    except SolverError:
+        return None
+    return outside if outside.upper <= slack else None
+
+
+def _grown(wrenches: WrenchSet, gap: float) -> tuple[Array | None, InnerPolytope | None]:
+    """The weakest direction found, and a polytope that shows there is no much weaker one."""
+    edges = wrenches.edges()
+    points = edges @ wrenches.G.T
+    start = spread_simplex(points)
+    if start is None:
+        return None, None
+    hull, forces = GrowingHull(points[start]), list(edges[start])
+    upper, weakest = np.inf, None
+    while True:
+        normal, offset = hull.lowest()
+        support, force = wrenches.support(normal)
+        if support < upper:
+            upper, weakest = support, normal.copy()
+        full = len(forces) == MOST_POINTS or hull.size > MOST_SIMPLICES
+        if upper <= 0.0 or full or upper - offset <= gap * upper:
+            break
+        if not hull.add(wrenches.G @ force):
+            break
+        forces.append(force)
+    if upper <= 0.0 or hull.lowest()[1] <= 0.0:
+        return weakest, None
+    normals, corners = hull.simplices()
+    return weakest, InnerPolytope(np.array(forces), corners, normals)
+
+
+def _outside(wrenches: WrenchSet, direction: Array | None) -> FerrariCanny:
+    """Bounds where zero is not inside the set, or that cannot be told."""
+    unit = replace(wrenches, norm="l1")
+    forces, facing = nearest_wrench(unit)
+    wrench = unit.G @ forces
+    length = float(np.linalg.norm(wrench))
+    trials = [] if direction is None else [direction]
+    _, _, right = np.linalg.svd(wrenches.edges() @ wrenches.G.T, full_matrices=False)
+    trials += [_unit(y) for y in (-wrench, facing, right[-1], -right[-1]) if y.any()]
+    weakest = min(trials, key=lambda y: wrenches.support(y)[0])
+    upper = wrenches.support(weakest)[0]
+    if wrenches.norm == "linf":
+        forces, length = np.zeros_like(forces), 0.0
+    return FerrariCanny(-length, max(upper, -length), wrenches, weakest, None, forces)
+
+
+def _unit(direction: Array) -> Array:
+    return direction / float(np.linalg.norm(direction))

@@ -1,0 +1,212 @@
+"""A polytope that grows inside a set of wrenches until its nearest plane touches the set.
+
+Solved: the method of `quality`, from the first simplex to the last, for one set. The answer says
+which forces give the points, which points bound each simplex, and with which normals; `quality`
+checks that these simplices enclose zero and takes its bounds from them.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.solvers.hull_kernel import (
+    DEAD,
+    D,
+    enclose,
+    extend,
+    larger,
+    look,
+    lowest,
+    vacant_hull,
+)
+
+ROOM = 2048
+"""Simplices at first; at least twice as many whenever these do not suffice."""
+GROWN, OUTSIDE, FLAT, LOST = 0, 1, 2, 3
+"""A polytope around zero; zero is outside; all points lie in a plane; the hull fell apart."""
+
+
+class Cones(NamedTuple):
+    """What wrenches there are."""
+
+    G: Array
+    """Local contact forces to their wrench, (6, 3k), contiguous."""
+    friction: Array
+    """(k,)"""
+    linf: bool
+    """Whether each normal force is bounded, not their sum."""
+
+
+class Limits(NamedTuple):
+    """When to stop."""
+
+    gap: float
+    """(upper - lower) / upper that is enough."""
+    simplices: int
+    points: int
+    flat: float
+    """Points closer than this to a common plane, relative to their extent, span nothing more."""
+    above: float
+    """A point sees a simplex from this height on, relative to the extent."""
+
+
+def try_out() -> None:
+    """Grow a tiny polytope."""
+    limits = Limits(0.5, 100, 100, 1e-9, 1e-12)
+    grow(Cones(np.eye(D), np.ones(2), False), np.ones((1, D)), limits)
+
+
+@njit(cache=True)
+def grow(cones: Cones, edges: Array, limits: Limits) -> tuple[int, Array, Indices, Array, Array]:
+    """Grow the polytope.
+
+    Args:
+        cones: Of the set.
+        edges: Local forces whose wrenches span what the set spans, (n, 3k), contiguous.
+        limits: When to stop.
+
+    Returns:
+        How it ended; local forces of the points, (p, 3k); corners, (m, 6), and normals, (m, 6), of
+        the simplices; the direction of least support found, (6,).
+    """
+    weakest, upper = np.zeros(D), np.inf
+    forces, points = np.empty((limits.points, edges.shape[1])), np.empty((limits.points, D))
+    hull, slack = vacant_hull(ROOM), _begin(cones.G, edges, limits, forces, points)
+    if slack < 0.0 or not enclose(hull, points):
+        return FLAT, forces[:0], hull.corners[:0], hull.normals[:0], weakest
+    count = D + 1
+    while True:
+        nearest = lowest(hull)
+        support = _support(cones, hull.normals[nearest], forces[count])
+        if support < upper:
+            upper, weakest = support, hull.normals[nearest].copy()
+        full = count + 1 == limits.points or hull.counts[0] > limits.simplices
+        if upper <= slack or full or upper - hull.offsets[nearest] <= limits.gap * upper:
+            break
+        _wrench(cones.G, forces[count], points[count])
+        seen, ridges = look(hull, points[count], nearest, slack, count)
+        if seen == 0:
+            break
+        if hull.counts[0] + ridges > len(hull.offsets):
+            hull = larger(hull)
+        if not extend(hull, seen, count, slack):
+            return LOST, forces[:0], hull.corners[:0], hull.normals[:0], weakest
+        count += 1
+    inside = upper > slack and hull.offsets[lowest(hull)] > 0.0
+    live = np.flatnonzero(hull.offsets[: hull.counts[0]] < DEAD)
+    status = GROWN if inside else OUTSIDE
+    return status, forces[:count].copy(), hull.corners[live], hull.normals[live], weakest
+
+
+@njit(cache=True)
+def _support(cones: Cones, y: Array, force: Array) -> float:
+    """Support of the set in the direction y; fills in the local forces that attain it."""
+    total, best, at = 0.0, -np.inf, np.empty(3)
+    force.fill(0.0)
+    for i in range(len(cones.friction)):
+        for j in range(3):
+            at[j] = 0.0
+            for row in range(D):
+                at[j] += y[row] * cones.G[row, 3 * i + j]
+        across = np.sqrt(at[1] * at[1] + at[2] * at[2])
+        reached = at[0] + cones.friction[i] * across
+        if cones.linf:
+            if reached <= 0.0:
+                continue
+            total += reached
+        elif reached > best:
+            best = reached
+            force.fill(0.0)
+        else:
+            continue
+        slide = cones.friction[i] / across if across > 0.0 else 0.0
+        force[3 * i], force[3 * i + 1], force[3 * i + 2] = 1.0, slide * at[1], slide * at[2]
+    return total if cones.linf else best
+
+
+@njit(cache=True)
+def _wrench(G: Array, force: Array, point: Array) -> None:
+    point.fill(0.0)
+    for i in range(len(force)):
+        if force[i] != 0.0:
+            for row in range(D):
+                point[row] += G[row, i] * force[i]
+
+
+@njit(cache=True)
+def _begin(G: Array, edges: Array, limits: Limits, forces: Array, points: Array) -> float:
+    """Fill in seven widely spread points; the height at which points see, -1 if all are flat.
+
+    Each is the farthest from the affine hull of those before it.
+    """
+    wrenches, rest, mean = np.empty((len(edges), D)), np.empty((len(edges), D)), np.zeros(D)
+    for i in range(len(edges)):
+        _wrench(G, edges[i], wrenches[i])
+        for j in range(D):
+            mean[j] += wrenches[i, j] / len(edges)
+    _shift(wrenches, mean, rest)
+    flat = -1.0
+    for step in range(D + 1):
+        farthest, square = _farthest(rest)
+        if square <= flat:
+            return -1.0
+        for i in range(edges.shape[1]):
+            forces[step, i] = edges[farthest, i]
+        for j in range(D):
+            points[step, j] = wrenches[farthest, j]
+        if step == 0:
+            flat = (limits.flat * _shift(wrenches, points[0], rest)) ** 2
+        else:
+            _flatten(rest, farthest, np.sqrt(square))
+    return limits.above * _extent(points)
+
+
+@njit(cache=True)
+def _shift(wrenches: Array, origin: Array, rest: Array) -> float:
+    """Fill in the wrenches as seen from an origin; the largest of their components."""
+    largest = 0.0
+    for i in range(len(wrenches)):
+        for j in range(D):
+            rest[i, j] = wrenches[i, j] - origin[j]
+            largest = max(largest, abs(rest[i, j]))
+    return largest
+
+
+@njit(cache=True)
+def _farthest(rest: Array) -> tuple[int, float]:
+    farthest, largest = 0, -1.0
+    for i in range(len(rest)):
+        square = 0.0
+        for j in range(D):
+            square += rest[i, j] * rest[i, j]
+        if square > largest:
+            farthest, largest = i, square
+    return farthest, largest
+
+
+@njit(cache=True)
+def _flatten(rest: Array, chosen: int, length: float) -> None:
+    """Take away from each row what it has along a chosen one."""
+    unit = np.empty(D)
+    for j in range(D):
+        unit[j] = rest[chosen, j] / length
+    for i in range(len(rest)):
+        along = 0.0
+        for j in range(D):
+            along += rest[i, j] * unit[j]
+        for j in range(D):
+            rest[i, j] -= along * unit[j]
+
+
+@njit(cache=True)
+def _extent(points: Array) -> float:
+    """Of the first seven points, along the axis of the largest."""
+    extent = 0.0
+    for j in range(D):
+        least = largest = points[0, j]
+        for i in range(D + 1):
+            least, largest = min(least, points[i, j]), max(largest, points[i, j])
+        extent = max(extent, largest - least)
+    return extent

@@ -1,0 +1,303 @@
+"""How much contacts resist: the largest multiple of a wrench, and the weakest of several.
+
+With each normal force at most f_max, the wrenches that the contacts can apply form a convex
+body W around the origin. An external wrench w is resisted up to the largest lambda with
+-lambda w in W, a conic program. Its dual is a facet of W: a twist y with y.w = -1 and
+lambda = h(y) = f_max sum_i max(0, s_i(y)), the support of W (s_i as in `closure`). The
+wrench -y / |y| meets that facet squarely, so its limit is at most h(y) / |y|: stepping from
+a wrench to the one its limiting facet points at never raises the limit, and stops at a
+wrench that is locally the weakest. No wrench of unit size has a limit below f_max times the `linf`
+quality of the contacts (see `quality`), which is the bound over all directions.
+
+Torques are compared with forces through a stated length.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, frozen
+from grasp_core.checked import LARGEST, SMALLEST, positive
+from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions
+from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
+from grasp_core.errors import InputError
+from grasp_core.fields import is_array, is_number
+from grasp_core.solvers.conic import ConicProgram, minimize
+from grasp_core.solvers.ties import first_best, smallest_first
+from grasp_core.values import Grasp
+
+SETTLED = 1e-3
+"""The search for the weakest wrench ends when a step lowers the limit by less than this share."""
+HELD = 1e-7
+"""How far forces at a limit may leave cones and balance, relative to the largest wrench of a unit
+normal force: what conic programs leave."""
+ROUNDING = 1e-9
+"""Of the bound, relative to it, and of the facet's power, relative to the lengths of its parts."""
+LAST_DIGITS = 1e-12
+"""Of a bound near zero, relative to the largest that the facet's length allows."""
+MAX_STEPS = 30
+STARTS = 3
+"""From how many of the weakest axis wrenches the search starts."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WrenchLimit:
+    """How far one external wrench is resisted, with both sides of the proof."""
+
+    wrench: Array
+    """(6,) [N, N m], torque about the stated centre."""
+    limit: float
+    """Largest multiple of `wrench` that is resisted: `forces` balance it."""
+    upper: float
+    """No multiple above this is resisted: the support of `facet`, in plain arithmetic."""
+    forces: Array
+    """Contact forces that resist it at the limit, (k, 3) [N]: in their cones, of normal parts up to
+    the largest and balanced, to within `HELD`."""
+    facet: Array
+    """Twist y of the limiting facet, (6,), with y.wrench = -1, about the stated centre."""
+
+    def verify(
+        self,
+        positions: ArrayLike | Grasp,
+        normals: ArrayLike | None,
+        friction: ArrayLike,
+        *,
+        max_normal_force: float,
+        center: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> bool:
+        """Re-check both sides in plain arithmetic, for the contacts they are said to be about.
+
+        Args:
+            positions: As given to `wrench_limits`, like the others.
+            normals: (k, 3), or None with a Grasp.
+            friction: One for all contacts or one each.
+            max_normal_force: [N]
+            center: (3,) [m]
+
+        Returns:
+            Whether every field is true; False for what is no certificate.
+
+        Raises:
+            InputError: What is given is no contacts.
+        """
+        points, units = contact_arrays(positions, normals)
+        about = frozen(center, (3,), "center")
+        body = WrenchBody(
+            points - about, units, contact_frictions(friction, len(points)), max_normal_force
+        )
+        with np.errstate(all="ignore"):
+            return self._has_numbers(len(points)) and body.attains(self) and body.bounds(self)
+
+    def _has_numbers(self, count: int) -> bool:
+        return (
+            is_array(self.wrench, WRENCH)
+            and bool(self.wrench.any())
+            and is_array(self.facet, WRENCH)
+            and is_array(self.forces, count, 3)
+            and is_number(self.limit, least=0.0)
+            and is_number(self.upper)
+            and self.limit <= self.upper
+        )
+
+
+def max_resisted_wrench(
+    positions: ArrayLike | Grasp,
+    normals: ArrayLike | None,
+    friction: ArrayLike,
+    wrench: ArrayLike,
+    *,
+    max_normal_force: float,
+    center: ArrayLike = (0.0, 0.0, 0.0),
+) -> float:
+    """Largest multiple of an external wrench that the contacts can resist.
+
+    Args:
+        positions: Contact points, (k, 3) [m]; or a Grasp, with `normals` None.
+        normals: Unit vectors into the object, (k, 3).
+        friction: Coulomb coefficient, one for all contacts or one each.
+        wrench: External (force, torque), (6,) [N, N m], torque about `center`.
+        max_normal_force: Largest normal force of each contact [N].
+        center: (3,) [m]
+
+    Raises:
+        InputError: Shapes or limits are wrong, or the wrench is zero.
+    """
+    loads = frozen(wrench, (6,), "wrench")[None]
+    _check_sizes(loads, "wrench")
+    return wrench_limits(
+        positions, normals, friction, loads, max_normal_force=max_normal_force, center=center
+    )[0].limit
+
+
+def wrench_limits(
+    positions: ArrayLike | Grasp,
+    normals: ArrayLike | None,
+    friction: ArrayLike,
+    wrenches: ArrayLike,
+    *,
+    max_normal_force: float,
+    center: ArrayLike = (0.0, 0.0, 0.0),
+) -> tuple[WrenchLimit, ...]:
+    """How far each of several wrenches is resisted, with the forces that do it and a bound.
+
+    The weakest of them is `min(limits, key=lambda found: found.limit)`.
+
+    Args:
+        positions: Contact points, (k, 3) [m]; or a Grasp, with `normals` None.
+        normals: Unit vectors into the object, (k, 3).
+        friction: Coulomb coefficient, one for all contacts or one each.
+        wrenches: External (force, torque), (n, 6) [N, N m], torque about `center`.
+        max_normal_force: Largest normal force of each contact [N].
+        center: (3,) [m]
+
+    Raises:
+        InputError: Shapes or limits are wrong, or a wrench is zero.
+        SolverError: A program's answer failed its check.
+    """
+    points, units = contact_arrays(positions, normals)
+    loads = frozen(wrenches, (None, 6), "wrenches")
+    _check_sizes(loads, "wrenches")
+    about = frozen(center, (3,), "center")
+    body = WrenchBody(
+        points - about, units, contact_frictions(friction, len(points)), max_normal_force
+    )
+    return tuple(body.limit(load) for load in loads)
+
+
+def _check_sizes(loads: Array, name: str) -> None:
+    """Refuse wrenches (n, 6) that are zero, of which every multiple is resisted, or nearly so."""
+    sizes = np.abs(loads).max(axis=1)
+    if len(loads) and not SMALLEST <= float(sizes.min()) <= float(sizes.max()) <= LARGEST:
+        wrong = sizes[(sizes < SMALLEST) | (sizes > LARGEST)][0]
+        raise InputError(
+            f"{name} must not be zero: the largest part is from {SMALLEST:g} to {LARGEST:g}, got "
+            f"{float(wrong):.6g}"
+        )
+
+
+class WrenchBody:
+    """The wrenches that contacts can apply with bounded normal forces."""
+
+    def __init__(
+        self, arms: Array, normals: Array, friction: Array, max_normal_force: float
+    ) -> None:
+        """Set up the conic program, whose last column is the wrench asked about.
+
+        Args:
+            arms: Contact points from the centre of torques, (k, 3) [m].
+            normals: Unit vectors into the object, (k, 3).
+            friction: Coulomb coefficients, (k,).
+            max_normal_force: [N]
+        """
+        self.max_normal_force = positive(max_normal_force, "max_normal_force")
+        self.count = k = len(arms)
+        self.middle = arms.mean(axis=0)  # a far centre would swamp the levers
+        arms = arms - self.middle
+        self.size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
+        self.scale = np.array([1.0] * 3 + [self.size] * 3)
+        self.frames = contact_frames(normals)
+        G = in_frames(grasp_map(arms / self.size), self.frames)
+        self.G, self.bounded = G, WrenchSet(G, friction, "linf")
+        self.A = np.zeros((WRENCH + 5 * k, 3 * k + 1))
+        self.A[:WRENCH, :-1] = G
+        caps, cones = WRENCH + np.arange(2 * k), WRENCH + 2 * k + np.arange(3 * k)
+        self.A[caps, np.tile(np.arange(0, 3 * k, 3), 2)] = np.repeat([1.0, -1.0], k)
+        self.A[cones, np.arange(3 * k)] = -1.0
+        self.A[cones[::3], np.arange(0, 3 * k, 3)] = -friction
+        self.b = np.concatenate([np.zeros(6), np.ones(k), np.zeros(4 * k)])
+
+    def limit(self, wrench: Array) -> WrenchLimit:
+        """Largest multiple of an external wrench that is resisted, with its proof."""
+        unit = self._about_middle(wrench)
+        length = float(np.linalg.norm(unit))
+        A = self.A.copy()
+        A[:6, -1] = unit / length
+        q = np.zeros(A.shape[1])
+        q[-1] = -1.0
+        k = self.count
+        answer = minimize(ConicProgram(q, A, self.b, 6, 2 * k, (3,) * k))
+        share = self.max_normal_force / length
+        facet = answer.z[:6] / -float(answer.z[:6] @ unit)
+        limit = max(share * float(answer.x[-1]), 0.0)
+        local = answer.x[:-1].reshape(k, 3)
+        return WrenchLimit(
+            wrench=wrench,
+            limit=limit,
+            upper=max(limit, self.max_normal_force * self.bounded.support(facet)[0]),
+            forces=self.max_normal_force * np.einsum("kij,kj->ki", self.frames, local),
+            facet=self._about_center(facet / self.scale),
+        )
+
+    def attains(self, found: WrenchLimit) -> bool:
+        """Whether the forces are allowed, and balance the limit's multiple of the wrench."""
+        shares = np.einsum("kij,ki->kj", self.frames, found.forces) / self.max_normal_force
+        left = self.G @ shares.ravel()
+        left += found.limit / self.max_normal_force * self._about_middle(found.wrench)
+        balanced = float(np.linalg.norm(left)) <= HELD * self.bounded.size
+        allowed = self.bounded.holds(shares.ravel()[None], HELD * self.bounded.size)
+        return balanced and allowed
+
+    def bounds(self, found: WrenchLimit) -> bool:
+        """Whether the facet shows that no larger multiple than the upper one is resisted."""
+        load, twist = self._about_middle(found.wrench), found.facet * self.scale
+        slides = np.asarray(np.cross(found.facet[3:], self.middle), dtype=np.float64)
+        twist[:3] += slides
+        power = float(twist @ load)
+        lengths = float(np.linalg.norm(twist) * np.linalg.norm(load))
+        bound = self.max_normal_force * self.bounded.support(twist)[0]
+        farthest = self.bounded.size * float(np.linalg.norm(twist))
+        slack = LAST_DIGITS * self.max_normal_force * farthest
+        bounded = bound <= found.upper * (1.0 + ROUNDING) + slack
+        return bounded and abs(power + 1.0) <= ROUNDING * lengths
+
+    def _about_middle(self, wrench: Array) -> Array:
+        """A wrench about the contacts' middle, at unit size."""
+        moved = np.append(wrench[:3], wrench[3:] - np.cross(self.middle, wrench[:3]))
+        return moved / self.scale
+
+    def _about_center(self, facet: Array) -> Array:
+        slides = np.asarray(np.cross(facet[3:], self.middle), dtype=np.float64)
+        return np.concatenate([facet[:3] - slides, facet[3:]])
+
+    def weakest_from(self, limits: Iterable[WrenchLimit], torque_scale: float) -> WrenchLimit:
+        """A wrench of unit size that is locally the hardest to resist.
+
+        Args:
+            limits: Of wrenches of unit size; the weakest of them are followed.
+            torque_scale: Length that makes a torque comparable with a force [m].
+
+        Returns:
+            The weakest found: a wrench with |(force, torque / torque_scale)| = 1.
+        """
+        scale = np.array([1.0] * 3 + [torque_scale] * 3)
+        every = list(limits)
+        weak = [every[place] for place in smallest_first([found.limit for found in every])]
+        ends = [self._descend(start, scale) for start in weak[:STARTS]]
+        return ends[first_best([-found.limit for found in ends])]
+
+    def _descend(self, start: WrenchLimit, scale: Array) -> WrenchLimit:
+        best = start
+        for _ in range(MAX_STEPS):
+            facing = -best.facet * scale**2
+            found = self.limit(_unit(facing, scale))
+            if found.limit > best.limit * (1.0 - SETTLED):
+                break
+            best = found
+        return best
+
+
+def axis_wrenches(torque_scale: float) -> Array:
+    """The twelve wrenches along and against each axis, (12, 6) [N, N m].
+
+    Args:
+        torque_scale: Torque that goes with a force of one newton [m].
+    """
+    scale = np.array([1.0] * 3 + [torque_scale] * 3)
+    return np.vstack([np.eye(6), -np.eye(6)]) * scale
+
+
+def _unit(wrench: Array, scale: Array) -> Array:
+    return wrench / float(np.linalg.norm(wrench / scale))

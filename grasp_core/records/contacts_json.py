@@ -1,0 +1,245 @@
+"""Contacts from elsewhere: the text of a contacts file, or of a `grasps.json`, to checked values.
+
+A contacts file is JSON: `{"contacts": [...]}` for one grasp, or `{"grasps": [{"id": ...,
+"contacts": [...]}, ...]}`, where a contact is `{"position_m": [3], "normal": [3]}` and perhaps
+`"friction"`. Beside the list may stand `friction`, `center_m` and `torque_scale_m`, for all.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal, TypeAlias
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from grasp_core.arrays import Array, frozen, frozen_units
+from grasp_core.checked import LARGEST_FRICTION, positive
+from grasp_core.closure.contact_arrays import contact_frictions
+from grasp_core.errors import InputError
+from grasp_core.files.complaints import record_of
+from grasp_core.files.strict_json import value_of
+from grasp_core.records.grasps_json import grasps_from_json
+
+FEWEST_CONTACTS = 2
+MOST_CONTACTS = 100
+"""Of one grasp: it takes some seconds then, most of it for the hull's volume."""
+MOST_GRASPS = 100_000
+"""Of one file: two hours' work for one processor."""
+LARGEST_LENGTH_M = 1e6
+"""Longer ones are mistakes, and their squares might overflow."""
+NEARLY_UNIT = 1e-3
+"""How far the length of a normal may be from 1: rounding of a file with three digits."""
+ROUNDING = 1e-15
+"""How far rounding takes the length of a unit vector from 1."""
+SAME_POINT = 1e-9
+"""Contacts closer than this to their mean, relative to the numbers in the file, are at one point:
+what rounding leaves of smaller differences tells nothing."""
+
+CenterSource: TypeAlias = Literal["file", "mean contact", "center of mass"]
+ScaleSource: TypeAlias = Literal["flag", "file", "farthest contact", "object radius"]
+
+Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH_M, le=LARGEST_LENGTH_M, allow_inf_nan=False)]
+Point = tuple[Coordinate, Coordinate, Coordinate]
+Friction = Annotated[float, Field(ge=0.0, le=LARGEST_FRICTION, allow_inf_nan=False)]
+Length = Annotated[float, Field(gt=0.0, le=LARGEST_LENGTH_M, allow_inf_nan=False)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class _GivenContact(_Strict):
+    position_m: Point
+    normal: Point
+    friction: Friction | None = None
+
+
+GivenContacts = Annotated[
+    list[_GivenContact],
+    Field(min_length=FEWEST_CONTACTS, max_length=MOST_CONTACTS, fail_fast=True),
+]
+
+
+class _GivenGrasp(_Strict):
+    id: Annotated[str, Field(min_length=1, max_length=100)] | None = None
+    contacts: GivenContacts
+
+
+GivenGrasps = Annotated[
+    list[_GivenGrasp], Field(min_length=1, max_length=MOST_GRASPS, fail_fast=True)
+]
+
+
+class _ContactsFile(_Strict):
+    contacts: GivenContacts | None = None
+    grasps: GivenGrasps | None = None
+    friction: Friction | None = None
+    center_m: Point | None = None
+    torque_scale_m: Length | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactSet:
+    """The contacts of one grasp, and how its wrenches are measured."""
+
+    id: str
+    positions: Array
+    """(k, 3) [m], k >= 2"""
+    normals: Array
+    """Unit vectors into the object, (k, 3)."""
+    friction: Array
+    """Coulomb coefficients, (k,)."""
+    center: Array
+    """About which torques are taken, (3,) [m]."""
+    torque_scale: float
+    """Length that makes a torque comparable with a force [m]."""
+    center_from: CenterSource
+    torque_scale_from: ScaleSource
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "positions", frozen(self.positions, (None, 3), "positions"))
+        count = len(self.positions)
+        object.__setattr__(self, "normals", frozen_units(self.normals, (count, 3), "normals"))
+        object.__setattr__(self, "friction", contact_frictions(self.friction, count))
+        object.__setattr__(self, "center", frozen(self.center, (3,), "center"))
+        object.__setattr__(self, "torque_scale", positive(self.torque_scale, "torque_scale"))
+
+
+@dataclass(frozen=True, slots=True)
+class Overrides:
+    """What a user says about a file's contacts."""
+
+    friction: float | None = None
+    """Of contacts without their own, in place of the file's."""
+    torque_scale: float | None = None
+    """In place of the file's, or of the object's radius [m]."""
+    outward: bool = False
+    """Whether the file's normals point out of the object."""
+
+
+def contact_sets_from_json(text: str, overrides: Overrides = Overrides()) -> tuple[ContactSet, ...]:
+    """Read the text of a contacts file or of a `grasps.json`.
+
+    Without a centre in the file, torques are taken about the mean contact (about the centre of
+    mass for a `grasps.json`), and compared with forces through the largest distance of a contact
+    from there (the object's radius) unless a torque scale is given.
+
+    Raises:
+        InputError: The text is neither, or no friction is given; the message names the field.
+    """
+    found = value_of(text)
+    if isinstance(found, dict) and "schema" in found and "contacts" not in found:
+        return _planned(text, overrides)
+    file = record_of(_ContactsFile, text, "contacts file", nulls=False)
+    if (file.contacts is None) == (file.grasps is None):
+        raise InputError('expected one key of "contacts" (one grasp) and "grasps" (several)')
+    if file.contacts is not None:
+        return (_contact_set(file, file.contacts, "0", "contacts", overrides),)
+    listed = file.grasps or ()
+    ids = [str(i) if grasp.id is None else grasp.id for i, grasp in enumerate(listed)]
+    _check_ids(ids)
+    return tuple(
+        _contact_set(file, grasp.contacts, ids[i], f"grasps[{i}].contacts", overrides)
+        for i, grasp in enumerate(listed)
+    )
+
+
+def _check_ids(ids: list[str]) -> None:
+    first: dict[str, int] = {}
+    for i, name in enumerate(ids):
+        if first.setdefault(name, i) != i:
+            raise InputError(
+                f"grasps[{i}].id: {name!r} is also that of grasps[{first[name]}]; ids must differ, "
+                "and a grasp without one gets its index"
+            )
+
+
+def _planned(text: str, overrides: Overrides) -> tuple[ContactSet, ...]:
+    """Contacts of a `grasps.json`."""
+    if overrides.outward:
+        raise InputError("normals of a grasps.json point into the object: leave out --outward")
+    saved = grasps_from_json(text)
+    if not saved.grasps:
+        raise InputError("grasps: the list is empty, there is nothing to analyse")
+    friction = saved.friction if overrides.friction is None else overrides.friction
+    scale, source = _first((overrides.torque_scale, "flag"), (saved.body.radius, "object radius"))
+    return tuple(
+        ContactSet(
+            id=grasp.id,
+            positions=grasp.positions,
+            normals=grasp.normals,
+            friction=contact_frictions(friction, len(grasp.contacts)),
+            center=saved.body.center_of_mass,
+            torque_scale=scale,
+            center_from="center of mass",
+            torque_scale_from=source,
+        )
+        for grasp in saved.grasps
+    )
+
+
+def _contact_set(
+    file: _ContactsFile, contacts: list[_GivenContact], name: str, where: str, overrides: Overrides
+) -> ContactSet:
+    positions = np.array([contact.position_m for contact in contacts])
+    given = file.center_m
+    center = positions.mean(axis=0) if given is None else np.array(given)
+    _check_apart(positions, center, where)
+    farthest = float(np.linalg.norm(positions - center, axis=1).max())
+    scale, source = _first(
+        (overrides.torque_scale, "flag"),
+        (file.torque_scale_m, "file"),
+        (farthest, "farthest contact"),
+    )
+    inward = -1.0 if overrides.outward else 1.0
+    return ContactSet(
+        id=name,
+        positions=positions,
+        normals=inward * _unit_normals(contacts, where),
+        friction=_frictions(file, contacts, where, overrides.friction),
+        center=center,
+        torque_scale=scale,
+        center_from="mean contact" if given is None else "file",
+        torque_scale_from=source,
+    )
+
+
+def _check_apart(positions: Array, center: Array, where: str) -> None:
+    extent = float(np.linalg.norm(positions - positions.mean(axis=0), axis=1).max())
+    largest = float(max(np.abs(positions).max(), np.abs(center).max()))
+    if extent <= SAME_POINT * largest:
+        raise InputError(
+            f"{where}: all lie within {extent:.2g} m of one point, next to numbers of "
+            f"{largest:.2g} m; move the contacts apart or the frame's origin nearer"
+        )
+
+
+def _unit_normals(contacts: list[_GivenContact], where: str) -> Array:
+    normals = np.array([contact.normal for contact in contacts])
+    lengths = np.linalg.norm(normals, axis=1)
+    worst = int(np.abs(lengths - 1.0).argmax())
+    if abs(lengths[worst] - 1.0) > NEARLY_UNIT:
+        raise InputError(
+            f"{where}[{worst}].normal: its length must be 1 within {NEARLY_UNIT:g}, got "
+            f"{lengths[worst]:.6g}; divide it by its length"
+        )
+    off = np.abs(lengths - 1.0) > ROUNDING  # what is a unit vector stays as it is
+    return np.where(off[:, None], normals / lengths[:, None], normals)
+
+
+def _frictions(
+    file: _ContactsFile, contacts: list[_GivenContact], where: str, flag: float | None
+) -> Array:
+    common = file.friction if flag is None else flag
+    values = [common if contact.friction is None else contact.friction for contact in contacts]
+    known = [value for value in values if value is not None]
+    if len(known) < len(values):
+        raise InputError(
+            f"{where}[{values.index(None)}].friction: missing; give it there, as a key "
+            '"friction" of the file, or with --friction'
+        )
+    return contact_frictions(known, len(known))
+
+
+def _first(*given: tuple[float | None, ScaleSource]) -> tuple[float, ScaleSource]:
+    """The first value that there is, and its source."""
+    return next((value, source) for value, source in given if value is not None)

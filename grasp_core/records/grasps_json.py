@@ -1,0 +1,217 @@
+"""Grasps <-> JSON text, with units in the keys; what is read is checked field by field.
+
+The file holds the object's mesh, so that grasps can be validated from it alone. The schema it is
+checked against is imported where a file is read: plans are written without it.
+"""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from grasp_core.errors import InputError
+from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.objects.face import PatchLimits
+from grasp_core.objects.on_faces import check_on_faces
+from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
+from grasp_core.planning.certify import check_witness
+from grasp_core.planning.reach import Finger
+from grasp_core.planning.result import Plan
+from grasp_core.provenance import versions
+from grasp_core.values import Contact, ContactRegion, ForceCone, Grasp, Witness, four
+
+if TYPE_CHECKING:
+    from grasp_core.records.grasps_schema import GraspRecord
+
+SCHEMA = 1
+SAME_DIRECTION = 1e-6
+"""How far a witness direction may be from its force's: what six digits in a file keep."""
+
+RECORDED = MeshLimits(max_triangles=2_000_000, max_faces=50_000, max_parts=640)
+"""Of the objects in grasps files: ten times what is usual, for those who raised a limit."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SavedGrasps:
+    """What a `grasps.json` says, as values."""
+
+    body: Polyhedron
+    friction: float
+    seed: int
+    grasps: tuple[Grasp, ...]
+    finger: Finger | None = None
+    """What was planned to get to the contacts, if anything."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """How optimisation changed the quality of a grasp."""
+
+    id: str
+    moved_from: str
+    """Id of the planned grasp; the same where it stayed."""
+    before: tuple[float, float]
+    after: tuple[float, float]
+    ceiling: float | None
+    """No contacts on the same faces are better; None where that was not asked."""
+
+    @property
+    def gain(self) -> float:
+        """Ratio of the proved lower bounds."""
+        return self.after[0] / self.before[0]
+
+
+def plan_to_json(body: Polyhedron, plan: Plan, moves: Sequence[Moved] = ()) -> str:
+    """The text of `grasps.json`: the same for the same plan."""
+    document: dict[str, object] = {
+        "schema": SCHEMA,
+        "object": {
+            "name": body.name,
+            "source_sha256": body.source_sha256,
+            "content_sha256": body.content_sha256,
+            "mesh": {
+                "vertices_m": body.vertices.tolist(),
+                "triangles": body.triangles.tolist(),
+            },
+            "center_of_mass_m": body.center_of_mass.tolist(),
+            "patches": None if body.patches is None else asdict(body.patches),
+        },
+        "friction": plan.friction,
+        "theta_deg": math.degrees(plan.theta),
+        "seed": plan.seed,
+        "finger": None if plan.finger is None else asdict(plan.finger),
+        "versions": versions(),
+        "counts": asdict(plan.counts),
+        "outcomes": asdict(plan.outcomes),
+        "absence": plan.absence,
+        "optimization": [
+            {
+                "id": move.id,
+                "moved_from": move.moved_from,
+                "ferrari_canny_before": list(move.before),
+                "ferrari_canny_after": list(move.after),
+                "ferrari_canny_ceiling": move.ceiling,
+            }
+            for move in moves
+        ],
+        "grasps": [_grasp_to_record(grasp) for grasp in plan.grasps],
+    }
+    return json.dumps(document, allow_nan=False, indent=1) + "\n"
+
+
+def _grasp_to_record(grasp: Grasp) -> Mapping[str, object]:
+    return {
+        "id": grasp.id,
+        "family": grasp.family,
+        "faces": list(grasp.faces),
+        "contacts": [
+            {"position_m": contact.position.tolist(), "normal": contact.normal.tolist()}
+            for contact in grasp.contacts
+        ],
+        "focus_points_m": grasp.focus_points.tolist(),
+        "force_cones": [
+            {"axis": cone.axis.tolist(), "half_angle_deg": math.degrees(cone.half_angle)}
+            for cone in grasp.force_cones
+        ],
+        "radius_m": grasp.radius,
+        "regions": [
+            {
+                "kind": region.kind,
+                "polygon_m": region.polygon.tolist(),
+                "inscribed_radius_m": region.inscribed_radius,
+            }
+            for region in grasp.regions
+        ],
+        "span_angle_deg": math.degrees(grasp.span_angle),
+        "critical_friction": grasp.critical_friction,
+        "closure_margin": grasp.closure_margin,
+        "ferrari_canny": list(grasp.ferrari_canny),
+        "witness": {
+            "points_m": grasp.witness.points.tolist(),
+            "directions": grasp.witness.directions.tolist(),
+            "forces": grasp.witness.forces.tolist(),
+        },
+        "approach_directions": (
+            None if grasp.approach_directions is None else grasp.approach_directions.tolist()
+        ),
+    }
+
+
+def grasps_from_json(text: str) -> SavedGrasps:
+    """Read the text of a `grasps.json`.
+
+    Raises:
+        InputError: The text is not such a file; the message names the field.
+        MeshError: Its mesh is not a solid.
+    """
+    from grasp_core.files.complaints import record_of
+    from grasp_core.records.grasps_schema import GraspsRecord
+
+    record = record_of(GraspsRecord, text, "grasps.json", schema=SCHEMA)
+    mesh, patches = record.object.mesh, record.object.patches
+    body = polyhedron_from_mesh(
+        mesh.vertices_m,
+        mesh.triangles,
+        name=record.object.name,
+        source_sha256=record.object.source_sha256,
+        faces="patches" if patches else "planar",
+        patches=PatchLimits(**patches.model_dump()) if patches else None,
+        center_of_mass=record.object.center_of_mass_m,
+        limits=RECORDED,
+    )
+    if body.content_sha256 != record.object.content_sha256:
+        raise InputError("object.content_sha256: is not that of its mesh; plan again")
+    grasps = tuple(
+        _named_grasp(body, grasp, record.friction, i) for i, grasp in enumerate(record.grasps)
+    )
+    if len({grasp.id for grasp in grasps}) < len(grasps):
+        raise InputError("grasps: two have the same id; ids must differ")
+    finger = None if record.finger is None else Finger(**record.finger.model_dump())
+    return SavedGrasps(body, record.friction, record.seed, grasps, finger)
+
+
+def _named_grasp(body: Polyhedron, record: "GraspRecord", friction: float, number: int) -> Grasp:
+    """A grasp, whose refusal says where in the file it is."""
+    try:
+        return _grasp_from_record(body, record, friction)
+    except InputError as error:
+        raise InputError(f"grasps[{number}]: {error}") from error
+
+
+def _grasp_from_record(body: Polyhedron, record: "GraspRecord", friction: float) -> Grasp:
+    grasp = Grasp(
+        id=record.id,
+        family=record.family,
+        faces=record.faces,
+        contacts=four(
+            Contact(np.array(contact.position_m), np.array(contact.normal))
+            for contact in record.contacts
+        ),
+        focus_points=np.array(record.focus_points_m).reshape(-1, 3),
+        force_cones=four(
+            ForceCone(np.array(cone.axis), math.radians(cone.half_angle_deg))
+            for cone in record.force_cones
+        ),
+        regions=four(
+            ContactRegion(region.kind, np.array(region.polygon_m), region.inscribed_radius_m)
+            for region in record.regions
+        ),
+        radius=record.radius_m,
+        span_angle=math.radians(record.span_angle_deg),
+        critical_friction=record.critical_friction,
+        closure_margin=record.closure_margin,
+        ferrari_canny=record.ferrari_canny,
+        witness=Witness(np.array(record.witness.points_m), np.array(record.witness.forces)),
+        approach_directions=(
+            None if record.approach_directions is None else np.array(record.approach_directions)
+        ),
+    )
+    check_on_faces(body, grasp)
+    check_witness(body, grasp, friction)
+    off = np.abs(grasp.witness.directions - np.array(record.witness.directions)).max()
+    if off > SAME_DIRECTION:
+        raise InputError(f"grasp {grasp.id}: a witness direction is not that of its force")
+    return grasp

@@ -1,0 +1,114 @@
+"""Centres of discs moved so that the discs can be larger.
+
+A cover has fixed forces on fixed twists, and the power of a fixed force is linear in the place of
+its contact. So the largest radius r that its forces allow, over all centres c_i with the discs on
+their faces, is one linear program:
+
+    maximise r  over c_i, r
+    sum over i of F_i.(a + b x c_i) - r |T_i'(F_i x b)| >= 0   for each ray of each cone,
+    E_i c_i + r <= b_i                                          for each face.
+
+New centres allow other forces, so covers are sought anew around them, and so on while the radius
+grows: the paper's own program for concurrent grasps is of this kind, with one focus for all twists.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.errors import SolverError
+from grasp_core.geometry.polygons import nearest_point
+from grasp_core.regions.largest_discs import Grounds, Proved, largest_discs
+from grasp_core.regions.proof import power_of
+from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
+from grasp_core.solvers.ties import first_best, nearest_optimum, on_grid
+
+MOVES = 12
+MOVING = 8
+"""Covers of moves take so many times fewer cones."""
+WORTH = 1.005
+"""A move ends the search unless the radius grows by this factor."""
+FARTHEST = 1.0
+"""That a centre moves at once, in radii."""
+MOVED_DIGITS = 6
+"""Digits after the point of moved centres."""
+NEAR = 3.0
+"""Rays count that allow radii up to this factor of the present one."""
+
+
+def better_centers(grounds: Grounds, ys: Array) -> Array:
+    """Centres (k, 2) of discs inside the faces that are larger than around given ones, if found."""
+    coarse = replace(grounds, cones=grounds.cones // MOVING)
+    best = largest_discs(coarse, ys)
+    if best is None:
+        return ys
+    for _ in range(MOVES):
+        moved = _best_for_forces(coarse, best)
+        found = None if moved is None else largest_discs(coarse, moved, best.radius)
+        if found is None or inside_faces(coarse, found) < WORTH * inside_faces(coarse, best):
+            break
+        best = found
+    return best.ys
+
+
+def larger_inside(grounds: Grounds, one: Proved | None, other: Proved | None) -> Proved | None:
+    """Those of two sets of discs of which larger ones are inside the faces."""
+    if one is None or other is None:
+        return other if one is None else one
+    return (one, other)[first_best([inside_faces(grounds, each) for each in (one, other)])]
+
+
+def inside_faces(grounds: Grounds, proved: Proved) -> float:
+    """The radius of discs that are proved and inside the faces."""
+    depths = [(p.b - p.E @ y).min() for p, y in zip(grounds.pieces, proved.ys, strict=True)]
+    return min(proved.radius, *map(float, depths))
+
+
+def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
+    """The best centres for the forces of a cover, near the present ones, (k, 2)."""
+    k = len(proved.ys)
+    rows, limits = list[Array](), list[Array]()
+    points = grounds.points(proved.ys)
+    for where, rays in proved.cover.leaves():
+        twists = rays @ proved.cover.axes
+        twists = (twists / np.linalg.norm(twists, axis=2, keepdims=True)).reshape(-1, 6)
+        powers, falls, moves = np.zeros(len(twists)), np.zeros(len(twists)), list[Array]()
+        for piece, point, F in zip(
+            grounds.pieces, points, proved.cover.forces[where].swapaxes(0, 1), strict=True
+        ):
+            each = np.repeat(F / _sizes(proved.cover.forces[where]), rays.shape[1], axis=0)
+            slope, at_origin = power_of(each, twists[:, None])
+            slope, across = slope[:, 0], slope[:, 0] @ piece.frame
+            powers += at_origin[:, 0] + slope @ point - piece.depth * np.abs(slope @ piece.normal)
+            falls += np.linalg.norm(across, axis=1)
+            moves.append(across)
+        near = powers < NEAR * proved.radius * falls
+        rows.append(np.column_stack([-np.hstack(moves), falls])[near])
+        limits.append(powers[near])
+    for i, (piece, y) in enumerate(zip(grounds.pieces, proved.ys, strict=True)):
+        edges = np.zeros((len(piece.E), 2 * k + 1))
+        edges[:, 2 * i : 2 * i + 2], edges[:, -1] = piece.E, 1.0
+        rows.append(edges)
+        limits.append(piece.b - piece.E @ y)
+    box = np.eye(2 * k, 2 * k + 1)
+    rows += [box, -box]
+    limits += [np.full(2 * k, FARTHEST * proved.radius)] * 2
+    c = np.zeros(2 * k + 1)
+    c[-1] = 1.0
+    program = LinearProgram(c, np.vstack(rows), np.concatenate(limits))
+    try:
+        best = maximize(program)
+    except SolverError:
+        return None
+    if not isinstance(best, Optimum):
+        return None
+    moved = on_grid(proved.ys + nearest_optimum(program, best)[:-1].reshape(k, 2), MOVED_DIGITS)
+    return np.array([
+        nearest_point(piece.corners, y) for piece, y in zip(grounds.pieces, moved, strict=True)
+    ])  # fmt: skip
+
+
+def _sizes(forces: Array) -> Array:
+    """Lengths of the forces of each cone together, (m, 1)."""
+    return np.sqrt(np.einsum("mki,mki->m", forces, forces))[:, None]

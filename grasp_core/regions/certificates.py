@@ -1,0 +1,178 @@
+"""Independent regions with their proof: what is claimed of them, and how each claim is checked."""
+
+import math
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from grasp_core.arrays import Array, frozen
+from grasp_core.checked import SMALLEST, instance, number, positive, several
+from grasp_core.closure.contact_arrays import contact_frictions
+from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.errors import InputError
+from grasp_core.fields import are_frictions, are_units, is_a, is_array, is_number, is_tuple_of
+from grasp_core.geometry.flat_polygons import (
+    FEWEST_CORNERS,
+    MOST_CORNERS,
+    FlatPolygon,
+    flat_polygon,
+    has_inscribed_radius,
+    holds_disc,
+)
+from grasp_core.geometry.polygons import plane_frame
+from grasp_core.regions.proof import TwistCover
+from grasp_core.values import FINGERS, ContactRegion
+
+PLACED = 1e-9
+"""How far points may be off the planes and borders they are on, and radii from what they measure,
+relative to `scale`: what files with ten digits keep."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CertifiedRegions:
+    """Where each finger may stand while the others are anywhere in their own regions."""
+
+    regions: tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
+    """Convex polygons inside `borders`."""
+    borders: tuple[Array, Array, Array, Array]
+    """Convex piece of its face that each region is on, clear of edges as asked for, (k, 3) [m]."""
+    radius: float
+    """Of discs around `centers`: the polygons hold what `borders` have of them, but for two
+    thousandths of the polygon's area; no larger than discs that hold all of `borders` [m]."""
+    centers: Array
+    """In the polygons, (4, 3) [m]."""
+    limit: float
+    """Of discs that hold `open_choice`, a little larger; infinite if none was found [m]."""
+    open_choice: Array | None
+    """Contacts inside `borders`, in those discs, that are not force-closed, (4, 3) [m]."""
+    open_wrench: Array | None
+    """What shows it: as `ClosureCertificate.separating_wrench`, (6,)."""
+    friction: Array
+    """For which all choices are force-closed, (4,)."""
+    origin: Array
+    """Of the torques of the proof, (3,) [m]."""
+    normals: Array
+    """Of the faces, into the object, (4, 3)."""
+    depths: Array
+    """How far the surface may be off the regions' planes, (4,) [m]."""
+    cover: TwistCover
+    """The proof; lengths relative to `scale`."""
+    scale: float
+    """[m]"""
+
+    def __post_init__(self) -> None:
+        for name in ("centers", "normals"):
+            object.__setattr__(self, name, frozen(getattr(self, name), (FINGERS, 3), name))
+        object.__setattr__(self, "friction", contact_frictions(self.friction, FINGERS))
+        object.__setattr__(self, "origin", frozen(self.origin, (3,), "origin"))
+        object.__setattr__(self, "depths", frozen(self.depths, (FINGERS,), "depths"))
+        for name, shape in (("open_choice", (FINGERS, 3)), ("open_wrench", (6,))):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
+        each = partial(frozen, shape=(None, 3), name="borders")
+        object.__setattr__(self, "borders", several(self.borders, each, "borders", "polygons"))
+        _check_parts(self)
+        if (self.depths < 0.0).any():
+            raise InputError(f"depths must not be negative, got {float(self.depths.min()):.6g}")
+
+    def verify(self) -> bool:
+        """Re-check every field in plain arithmetic.
+
+        That every choice of contacts in `regions`, on planes with `normals` and at most `depths`
+        off them, is force-closed with `friction`; that the polygons are convex, in their borders,
+        as wide as they say, and hold the discs; and that `open_choice` is open. That `borders`
+        are those of an object's faces is for who has the object.
+        """
+        with np.errstate(all="ignore"):
+            return self._has_numbers() and self._has_discs() and self._is_open() and self._closes()
+
+    def _has_numbers(self) -> bool:
+        return (
+            is_number(self.scale, least=SMALLEST)
+            and is_array(self.origin, 3)
+            and is_array(self.depths, FINGERS)
+            and bool((self.depths >= 0.0).all())
+            and is_array(self.centers, FINGERS, 3)
+            and are_units(self.normals, FINGERS, 3)
+            and are_frictions(self.friction, FINGERS)
+            and is_tuple_of(self.regions, ContactRegion, FINGERS)
+            and is_tuple_of(self.borders, np.ndarray, FINGERS)
+            and all(len(border) >= FEWEST_CORNERS for border in self.borders)
+            and is_a(self.cover, TwistCover)
+            and is_number(self.radius, least=0.0)
+        )
+
+    def _has_discs(self) -> bool:
+        farthest = 0.0
+        for i, region in enumerate(self.regions):
+            if region.kind != "certified":
+                return False
+            border, polygon = self._flat(i, self.borders[i]), self._flat(i, region.polygon)
+            center = self._at(i, self.centers[i])
+            if border is None or polygon is None or center is None:
+                return False
+            width, radius = region.inscribed_radius / self.scale, self.radius / self.scale
+            if not (
+                border.holds(polygon.corners, PLACED)
+                and polygon.holds(center[None], PLACED)
+                and has_inscribed_radius(polygon, width)
+                and holds_disc(polygon, border, center, radius)
+            ):
+                return False
+            away = np.linalg.norm(border.corners - center, axis=1)
+            farthest = max(farthest, float(away.max()))
+        return self.radius <= (farthest + PLACED) * self.scale
+
+    def _flat(self, i: int, polygon: Array) -> FlatPolygon | None:
+        """A polygon in the plane of a finger's border, at unit size; None if it is none there."""
+        if not is_array(polygon, None, 3) or not FEWEST_CORNERS <= len(polygon) <= MOST_CORNERS:
+            return None
+        start = self.borders[i][0]
+        return flat_polygon((polygon - start) / self.scale, self.normals[i], PLACED)
+
+    def _at(self, i: int, point: Array) -> Array | None:
+        """A point in plane coordinates, (2,), as `_flat`; None if it is off the plane."""
+        arm = (point - self.borders[i][0]) / self.scale
+        if abs(float(arm @ self.normals[i])) > PLACED:
+            return None
+        return arm @ plane_frame(self.normals[i])
+
+    def _is_open(self) -> bool:
+        """Whether the open choice is one, in discs of the radius `limit`."""
+        choice, wrench = self.open_choice, self.open_wrench
+        if choice is None:
+            return wrench is None and self.limit == math.inf
+        if not is_array(choice, FINGERS, 3) or not is_number(self.limit, least=0.0):
+            return False
+        for i, place in enumerate(choice):
+            border, at = self._flat(i, self.borders[i]), self._at(i, place)
+            if border is None or at is None or not border.holds(at[None], PLACED):
+                return False
+        away = float(np.linalg.norm(choice - self.centers, axis=1).max())
+        proof = ClosureCertificate(False, 0.0, choice, self.normals, self.friction, None, wrench)
+        return abs(away - self.limit) <= PLACED * self.scale and proof.verify()
+
+    def _closes(self) -> bool:
+        prisms = [
+            (np.vstack([r.polygon - depth * n, r.polygon + depth * n]) - self.origin) / self.scale
+            for r, n, depth in zip(self.regions, self.normals, self.depths, strict=True)
+        ]
+        return self.cover.verify(prisms, self.normals, self.friction)
+
+
+def _check_parts(found: CertifiedRegions) -> None:
+    """Refuse what is no region, no cover, or no length.
+
+    Raises:
+        InputError: A part is none.
+    """
+    each = partial(instance, kind=ContactRegion, name="regions")
+    count = len(several(found.regions, each, "regions", "ContactRegion values"))
+    if not count == len(found.borders) == FINGERS:
+        got = f"{count} and {len(found.borders)}"
+        raise InputError(f"regions and borders must be {FINGERS}, one per finger, got {got}")
+    instance(found.cover, TwistCover, "cover")
+    positive(found.scale, "scale")
+    number(found.radius, "radius", least=0.0)
+    number(found.limit, "limit", least=0.0, most=math.inf)

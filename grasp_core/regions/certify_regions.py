@@ -1,0 +1,292 @@
+"""Independent regions for the fingers of any grasp, polygons on its faces, with a proof.
+
+Contacts may be anywhere in their own regions, whatever the others do, and the grasp stays in force
+closure: first the largest equal discs for which that is proved (`region_search`), around the
+contacts or around better centres (`region_centers`), then polygons around the discs that the same
+proof allows, or as much area as covers are found for (`region_growth`). Every proof is checked by
+`CertifiedRegions.verify` before it is returned.
+
+On patches of curved surfaces a contact may be as far off the plane as the surface is, and friction
+loses the angle by which the surface leans, so that normals are counted as the plane's.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import (
+    coefficient,
+    number,
+    one_of,
+    switch,
+    whole,
+)
+from grasp_core.closure.contact_arrays import stacked
+from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.errors import InputError, SolverError, UndecidedError
+from grasp_core.geometry.flat_polygons import convex_polygon, holds_disc
+from grasp_core.geometry.polygons import (
+    SAME_CORNER,
+    clip,
+    edge_rows,
+    nearest_point,
+    tidy,
+    with_fewer_corners,
+)
+from grasp_core.objects.face_pieces import FacePiece, inscribed_radius, piece_of
+from grasp_core.objects.on_faces import check_on_faces
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.regions.centers import better_centers, larger_inside
+from grasp_core.regions.certificates import PLACED, CertifiedRegions
+from grasp_core.regions.growth import BEGINNINGS, disc_polygons, most_area, shared_out
+from grasp_core.regions.largest_discs import Grounds, Proved, largest_discs
+from grasp_core.regions.proof import TwistCover
+from grasp_core.solvers.ties import coarse, first_best, on_grid
+from grasp_core.values import ContactRegion, Grasp, four
+
+Balance: TypeAlias = Literal["radius", "area"]
+"""What regions are grown for: the smallest inscribed disc, or the total area."""
+FEWEST = 64
+"""Cones that the search begins with."""
+MOST_CONES = 1_000_000
+CONES = 10_000
+"""Cones of one cover at most, unless told otherwise: half a second's work."""
+UNIT_DIGITS, PLACE_DIGITS = 6, 8
+"""Digits after the point of the unit and its origin, in object radii; of centres, in the unit."""
+NARROWED = 1e-3
+"""How finely the discs in grown polygons are measured, relative to those proved first."""
+
+
+def certify_regions(  # noqa: PLR0913 - what a user may choose
+    body: Polyhedron,
+    grasp: Grasp,
+    friction: float,
+    *,
+    reserve: float = 0.0,
+    balance: Balance = "radius",
+    recenter: bool = False,
+    clearance: float = 0.0,
+    cones: int = CONES,
+) -> CertifiedRegions | None:
+    """Regions around the contacts of a grasp, as large as a proof is found for.
+
+    Args:
+        body: The object.
+        grasp: On its faces.
+        friction: Coulomb coefficient at every contact.
+        reserve: Share of the friction that is not counted on.
+        balance: Seek large discs for all fingers, or much area in total, with smaller discs
+            perhaps, and several times slower.
+        recenter: Move the regions' centres to where the discs can be largest; the contacts may
+            then be outside of their regions.
+        clearance: How far regions stay from the edges of their faces [m]. Where a contact does not,
+            the middle of its region is the nearest place that does.
+        cones: Of one attempt at a proof, at least `FEWEST`. With more, radii grow by some
+            hundredths, or not at all where they are as large as can be.
+
+    Returns:
+        The regions; None if no radius could be proved.
+
+    Raises:
+        InputError: The contacts are not on the faces, or not closed with what friction is left; a
+            number or a choice is out of its range.
+        UndecidedError: Whether the contacts are closed is too close to call.
+        SolverError: A proof failed its check.
+    """
+    check_on_faces(body, grasp)
+    number(reserve, "reserve", least=0.0, below=1.0)
+    one_of(balance, get_args(Balance), "balance")
+    switch(recenter, "recenter")
+    number(clearance, "clearance", least=0.0, below=body.radius, where=", the object's radius in m")
+    whole(cones, "cones", least=FEWEST, most=MOST_CONES)
+    left = coefficient(friction) * (1.0 - reserve)
+    positions, normals = stacked(grasp.contacts)
+    if not force_closure(positions, normals, left).closed:
+        raise InputError(f"grasp {grasp.id} is not in force closure at friction {left:.6g}")
+    unit = _Unit.of(body, positions)
+    pieces = _pieces(body, grasp, unit, clearance)
+    least = math.atan(left) - max(body.faces[face].spread for face in grasp.faces)
+    if pieces is None or least <= 0.0:
+        return None
+    leaning = [math.tan(math.atan(left) - p.spread) if p.spread else left for p in pieces]
+    grounds = Grounds(pieces, np.array(leaning), cones)
+    ys = np.array([
+        nearest_point(piece.corners, on_grid(piece.frame.T @ (x - piece.origin), PLACE_DIGITS))
+        for piece, x in zip(pieces, unit.at(positions), strict=True)
+    ])  # fmt: skip
+    proved = largest_discs(grounds, ys)
+    if recenter:
+        moved = largest_discs(grounds, better_centers(grounds, ys))
+        proved = larger_inside(grounds, moved, proved)
+    if proved is None:
+        return None
+    polygons, cover = _polygons(grounds, proved, balance, grasp, unit)
+    if min(map(len, polygons)) < 3:  # noqa: PLR2004 - not polygons
+        return None
+    found = _placed(grounds, proved, polygons, cover, unit)
+    if not found.verify():
+        raise SolverError(f"grasp {grasp.id}: the proof of its regions fails its check")
+    return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Unit:
+    """The unit of length, and the origin, in which the contacts' largest lever is about one.
+
+    Both have few digits, so that places in it do not depend on the last digits of the contacts.
+    """
+
+    origin: Array
+    scale: float
+
+    @classmethod
+    def of(cls, body: Polyhedron, positions: Array) -> "_Unit":
+        places = (positions - body.center_of_mass) / body.radius
+        middle = on_grid(places.mean(axis=0), UNIT_DIGITS)
+        lever = float(np.linalg.norm(places - middle, axis=1).max())
+        return cls(
+            body.center_of_mass + body.radius * middle, body.radius * coarse(lever, UNIT_DIGITS)
+        )
+
+    def at(self, points: Array) -> Array:
+        """Points in this unit, (..., 3)."""
+        return (points - self.origin) / self.scale
+
+    def back(self, points: Array) -> Array:
+        """Points in the object's frame [m]."""
+        return self.origin + self.scale * points
+
+
+def _pieces(
+    body: Polyhedron, grasp: Grasp, unit: _Unit, clearance: float
+) -> tuple[FacePiece, ...] | None:
+    """The convex pieces that contacts lie on, clear of edges; None if one has no room.
+
+    Of several pieces of a face it is the one that the contact is deepest in.
+    """
+    found = list[FacePiece]()
+    for index, contact in zip(grasp.faces, grasp.contacts, strict=True):
+        face = body.faces[index]
+        normal = face.normal / np.linalg.norm(face.normal)  # files round them
+        every = [piece_of(index, normal, unit.at(corners)) for corners in face.pieces]
+        point = unit.at(contact.position)
+        whole = every[first_best([_room(point, piece) for piece in every], SAME_CORNER)]
+        corners = tidy(clip(whole.corners, whole.E, whole.b - clearance / unit.scale))
+        if len(corners) < 3:  # noqa: PLR2004 - not a polygon
+            return None
+        clear = piece_of(index, normal, whole.origin + corners @ whole.frame.T)
+        found.append(replace(clear, spread=face.spread, depth=face.depth / unit.scale))
+    return tuple(found)
+
+
+def _room(point: Array, piece: FacePiece) -> float:
+    """How far inside of a piece a point is."""
+    return float((piece.b - piece.E @ (piece.frame.T @ (point - piece.origin))).min())
+
+
+def _polygons(
+    grounds: Grounds, proved: Proved, balance: Balance, grasp: Grasp, unit: _Unit
+) -> tuple[list[Array], TwistCover]:
+    """Polygons in plane coordinates, and their proof."""
+    if balance == "radius":
+        discs = grounds.discs(proved.ys, proved.radius)
+        return shared_out(grounds, proved.ys, discs, proved.cover), proved.cover
+    beginnings = [disc_polygons(grounds, proved.ys, b * proved.radius) for b in BEGINNINGS]
+    planned = [
+        tidy(clip((unit.at(region.polygon) - piece.origin) @ piece.frame, piece.E, piece.b))
+        for region, piece in zip(grasp.regions, grounds.pieces, strict=True)
+    ]
+    if min(map(len, planned)) > 2:  # noqa: PLR2004 - polygons, not points
+        beginnings.append(planned)
+    return most_area(grounds, proved, beginnings)
+
+
+def _placed(
+    grounds: Grounds, proved: Proved, polygons: list[Array], cover: TwistCover, unit: _Unit
+) -> CertifiedRegions:
+    """Regions in the object's frame, with their proof."""
+    trimmed = [_trimmed(polygon, y) for polygon, y in zip(polygons, proved.ys, strict=True)]
+    centers = unit.back(grounds.points(proved.ys))
+    opened = _open_choice(grounds, proved, unit)
+    choice = None if opened is None else opened.positions
+    return CertifiedRegions(
+        regions=four(
+            ContactRegion(
+                "certified",
+                unit.back(piece.origin + polygon @ piece.frame.T),
+                unit.scale * inscribed_radius(*edge_rows(polygon)),
+            )
+            for piece, polygon in zip(grounds.pieces, trimmed, strict=True)
+        ),
+        borders=four(unit.back(grounds.places(i)) for i in range(len(grounds.pieces))),
+        radius=unit.scale * _radius_held(grounds, proved, trimmed),
+        centers=centers,
+        limit=math.inf if choice is None else _farthest(choice, centers),
+        open_choice=choice,
+        open_wrench=None if opened is None else opened.separating_wrench,
+        friction=grounds.friction,
+        origin=unit.origin,
+        normals=np.array([piece.normal for piece in grounds.pieces]),
+        depths=unit.scale * np.array([piece.depth for piece in grounds.pieces]),
+        cover=cover,
+        scale=unit.scale,
+    )
+
+
+def _farthest(points: Array, centers: Array) -> float:
+    return float(np.linalg.norm(points - centers, axis=1).max())
+
+
+def _radius_held(grounds: Grounds, proved: Proved, polygons: list[Array]) -> float:
+    """The radius of the discs proved first, or of smaller ones that the polygons hold.
+
+    Polygons grown for their area may begin with smaller discs.
+    """
+    pairs = [
+        (convex_polygon(polygon, PLACED), convex_polygon(piece.corners, PLACED), y)
+        for piece, polygon, y in zip(grounds.pieces, polygons, proved.ys, strict=True)
+    ]
+
+    def held(radius: float) -> bool:
+        return all(
+            polygon and border and holds_disc(polygon, border, y, radius)
+            for polygon, border, y in pairs
+        )
+
+    if held(proved.radius):
+        return proved.radius
+    low, high = 0.0, proved.radius
+    while high - low > NARROWED * proved.radius:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if held(middle) else (low, middle)
+    return low
+
+
+def _trimmed(polygon: Array, y: Array) -> Array:
+    """A polygon with fewer corners that still holds its centre."""
+    fewer = with_fewer_corners(polygon)
+    E, b = edge_rows(fewer)
+    return fewer if (E @ y <= b).all() else polygon
+
+
+def _open_choice(grounds: Grounds, proved: Proved, unit: _Unit) -> ClosureCertificate | None:
+    """The proof that the choice that a search found is open, in the object's frame.
+
+    None unless it is open by the exact test, and on the pieces. Patches of curved surfaces are
+    not planes, so nothing is said of them.
+    """
+    if proved.choice is None or any(piece.depth or piece.spread for piece in grounds.pieces):
+        return None
+    on_pieces = all(
+        _room(x, piece) >= -SAME_CORNER
+        for piece, x in zip(grounds.pieces, proved.choice, strict=True)
+    )
+    normals = np.array([piece.normal for piece in grounds.pieces])
+    try:
+        found = force_closure(unit.back(proved.choice), normals, grounds.friction)
+    except UndecidedError:
+        return None
+    return found if on_pieces and not found.closed else None

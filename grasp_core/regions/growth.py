@@ -1,0 +1,155 @@
+"""Polygons as large as a cover allows, and larger ones by covers of their own.
+
+A cover proves more than the discs it was sought for. On a ray of one of its cones the least powers
+of the forces sum to s > 0; each of the m contacts with a force may lose s / m there and no more, so
+its place x is held to F.(a + b x x) >= its least power - s / m: a half-plane. What a face has in
+all half-planes of its finger is a convex polygon around the old region, and the cover proves these
+polygons too, as the losses on each ray sum to s at most. What is left is given away again.
+
+Larger areas: polygons are moved outwards one finger at a time, and kept if a cover is found.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.geometry.polygons import ON_LINE, SAME_CORNER, clip, edge_rows, signed_area, tidy
+from grasp_core.regions.cover_search import search_cover
+from grasp_core.regions.largest_discs import Grounds, Proved, part_of_disc
+from grasp_core.regions.proof import TwistCover, power_of, slack_of, summed
+from grasp_core.regions.sites import Sites
+from grasp_core.solvers.ties import first_best, surpassing
+
+SHARINGS = 2
+"""Times that what is left is given away."""
+MARGIN = 4.0
+"""Powers are kept above so many times the slack of their check."""
+FIRST_STEP, LAST_STEP = 0.4, 0.03
+"""By which polygons are moved outwards, relative to the radius of the discs."""
+BEGINNINGS = (1.0, 0.6)
+"""Radii of discs from which areas grow, relative to the largest that were proved."""
+GROWING = 4
+"""Each attempt to grow takes so many times fewer cones."""
+
+
+def shared_out(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) -> list[Array]:
+    """Polygons around sites that the same cover proves, in plane coordinates, (c, 2) each.
+
+    Args:
+        grounds: What contacts may stand on.
+        ys: Where the points of the sites are in the planes, (k, 2).
+        sites: Proved ones.
+        cover: Their proof.
+    """
+    polygons = list[Array]()
+    for _ in range(SHARINGS):
+        polygons = _given_away(grounds, ys, sites, cover)
+        if min(map(len, polygons)) == 0:
+            break  # thinner than the slack of the check
+        sites = grounds.around(ys, polygons, np.zeros(len(ys)))
+    return polygons
+
+
+def _given_away(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) -> list[Array]:
+    """The pieces' parts in all half-planes, for one sharing of what is left."""
+    each = range(len(ys))
+    rows, limits = [list[Array]() for _ in each], [list[Array]() for _ in each]
+    for where, rays in cover.leaves():
+        twists, lengths = rays @ cover.axes, summed(rays, cover.axes)
+        spare, slopes, lowest = np.zeros(lengths.shape), list[Array](), list[Array]()
+        forces = cover.forces[where].swapaxes(0, 1)
+        for i, (piece, point, F) in enumerate(
+            zip(grounds.pieces, sites.points, forces, strict=True)
+        ):
+            slope, at_origin = power_of(F, twists)
+            slopes.append(slope @ piece.frame)
+            lowest.append(sites.lowest(i, slopes[i]))
+            spare += at_origin + slope @ point + lowest[i]
+            spare -= piece.depth * np.abs(slope @ piece.normal)
+            spare -= MARGIN * lengths * slack_of(F, grounds.places(i))[:, None]
+        sharing = np.maximum((forces != 0.0).any(axis=2).sum(axis=0), 1)[:, None]
+        for i in each:
+            sizes = np.linalg.norm(slopes[i], axis=2)
+            used = sizes > 0.0
+            kept = (lowest[i] - np.maximum(spare, 0.0) / sharing)[used] / sizes[used]
+            rows[i].append(-slopes[i][used] / sizes[used][:, None])
+            limits[i].append(-kept)
+    return [
+        y + tidy(_inside(piece.corners - y, np.concatenate(r), np.concatenate(b)))
+        for piece, y, r, b in zip(grounds.pieces, ys, rows, limits, strict=True)
+    ]
+
+
+def _inside(polygon: Array, rows: Array, limits: Array) -> Array:
+    """The part of a convex polygon (c, 2) in half-planes rows @ y <= limits, most idle."""
+    while len(rows) and len(polygon):
+        beyond = (rows @ polygon.T).max(axis=1) - limits
+        worst = first_best(beyond, ON_LINE)
+        if beyond[worst] <= 0.0:
+            break
+        polygon = clip(polygon, rows[worst : worst + 1], limits[worst : worst + 1])
+        beyond[worst] = 0.0
+        rows, limits = rows[beyond > 0.0], limits[beyond > 0.0]
+    return polygon
+
+
+def disc_polygons(grounds: Grounds, ys: Array, radius: float) -> list[Array]:
+    """What the pieces have of polygons around discs, in plane coordinates, (c, 2) each."""
+    return [
+        tidy(part_of_disc(piece, y, radius)) for piece, y in zip(grounds.pieces, ys, strict=True)
+    ]
+
+
+def most_area(
+    grounds: Grounds, proved: Proved, beginnings: Sequence[list[Array]]
+) -> tuple[list[Array], TwistCover]:
+    """Polygons of much area in total, the best of what discs and other beginnings grow to."""
+    axes, discs = grounds.axes(proved.ys), grounds.discs(proved.ys, proved.radius)
+    best = shared_out(grounds, proved.ys, discs, proved.cover), proved.cover
+    for polygons in beginnings:
+        cover = _cover(grounds, proved.ys, polygons, axes)
+        if cover is None:
+            continue
+        polygons, cover = _grown(grounds, proved, polygons, cover, axes)
+        sites = grounds.around(proved.ys, polygons, np.zeros(len(polygons)))
+        polygons = shared_out(grounds, proved.ys, sites, cover)
+        if total_area(polygons) > surpassing(total_area(best[0])):
+            best = polygons, cover
+    return best
+
+
+def total_area(polygons: Sequence[Array]) -> float:
+    """Of counter-clockwise polygons (c, 2)."""
+    return sum(map(signed_area, polygons))
+
+
+def _grown(
+    grounds: Grounds, proved: Proved, polygons: list[Array], cover: TwistCover, axes: Array
+) -> tuple[list[Array], TwistCover]:
+    """Polygons moved outwards in turn, each in steps that are halved where no cover is found."""
+    steps = np.full(len(polygons), FIRST_STEP * proved.radius)
+    while (steps > LAST_STEP * proved.radius).any():
+        for i, piece in enumerate(grounds.pieces):
+            if steps[i] <= LAST_STEP * proved.radius:
+                continue
+            tried = list(polygons)
+            tried[i] = _offset(piece.corners, polygons[i], steps[i])
+            full = signed_area(tried[i]) <= signed_area(polygons[i]) * (1.0 + SAME_CORNER)
+            found = None if full else _cover(grounds, proved.ys, tried, axes)
+            if found is None:
+                steps[i] = 0.0 if full else 0.5 * steps[i]
+            else:
+                polygons, cover = tried, found
+    return polygons, cover
+
+
+def _cover(grounds: Grounds, ys: Array, polygons: list[Array], axes: Array) -> TwistCover | None:
+    sites = grounds.around(ys, polygons, np.zeros(len(ys)))
+    return search_cover(sites, axes, grounds.cones // GROWING).cover
+
+
+def _offset(piece: Array, polygon: Array, distance: float) -> Array:
+    """What a piece (c, 2) has of a convex polygon with its edges moved out, (c, 2)."""
+    E, b = edge_rows(polygon)
+    return tidy(clip(piece, E, b + distance))

@@ -1,0 +1,192 @@
+"""The largest equal discs around contacts in which all choices are proved to be force-closed.
+
+Solved: for contacts on faces, a radius for which a cover of all twists is found (`twist_covers`),
+and a larger one for which some choice is open. What a face does not have of a disc is left out. The
+radius is doubled from a small one and then halved into, first with few cones for each attempt, then
+in smaller steps with as many as are granted.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array, to_digits
+from grasp_core.geometry.polygons import SAME_CORNER, clip
+from grasp_core.objects.face_pieces import FacePiece
+from grasp_core.regions.cover_search import search_cover
+from grasp_core.regions.proof import TwistCover
+from grasp_core.regions.sites import TINY, Sites, stacked_corners
+from grasp_core.solvers.ties import coarse
+
+FINENESS = 0.02
+"""The radius is found to this, relative to it."""
+FIRST_RADIUS, LEAST_RADIUS = 0.05, 1e-6
+"""Where the search begins and gives up, relative to the levers of the contacts."""
+COARSE = 16
+"""The first attempts take so many times fewer cones."""
+FAST, SLOW = 2.0, 1.1
+"""Steps of the radius, of the first attempts and of the others."""
+NEAR = 0.04
+"""So near to what is proved an open choice is sought, relative to it."""
+REFUTING = 4
+"""Attempts to find one take so many times fewer cones."""
+REACH_DIGITS = 10
+"""Digits after the point of the largest radius that is tried."""
+SIDES = 16
+"""Of the polygon around a disc that a face's border cuts."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grounds:
+    """What contacts may stand on, at unit size."""
+
+    pieces: tuple[FacePiece, ...]
+    """Of one face each, about any common origin."""
+    friction: Array
+    """(k,)"""
+    cones: int
+    """Of one proof at most."""
+
+    @property
+    def frames(self) -> Array:
+        """Columns (normal, tangent, tangent) of the pieces, (k, 3, 3)."""
+        return np.array([np.column_stack([p.normal, p.frame]) for p in self.pieces])
+
+    def points(self, ys: Array) -> Array:
+        """Points of the pieces with these plane coordinates (k, 2), (k, 3)."""
+        return np.array([piece.point(y) for piece, y in zip(self.pieces, ys, strict=True)])
+
+    def places(self, i: int) -> Array:
+        """Corners of a piece, (c, 3): no contact is farther away, but for the piece's depth."""
+        piece = self.pieces[i]
+        return piece.origin + piece.corners @ piece.frame.T
+
+    def around(self, ys: Array, polygons: Sequence[Array], radii: Array) -> Sites:
+        """Sites of polygons (c, 2), in plane coordinates, widened by discs (k,)."""
+        return Sites(
+            self.points(ys),
+            self.frames,
+            self.friction,
+            stacked_corners([polygon - y for polygon, y in zip(polygons, ys, strict=True)]),
+            radii,
+            np.array([piece.depth for piece in self.pieces]),
+        )
+
+    def discs(self, ys: Array, radius: float) -> Sites:
+        """Sites of what the pieces have of discs around points (k, 2)."""
+        radii, polygons = np.zeros(len(ys)), list[Array]()
+        for i, (piece, y) in enumerate(zip(self.pieces, ys, strict=True)):
+            if (piece.E @ y + radius <= piece.b - SAME_CORNER).all():  # not if it touches an edge
+                radii[i] = radius
+                polygons.append(y[None])
+            else:
+                polygons.append(part_of_disc(piece, y, radius))
+        return self.around(ys, polygons, radii)
+
+    def axes(self, ys: Array) -> Array:
+        """Twists as rows that move contacts alike, tangents counted with the friction, (6, 6).
+
+        Long objects then need no more cones than round ones.
+        """
+        motions = list[Array]()
+        for (x, y, z), F, mu in zip(self.points(ys), self.frames, self.friction, strict=True):
+            turning = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+            weights = np.array([1.0, mu, mu])
+            motions.append(weights[:, None] * (F.T @ np.hstack([np.eye(3), turning])))
+        J = np.vstack(motions)
+        # a triangular factor is the same on all machines, unlike eigenvectors of symmetric contacts
+        factor = np.linalg.cholesky(J.T @ J + TINY * np.eye(J.shape[1]))
+        return to_digits(np.asarray(np.linalg.inv(factor), dtype=np.float64))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Proved:
+    """Discs in which all choices are closed, and larger ones in which one is open."""
+
+    ys: Array
+    """Centres, in plane coordinates, (k, 2)."""
+    radius: float
+    cover: TwistCover
+    limit: float
+    """A radius with an open choice; infinite where none was found."""
+    choice: Array | None
+    """That choice, (k, 3)."""
+
+
+def part_of_disc(piece: FacePiece, y: Array, radius: float) -> Array:
+    """Corners of what a piece has of a polygon around a disc about one of its points, (c, 2)."""
+    turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    rows = np.column_stack([np.cos(turns), np.sin(turns)])
+    return clip(piece.corners, rows, rows @ y + radius)
+
+
+def reach_of(grounds: Grounds, ys: Array) -> float:
+    """The least radius of discs that hold whole pieces, or hardly more."""
+    least = max(
+        float(np.linalg.norm(piece.corners - y, axis=1).max())
+        for piece, y in zip(grounds.pieces, ys, strict=True)
+    )
+    return coarse(least, REACH_DIGITS)
+
+
+def largest_discs(grounds: Grounds, ys: Array, first: float = FIRST_RADIUS) -> Proved | None:
+    """The largest equal discs, up to whole faces, for which a cover is found, if there are any.
+
+    Args:
+        grounds: What contacts may stand on.
+        ys: Centres, in plane coordinates of the pieces, (k, 2).
+        first: The radius to try first.
+    """
+    search = _Search(grounds, ys)
+    search.widen(grounds.cones // COARSE, first, FAST, SLOW - 1.0)
+    search.widen(grounds.cones, SLOW * search.lower or first, SLOW, FINENESS)
+    if search.cover is None:
+        return None
+    search.refute(grounds.cones // REFUTING)
+    return Proved(ys, search.lower, search.cover, search.limit, search.choice)
+
+
+class _Search:
+    """What is known of discs around some centres."""
+
+    def __init__(self, grounds: Grounds, ys: Array) -> None:
+        self.grounds, self.ys, self.axes = grounds, ys, grounds.axes(ys)
+        self.reach = reach_of(grounds, ys)
+        self.lower = 0.0
+        self.limit: float = math.inf
+        self.cover: TwistCover | None = None
+        self.choice: Array | None = None
+
+    def widen(self, cones: int, radius: float, growth: float, fineness: float) -> None:
+        """Try a radius, others larger by a factor each, and then those between."""
+        upper, radius = self.limit, min(radius, 0.5 * (self.lower + self.limit))
+        while radius >= LEAST_RADIUS and upper - self.lower > fineness * self.lower:
+            radius = min(radius, self.reach)
+            if radius <= self.lower:
+                break
+            found = search_cover(self.grounds.discs(self.ys, radius), self.axes, cones)
+            if found.cover is not None:
+                self.lower, self.cover = radius, found.cover
+            else:
+                upper = radius
+                if found.choice is not None:
+                    self.limit, self.choice = radius, found.choice
+            if math.isinf(upper):
+                radius = growth * self.lower
+            else:
+                radius = 0.5 * (self.lower + upper) if self.lower > 0.0 else 0.25 * upper
+
+    def refute(self, cones: int) -> None:
+        """Try larger radii, and then those between, for an open choice."""
+        below, radius = self.lower, (1.0 + NEAR) * self.lower
+        while self.limit - below > NEAR * self.lower and min(radius, self.reach) > below:
+            radius = min(radius, self.reach)
+            found = search_cover(self.grounds.discs(self.ys, radius), self.axes, cones)
+            if found.choice is not None:
+                self.limit, self.choice = radius, found.choice
+            else:
+                below = radius
+            ahead = below + 2.0 * max(below - self.lower, NEAR * self.lower)
+            radius = min(0.5 * (below + self.limit), ahead)

@@ -1,0 +1,115 @@
+"""How a twist moves a contact that may be anywhere in its site, and whether friction resists it.
+
+A motion is six numbers per twist of unit length and contact: the velocity of the contact's point
+along its normal and two tangents, and the turning about these tangents and about the normal.
+"""
+
+import math
+
+import numpy as np
+from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
+
+from grasp_core.arrays import Array
+from grasp_core.regions.sites import AHEAD, TINY, Sites
+
+MOTIONS = 6
+STEPS = 40
+"""Towards the place of a contact where a twist is resisted least."""
+
+
+@njit(cache=True, error_model="numpy")
+def lowest(
+    motion: Array, sites: Sites, i: int, force: tuple[float, float]
+) -> tuple[float, float, float, float]:
+    """Least power of a force n + f t_1 + g t_2 over a contact's site, and where, (n, t_1, t_2)."""
+    f, g = force
+    u, v, w = motion[3] - motion[5] * f, motion[4] - motion[5] * g, f * motion[4] - g * motion[3]
+    least, x, y = np.inf, 0.0, 0.0
+    for corner in range(sites.corners.shape[1]):
+        height = u * sites.corners[i, corner, 1] - v * sites.corners[i, corner, 0]
+        if height < least:
+            least, x, y = height, sites.corners[i, corner, 0], sites.corners[i, corner, 1]
+    length = math.sqrt(u * u + v * v)
+    if sites.radii[i] > 0.0 and length > 0.0:
+        least -= sites.radii[i] * length
+        x += sites.radii[i] * v / length
+        y -= sites.radii[i] * u / length
+    out = -sites.depths[i] if w > 0.0 else sites.depths[i]
+    return motion[0] + f * motion[1] + g * motion[2] + least + out * w, out, x, y
+
+
+@njit(cache=True, error_model="numpy")
+def velocity(
+    motion: Array, place: Array | tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Of a contact that is off its point, along the frame."""
+    out, x, y = place
+    return (
+        motion[0] + motion[3] * y - motion[4] * x,
+        motion[1] - motion[5] * y + motion[4] * out,
+        motion[2] + motion[5] * x - motion[3] * out,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def longest(f: float, g: float, most: float) -> tuple[float, float]:
+    """The tangential part in a direction that friction allows."""
+    length = math.sqrt(f * f + g * g)
+    return (f * most / length, g * most / length) if length > 0.0 else (0.0, 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def holds(sites: Sites, i: int, x: float, y: float) -> bool:
+    """Whether a place in its plane is in a contact's polygon, or in its disc."""
+    if x * x + y * y <= sites.radii[i] ** 2:
+        return True
+    corners, sides = sites.corners[i], 0
+    for place in range(len(corners)):
+        here, there = corners[place - 1], corners[place]
+        sides += int(here[0] != there[0] or here[1] != there[1])
+        ahead = (there[0] - here[0]) * (y - here[1]) - (there[1] - here[1]) * (x - here[0])
+        if ahead < 0.0:
+            return False
+    return sides > 0
+
+
+@njit(cache=True, error_model="numpy")
+def resists(motion: Array, sites: Sites, i: int, shift: Array) -> bool:
+    """Whether a contact may resist a twist wherever it is; else a place, perhaps, where it cannot.
+
+    Where a contact does not slide friction has no power, and otherwise the most that it allows is
+    convex in the place, and steps go to where it is least. False, with a place that resists, where
+    the steps do not suffice.
+    """
+    most = sites.friction[i] * (1.0 - TINY)
+    out, x, y = 0.0, 0.0, 0.0
+    if motion[5] != 0.0:
+        shift[0], shift[1], shift[2] = 0.0, -motion[2] / motion[5], motion[1] / motion[5]
+        if holds(sites, i, shift[1], shift[2]) and velocity(motion, shift)[0] <= 0.0:
+            return False
+    for step in range(STEPS):
+        _, q, r = velocity(motion, (out, x, y))
+        least, out_ahead, x_ahead, y_ahead = lowest(motion, sites, i, longest(q, r, most))
+        if least > AHEAD:
+            return True
+        share = 2.0 / (step + 2.0)
+        out += share * (out_ahead - out)
+        x += share * (x_ahead - x)
+        y += share * (y_ahead - y)
+        p, q, r = velocity(motion, (out, x, y))
+        if p + sites.friction[i] * math.sqrt(q * q + r * r) <= 0.0:
+            break
+    shift[0], shift[1], shift[2] = out, x, y
+    return False
+
+
+@njit(cache=True, error_model="numpy")
+def is_open(motions: Array, sites: Sites, shifts: Array) -> bool:
+    """Whether no contact resists a twist at the places that are filled in."""
+    for i in range(len(sites.points)):
+        if resists(motions[i], sites, i, shifts[i]):
+            return False
+        p, q, r = velocity(motions[i], (shifts[i, 0], shifts[i, 1], shifts[i, 2]))
+        if p + sites.friction[i] * math.sqrt(q * q + r * r) > 0.0:
+            return False
+    return True

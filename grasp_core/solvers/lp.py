@@ -1,0 +1,277 @@
+"""Linear program -> optimum or proof that there is none, re-checked; the door to HiGHS.
+
+    maximise c.x  subject to  A x <= b,  A_eq x = b_eq,  x free.
+
+An optimum comes with multipliers y >= 0, z such that c = A'y + A_eq'z, which bound every
+feasible value by b.y + b_eq.z. An infeasible program comes with y >= 0, z such that
+A'y + A_eq'z = 0 and b.y + b_eq.z < 0, which no feasible x survives. Both are checked in
+plain arithmetic before they are returned; the solver's status is not believed.
+
+Programs go to a compiled dual simplex method first; it names the rows of a best vertex, and the
+vertex and its multipliers are solved for afresh. What it leaves or gets wrong goes to HiGHS, and so
+does everything where there are no kernels (`GRASPPROOF_KERNELS=off`).
+"""
+
+import importlib
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.compiled import compiled
+from grasp_core.errors import SolverError
+
+RESIDUAL = 1e-8
+"""Largest accepted violation, for programs whose data are of order one (the planner scales
+objects to unit size): ten times the tolerance the solver is asked for."""
+FARTHEST = 1e4
+"""A proof of infeasibility excludes all points with |x|_1 up to this, at unit size."""
+
+KERNEL = "grasp_core.solvers.lp_kernel"
+STRATEGIES = (1, 4)
+"""HiGHS's dual and primal simplex, in the order they are tried: one program in some thousand ends
+as unknown under the one and is solved under the other."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearProgram:
+    """Data of one program; the equality part may be empty."""
+
+    c: Array
+    """Objective, (n,)."""
+    A: Array
+    """(rows, n)"""
+    b: Array
+    """(rows,)"""
+    A_eq: Array | None = None
+    """(equalities, n)"""
+    b_eq: Array | None = None
+    """(equalities,)"""
+
+    def stacked(self) -> tuple[Array, Array]:
+        """Inequality rows, then equality rows, with their right-hand sides."""
+        if self.A_eq is None or self.b_eq is None:
+            return self.A, self.b
+        return np.vstack([self.A, self.A_eq]), np.concatenate([self.b, self.b_eq])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Optimum:
+    """A best point, with the multipliers that prove it is best."""
+
+    x: Array
+    value: float
+    multipliers: Array
+    """(rows + equalities,); the first `rows` are non-negative."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Infeasible:
+    """No point with |x|_1 <= `FARTHEST` is feasible, by a combination of the rows (Farkas)."""
+
+    multipliers: Array
+    """(rows + equalities,)"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Below:
+    """No feasible value reaches the cutoff, by multipliers y >= 0, z as those of an optimum."""
+
+    bound: float
+    """b.y + b_eq.z"""
+    multipliers: Array
+    """(rows + equalities,)"""
+
+
+def maximize(program: LinearProgram) -> Optimum | Infeasible:
+    """Solve a linear program, or prove that it has no feasible point.
+
+    Raises:
+        SolverError: The solver's answer failed our check, or the program is unbounded.
+    """
+    found = maximize_above(program, -math.inf)
+    if isinstance(found, Below):
+        raise SolverError("called below minus infinity")
+    return found
+
+
+def maximize_above(program: LinearProgram, cutoff: float) -> Optimum | Infeasible | Below:
+    """As `maximize`, but a bound below a cutoff may end the search.
+
+    Args:
+        program: Its data are of order one.
+        cutoff: Smaller values are not worth having.
+
+    Raises:
+        SolverError: As `maximize`.
+    """
+    if compiled(KERNEL) is not None:
+        try:
+            return _by_simplex(program, cutoff)
+        except (SolverError, np.linalg.LinAlgError):
+            pass
+    return _by_highs(program)
+
+
+def _by_highs(program: LinearProgram) -> Optimum | Infeasible:
+    failure = SolverError("no way of solving was tried")
+    for strategy in STRATEGIES:
+        try:
+            return _solved(program, strategy)
+        except SolverError as error:
+            failure = error
+    return _refuted_by_least_violation(program, failure)
+
+
+def _refuted_by_least_violation(program: LinearProgram, failure: SolverError) -> Infeasible:
+    """Infeasible if every point violates some row: the least violation always exists.
+
+    The violation, a further variable, is kept above -1 to bound it.
+    """
+    G, h = program.stacked()
+    rows = len(program.b)
+    relaxed = np.vstack([G, -G[rows:]])
+    limits = np.concatenate([h, -h[rows:]])
+    violation = np.append(np.zeros(G.shape[1]), -1.0)
+    with_violation = np.vstack([np.hstack([relaxed, -np.ones((len(relaxed), 1))]), violation])
+    limits = np.append(limits, 1.0)
+    answer = _solved(LinearProgram(violation, with_violation, limits), STRATEGIES[0])
+    if not isinstance(answer, Optimum) or answer.value > -RESIDUAL:
+        raise failure
+    multipliers = answer.multipliers[: len(G)].copy()
+    multipliers[rows:] -= answer.multipliers[len(G) : -1]
+    return _checked_ray(program, multipliers)
+
+
+def _by_simplex(program: LinearProgram, cutoff: float) -> Optimum | Infeasible | Below:
+    G, h = program.stacked()
+    count, n = G.shape
+    kernel, basis = compiled(KERNEL), np.empty(n, dtype=np.int64)
+    ended = kernel.Vertex(basis, np.empty(n), np.empty(n))
+    norms = np.maximum(np.sqrt(np.einsum("ki,ki->k", G, G)), RESIDUAL)
+    rows = kernel.Rows(np.array(G.T, order="C"), np.array(h), norms, count - len(program.b))
+    status, against = kernel.solve(program.c, rows, cutoff, ended)
+    if status == kernel.LOST:
+        raise SolverError("the simplex method did not end")
+    basis.sort()
+    vertex = np.vstack([G, np.repeat(np.eye(n), 2, axis=0)])[basis]
+    multipliers = np.zeros(count + 2 * n)
+    if status == kernel.INFEASIBLE:
+        row = rows.At[:, against]  # an equality may have been turned
+        multipliers[basis] = -np.linalg.solve(vertex.T, row)
+        as_given = (row == G[against]).all() and rows.b[against] == h[against]
+        multipliers[against] = 1.0 if as_given else -1.0
+        if np.abs(multipliers[count:]).max() > RESIDUAL:
+            raise SolverError("infeasible only inside the box of the simplex method")
+        return _checked_ray(program, multipliers[:count])
+    multipliers[basis] = np.linalg.solve(vertex.T, program.c)
+    if status == kernel.BELOW:
+        return _checked_bound(program, multipliers[:count], cutoff)
+    if basis[-1] >= count:
+        raise SolverError("the simplex method ended at its box")
+    x = np.asarray(np.linalg.solve(vertex, h[basis]), dtype=np.float64)
+    return _checked_optimum(program, x, multipliers[:count])
+
+
+def _checked_bound(program: LinearProgram, multipliers: Array, cutoff: float) -> Below:
+    G, h = program.stacked()
+    multipliers[: len(program.b)] = np.maximum(multipliers[: len(program.b)], 0.0)
+    off = float(np.abs(program.c - G.T @ multipliers).max())
+    bound = float(h @ multipliers)
+    if not (off <= RESIDUAL and bound <= cutoff):  # nor if one is not a number
+        raise SolverError(f"called below {cutoff:.3g}, but the bound is {bound:.3g}")
+    return Below(bound, multipliers)
+
+
+def _solved(program: LinearProgram, strategy: int) -> Optimum | Infeasible:
+    solver, status = _run(program, strategy)
+    kinds = _highspy().HighsModelStatus
+    if status == kinds.kOptimal:
+        solution = solver.getSolution()
+        x, duals = np.array(solution.col_value), np.array(solution.row_dual)
+        return _checked_optimum(program, x, duals)
+    if status == kinds.kInfeasible:
+        return _checked_ray(program, np.array(solver.getDualRay()[2]))
+    raise SolverError(f"the linear program ended as {solver.modelStatusToString(status)}")
+
+
+def _checked_optimum(program: LinearProgram, x: Array, duals: Array) -> Optimum:
+    G, h = program.stacked()
+    rows = len(program.b)
+    slack = h - G @ x
+    stationarity = np.abs(program.c - G.T @ duals).max()
+    scale = 1.0 + float(np.abs(x).max(initial=0.0))
+    value = float(program.c @ x)
+    failures = {
+        "a row is violated": np.max([-slack[:rows].min(initial=0.0), np.abs(slack[rows:]).max(initial=0.0)]),  # noqa: E501
+        "a multiplier is negative": -duals[:rows].min(initial=0.0),
+        "the multipliers do not give the objective": stationarity,
+        "the bound does not meet the value": abs(float(h @ duals) - value),
+    }  # fmt: skip
+    for failure, size in failures.items():
+        if not size <= RESIDUAL * scale:  # nor if it is not a number
+            raise SolverError(f"{failure} by {size:.3g}, allowed {RESIDUAL * scale:.3g}")
+    return Optimum(x, value, duals)
+
+
+def _checked_ray(program: LinearProgram, ray: Array) -> Infeasible:
+    G, h = program.stacked()
+    rows = len(program.b)
+    unit = ray / max(float(np.abs(ray).max(initial=0.0)), np.finfo(np.float64).tiny)
+    for multipliers in (unit, -unit):
+        if multipliers[:rows].min(initial=0.0) < -RESIDUAL:
+            continue
+        multipliers[:rows] = np.maximum(multipliers[:rows], 0.0)
+        combined = np.abs(G.T @ multipliers).max(initial=0.0)
+        if -float(h @ multipliers) > FARTHEST * combined + RESIDUAL:
+            return Infeasible(multipliers)
+    raise SolverError("called infeasible, but the proof does not check")
+
+
+def _run(program: LinearProgram, strategy: int) -> tuple[Any, Any]:
+    highspy = _highspy()
+    G, h = program.stacked()
+    lower = np.full(len(h), -np.inf)
+    lower[len(program.b) :] = h[len(program.b) :]
+    model = highspy.HighsLp()
+    model.num_col_, model.num_row_ = G.shape[1], G.shape[0]
+    model.sense_ = highspy.ObjSense.kMaximize
+    model.col_cost_ = program.c
+    model.col_lower_ = np.full(G.shape[1], -np.inf)
+    model.col_upper_ = np.full(G.shape[1], np.inf)
+    model.row_lower_, model.row_upper_ = lower, h
+    model.a_matrix_.format_ = highspy.MatrixFormat.kRowwise
+    filled = G != 0.0
+    model.a_matrix_.start_ = np.concatenate([[0], np.cumsum(filled.sum(axis=1))])
+    model.a_matrix_.index_ = np.nonzero(filled)[1]
+    model.a_matrix_.value_ = G[filled]
+    solver = _solver()
+    solver.clearSolver()
+    solver.setOptionValue("simplex_strategy", strategy)
+    solver.passModel(model)
+    solver.run()
+    return solver, solver.getModelStatus()
+
+
+@cache
+def _highspy() -> Any:
+    return importlib.import_module("highspy")
+
+
+@cache
+def _solver() -> Any:
+    solver = _highspy().Highs()
+    options = {
+        "output_flag": False,
+        "threads": 1,
+        "presolve": "off",  # keeps the proof of infeasibility
+        "solver": "simplex",
+        "primal_feasibility_tolerance": 1e-9,
+        "dual_feasibility_tolerance": 1e-9,
+    }
+    for name, value in options.items():
+        solver.setOptionValue(name, value)
+    return solver

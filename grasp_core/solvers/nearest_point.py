@@ -1,0 +1,133 @@
+"""The point of a polyhedron that is nearest to the origin, for many polyhedra with equal normals.
+
+Solved: minimise |x| subject to C x <= d, for every row d of D.
+
+A point x is nearest iff C x <= d and x = -C'u for some u >= 0 that vanishes off the active rows,
+those with equality. A compiled dual active-set method finds x and u; what it leaves, or what does
+not meet these conditions, is found as it all is where there are no kernels
+(`GRASPPROOF_KERNELS=off`). Least squares give u (Lawson & Hanson): with the residual (y, s) of
+
+    minimise |C'v|^2 + (1 + d.v)^2  over  v >= 0
+
+x = -y / s and u = v / s; where the residual vanishes, v proves that nothing is feasible. Active
+rows a alone give x = C_a^+ d_a, linear in d, so those of one d are tried on others: for loads
+along a path or along few directions, few programs need to be solved.
+
+Source: Lawson & Hanson, "Solving Least Squares Problems", 1974, chapter 23.
+"""
+
+import importlib
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import compiled
+
+KERNEL = "grasp_core.solvers.nearest_point_kernel"
+EXACT = 1e-11
+"""Violation of the conditions that is accepted, relative to x: some thousand times the rounding of
+such numbers, a hundred times less than any use can tell apart."""
+TRIED = 200
+"""Active rows are tried on so many others, which takes about twice as long as finding them."""
+WORTH = 2
+"""They pay if they serve more than so many; while they do not, they are tried half as often."""
+
+
+def least_distance(C: Array, D: Array, *, accuracy: float = EXACT) -> Array:
+    """The nearest points, (n, v), as rows; NaN where none was found that meets the conditions.
+
+    A row of the answer does not depend on the other rows of D, but for rounding.
+
+    Args:
+        C: (m, v)
+        D: (n, m)
+        accuracy: Violation of the conditions that is accepted, relative to x; active rows that are
+            nearly parallel need more than `EXACT`.
+    """
+    X = np.zeros((len(D), C.shape[1]))
+    outside = np.flatnonzero(D.min(axis=1) < 0.0)
+    sizes = -D[outside].min(axis=1)[:, None]
+    alike = D[outside] / sizes
+    near, proved = np.zeros((len(alike), C.shape[1])), np.zeros(len(alike), dtype=bool)
+    if compiled(KERNEL) is not None:
+        near, proved = _by_kernel(C, alike, accuracy)
+    if not proved.all():
+        near[~proved] = _by_least_squares(C, alike[~proved])
+    X[outside] = sizes * near
+    return X
+
+
+def _by_kernel(C: Array, D: Array, accuracy: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Points of the compiled method, (n, v), and which are proved to be nearest."""
+    X, U = np.zeros((len(D), C.shape[1])), np.zeros(D.shape)
+    compiled(KERNEL).solve(np.array(C, order="C"), np.array(D, order="C"), X, U)
+    slack = D - X @ C.T
+    unmet = np.abs(X + U @ C).max(axis=1, initial=0.0)
+    np.maximum(unmet, -slack.min(axis=1), out=unmet)
+    np.maximum(unmet, np.where(U != 0.0, slack, 0.0).max(axis=1), out=unmet)
+    np.maximum(unmet, -U.min(axis=1), out=unmet)
+    return X, unmet <= accuracy * np.abs(X).max(axis=1, initial=1.0)
+
+
+def _by_least_squares(C: Array, D: Array) -> Array:
+    """Nearest points, (n, v), where every row of D has a negative entry."""
+    X, V = np.zeros((len(D), C.shape[1])), np.zeros(D.shape)
+    waiting, solved = np.ones(len(D), dtype=bool), np.zeros(len(D), dtype=bool)
+    pause, wait = 1, 0
+    for i in range(len(D)):
+        if not waiting[i]:
+            continue
+        V[i] = _weights(C, D[i])
+        solved[i], waiting[i], wait = True, False, wait - 1
+        others = np.flatnonzero(waiting[i : i + TRIED]) + i
+        if others.size and wait < 0:
+            near, proved = _on_rows(C, D[others], np.flatnonzero(V[i]))
+            X[others[proved]], waiting[others[proved]] = near[proved], False
+            pause = 1 if np.count_nonzero(proved) > WORTH else 2 * pause
+            wait = pause - 1
+    X[solved] = _from_weights(C, D[solved], V[solved])
+    return X
+
+
+def _weights(C: Array, d: Array) -> Array:
+    """The v of the module's text; zero if there are too many iterations."""
+    target = np.zeros(C.shape[1] + 1)
+    target[-1] = -1.0
+    try:
+        return _optimize().nnls(np.vstack([C.T, d]), target)[0]
+    except RuntimeError:
+        return np.zeros(len(d))
+
+
+def _from_weights(C: Array, D: Array, V: Array) -> Array:
+    """The nearest points that weights stand for, checked, and corrected where they fail."""
+    left = np.maximum(1.0 + (D * V).sum(axis=1, keepdims=True), np.finfo(np.float64).eps)
+    X = -(V @ C) / left
+    slack = D - X @ C.T
+    unmet = np.maximum(-slack.min(axis=1), np.where(V > 0.0, slack, 0.0).max(axis=1))
+    for i in np.flatnonzero(~(unmet <= _allowed(X))):
+        near, proved = _on_rows(C, D[i : i + 1], np.flatnonzero(V[i]))
+        X[i] = near[0] if proved[0] else np.nan
+    return X
+
+
+def _on_rows(C: Array, D: Array, active: Indices) -> tuple[Array, NDArray[np.bool_]]:
+    """Nearest points if these rows are the active ones, (n, v), and which are proved to be."""
+    inverse = np.linalg.pinv(C[active])
+    X = D[:, active] @ inverse.T
+    slack, multipliers = D - X @ C.T, -(X @ inverse)
+    unmet = np.maximum(-slack.min(axis=1), slack[:, active].max(axis=1, initial=0.0))
+    unmet = np.maximum(unmet, -multipliers.min(axis=1, initial=0.0))
+    return X, unmet <= _allowed(X)
+
+
+def _allowed(X: Array) -> Array:
+    return EXACT * np.abs(X).max(axis=1, initial=1.0)
+
+
+@cache
+def _optimize() -> Any:
+    return importlib.import_module("scipy.optimize")

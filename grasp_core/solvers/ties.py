@@ -1,0 +1,149 @@
+"""Equal candidates are decided by a rule with a margin, never by the last digits of a number.
+
+Two machines, or two ways to write the same object down, give numbers that differ in their last
+digits. Where candidates are equal in truth, a plain comparison would pick another one on each.
+These rules replace it wherever something is chosen.
+
+1. *Optima of linear programs* are often faces of the feasible set, not points. Of all points whose
+   value is within `SAME_VALUE` of the best, `nearest_optimum` takes the one nearest to the origin
+   of the variables. It is unique, as the squared distance is strictly convex, and it moves
+   only as far as rounding moves the rows, times a constant of the program.
+2. *The best of several:* `first_best` takes the first one that is within a margin of the best.
+   Where candidates come one by one, a later one has to be better by a margin, see `surpassing`.
+3. *Orders:* `smallest_first` calls numbers equal that a chain of small gaps connects, so that a
+   second key decides, as a rule the faces, ascending. Of numbers that come one by one, `graded`
+   counts the cells of a grid up to each. The grid is shifted by a fraction that no ratio of small
+   whole numbers comes near: the numbers of regular objects (0, 1/2, 1/3) are far from borders.
+4. *Searches of many steps*, whose every comparison would need a margin, are told no last digits:
+   compiled loops are given numbers that lie on a grid, see `on_grid`. Their sums have one order on
+   all machines, so that they decide alike. What they find is proved for the exact numbers.
+
+What is left to chance is a number that comes within rounding of a border by accident: with
+fourteen good digits and cells of 1e-7, one in ten million.
+"""
+
+import math
+from typing import overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import SHIFT, Array, Indices
+from grasp_core.solvers.lp import LinearProgram, Optimum
+from grasp_core.solvers.nearest_point import least_distance
+
+SAME_VALUE = 1e-5
+"""Share of a program's value that the nearest optimum may give up: with less, optima are slivers in
+which rounding moves the nearest point farther."""
+FOUND = 1e-7
+"""How far the nearest optimum may miss its conditions. They are met by far or not at all: an answer
+near this border would be taken on one machine only."""
+GRID_DIGITS = 9
+"""Digits after the point that searches of many steps are told, at size one."""
+FEASIBLE = 1e-9
+"""How far it may be beyond a row."""
+SAME_DIGITS = 7
+"""Figures are equal to so many digits after the point (object size one), unless told otherwise."""
+SAME_SHARE = 1e-6
+"""Figures whose difference is a smaller share of the best are equal."""
+
+
+@overload
+def graded(values: float, digits: int = SAME_DIGITS) -> float: ...
+@overload
+def graded(values: Array, digits: int = SAME_DIGITS) -> Array: ...
+def graded(values: float | Array, digits: int = SAME_DIGITS) -> float | Array:
+    """Number of the cell in which each value lies, of any shape; equal values share a cell.
+
+    Args:
+        values: Infinite ones lie in infinite cells.
+        digits: After the point, how narrow cells are.
+    """
+    cells = np.floor(np.asarray(values, dtype=np.float64) * 10.0**digits + SHIFT)
+    return cells if cells.ndim else float(cells)
+
+
+@overload
+def coarse(values: float, digits: int = SAME_DIGITS) -> float: ...
+@overload
+def coarse(values: Array, digits: int = SAME_DIGITS) -> Array: ...
+def coarse(values: float | Array, digits: int = SAME_DIGITS) -> float | Array:
+    """The upper end of each value's cell: an upper bound that equal values share."""
+    return (graded(values, digits) + (1.0 - SHIFT)) * 10.0**-digits
+
+
+def on_grid(values: Array, digits: int = GRID_DIGITS) -> Array:
+    """A number of each value's cell, of any shape, so that equal values share all bits.
+
+    It has so many digits after the point, and is at most 0.62 units of the last one away.
+    """
+    return graded(values, digits) * 10.0**-digits
+
+
+def ranks(values: ArrayLike, share: float = SAME_SHARE) -> Indices:
+    """Place of each number among its like, (n,): 0 for the smallest and all that equal it.
+
+    Args:
+        values: (n,)
+        share: Neighbours are equal if their gap is a smaller share of the larger one in size.
+    """
+    numbers = np.asarray(values, dtype=np.float64)
+    order = np.argsort(numbers, kind="stable")
+    ordered = numbers[order]
+    sizes = np.where(np.isfinite(ordered), np.abs(ordered), 0.0)
+    with np.errstate(invalid="ignore"):  # infinities are equal to themselves, and to nothing else
+        near = np.diff(ordered) <= share * np.maximum(sizes[1:], sizes[:-1])
+    apart = ~near & (ordered[1:] != ordered[:-1])
+    found = np.empty(len(numbers), dtype=np.int64)
+    found[order] = np.concatenate([[0], np.cumsum(apart)])[: len(numbers)]
+    return found
+
+
+def smallest_first(values: ArrayLike) -> list[int]:
+    """Places of numbers in rising order, (n,); equal ones stay in the order in which they come."""
+    return [int(place) for place in np.argsort(ranks(values), kind="stable")]
+
+
+def largest_first(values: ArrayLike) -> list[int]:
+    """As `smallest_first`, in falling order."""
+    return smallest_first(-np.asarray(values, dtype=np.float64))
+
+
+def first_best(values: ArrayLike, margin: float | None = None) -> int:
+    """Place of the first value that is as large as the largest, ties apart.
+
+    Args:
+        values: (n,), at least one.
+        margin: By how much less counts as equal; a share of the largest one if not given.
+    """
+    numbers = np.asarray(values, dtype=np.float64)
+    best = float(numbers.max())
+    allowed = SAME_SHARE * abs(best) if margin is None else margin
+    near = numbers >= best - allowed if math.isfinite(best) else numbers == best
+    return int(np.argmax(near))
+
+
+def surpassing(best: float) -> float:
+    """What a challenger's figure must exceed to be larger than the best so far, ties apart."""
+    return best + SAME_SHARE * abs(best) if math.isfinite(best) else best
+
+
+def nearest_optimum(program: LinearProgram, optimum: Optimum, share: float = SAME_VALUE) -> Array:
+    """Of all optima of a program the one nearest to the origin, (n,).
+
+    Args:
+        program: Its data are of order one.
+        optimum: One of its optima.
+        share: What may be given up of the value, as a share of 1 + |value|.
+
+    Returns:
+        A point that meets all rows with such a value; the optimum itself if the nearest one cannot
+        be found.
+    """
+    G, h = program.stacked()
+    kept = optimum.value - share * (1.0 + abs(optimum.value))
+    equalities = slice(len(program.b), None)
+    rows = np.vstack([G, -program.c[None], -G[equalities]])
+    limits = np.concatenate([h, [-kept], -h[equalities]])
+    (x,) = least_distance(rows, limits[None], accuracy=FOUND)
+    return x if float((rows @ x - limits).max()) <= FEASIBLE else optimum.x  # nor if there is none

@@ -1,0 +1,197 @@
+"""What moved in a scene -> a clip, drawn in a process of its own, where graphics are available.
+
+Motions of a grasp that holds are micrometres: they can be shown larger than they are. Since the
+first sample, shifts and turns of the object about the point between the contacts, and the slides
+of the fingertips, are multiplied by one factor, so that who moves with whom stays visible.
+"""
+
+import importlib
+import math
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array
+from grasp_core.errors import GraspError, InputError
+from grasp_core.files.whole_files import write_parts
+from scenes.drawing.palette import FINGERS, rgb
+from scenes.mjcf import Scene
+
+FORMATS = (".gif", ".webp")
+ANGLES_DEG = (-50.0, 25.0)
+"""Where the camera is, if not told otherwise: azimuth and elevation."""
+SIZE = (480, 360)
+"""Of the picture [pixels]."""
+RATE = 25.0
+"""Frames per second."""
+NEARER = 0.9
+"""Fingertips may come so much nearer to the border of the picture than the object."""
+RIGID = 7
+"""Numbers of a scene whose fingertips do not slide: the pose of the object."""
+VISIBLE = 0.1
+"""Motion that is easily seen, in grasp sizes."""
+MOST = 1000.0
+"""Times that motions are multiplied."""
+PATIENCE_S = 300.0
+
+
+class GraphicsError(GraspError):
+    """Nothing can be drawn on this machine."""
+
+
+def write_clip(
+    scene: Scene, joints: Array, path: Path, caption: str, *, angles_deg: ArrayLike = ANGLES_DEG
+) -> Path:
+    """Draw what moved in a scene, a frame for each sample.
+
+    Args:
+        scene: What was simulated.
+        joints: Position and quaternion of the object's frame, then the slides of the fingertips
+            along the axes of their contacts, (n, 7 + 3k) [m].
+        path: Of the file to write, gif or webp.
+        caption: Written into the picture.
+        angles_deg: Azimuth and elevation of the camera as seen from the object, (2,) or for each
+            frame, (n, 2).
+
+    Raises:
+        InputError: The file's name ends otherwise.
+        GraphicsError: No graphics library draws here; the message has its words.
+    """
+    require_clip(path)
+    with tempfile.TemporaryDirectory() as folder:
+        job, out = Path(folder) / "job.npz", Path(folder) / f"clip{path.suffix.lower()}"
+        np.savez(
+            job, xml=scene.xml, joints=joints, size=SIZE, radius=_reach(scene, joints), rate=RATE,
+            caption=caption, angles=np.broadcast_to(angles_deg, (len(joints), 2)),
+            colours=[rgb(colour) for colour in FINGERS],
+        )  # fmt: skip
+        said = ""
+        for graphics in _graphics():
+            said = _drawn(job, out, graphics)
+            if not said:
+                return write_parts(path, [out.read_bytes()])
+    raise GraphicsError(f"no graphics: {said}; {remedy()}")
+
+
+def _reach(scene: Scene, joints: Array) -> float:
+    """How far from the object's centre there is something to see [m]."""
+    layout = scene.layout
+    slides = np.zeros((1, len(layout.contacts), 3))
+    if joints.shape[1] > RIGID:
+        slides = joints[:, RIGID:].reshape(len(joints), len(layout.contacts), 3)
+    tips = layout.tip_centers + np.einsum("kij,nkj->nki", layout.frames, slides)
+    farthest = float(np.linalg.norm(tips, axis=2).max()) + layout.drive.radius_m
+    return max(layout.radius_m, NEARER * farthest)
+
+
+def require_clip(path: Path) -> None:
+    """That a file is to be a clip.
+
+    Raises:
+        InputError: Its name ends otherwise.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise InputError(f"{path}: clips end in {' or '.join(FORMATS)}")
+
+
+def available_graphics() -> str:
+    """What MuJoCo's renderer can draw with here.
+
+    Raises:
+        GraphicsError: Nothing; the message says what was tried.
+    """
+    said = list[str]()
+    for graphics in _graphics():
+        trouble = _run_frames(graphics, [])
+        if not trouble:
+            return graphics
+        said.append(trouble)
+    raise GraphicsError("; ".join(said))
+
+
+def remedy() -> str:
+    """What would help where there are no graphics."""
+    if (chosen := os.environ.get("MUJOCO_GL")) is not None:
+        return f"MUJOCO_GL is set to {chosen!r}: unset it to have others tried"
+    return "install libegl1 or libosmesa6, or use a display"
+
+
+def has_display() -> bool:
+    """Whether MuJoCo's viewer has a display to open on."""
+    if sys.platform != "linux":
+        return True
+    return any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+
+
+def _graphics() -> Iterator[str]:
+    """What MuJoCo may draw with, in the order to try."""
+    chosen = os.environ.get("MUJOCO_GL")
+    if chosen is not None:
+        yield chosen
+    elif sys.platform == "linux":
+        yield from ("egl", "osmesa", *(["glfw"] if os.environ.get("DISPLAY") else []))
+    else:
+        yield ""
+
+
+def _drawn(job: Path, out: Path, graphics: str) -> str:
+    """Draw in another process; what went wrong, empty if nothing."""
+    trouble = _run_frames(graphics, [str(job), str(out)])
+    return trouble or ("" if out.is_file() else f"{graphics}: nothing was drawn")
+
+
+def _run_frames(graphics: str, arguments: list[str]) -> str:
+    """Run the program that draws, or without arguments sees whether it could; what went wrong."""
+    program = str(Path(__file__).with_name("frames.py"))
+    command = [sys.executable, "-P", program, *arguments]
+    settings = {**os.environ, "MUJOCO_GL": graphics}
+    try:
+        ran = subprocess.run(  # noqa: S603 - our own program
+            command, env=settings, capture_output=True, timeout=PATIENCE_S, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return f"{graphics} took more than {PATIENCE_S:g} s"
+    if ran.returncode == 0:
+        return ""
+    words = ran.stderr.decode(errors="replace").strip().splitlines()
+    return f"{graphics}: {words[-1] if words else f'ended with {ran.returncode}'}"
+
+
+def magnified(joints: Array, scene: Scene) -> tuple[Array, float]:
+    """Motions made large enough to be seen.
+
+    Args:
+        joints: As for `write_clip`, (n, 7 + 3k).
+        scene: Where they come from.
+
+    Returns:
+        The same from the planned pose on, with every motion since the first sample multiplied,
+        and by how much: one significant digit, at least 1.
+    """
+    center, size = scene.layout.center, scene.layout.grasp_size_m
+    rotation: Any = importlib.import_module("scipy.spatial.transform").Rotation
+    poses = rotation.from_quat(joints[:, 3:7], scalar_first=True)
+    turns = (poses * poses[0].inv()).as_rotvec()
+    centers = joints[:, :3] + poses.apply(center)
+    shifts, slides = centers - centers[0], joints[:, 7:] - joints[0, 7:]
+    largest = float((np.linalg.norm(shifts, axis=1) + size * np.linalg.norm(turns, axis=1)).max())
+    factor = _rounded_down(VISIBLE * size / max(largest, VISIBLE * size / MOST))
+    larger = rotation.from_rotvec(factor * turns)
+    places = center + factor * shifts - larger.apply(center)
+    quaternions = larger.as_quat(scalar_first=True)
+    return np.column_stack([places, quaternions, factor * slides]), factor
+
+
+def _rounded_down(factor: float) -> float:
+    """The next smaller number of one significant digit, at least 1."""
+    if factor < 1.0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(factor))
+    return math.floor(factor / power) * power

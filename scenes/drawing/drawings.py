@@ -1,0 +1,166 @@
+"""What is drawn of a grasp, after the figures of the paper.
+
+The object is glass. On its outside fingers are long bars; on its inside, at each contact, is the
+friction cone and in it the cone of forces that the construction used. Lines of force run through
+the focus points; a pencil also shows the plane of each pair, a regulus the surface of its lines.
+Pictures and turnable pages draw what is listed here.
+"""
+
+import math
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import coefficient
+from grasp_core.cones.spanning import angles_between
+from grasp_core.objects.on_faces import check_on_faces
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Grasp
+from scenes.drawing.ruled_surfaces import between, rulings
+from scenes.drawing.shapes import Shape, closed, cone_rim, cone_sides, tube
+
+BAR_LENGTH, BAR_RADIUS = 0.75, 0.05
+"""Of a finger, in object radii."""
+CONE_LENGTH = 0.42
+"""Of a cone's sides, in object radii."""
+BEYOND = 0.2
+"""How far lines go on behind the points that they are drawn for, in object radii."""
+REACH = 0.95
+"""How far from the object's centre the surface of a regulus is drawn, in object radii."""
+FARTHEST = 4.0
+"""Length of a line of force at most, and how far foci of planes that are drawn are from the centre,
+in object radii; the foci of built-in objects are within three."""
+SLACK_RAD = 1e-6
+"""By which a force cone may seem to stick out of its friction cone."""
+POLYGON = 3
+"""Corners of the smallest region that can be shaded."""
+MOST_TRIANGLES = 2500
+"""Of the glass: finer surfaces are drawn coarser."""
+
+
+def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, ...]:
+    """Everything that is drawn of a grasp.
+
+    Args:
+        body: The object.
+        grasp: On it.
+        friction: Coulomb coefficient of the friction cones.
+
+    Returns:
+        Shapes in the object's frame. Force cones that are wider than this friction allows are left
+        out.
+
+    Raises:
+        InputError: The friction is not positive, or the grasp is not on this object.
+    """
+    coefficient(friction)
+    check_on_faces(body, grasp)
+    shapes = [*glass(body)]
+    for finger in range(len(grasp.contacts)):
+        shapes += _finger(body, grasp, finger, math.atan(friction))
+    shapes += _family(body, grasp)
+    return (*shapes, Shape("contact", points=grasp.positions))
+
+
+def glass(body: Polyhedron) -> tuple[Shape, ...]:
+    """The object: its surface, and the borders of its faces."""
+    loops = [loop for face in body.faces for loop in (face.polygon, *face.holes)]
+    return (
+        Shape("object", polygons=_panes(body)),
+        Shape("edge", lines=tuple(closed(loop) for loop in loops)),
+    )
+
+
+def _panes(body: Polyhedron) -> tuple[Array, ...]:
+    """Pieces of planar faces, or the triangles of a curved surface."""
+    if body.patches is None:
+        return tuple(piece for face in body.faces for piece in face.pieces)
+    fine = len(body.triangles) > MOST_TRIANGLES
+    return tuple(_coarse(body) if fine else body.vertices[body.triangles])
+
+
+def _coarse(body: Polyhedron) -> Array:
+    """Triangles between the middles of cells of a grid, (t, 3, 3) [m]: what they join stays joined.
+
+    Each vertex moves to the middle of those in its cell; triangles inside one cell or along two
+    are gone.
+    """
+    cells = math.sqrt(MOST_TRIANGLES) / 2.0
+    low = body.vertices.min(axis=0)
+    size = float((body.vertices.max(axis=0) - low).max()) / cells
+    places = np.floor((body.vertices - low) / size).astype(np.int64)
+    _, owners = np.unique(places, axis=0, return_inverse=True)
+    owners = owners.reshape(-1)
+    counts = np.bincount(owners)
+    middles = np.stack([np.bincount(owners, axis) / counts for axis in body.vertices.T], axis=1)
+    joined = owners[body.triangles]
+    a, b, c = joined.T
+    joined = joined[(a != b) & (b != c) & (c != a)]
+    _, first = np.unique(np.sort(joined, axis=1), axis=0, return_index=True)
+    return middles[joined[np.sort(first)]]
+
+
+def _finger(body: Polyhedron, grasp: Grasp, finger: int, half_angle: float) -> list[Shape]:
+    contact, cone = grasp.contacts[finger], grasp.force_cones[finger]
+    tip, length = contact.position, CONE_LENGTH * body.radius
+    ways = grasp.approach_directions
+    inward = contact.normal if ways is None else ways[finger]
+    bar = tube(tip, tip - BAR_LENGTH * body.radius * inward, BAR_RADIUS * body.radius)
+    rim = cone_rim(tip, contact.normal, half_angle, length)
+    spokes = [np.array([tip, corner]) for corner in rim[::5]]
+    shapes = [
+        Shape("finger", finger, polygons=bar),
+        Shape("friction cone", finger, lines=(closed(rim), *spokes)),
+    ]
+    lean = float(angles_between(cone.axis, contact.normal))
+    if lean + cone.half_angle <= half_angle + SLACK_RAD:
+        sides = cone_sides(tip, cone.axis, cone.half_angle, length)
+        shapes.append(Shape("force cone", finger, polygons=sides))
+    region = grasp.regions[finger].polygon
+    if len(region) >= POLYGON:
+        shapes.append(Shape("region", finger, polygons=(region,)))
+    return shapes
+
+
+def _family(body: Polyhedron, grasp: Grasp) -> list[Shape]:
+    """Lines of force, and what shows that they are of the grasp's family."""
+    if grasp.family == "regulus":
+        return _regulus(body, grasp)
+    beyond = BEYOND * body.radius
+    foci = np.repeat(grasp.focus_points, len(grasp.contacts) // len(grasp.focus_points), axis=0)
+    shapes = [Shape("focus", points=grasp.focus_points)]
+    for finger, (start, focus) in enumerate(zip(grasp.positions, foci, strict=True)):
+        length = min(float(np.linalg.norm(focus - start)) + beyond, FARTHEST * body.radius)
+        line = np.array([start, start + length * _unit(focus - start)])
+        shapes.append(Shape("line of force", finger, lines=(line,)))
+    away = np.linalg.norm(grasp.focus_points - body.center_of_mass, axis=1)
+    if grasp.family == "pencil" and away.max() <= FARTHEST * body.radius:
+        shapes += _planes(grasp, beyond)
+    return shapes
+
+
+def _regulus(body: Polyhedron, grasp: Grasp) -> list[Shape]:
+    """Lines along the witness forces, and the surface that they rule."""
+    reach, beyond = REACH * body.radius, BEYOND * body.radius
+    ways = grasp.witness.directions
+    ruled = rulings(grasp.positions, ways, body.center_of_mass, reach)
+    shapes = [Shape("ruled surface", polygons=between(ruled), lines=ruled)]
+    for finger, (start, way) in enumerate(zip(grasp.positions, ways, strict=True)):
+        ahead = max(float((body.center_of_mass - start) @ way), 0.0)
+        line = np.array([start, start + (2.0 * ahead + beyond) * way])
+        shapes.append(Shape("line of force", finger, lines=(line,)))
+    return shapes
+
+
+def _planes(grasp: Grasp, beyond: float) -> list[Shape]:
+    """The plane of each pair of a pencil; both hold the line through the foci."""
+    one, two = grasp.focus_points
+    along = beyond * _unit(two - one)
+    ends = np.array([one - along, two + along])
+    x = grasp.positions
+    quads = [np.array([x[first], ends[0], x[first + 1], ends[1]]) for first in (0, 2)]
+    return [Shape("plane", polygons=tuple(quads), lines=(ends,))]
+
+
+def _unit(vector: Array) -> Array:
+    return vector / max(float(np.linalg.norm(vector)), np.finfo(np.float64).tiny)

@@ -1,0 +1,92 @@
+"""A scene and what moved in it -> an animated picture; a program of its own.
+
+Run as `python -P frames.py JOB.npz OUT`, by `scenes.drawing.clips` only: which graphics MuJoCo uses
+is chosen when it is first imported, and a driver that is broken may end the whole process. Without
+arguments it draws an empty scene, to see whether it can.
+"""
+
+# pyright: basic, reportAttributeAccessIssue=false
+# MuJoCo and Pillow at their door.
+
+import sys
+from pathlib import Path
+
+import mujoco  # noqa: TID251 - this is the door to its renderer
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont  # noqa: TID251
+
+DISTANCE = 3.2
+"""Of the camera, in radii of what is seen."""
+SKY, AMBIENT, DIFFUSE = (0.93, 0.95, 0.97), 0.45, 0.45
+"""Colour of the background, and of the light from the camera."""
+INK, LETTERS = (30, 30, 40), 18
+"""Colour and height of the caption's letters [pixels]."""
+
+
+def main(job: str, out: str) -> None:
+    """Draw every row of joint positions."""
+    given = np.load(job, allow_pickle=False)
+    model = _lit(str(given["xml"]))
+    for finger, colour in enumerate(given["colours"]):
+        for place in range(model.ngeom):
+            if model.geom(place).name == f"finger{finger}":
+                model.geom_rgba[place, :3] = colour
+    data = mujoco.MjData(model)
+    width, height = (int(size) for size in given["size"])
+    model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+    camera = mujoco.MjvCamera()
+    camera.lookat[:] = 0.0
+    camera.distance = DISTANCE * float(given["radius"])
+    frames = []
+    with mujoco.Renderer(model, height, width) as renderer:
+        for joints, (azimuth, elevation) in zip(given["joints"], given["angles"], strict=True):
+            camera.azimuth, camera.elevation = azimuth + 180.0, -elevation  # of its line of sight
+            data.qpos[:] = joints
+            mujoco.mj_kinematics(model, data)
+            renderer.update_scene(data, camera)
+            frames.append(_captioned(renderer.render(), str(given["caption"])))
+    frames[0].save(
+        Path(out),
+        save_all=True,
+        append_images=frames[1:],
+        duration=round(1000.0 / float(given["rate"])),
+        loop=0,
+    )
+
+
+def try_out() -> None:
+    """Draw an empty scene."""
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    with mujoco.Renderer(model, 8, 8) as renderer:
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        renderer.update_scene(data)
+        renderer.render()
+
+
+def _lit(xml: str) -> mujoco.MjModel:
+    """A scene in daylight."""
+    spec = mujoco.MjSpec.from_string(xml)
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
+        rgb1=SKY,
+        rgb2=SKY,
+        width=8,
+        height=8,
+    )
+    model = spec.compile()
+    model.vis.headlight.ambient[:], model.vis.headlight.diffuse[:] = AMBIENT, DIFFUSE
+    return model
+
+
+def _captioned(pixels: np.ndarray, caption: str) -> Image.Image:
+    picture = Image.fromarray(pixels)
+    font = ImageFont.load_default(LETTERS)
+    ImageDraw.Draw(picture).text((LETTERS // 2, LETTERS // 2), caption, INK, font=font)
+    return picture
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:]) if sys.argv[1:] else try_out()

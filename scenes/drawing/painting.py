@@ -1,0 +1,105 @@
+"""Shapes as seen from a view -> flat coloured polygons, the farthest first.
+
+Lines and points become polygons, too, so that one order by depth holds for everything: a finger
+in front of a line of force hides it, glass in front of it does not.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from scenes.drawing.palette import LOOKS, Look, colour_of, rgb
+from scenes.drawing.shapes import SIDES, Shape
+from scenes.drawing.views import View
+
+LIGHT = np.array([-0.4, 0.7, 0.6]) / np.linalg.norm([-0.4, 0.7, 0.6])
+"""Where it comes from: left, above, before."""
+DARKEST = 0.55
+"""Of a shaded side, as a share of its colour."""
+DASHES = 24
+"""Parts, every other one drawn, of a line as long as the picture is wide."""
+SEAMS = 0.5
+"""Opacity of polygons up to which smooth borders of neighbours would show as lines."""
+PIECES = 12
+"""Parts of a whole line of that length, each with its own depth."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Patch:
+    """One flat polygon of a picture."""
+
+    polygon: Array
+    """(k, 2) [m]"""
+    nearness: float
+    """[m]"""
+    colour: tuple[float, float, float, float]
+    """Red, green, blue, opacity."""
+    smooth: bool
+    """Whether its border is drawn smoothly; neighbours that share a border are not, as it would
+    show."""
+
+
+def painted(shapes: Iterable[Shape], view: View, width: float) -> tuple[Patch, ...]:
+    """Polygons of a picture so wide [m], in the order to draw them."""
+    patches = [patch for shape in shapes for patch in _patches(shape, view, width)]
+    return tuple(sorted(patches, key=lambda patch: patch.nearness))
+
+
+def _patches(shape: Shape, view: View, width: float) -> Iterator[Patch]:
+    look, colour = LOOKS[shape.role], rgb(colour_of(shape))
+    if look.fill:
+        for polygon in shape.polygons:
+            yield _filled(polygon, look, colour, view)
+    solid = (*colour, look.opacity)
+    for line in shape.lines if look.line else ():
+        yield from _line(line, look, solid, view, width)
+    for point in () if shape.points is None else shape.points:
+        (place,), (near,) = view.seen(point[None])
+        angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
+        around = 0.005 * look.dot * width * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        yield Patch(place + around, float(near) + 0.02 * width, solid, smooth=True)
+
+
+def _filled(polygon: Array, look: Look, colour: tuple[float, float, float], view: View) -> Patch:
+    flat, near = view.seen(polygon)
+    shade = _brightness(polygon, view) if look.shaded else 1.0
+    red, green, blue = (shade * part for part in colour)
+    return Patch(flat, float(near.mean()), (red, green, blue, look.fill), smooth=look.fill > SEAMS)
+
+
+def _brightness(polygon: Array, view: View) -> float:
+    """Of a flat side, from `DARKEST` to 1: as it faces the light, seen from either side."""
+    normal = view.axes @ np.cross(polygon[1] - polygon[0], polygon[2] - polygon[1])
+    length = float(np.linalg.norm(normal))
+    if length == 0.0:
+        return 1.0
+    facing = float(normal @ LIGHT) / length
+    facing = facing if normal[2] > 0.0 else -facing
+    return DARKEST + (1.0 - DARKEST) * max(facing, 0.0)
+
+
+def _line(
+    line: Array, look: Look, colour: tuple[float, float, float, float], view: View, width: float
+) -> Iterator[Patch]:
+    flat, near = view.seen(line)
+    half = 0.005 * look.line * width
+    for start, end, first, last in zip(flat, flat[1:], near, near[1:], strict=False):
+        length = float(np.linalg.norm(end - start))
+        if length > 0.0:
+            across = half * np.array([start[1] - end[1], end[0] - start[0]]) / length
+            for low, high in _spans(length / width, look):
+                a, b = start + low * (end - start), start + high * (end - start)
+                depth = float(first + 0.5 * (low + high) * (last - first)) + half
+                yield Patch(np.array([a - across, b - across, b + across, a + across]), depth,
+                            colour, smooth=True)  # fmt: skip
+
+
+def _spans(length: float, look: Look) -> Sequence[tuple[float, float]]:
+    """Which parts of a line are drawn, each from one share of its length to another."""
+    if look.dashed:
+        count = 2 * max(round(0.5 * DASHES * length), 1) + 1
+        return [(part / count, (part + 1) / count) for part in range(0, count, 2)]
+    count = max(round(PIECES * length), 1)
+    return [(part / count, (part + 1) / count) for part in range(count)]

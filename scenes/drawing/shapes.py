@@ -1,0 +1,84 @@
+"""Things to draw: flat polygons, lines and points in space, each with the role it plays."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from grasp_core.arrays import Array, frozen
+from grasp_core.solvers.ties import SAME_SHARE, first_best
+
+Role: TypeAlias = Literal[
+    "object", "edge", "finger", "friction cone", "force cone", "region", "line of force", "focus",
+    "plane", "ruled surface", "contact",
+]  # fmt: skip
+SIDES = 20
+"""Of what is round."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shape:
+    """One thing to draw."""
+
+    role: Role
+    finger: int | None = None
+    """Whose it is."""
+    polygons: tuple[Array, ...] = ()
+    """Flat, or nearly so, corners in order, each (k, 3) [m]."""
+    lines: tuple[Array, ...] = ()
+    """Polylines, each (k, 3) [m]."""
+    points: Array | None = None
+    """(k, 3) [m]"""
+
+    def __post_init__(self) -> None:
+        for name in ("polygons", "lines"):
+            parts = tuple(frozen(part, (None, 3), name) for part in getattr(self, name))
+            object.__setattr__(self, name, parts)
+        if self.points is not None:
+            object.__setattr__(self, "points", frozen(self.points, (None, 3), "points"))
+
+    def vertices(self) -> Array:
+        """All of its points, (n, 3) [m]."""
+        alone = [] if self.points is None else [self.points]
+        return np.vstack([np.empty((0, 3)), *self.polygons, *self.lines, *alone])
+
+
+def extent_of(shapes: Iterable[Shape]) -> Array:
+    """All points of several shapes, (n, 3) [m]."""
+    return np.vstack([shape.vertices() for shape in shapes])
+
+
+def closed(loop: Array) -> Array:
+    """The border of a polygon as a line, (k + 1, 3)."""
+    return np.vstack([loop, loop[:1]])
+
+
+def ring(center: Array, axis: Array, radius: float) -> Array:
+    """Points of a circle around a unit axis, (SIDES, 3)."""
+    side = np.cross(axis, np.eye(3)[first_best(-np.abs(axis), SAME_SHARE)])
+    side /= np.linalg.norm(side)
+    angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    around = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), np.cross(axis, side))
+    return center + radius * around
+
+
+def tube(start: Array, end: Array, radius: float) -> tuple[Array, ...]:
+    """Sides and lids of a round bar between two points."""
+    axis = (end - start) / np.linalg.norm(end - start)
+    low, high = ring(start, axis, radius), ring(end, axis, radius)
+    sides = [np.array([low[i - 1], low[i], high[i], high[i - 1]]) for i in range(SIDES)]
+    return (*sides, low[::-1], high)
+
+
+def cone_rim(tip: Array, axis: Array, half_angle: float, length: float) -> Array:
+    """The circle in which a cone ends whose sides are so long, (SIDES, 3)."""
+    height = length * math.cos(half_angle)
+    return ring(tip + height * axis, axis, length * math.sin(half_angle))
+
+
+def cone_sides(tip: Array, axis: Array, half_angle: float, length: float) -> tuple[Array, ...]:
+    """Triangles between the tip of a cone and its rim."""
+    rim = cone_rim(tip, axis, half_angle, length)
+    return tuple(np.array([tip, rim[i - 1], rim[i]]) for i in range(SIDES))

@@ -1,0 +1,38 @@
+"""A grasp's picture, turning once around: a clip that needs no graphics library."""
+
+from pathlib import Path
+
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Grasp
+from scenes.drawing.canvas import in_style, write_frames
+from scenes.drawing.clips import require_clip
+from scenes.drawing.pictures import draw_grasp, empty_picture
+from scenes.drawing.views import View
+
+FRAMES, RATE = 48, 12.0
+"""Of one turn; frames per second."""
+ELEVATION_DEG = 25.0
+
+
+@in_style
+def write_turning_clip(body: Polyhedron, grasp: Grasp, path: Path, friction: float) -> Path:
+    """Draw a grasp from all around.
+
+    Args:
+        body: The object.
+        grasp: On it.
+        path: Of the file to write, gif or webp.
+        friction: Coulomb coefficient, of the friction cones.
+
+    Raises:
+        InputError: The file's name ends otherwise.
+    """
+    require_clip(path)
+    figure, axes = empty_picture()
+    views = [View.of_angles(360.0 * frame / FRAMES, ELEVATION_DEG, body) for frame in range(FRAMES)]
+
+    def draw(frame: int) -> None:
+        axes.clear()
+        draw_grasp(axes, body, grasp, friction, views[frame], steady=True)
+
+    return write_frames(figure, draw, FRAMES, RATE, path)

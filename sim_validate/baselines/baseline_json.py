@@ -1,0 +1,95 @@
+"""Baselines <-> JSON that is read in reviews: a header, then a line for each grasp, sorted."""
+
+import json
+from dataclasses import asdict, fields
+from pathlib import Path, PurePath
+
+from pydantic import TypeAdapter, ValidationError
+
+from grasp_core.errors import InputError
+from grasp_core.files.complaints import complaint
+from grasp_core.files.strict_json import check_schema, object_of, shown
+from sim_validate.baselines.entries import Baseline
+from sim_validate.files.reading import read_text, write_text
+
+SCHEMA = 1
+MARK = '"grasps_file"'
+"""What only baselines have."""
+
+
+def baseline_to_json(baseline: Baseline) -> str:
+    """The text of a baseline: the same for the same verdicts."""
+    header = {
+        "schema": SCHEMA,
+        **{each.name: getattr(baseline, each.name) for each in fields(Baseline)},
+    }
+    del header["entries"]
+    head = json.dumps(header, indent=1, sort_keys=True, allow_nan=False).removesuffix("\n}")
+    lines = ",\n  ".join(json.dumps(asdict(entry), allow_nan=False) for entry in baseline.entries)
+    return f'{head},\n "grasps": [\n  {lines}\n ]\n}}\n'
+
+
+def baseline_from_json(text: str, path: str) -> Baseline:
+    """Read a baseline.
+
+    Args:
+        text: Of the file.
+        path: Of the file, for messages.
+
+    Raises:
+        InputError: It is no baseline of this version; the message names the field.
+    """
+    try:
+        return _from_text(text)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _from_text(text: str) -> Baseline:
+    record = object_of(text, "baseline")
+    if "grasps_file" not in record:
+        raise InputError("is no baseline, which `graspproof baseline record` writes")
+    check_schema(record, SCHEMA)
+    del record["schema"]
+    record["entries"] = record.pop("grasps", None) or None  # a file with none checks nothing
+    try:
+        found = TypeAdapter(Baseline).validate_json(json.dumps(record))
+    except ValidationError as error:
+        said = complaint(error, Baseline)
+        raise InputError("grasps" + said.removeprefix("entries")
+                         if said.startswith("entries") else said) from error  # fmt: skip
+    if PurePath(found.grasps_file).is_absolute() or not found.grasps_file.isprintable():
+        raise InputError(
+            "grasps_file: expected a path from this file's folder, got "
+            f"{shown(found.grasps_file)}; name the file with --grasps"
+        )
+    return found
+
+
+def read_baseline(path: Path) -> Baseline:
+    """The baseline of a file.
+
+    Raises:
+        InputError: It is missing or refused.
+    """
+    return baseline_from_json(read_text(path), str(path))
+
+
+def write_baseline(path: Path, baseline: Baseline) -> None:
+    """Write a baseline to a new file, or over another baseline.
+
+    Raises:
+        InputError: The file is something else.
+    """
+    check_writable(path)
+    write_text(path, baseline_to_json(baseline))
+
+
+def check_writable(path: Path) -> None:
+    """Refuse a path at which something else than a baseline is, of whatever version.
+
+    Raises:
+        InputError: Something is.
+    """
+    if path.exists() and MARK not in read_text(path):
+        raise InputError(f"{path}: is no baseline, and will not be overwritten")

@@ -1,0 +1,71 @@
+"""A baseline and the grasps of now -> what became of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from grasp_core.records.grasps_json import SavedGrasps
+from sim_validate.baselines.compare import Finding, bands_between, compare
+from sim_validate.baselines.entries import Baseline
+from sim_validate.baselines.measure import Measured, Report, measured, with_planned_fingers
+from sim_validate.simulation.setup import Agenda, Setup
+from sim_validate.validation.grasp_verdict import Verdict
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Checked:
+    """What became of the grasps of a baseline."""
+
+    findings: tuple[Finding, ...]
+    measured: Measured
+    how: str
+    """How they were compared, in words."""
+
+    @property
+    def verdicts(self) -> Mapping[str, Verdict]:
+        """By grasp, of those that could be simulated."""
+        return self.measured.verdicts
+
+
+def check(
+    before: Baseline, saved: SavedGrasps, where: str, how: tuple[Setup, Agenda],
+    processors: int, report: Report,
+) -> Checked:  # fmt: skip
+    """Simulate grasps again and compare.
+
+    Args:
+        before: The baseline.
+        saved: The grasps of now.
+        where: They are, from the baseline's folder.
+        how: Trials are simulated, and which ones.
+        processors: How many to use; nothing depends on it.
+        report: Told how many grasps are done.
+
+    Raises:
+        InputError: There is no grasp.
+        UnfaithfulError: The simulator fails the gate.
+    """
+    setup, agenda = with_planned_fingers(how[0], before, saved), how[1]
+    found = measured(saved, (where, before.limit), setup, agenda, processors, report)
+    return Checked(
+        compare(before, found.baseline, found.refused),
+        found,
+        bands_between(before, found.baseline)[1],
+    )
+
+
+def check_one(
+    before: Baseline, saved: SavedGrasps, where: str, how: tuple[Setup, Agenda], name: str
+) -> Checked:
+    """The same for one grasp, by its id."""
+    limited = saved.grasps[: before.limit]
+    one = tuple(grasp for grasp in limited if grasp.id == name)
+    kept = replace(before, entries=tuple(e for e in before.entries if e.id == name), limit=None)
+    if one:
+        alone = SavedGrasps(saved.body, saved.friction, saved.seed, one, saved.finger)
+        return check(kept, alone, where, how, 1, silent)
+    gone = Measured(replace(kept, entries=(), content_sha256=saved.body.content_sha256), {}, {})
+    return Checked(compare(kept, gone.baseline), gone, "")
+
+
+def silent(_: int, __: int) -> None:
+    """Nobody is told."""

@@ -1,0 +1,191 @@
+"""Two baselines -> what became of each grasp: the same, better, worse, or not to be compared.
+
+With the same versions, on processors that round alike, results are the same, and every difference
+counts. With the same versions they differ by rounding, which the searches of the simulation turn
+into steps of theirs. Otherwise verdicts must be the same, but for grasps close to their critical
+friction, which a trifle may decide, and numbers may differ within wider bands.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from math import radians
+from typing import Any, cast
+
+from sim_validate.baselines.differences import Bands, Difference, differences
+from sim_validate.baselines.entries import Baseline, Entry
+from sim_validate.simulation.hold_verdict import LET_GO, Outcome
+
+DECISIVE = ("graspproof", "mujoco", "machine")
+"""Versions of which others may change any result."""
+ASIDE = ("python",)
+"""Versions that change none."""
+
+
+class Status(StrEnum):
+    """What became of a grasp."""
+
+    SAME = "same"
+    WITHIN = "within bands"
+    """Numbers differ as other versions or processors make them differ."""
+    GREY = "grey zone"
+    """Another verdict, on a grasp that is too close to its critical friction to tell."""
+    IMPROVED = "improved"
+    REGRESSED = "regressed"
+    NOT_COMPARABLE = "not comparable"
+    """Another object, other contacts or settings: there is nothing to compare."""
+    MISSING = "missing"
+    """In the baseline, but not among the grasps."""
+    NEW = "new"
+    """Among the grasps, but not in the baseline."""
+
+
+FAILED = (Status.REGRESSED, Status.MISSING, Status.NEW)
+
+
+def failing(*, strict: bool) -> tuple[Status, ...]:
+    """What fails a check, beside what cannot be compared; if strict, what is better, too."""
+    return (*FAILED, Status.IMPROVED) if strict else FAILED
+
+
+EXACT = Bands(
+    predicted=1e-9, simulated=1e-9, least=0.0, displacement_m=1e-12, rotation_rad=1e-12,
+    grey=0.0, exact=True,
+)  # fmt: skip
+"""With the same versions and rounding: what is lost in writing numbers down."""
+ROUNDING = Bands(
+    predicted=1e-6, simulated=5e-3, least=1e-7, displacement_m=1e-6, rotation_rad=1e-5,
+    grey=1e-4, exact=True,
+)  # fmt: skip
+"""With the same versions: with linear algebra for another processor, or without compiled loops, no
+verdict of sixty grasps changed, predicted limits were the same to nine digits, critical frictions
+to 5e-9, motions of some 1e-8 m to .6 %, and what is sought by halving to two steps of .13 %."""
+OTHER_VERSIONS = Bands(
+    predicted=0.05, simulated=0.05, least=1e-7, displacement_m=2e-4, rotation_rad=radians(0.2),
+    grey=0.02, exact=False,
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What became of one grasp."""
+
+    id: str
+    status: Status
+    reasons: tuple[str, ...] = ()
+    """Why, in words."""
+    differences: tuple[str, ...] = ()
+    """Everything that is not as it was, in words."""
+    before: Entry | None = None
+    after: Entry | None = None
+
+
+def bands_between(before: Baseline, after: Baseline) -> tuple[Bands, str]:
+    """How far results may differ, and because of what, in words."""
+    names = sorted({*before.versions, *after.versions} - {*ASIDE})
+    others = [
+        f"{name} {before.versions.get(name)} -> {after.versions.get(name)}"
+        for name in names
+        if before.versions.get(name) != after.versions.get(name)
+    ]
+    if any(name in DECISIVE and before.versions.get(name) != after.versions.get(name)
+           for name in names):  # fmt: skip
+        return OTHER_VERSIONS, f"with the bands of other versions: {', '.join(others)}"
+    if others or before.arithmetic != after.arithmetic:
+        why = ", ".join([*others, *(["another processor"] if not others else [])])
+        return ROUNDING, f"with the bands of rounding: {why}"
+    return EXACT, "exactly"
+
+
+def compare(
+    before: Baseline, after: Baseline, refused: Mapping[str, str] | None = None
+) -> tuple[Finding, ...]:
+    """What became of each grasp, sorted by id.
+
+    Args:
+        before: The baseline.
+        after: What was measured now.
+        refused: Why grasps could not be simulated, by id.
+    """
+    refused = refused or {}
+    bands, _ = bands_between(before, after)
+    changed = tuple(_changed(before, after))
+    another = before.content_sha256 != after.content_sha256
+    old = {entry.id: entry for entry in before.entries}
+    new = {entry.id: entry for entry in after.entries}
+    found = list[Finding]()
+    for name in sorted({*old, *new, *refused}):
+        one, other = old.get(name), new.get(name)
+        if one is not None and other is not None:
+            found.append(_compared(one, other, before.friction, changed, bands))
+        elif name in refused:
+            status = Status.NOT_COMPARABLE if changed else Status.REGRESSED
+            why = (*changed, f"refused: {refused[name]}")
+            found.append(Finding(name, status, why, (), one, other))
+        elif another:
+            found.append(Finding(name, Status.NOT_COMPARABLE, changed, (), one, other))
+        elif one is None:
+            found.append(Finding(name, Status.NEW, ("not in the baseline",), (), one, other))
+        else:
+            reasons = ("in the baseline, but not among the grasps",)
+            found.append(Finding(name, Status.MISSING, reasons, (), one, other))
+    return tuple(found)
+
+
+def _changed(before: Baseline, after: Baseline) -> Iterator[str]:
+    """Why two baselines cannot be compared."""
+    if before.content_sha256 != after.content_sha256:
+        same = before.object == after.object
+        named = f"{before.object} has changed" if same else f"{before.object} -> {after.object}"
+        yield f"the object is another one: {named}"
+    if before.friction != after.friction:
+        yield f"friction: {before.friction} -> {after.friction}"
+    if before.planned_radius_m != after.planned_radius_m:
+        radii = f"{before.planned_radius_m} -> {after.planned_radius_m}"
+        yield f"fingertips that were planned for: radius_m {radii}"
+    yield from _settings_changed("", dict(before.settings), dict(after.settings))
+
+
+def _settings_changed(where: str, before: Any, after: Any) -> Iterator[str]:
+    if isinstance(before, dict) and isinstance(after, dict):
+        one, other = cast("dict[str, Any]", before), cast("dict[str, Any]", after)
+        for name in sorted({*one, *other}):
+            inside = f"{where}.{name}" if where else name
+            yield from _settings_changed(inside, one.get(name), other.get(name))
+    elif before != after:
+        yield f"{where}: {before} -> {after}"
+
+
+def _compared(
+    one: Entry, other: Entry, friction: float, changed: tuple[str, ...], bands: Bands
+) -> Finding:
+    every = differences(one, other, bands)
+    texts = tuple(each.text for each in every)
+    if one.contacts_sha256 != other.contacts_sha256:
+        changed = (*changed, "the contacts are others")
+    if changed:
+        return Finding(one.id, Status.NOT_COMPARABLE, changed, texts, one, other)
+    grey = _is_grey(one, other, friction, bands)
+    counting = [each for each in every if each.counts and not (grey and each.of_holding)]
+    status = _status(counting, grey=grey, same=one == other)
+    reasons = tuple(each.text for each in counting if each.worse is (status is Status.REGRESSED))
+    if status is Status.GREY:
+        reasons = (f"{one.outcome} -> {other.outcome}, at its critical friction",)
+    return Finding(one.id, status, reasons, texts, one, other)
+
+
+def _status(counting: list[Difference], *, grey: bool, same: bool) -> Status:
+    if any(each.worse for each in counting):
+        return Status.REGRESSED
+    if grey:
+        return Status.GREY
+    if counting:
+        return Status.IMPROVED
+    return Status.SAME if same else Status.WITHIN
+
+
+def _is_grey(one: Entry, other: Entry, friction: float, bands: Bands) -> bool:
+    """Whether wrenches that were held are let go, or the other way round, on the brink."""
+    brink = abs(friction - one.critical_friction) <= bands.grey * friction
+    decided = all(entry.outcome in (Outcome.HELD, *LET_GO) for entry in (one, other))
+    return brink and decided and one.held != other.held

@@ -1,0 +1,107 @@
+"""Whether a grasp is as stable as a test asks for."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from grasp_core.checked import LARGEST_FRICTION
+from grasp_core.errors import InputError
+from sim_validate.baselines.explain import unstable
+from sim_validate.baselines.grasp_cases import GraspCase
+from sim_validate.simulation.noise import Noise
+from sim_validate.simulation.setup import Agenda, NamedWrench, Setup
+from sim_validate.validation.grasp_verdict import Verdict
+from sim_validate.validation.validation import validate
+
+
+@dataclass(frozen=True, slots=True)
+class Demands:
+    """What a grasp is tried with, beside the usual wrenches and controls, and must reach.
+
+    Raises:
+        InputError: A number is none, or out of its range, or a share of no repeats is asked for.
+    """
+
+    wrenches: Sequence[NamedWrench] = ()
+    """To hold as they are."""
+    trials: int = 0
+    """Repeats with noise."""
+    noise: Noise = field(default_factory=Noise)
+    min_pass_rate: float = 0.0
+    """Least share of repeats that must hold."""
+    min_margin: float = 0.0
+    """Least distance of the friction from the critical one, by analysis and in simulation."""
+    random_wrenches: int = 0
+    seed: int = 0
+    setup: Setup = field(default_factory=Setup)
+    """How trials are simulated."""
+
+    def __post_init__(self) -> None:
+        for name, most in (("min_pass_rate", 1.0), ("min_margin", LARGEST_FRICTION)):
+            value = getattr(self, name)
+            if not (isinstance(value, int | float) and 0.0 <= value <= most):
+                raise InputError(f"{name} must be from 0 to {most:g}, got {value!r}")
+        if self.min_pass_rate > 0.0 and not self.trials:
+            raise InputError("min_pass_rate is a share of repeats with noise: give trials, too")
+        for each in self.wrenches:
+            if not isinstance(each, NamedWrench):  # pyright: ignore[reportUnnecessaryIsInstance]
+                raise InputError(f"wrenches must be NamedWrench values, got {each!r}")
+
+
+def demands_of(asked: Mapping[str, Any]) -> Demands:
+    """What a test asks for by name.
+
+    Raises:
+        InputError: There is no such demand, or its value is refused.
+    """
+    known = [each.name for each in fields(Demands)]
+    for name in asked:
+        if name not in known:
+            raise InputError(f"assert_stable takes {', '.join(known)}; got {name!r}")
+    return Demands(**asked)
+
+
+def checked(case: GraspCase, demands: Demands) -> tuple[Verdict, str]:
+    """Simulate a grasp and say what is wrong with it.
+
+    Args:
+        case: The grasp on its object, and the friction.
+        demands: What it must reach.
+
+    Returns:
+        The verdict, and what is wrong, empty if nothing is.
+
+    Raises:
+        InputError: The grasp or a setting is refused.
+        UnfaithfulError: The simulator fails the gate.
+    """
+    agenda = Agenda(
+        random_wrenches=demands.random_wrenches,
+        wrenches=tuple(demands.wrenches),
+        trials=demands.trials,
+        noise=demands.noise,
+        seed=demands.seed,
+    )
+    verdict = validate(case.body, case.grasp, case.friction, agenda=agenda, setup=demands.setup)
+    said, lacking = unstable(verdict), list(_lacking(verdict, demands))
+    if lacking and not said:
+        said = f"{verdict.id} at friction {verdict.friction}: less than is asked for"
+    return verdict, "\n  ".join([said, *lacking])
+
+
+def _lacking(verdict: Verdict, demands: Demands) -> Iterator[str]:
+    """What is less than asked for."""
+    found = verdict.robustness
+    if found is not None and found.held < demands.min_pass_rate * len(found.trials):
+        lower, upper = found.interval
+        yield (
+            f"with noise {found.held} of {len(found.trials)} held ({lower:.3g} to {upper:.3g} of "
+            f"all with 95 % confidence), asked for are {demands.min_pass_rate:g}"
+        )
+    critical = verdict.critical_friction
+    for how, value in (("predicted", critical.predicted), ("simulated", critical.simulated)):
+        if value is not None and verdict.friction - value < demands.min_margin:
+            yield (
+                f"friction {verdict.friction:g} is less than {demands.min_margin:g} above the "
+                f"{how} critical one, {value:.6g}"
+            )

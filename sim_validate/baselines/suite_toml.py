@@ -1,0 +1,212 @@
+"""A TOML file that says which grasps must stay as they were: grasps, baseline, settings."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from grasp_core.errors import InputError
+from grasp_core.files.strict_json import place, shown
+from grasp_core.records.grasps_json import SavedGrasps
+from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
+from sim_validate.baselines.check import Checked, check_one, silent
+from sim_validate.baselines.entries import Baseline
+from sim_validate.baselines.measure import (
+    complete,
+    measured,
+    seen_from,
+    with_planned_fingers,
+)
+from sim_validate.baselines.settings import noise_from_table, of_settings, setup_for
+from sim_validate.baselines.source_file import Source, source_of
+from sim_validate.files.toml_tables import read_tables
+from sim_validate.records.grasps import read_grasps
+from sim_validate.records.wrenches import wrenches_from_file
+from sim_validate.simulation.noise import Noise
+from sim_validate.simulation.setup import Agenda, Setup
+
+ENDING = ".grasps.toml"
+KINDS: Mapping[str, type] = {
+    "grasps": str, "object": str, "baseline": str, "strict": bool, "setup": str, "wrenches": str,
+    "limits": str, "random_wrenches": int, "trials": int, "noise": dict, "seed": int,
+}  # fmt: skip
+"""Settings of the file, and what they are."""
+WORDS = {str: "text", bool: "true or false", int: "a whole number", dict: "a table"}
+PATHS = ("grasps", "object", "baseline", "setup", "wrenches")
+DIRECT = ("limits", "random_wrenches", "trials", "seed")
+"""Fields of an agenda as the file has them."""
+
+
+@dataclass(frozen=True)
+class Suite:
+    """Grasps that must stay as they were; settings that are None are the baseline's."""
+
+    path: Path
+    """Of the file that says so."""
+    grasps: Path
+    """A grasps.json."""
+    baseline: Path
+    object: Path | None = None
+    """The mesh file that the grasps were planned from; one of its name beside them if not given."""
+    strict: bool = False
+    """Whether what is better fails, too."""
+    setup: Path | None = None
+    """TOML file of simulation settings."""
+    wrenches: Path | None = None
+    """JSON file of wrenches to hold beside the usual ones."""
+    limits: str | None = None
+    """How limits are found in simulation."""
+    random_wrenches: int | None = None
+    trials: int | None = None
+    """Repeats with noise."""
+    noise: Noise | None = None
+    seed: int | None = None
+
+    @cached_property
+    def saved(self) -> SavedGrasps:
+        """The grasps.
+
+        Raises:
+            InputError: Their file is missing or refused.
+        """
+        return read_grasps(self.grasps)
+
+    @cached_property
+    def source(self) -> Source:
+        """The mesh file that the grasps were planned from, if it is there.
+
+        Raises:
+            InputError: It has changed since, or a file is refused.
+        """
+        return source_of(self.saved, self.grasps, [self.path.parent], self.object)
+
+    @cached_property
+    def kept(self) -> Baseline:
+        """The baseline.
+
+        Raises:
+            InputError: It is missing or refused.
+        """
+        if not self.baseline.is_file():
+            raise InputError(f"{self.baseline}: there is no baseline yet: pytest --grasp-bless")
+        return read_baseline(self.baseline)
+
+    @property
+    def ids(self) -> list[str]:
+        """Of all grasps, in the file or in the baseline.
+
+        Raises:
+            InputError: A file is missing or refused.
+        """
+        kept = self.kept if self.baseline.is_file() else None
+        ours = {grasp.id for grasp in self.saved.grasps[: kept and kept.limit]}
+        return sorted(ours if kept is None else ours | {entry.id for entry in kept.entries})
+
+    @property
+    def where(self) -> str:
+        """The path of the grasps from the baseline's folder."""
+        return seen_from(self.baseline, self.grasps)
+
+    def tested(self, name: str) -> Checked:
+        """What became of one grasp, simulated with the baseline's settings and those of the file.
+
+        Raises:
+            InputError: A file is refused, or the part has changed.
+            UnfaithfulError: The simulator fails the gate.
+        """
+        _ = self.source
+        before = self.kept
+        return check_one(before, self.saved, self.where, self._settings(before), name)
+
+    def bless(self) -> Baseline:
+        """Simulate all grasps and write the baseline, with the settings that it has.
+
+        Raises:
+            InputError: A file or a grasp is refused, or the part has changed.
+            UnfaithfulError: The simulator fails the gate.
+        """
+        _ = self.source
+        check_writable(self.baseline)
+        before, saved = self._kept_if_any(), self.saved
+        setup, agenda = self._settings(before)
+        if before is not None:
+            setup = with_planned_fingers(setup, before, saved)
+        about = self.where, before and before.limit
+        found = complete(measured(saved, about, setup, agenda, 1, silent))
+        write_baseline(self.baseline, found)
+        return found
+
+    def _kept_if_any(self) -> Baseline | None:
+        """The baseline that is to be written anew.
+
+        Raises:
+            InputError: It is refused.
+        """
+        try:
+            return self.kept if self.baseline.is_file() else None
+        except InputError as error:
+            raise InputError(f"{error}; remove the file to begin a new baseline") from error
+
+    def _settings(self, before: Baseline | None) -> tuple[Setup, Agenda]:
+        """The baseline's, or the usual ones, with those of the file in their place."""
+        if before is None:
+            setup, agenda = setup_for(self.saved, None), Agenda(seed=self.saved.seed)
+        else:
+            setup, agenda = of_settings(before.settings, str(self.baseline))
+        if self.setup is not None:
+            setup = setup_for(self.saved, self.setup)
+        given: dict[str, Any] = {name: getattr(self, name) for name in (*DIRECT, "noise")}
+        if self.wrenches is not None:
+            given["wrenches"] = wrenches_from_file(self.wrenches)
+        try:
+            asked = {name: value for name, value in given.items() if value is not None}
+            return setup, replace(agenda, **asked)
+        except InputError as error:
+            raise InputError(f"{self.path}: {error}") from error
+
+
+def suite_from_toml(path: Path) -> Suite:
+    """Read which grasps must stay as they were; paths in the file start at its folder.
+
+    Raises:
+        InputError: It is not such a file; the message names the setting.
+    """
+    return suite_from_tables(read_tables(path), path)
+
+
+def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
+    """The same from what the file says.
+
+    Raises:
+        InputError: A setting is unknown, missing or refused.
+    """
+    _check(given, path)
+    usual = path.name.removesuffix(ENDING) + ".baseline.json"
+    settings: dict[str, Any] = {"baseline": usual, **given}
+    for name in PATHS:
+        if name in settings:
+            settings[name] = path.parent / settings[name]
+    if "noise" in settings:
+        try:
+            settings["noise"] = noise_from_table(settings["noise"])
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
+    return Suite(path=path, **settings)
+
+
+def _check(given: Mapping[str, Any], path: Path) -> None:
+    for name, value in given.items():
+        kind = KINDS.get(name)
+        if kind is None:
+            raise InputError(
+                f"{path}: {place([name])}: no such setting; there are {', '.join(KINDS)}"
+            )
+        if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+            raise InputError(f"{path}: {name}: expected {WORDS[kind]}, got {shown(value)}")
+        if name in PATHS and not str(value).isprintable():
+            raise InputError(f"{path}: {name}: expected the path of a file, got {shown(value)}")
+        if kind is int and value < 0:
+            raise InputError(f"{path}: {name}: expected 0 or more, got {value}")
+    if "grasps" not in given:
+        raise InputError(f"{path}: grasps: expected the path of a grasps.json")

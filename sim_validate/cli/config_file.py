@@ -1,0 +1,90 @@
+"""Settings of a TOML file as flags on the command line."""
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any, cast, get_args, get_type_hints
+
+from grasp_core.errors import InputError
+from grasp_core.files.strict_json import place
+from sim_validate.cli.flag_bounds import FlagsError
+
+COMMAND_WORDS = {"dataset": 2, "baseline": 2}
+"""Of how many words a command consists, where it is not one."""
+
+
+def with_config(arguments: list[str], commands: Mapping[str, type]) -> list[str]:
+    """Put the settings of `--config FILE.toml` before the flags, which then override them.
+
+    Args:
+        arguments: Words of a command line.
+        commands: Classes of flags, by the names of commands.
+
+    Raises:
+        FlagsError: There is no file after the flag, or the file names a flag that there is not.
+        InputError: There is no such file, or it is not TOML.
+    """
+    words = [part for word in arguments for part in _split_config(word)]
+    if "--config" not in words:
+        return arguments
+    at = words.index("--config")
+    if at + 1 >= len(words):
+        raise FlagsError("--config needs the name of a TOML file")
+    rest = words[:at] + words[at + 2 :]
+    flags = _read(Path(words[at + 1]), flag_names(commands.get(rest[0])) if rest else set())
+    command = COMMAND_WORDS.get(rest[0], 1) if rest else 0
+    return [*rest[:command], *flags, *rest[command:]]
+
+
+def flags_from(settings: dict[str, Any]) -> list[str]:
+    """Words of a command line that say the same as settings by name.
+
+    Raises:
+        InputError: One is a table.
+    """
+    for name, value in settings.items():
+        if any(isinstance(part, dict) for item in _items(value) for part in _items(item)):
+            raise InputError(f"{place([name])}: expected a value or a list, got a table")
+    return [word for name, value in settings.items() for word in _as_flags(name, value)]
+
+
+def flag_names(kind: Any) -> set[str]:
+    """What a command's flags are called in files: all fields of its class and of those inside."""
+    if not is_dataclass(kind):
+        return set[str]().union(*(flag_names(part) for part in get_args(kind)))
+    names = {field.name for field in fields(kind)}
+    return names.union(*(flag_names(inner) for inner in get_type_hints(kind).values()))
+
+
+def _read(path: Path, known: set[str]) -> list[str]:
+    """Words of a command line from a file of settings."""
+    from sim_validate.files.toml_tables import read_tables  # only where there is such a file
+
+    try:
+        settings = read_tables(path)
+    except InputError as error:
+        raise InputError(f"--config {error}") from error
+    for name in settings:
+        if name.replace("-", "_") not in known:
+            said = f"--config {path}: {place([name])}: there is no such flag; keys are long flags"
+            raise FlagsError(said)
+    try:
+        return flags_from(settings)
+    except InputError as error:
+        raise InputError(f"--config {path}: {error}") from error
+
+
+def _split_config(word: str) -> list[str]:
+    """`--config=FILE` as two words."""
+    return word.split("=", 1) if word.startswith("--config=") else [word]
+
+
+def _as_flags(name: str, value: Any) -> list[str]:
+    flag = "--" + name.replace("_", "-")
+    if isinstance(value, bool):
+        return [flag] if value else []
+    return [word for item in _items(value) for word in (flag, *map(str, _items(item)))]
+
+
+def _items(value: Any) -> list[Any]:
+    return cast("list[Any]", value) if isinstance(value, list) else [value]

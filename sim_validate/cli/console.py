@@ -1,0 +1,140 @@
+"""What people see: results on standard output, everything else on standard error."""
+
+import json
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+from rich.text import Text
+
+from sim_validate.parallel import interrupts
+
+PLAIN_EVERY_S = 5.0
+"""Without a terminal, progress is a line this often."""
+EARLIEST = 0.02
+"""Share of the work after which it is worth saying how long the rest takes."""
+
+
+def printable(text: str) -> str:
+    """Text without control characters, so that a file's name cannot steer the terminal."""
+    return "".join(c if c.isprintable() else "?" for c in text)
+
+
+TABLE_ROWS = 20
+"""Longer tables are cut; files and documents have everything."""
+
+
+@dataclass(slots=True)
+class Reporter:
+    """Where a command writes; `json_only` keeps standard output for one JSON document."""
+
+    quiet: bool = False
+    verbose: bool = False
+    json_only: bool = False
+    out: Console = field(default_factory=lambda: Console(highlight=False))
+    err: Console = field(default_factory=lambda: Console(stderr=True, highlight=False))
+
+    def say(self, text: str) -> None:
+        """A line for people: on standard output, or on standard error beside JSON."""
+        if not self.quiet:
+            console = self.err if self.json_only else self.out
+            console.print(Text(printable(text)), soft_wrap=True)
+
+    def detail(self, text: str) -> None:
+        """A line only with --verbose."""
+        if self.verbose:
+            self.err.print(Text(printable(text)), soft_wrap=True)
+
+    def warn(self, text: str) -> None:
+        """A line on standard error, even when quiet."""
+        self.err.print(Text(printable(text)), soft_wrap=True)
+
+    def document(self, value: object) -> None:
+        """The one JSON document of a command run with --json."""
+        if self.json_only:
+            sys.stdout.write(json.dumps(value, allow_nan=False, indent=1) + "\n")
+
+    def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+        """A table for people."""
+        if self.quiet:
+            return
+        table = Table(
+            title=Text(printable(title)),
+            title_justify="left",
+            box=SIMPLE_HEAD,
+            padding=(0, 1, 0, 0),
+        )
+        for place, column in enumerate(columns):
+            last = place == len(columns) - 1
+            table.add_column(
+                column, justify="left" if place == 0 else "right", overflow="fold", no_wrap=not last
+            )
+        for row in rows:
+            table.add_row(*(Text(printable(cell)) for cell in row))
+        (self.err if self.json_only else self.out).print(table)
+
+    def progress(self, title: str) -> "Steps":
+        """Progress of something long: a bar on a terminal, plain lines elsewhere."""
+        return Steps(title, self.err, shown=not self.quiet)
+
+
+class Steps:
+    """Counts steps done; use as a context manager."""
+
+    def __init__(self, title: str, console: Console, *, shown: bool) -> None:
+        self.title, self.console, self.shown = title, console, shown
+        self.bar: Any = None
+        self.task: Any = None
+        self.begun = self.last = time.monotonic()
+
+    def __enter__(self) -> "Steps":
+        if self.shown and self.console.is_terminal:
+            self.bar = Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TimeElapsedColumn(),
+                TimeRemainingColumn(),
+                console=self.console,
+                transient=True,
+            )
+            self.bar.start()
+            self.task = self.bar.add_task(self.title, total=None)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.bar is not None:
+            self.bar.stop()
+
+    def update(self, done: int, total: int, note: str = "") -> None:
+        """Say how far things are; an interrupt that was swallowed is raised here."""
+        interrupts.check()
+        if self.bar is not None:
+            title = f"{self.title} {note}" if note else self.title
+            self.bar.update(self.task, completed=done, total=total, description=title)
+        elif self.shown and time.monotonic() - self.last > PLAIN_EVERY_S:
+            self.last = time.monotonic()
+            rate = done / (self.last - self.begun)
+            line = f"{self.title} {done}/{total} {note} {rate:.1f}/s"
+            if done > EARLIEST * total:
+                line += f", {(total - done) / rate:.0f} s left"
+            self.console.print(Text(line), soft_wrap=True)
+
+
+def say_cut(count: int, reporter: Reporter) -> None:
+    """Say how many rows a table has not shown."""
+    if count > TABLE_ROWS:
+        reporter.say(f"... and {count - TABLE_ROWS} more")

@@ -1,0 +1,37 @@
+"""What a command exits with, and what it says about an error."""
+
+from enum import IntEnum
+
+from grasp_core.errors import GraspError, SolverError, UndecidedError, UnfaithfulError
+from sim_validate.cli.flag_bounds import FlagsError
+
+
+class Exit(IntEnum):
+    """Exit codes of the command."""
+
+    GOOD = 0
+    NEGATIVE = 1
+    """It ran, and a verdict is negative."""
+    USAGE = 2
+    INTERNAL = 3
+    INPUT = 4
+    """An input was refused."""
+    NONE = 5
+    """No grasp exists."""
+    PARTIAL = 6
+    INTERRUPTED = 130
+
+
+def reason_of(error: GraspError | OSError) -> str:
+    """What an error says to people, with the file it is about."""
+    if isinstance(error, OSError):
+        return f"{error.filename or 'output'}: {error.strerror or error}"
+    return str(error)
+
+
+def exit_code(error: GraspError | OSError) -> Exit:
+    """The exit code of a command that ended with an error."""
+    if isinstance(error, FlagsError):
+        return Exit.USAGE
+    ours = (SolverError, UndecidedError, UnfaithfulError)
+    return Exit.INTERNAL if isinstance(error, ours) else Exit.INPUT

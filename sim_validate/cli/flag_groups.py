@@ -1,0 +1,208 @@
+"""Groups of flags that several commands share.
+
+Nothing heavy is imported here, so that help and usage errors answer at once.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
+
+from grasp_core.checked import (
+    LARGEST,
+    LARGEST_FRICTION,
+    MOST_COUNT,
+    MOST_EDGES,
+    MOST_RANDOM_WRENCHES,
+    MOST_SEED,
+    MOST_TRIALS,
+    SMALLEST,
+)
+from grasp_core.mesh_files import limits as mesh_limits
+from sim_validate.cli.flag_bounds import FINITE, at_least, more_than, not_zero
+from sim_validate.parallel.processes import available_cores
+
+USUAL_MESH = mesh_limits.MeshLimits()
+Finite = Annotated[float, FINITE]
+Positive = Annotated[float, FINITE, more_than(0.0)]
+NotNegative = Annotated[float, FINITE, at_least(0.0)]
+Usual = Annotated[float, at_least(SMALLEST, up_to=LARGEST)]
+Friction = Annotated[float, at_least(SMALLEST, up_to=LARGEST_FRICTION)]
+Count = Annotated[int, at_least(1, up_to=MOST_COUNT)]
+Seed = Annotated[int, at_least(0, up_to=MOST_SEED)]
+Edges = Annotated[int, at_least(3, up_to=MOST_EDGES)]
+Point = tuple[Finite, Finite, Finite]
+Direction = Annotated[Point, not_zero(SMALLEST, LARGEST)]
+Wrench = Annotated[
+    tuple[Finite, Finite, Finite, Finite, Finite, Finite], not_zero(SMALLEST, LARGEST)
+]
+RuleName = Literal["5cm-15deg", "contact-remains", "2cm", "3cm", "six-forces"]
+
+
+@dataclass(frozen=True, slots=True)
+class Speech:
+    """How much to say, and in which form."""
+
+    json: bool = False
+    """Print one JSON document on standard output, everything else on standard error."""
+    quiet: Annotated[bool, arg(aliases=["-q"])] = False
+    """Say nothing but errors."""
+    verbose: Annotated[bool, arg(aliases=["-v"])] = False
+    """Say more."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeshLimits:
+    """How large a mesh may be, and what reading its file may cost."""
+
+    max_mesh_bytes: Count = USUAL_MESH.max_bytes
+    """Larger mesh files are refused."""
+    max_triangles: Count = USUAL_MESH.max_triangles
+    """Meshes of more are refused."""
+    max_faces: Count = USUAL_MESH.max_faces
+    """Objects of more planar faces are refused."""
+    max_parts: Count = USUAL_MESH.max_parts
+    """Surfaces of more separate parts are refused."""
+    max_mesh_seconds: Positive = USUAL_MESH.max_seconds
+    """Of a processor, for reading a mesh file."""
+    max_mesh_memory_mib: Count = USUAL_MESH.max_memory_mib
+    """For reading a mesh file."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """How a mesh file is to be read."""
+
+    unit: Literal["m", "cm", "mm", "in"] = "m"
+    """What one unit in a mesh file is."""
+    faces: Literal["auto", "planar", "patches"] = "auto"
+    """Exact planar faces, or nearly flat patches of a curved or scanned surface, which may have
+    holes; auto takes patches where there are more than 200 planar faces."""
+    patches: Annotated[int, at_least(4, up_to=200)] = 20
+    """So many patches at most, those with the largest discs."""
+    patch_spread_deg: Annotated[float, more_than(0.0, up_to=45.0)] = 10.0
+    """Largest angle between the surface and a patch's plane [deg]; friction loses it."""
+    patch_depth: Annotated[float, more_than(0.0, up_to=0.1)] = 0.01
+    """Largest distance of the surface from a patch's plane, relative to the object's extent."""
+    center_of_mass_m: Annotated[Point | None, arg(metavar="X Y Z")] = None
+    """In the file's frame, in metres; that of uniform density if not given, or of the convex hull
+    where the surface has holes."""
+    limits: OmitArgPrefixes[MeshLimits] = MeshLimits()
+
+
+@dataclass(frozen=True, slots=True)
+class Planning:
+    """What to plan."""
+
+    mesh: OmitArgPrefixes[Mesh] = Mesh()
+    friction: Friction = 0.5
+    """Coulomb coefficient at every contact."""
+    theta_deg: Positive | None = None
+    """Half-angle of the friction cones to plan with [deg]; the friction angle if not given."""
+    family: UseAppendAction[tuple[Literal["concurrent", "pencil", "regulus", "free"], ...]] = ()
+    """Construction to try, may be repeated; all if not given. `free` looks for grasps of any type
+    on the faces that the others leave over, and proves for those without that there is none, or
+    says that it is undecided."""
+    cones: Literal["normal", "tilted"] = "tilted"
+    """Force cones to construct with: those around the normals as in the paper, or leaning ones too,
+    which serve boxes, prisms and any friction."""
+    limit: Count | None = None
+    """Keep at most this many grasps, the best ones; None for all."""
+    rank_by: Literal["radius", "friction-margin", "ferrari-canny", "diverse"] = "radius"
+    """Which are the best: the largest discs, of each family in turn; the least critical friction;
+    the largest quality; or each next one the farthest from those before it."""
+    cells: Count = 1
+    """Into how many parts the free method may cut the four faces where it is undecided."""
+    complete: bool = False
+    """Cut the faces that stay undecided until each is decided."""
+    approach_m: Positive | None = None
+    """With --finger-radius-m: keep only grasps that fingers of that radius reach on straight free
+    lines of this length [m]."""
+    edge_clearance_m: NotNegative = 0.0
+    """How far contacts and their regions stay from the edges of their faces [m]."""
+    share_faces_m: NotNegative | None = None
+    """Let two fingers stand on one face, at least so far apart [m]."""
+    optimize: bool = False
+    """Move the contacts of each grasp on their faces to raise its Ferrari-Canny quality."""
+    regions: bool = False
+    """Certify regions around the contacts of each grasp by proofs of their own, as the command
+    `regions` does, after the grasps are chosen; they replace those of its construction where the
+    discs in them around all contacts are larger."""
+    finger_radius_m: Positive | None = None
+    """Radius of the fingertips that --approach-m lets come [m], and with --optimize how far moved
+    contacts stay from edges, or half the radius of the largest disc in a face if that is less. If
+    not given, they stay a twentieth of the object's radius from edges, or as far as planned."""
+    ceiling: Count | None = None
+    """With --optimize: also prove an upper bound of the quality of all contacts on the same faces
+    that are as clear of edges, cut into so many parts at most."""
+    seed: Seed = 0
+    """For everything random."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fingers:
+    """How fingertips are built; what is not given suits the grasp."""
+
+    max_normal_force: Usual = 10.0
+    """Limit of each finger's push [N]."""
+    fingertip_radius_m: Usual | None = None
+    """What was planned for, or a tenth of the object's radius, or what fits, if not given."""
+    fingertip_mass_kg: Usual | None = None
+    """So that similar grasps behave alike if not given, as the stiffness."""
+    stiffness_n_per_m: Usual | None = None
+    """Of the servos that drive a fingertip."""
+    approach: Annotated[Direction | None, arg(metavar="X Y Z")] = None
+    """Direction in which fingers arrive in the scene's keyframe; if not given, as planned or along
+    the normals."""
+
+
+@dataclass(frozen=True, slots=True)
+class Repeats:
+    """Whether to repeat with noise, and how much: standard deviations of normal distributions."""
+
+    trials: Annotated[int, at_least(0, up_to=MOST_TRIALS)] = 0
+    """Also repeat all holds so many times with noise, and say how often the grasp held."""
+    noise_shift: Annotated[float, at_least(0.0, up_to=1.0)] = 0.01
+    """Of the object's position along each axis, in object radii."""
+    noise_turn_deg: Annotated[float, at_least(0.0, up_to=45.0)] = 1.0
+    """Of its orientation about each axis."""
+    noise_normal_deg: Annotated[float, at_least(0.0, up_to=45.0)] = 1.0
+    """Of the surface's normal at each contact."""
+    noise_friction: Annotated[float, at_least(0.0, up_to=1.0)] = 0.05
+    """Of the friction, relative to it."""
+    noise_mass: Annotated[float, at_least(0.0, up_to=1.0)] = 0.05
+    """Of the mass, and with it of every load, relative to them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Testing:
+    """What to simulate, and how."""
+
+    fingers: OmitArgPrefixes[Fingers] = Fingers()
+    random_wrenches: Annotated[int, at_least(0, up_to=MOST_RANDOM_WRENCHES)] = 0
+    """Also hold so many random wrenches, each at a share of what the analysis says is resisted."""
+    wrenches: Path | None = None
+    """A file of wrenches to hold as they are (see docs/files.md)."""
+    weight_n: Usual | None = None
+    """Also hold the object's weight [N], along and against each axis or in the directions given."""
+    down: Annotated[UseAppendAction[tuple[Direction, ...]], arg(metavar="X Y Z")] = ()
+    """With --weight-n: a direction of gravity; may be repeated."""
+    limits: Literal["none", "ramp", "bisection"] = "none"
+    """Also find the largest multiple of each wrench in simulation."""
+    independent: bool = False
+    """Also try rigid fingertips, a fixed squeeze and the first instant, which know nothing of the
+    planned forces."""
+    also_judge_by: UseAppendAction[tuple[RuleName, ...]] = ()
+    """Show what the acceptance rule of another tool makes of the same trials; may be repeated."""
+    repeats: OmitArgPrefixes[Repeats] = Repeats()
+    traces: bool = False
+    """With --out: also write how each contact moved over time."""
+    surface: Literal["pads", "mesh"] = "pads"
+    """What fingertips touch: a pad each, exact on any object, or a convex object's own mesh."""
+    setup: Path | None = None
+    """A TOML file with settings of the simulation (see docs/files.md)."""
+    timeout_s: Positive = 600.0
+    """Stop trials of one contact set that take longer."""
+    jobs: Count = field(default_factory=available_cores)
+    """Largest number of processes; results do not depend on it."""

@@ -1,0 +1,91 @@
+"""The object and the fingers that the flags of a command ask to plan for."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from grasp_core.errors import InputError
+from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.mesh_files.reading import FORMATS
+from grasp_core.objects.face import PatchLimits
+from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
+from grasp_core.planning.reach import Finger
+from scenes.example_objects import example_object
+from sim_validate.cli import flag_groups
+from sim_validate.cli.console import Reporter
+
+
+def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
+    """A mesh file, or a built-in object when the name has no mesh ending."""
+    path = Path(name)
+    if path.suffix.lower().lstrip(".") in FORMATS or path.is_file():
+        given = mesh.limits
+        return load_polyhedron(
+            path,
+            unit=mesh.unit,
+            faces=mesh.faces,
+            patches=PatchLimits(mesh.patch_spread_deg, mesh.patch_depth, mesh.patches),
+            center_of_mass=mesh.center_of_mass_m,
+            limits=MeshLimits(
+                max_bytes=given.max_mesh_bytes,
+                max_triangles=given.max_triangles,
+                max_faces=given.max_faces,
+                max_parts=given.max_parts,
+                max_seconds=given.max_mesh_seconds,
+                max_memory_mib=given.max_mesh_memory_mib,
+            ),
+        )
+    if path.suffix or len(path.parts) > 1:
+        raise InputError(f"{name}: no such file, and the ending is none of {', '.join(FORMATS)}")
+    if replace(mesh, limits=flag_groups.MeshLimits()) != flag_groups.Mesh():
+        raise InputError(
+            f"{name} is built in; --unit, --faces, --patches, --patch-spread-deg, --patch-depth "
+            "and --center-of-mass-m say how mesh files are read"
+        )
+    return example_object(name)
+
+
+def object_to_plan(name: str, planning: flag_groups.Planning, reporter: Reporter) -> Polyhedron:
+    """The object, once all that is asked for fits it.
+
+    Raises:
+        InputError: The object or a setting is refused.
+    """
+    if planning.ceiling is not None and not planning.optimize:
+        raise InputError("--ceiling bounds what --optimize may reach; give both or neither")
+    _check_optimize(planning)
+    if planning.regions and planning.share_faces_m is not None:
+        raise InputError(
+            "--regions would let fingers that share a face meet; leave it or --share-faces-m out"
+        )
+    body = load_object(name, planning.mesh)
+    if planning.optimize and body.patches:
+        raise InputError(
+            f"{body.name} has a curved surface; --optimize is for exact planar faces only"
+        )
+    for note in body.notes:
+        reporter.warn(f"{body.name}: {note}")
+    reporter.detail(f"{body.name}: mesh {body.content_sha256}, {len(body.triangles)} triangles")
+    return body
+
+
+def _check_optimize(planning: flag_groups.Planning) -> None:
+    kept = (planning.edge_clearance_m, planning.share_faces_m, planning.approach_m)
+    if planning.optimize and any(kept):
+        raise InputError(
+            "--optimize moves contacts without regard to --edge-clearance-m, --share-faces-m and "
+            "--approach-m; leave it out, or them"
+        )
+
+
+def asked_finger(planning: flag_groups.Planning) -> Finger | None:
+    """The fingers whose free lines are to be planned, if any."""
+    if planning.approach_m is None:
+        if planning.finger_radius_m is not None and not planning.optimize:
+            raise InputError(
+                "--finger-radius-m also needs --approach-m, the length of the free line on which "
+                "fingers come, or --optimize, which keeps contacts that far from edges"
+            )
+        return None
+    if planning.finger_radius_m is None:
+        raise InputError("--approach-m also needs --finger-radius-m, the radius of the fingertips")
+    return Finger(planning.finger_radius_m, planning.approach_m)

@@ -1,0 +1,89 @@
+"""The trials that the flags and files of a command ask for, as settings of the simulator."""
+
+from pathlib import Path
+
+from grasp_core.planning.reach import Finger
+from scenes.fingertips import FingerSettings
+from sim_validate.cli import flag_groups
+from sim_validate.cli.flag_bounds import FlagsError
+from sim_validate.records.setup_toml import setup_from_file
+from sim_validate.records.wrenches import weights, wrenches_from_file
+from sim_validate.simulation.noise import Noise
+from sim_validate.simulation.setup import Agenda, Setup, with_planned_radius
+
+
+def finger_settings(given: flag_groups.Fingers) -> FingerSettings:
+    """What the flags say about fingertips."""
+    return FingerSettings(
+        max_normal_force_n=given.max_normal_force,
+        radius_m=given.fingertip_radius_m,
+        mass_kg=given.fingertip_mass_kg,
+        stiffness_n_per_m=given.stiffness_n_per_m,
+        approach=given.approach,
+    )
+
+
+def noise_of(given: flag_groups.Repeats) -> Noise:
+    """What the flags say about noise.
+
+    Raises:
+        InputError: There is noise, but no repeat to put it on.
+    """
+    plain = flag_groups.Repeats()
+    if not given.trials and given != plain:
+        raise FlagsError("--noise-... is for repeats: give --trials, too")
+    return Noise(
+        shift=given.noise_shift,
+        turn_deg=given.noise_turn_deg,
+        normal_deg=given.noise_normal_deg,
+        friction=given.noise_friction,
+        mass=given.noise_mass,
+    )
+
+
+def prepared(
+    testing: flag_groups.Testing, planned: Finger | None, seed: int, folder: Path | None
+) -> tuple[Setup, Agenda]:
+    """What the flags and files say about trials, checked before anything runs.
+
+    Args:
+        testing: The flags.
+        planned: Fingers that the grasps are planned for.
+        seed: Seed of what is drawn.
+        folder: Where results go, if anywhere.
+
+    Raises:
+        InputError: A flag or a file is refused, or flags contradict each other.
+    """
+    return _setup(testing, planned), _agenda(testing, seed, folder)
+
+
+def _setup(testing: flag_groups.Testing, planned: Finger | None) -> Setup:
+    """How the flags, and then a file, say trials are simulated."""
+    setup = Setup(
+        fingers=with_planned_radius(finger_settings(testing.fingers), planned),
+        surface=testing.surface,
+        timeout_s=testing.timeout_s,
+    )
+    return setup if testing.setup is None else setup_from_file(testing.setup, setup)
+
+
+def _agenda(testing: flag_groups.Testing, seed: int, folder: Path | None) -> Agenda:
+    """Which trials the flags ask for."""
+    if testing.down and testing.weight_n is None:
+        raise FlagsError("--down is a direction of the weight: give --weight-n too")
+    if testing.traces and folder is None:
+        raise FlagsError("--traces are written to files: give --out DIR too")
+    own = () if testing.wrenches is None else wrenches_from_file(testing.wrenches)
+    weight = () if testing.weight_n is None else weights(testing.weight_n, testing.down)
+    return Agenda(
+        random_wrenches=testing.random_wrenches,
+        wrenches=(*own, *weight),
+        limits=testing.limits,
+        independent=testing.independent,
+        rules=testing.also_judge_by,
+        trials=testing.repeats.trials,
+        noise=noise_of(testing.repeats),
+        keep_traces=testing.traces,
+        seed=seed,
+    )

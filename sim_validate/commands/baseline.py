@@ -1,0 +1,114 @@
+"""The commands about baselines: to record one, and to check whether stability has changed."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+
+from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
+from sim_validate.baselines.check import Checked, check
+from sim_validate.baselines.compare import Finding, Status, failing
+from sim_validate.baselines.junit import junit_text
+from sim_validate.baselines.measure import complete, measured, seen_from
+from sim_validate.baselines.settings import of_settings, setup_for
+from sim_validate.baselines.source_file import Source, source_of
+from sim_validate.cli import baseline_flags
+from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.commands.asked_trials import noise_of
+from sim_validate.files.reading import write_text
+from sim_validate.records.grasps import read_grasps
+from sim_validate.records.setup_toml import setup_from_file
+from sim_validate.records.wrenches import wrenches_from_file
+from sim_validate.simulation.setup import Agenda
+
+
+def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
+    """Write a baseline."""
+    check_writable(command.out)
+    saved = read_grasps(command.grasps)
+    source = source_of(saved, command.grasps, [command.out.parent])
+    agenda = Agenda(
+        random_wrenches=command.random_wrenches,
+        wrenches=() if command.wrenches is None else wrenches_from_file(command.wrenches),
+        limits=command.limits,
+        trials=command.repeats.trials,
+        noise=noise_of(command.repeats),
+        seed=saved.seed if command.seed is None else command.seed,
+    )
+    setup, about = setup_for(saved, command.setup), seen_from(command.out, command.grasps)
+    with reporter.progress("simulating") as steps:
+        done = measured(saved, (about, command.limit), setup, agenda, command.jobs, steps.update)
+    found = complete(done)
+    write_baseline(command.out, found)
+    held = sum(entry.held for entry in found.entries)
+    reporter.say(f"wrote {command.out}: {held} of {len(found.entries)} grasps held")
+    _say_source(source, reporter)
+    reporter.document({"baseline": str(command.out), "grasps": len(found.entries), "held": held})
+    return Exit.GOOD
+
+
+def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
+    """Say what became of the grasps of a baseline."""
+    before = read_baseline(command.baseline)
+    path = command.grasps or command.baseline.parent / before.grasps_file
+    saved = read_grasps(path)
+    source = source_of(saved, path, [command.baseline.parent])
+    setup, agenda = of_settings(before.settings, str(command.baseline))
+    if command.setup is not None:
+        setup = setup_from_file(command.setup, setup)
+    where = seen_from(command.baseline, path)
+    with reporter.progress("simulating") as steps:
+        done = check(before, saved, where, (setup, agenda), command.jobs, steps.update)
+    if command.junit is not None:
+        text = junit_text(str(command.baseline), done.findings, strict=command.strict)
+        write_text(command.junit, text)
+    _show(done, reporter)
+    _say_source(source, reporter)
+    if command.bless:
+        write_baseline(command.baseline, complete(done.measured))
+        reporter.say(f"wrote {command.baseline}")
+        return Exit.GOOD
+    return exit_code(done.findings, strict=command.strict)
+
+
+def _say_source(source: Source, reporter: Reporter) -> None:
+    if source.note:
+        reporter.say(source.note)
+
+
+def exit_code(findings: Sequence[Finding], *, strict: bool) -> int:
+    """1 if a grasp fails the check, 4 if one cannot be compared, else 0."""
+    came = {finding.status for finding in findings}
+    if came & {*failing(strict=strict)}:
+        return Exit.NEGATIVE
+    return Exit.INPUT if Status.NOT_COMPARABLE in came else Exit.GOOD
+
+
+def _show(done: Checked, reporter: Reporter) -> None:
+    told = [finding for finding in done.findings if finding.status is not Status.SAME]
+    rows = [(each.id, each.status.value, _why(each)) for each in told]
+    if rows:
+        reporter.table("what became of grasps", ("grasp", "status", "why"), rows[:TABLE_ROWS])
+        say_cut(len(rows), reporter)
+    counts = Counter(finding.status.value for finding in done.findings)
+    reporter.say(", ".join(f"{count} {name}" for name, count in sorted(counts.items())))
+    reporter.say(f"compared {done.how}")
+    listed = [_record(finding) for finding in done.findings]
+    reporter.document({"counts": dict(counts), "compared": done.how, "grasps": listed})
+
+
+def _why(finding: Finding) -> str:
+    """The reasons; then, where they are not what differs, that."""
+    more = [text for text in finding.differences if text not in finding.reasons]
+    return "; ".join([*finding.reasons, *more])
+
+
+def _record(finding: Finding) -> dict[str, object]:
+    return {
+        "id": finding.id,
+        "status": finding.status.value,
+        "reasons": list(finding.reasons),
+        "differences": list(finding.differences),
+        "before": None if finding.before is None else asdict(finding.before),
+        "after": None if finding.after is None else asdict(finding.after),
+    }

@@ -1,0 +1,166 @@
+"""The commands about datasets: to make one, to go on making it, to check and to export it."""
+
+from contextlib import AbstractContextManager
+from dataclasses import asdict, fields, replace
+from pathlib import Path
+from typing import Any
+
+from grasp_core.errors import InputError
+from grasp_core.mesh_files.reading import FORMATS
+from grasp_core.planning.request import METHODS
+from sim_validate.cli import dataset_flags
+from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.datasets.building.build import build
+from sim_validate.datasets.building.driver import Engine
+from sim_validate.datasets.building.worker import Limits
+from sim_validate.datasets.config import DatasetConfig, config_from_toml
+from sim_validate.datasets.describing.croissant import CROISSANT, missing_fields
+from sim_validate.datasets.exports.formats import export
+from sim_validate.datasets.manifest import read_manifest
+from sim_validate.datasets.verifying.redo import Sample
+from sim_validate.datasets.verifying.verify import verify
+from sim_validate.parallel.clusters import dask_workers, ray_workers
+from sim_validate.parallel.processes import local_processes
+
+FRICTION = 0.5
+"""Planned and tried at unless told otherwise."""
+MEGABYTE = 2**20
+
+
+def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:
+    """Make a dataset."""
+    return _build(_asked(command), command.out, command.work, reporter)
+
+
+def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:
+    """Judge grasps of other tools."""
+    config = DatasetConfig(
+        objects=(command.object,),
+        contacts=str(command.contacts),
+        outward=command.outward,
+        **_settings(command.settings),
+    )
+    return _build(config, command.out, command.work, reporter)
+
+
+def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter: Reporter) -> int:
+    _warn_of_missing(config, reporter)
+    memory = None if work.memory_mb is None else work.memory_mb * MEGABYTE
+    with reporter.progress("building") as steps, _engine(work) as engine:
+        built = build(config, out, engine, steps.update, Limits(work.timeout_s, memory))
+    rows = built.rows
+    reporter.say(
+        f"{out}: {built.units} units, {built.made} made now, {built.quarantined} quarantined; "
+        f"{rows['objects']} objects, {rows['grasps']} grasps and controls, {rows['trials']} trials"
+    )
+    if built.quarantined:
+        reporter.warn(f"{out / 'quarantine.jsonl'} says why objects were left out")
+    reporter.document({"out": str(out), "manifest": asdict(read_manifest(out))})
+    return Exit.PARTIAL if built.quarantined else Exit.GOOD
+
+
+def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:
+    """Where units are done.
+
+    Raises:
+        InputError: The engine is not installed, or there is no cluster.
+    """
+    if work.engine != "local":
+        start = ray_workers if work.engine == "ray" else dask_workers
+        return start(work.jobs, work.address)
+    if work.address is not None:
+        raise InputError("--address is for --engine ray and dask")
+    return local_processes(work.jobs)
+
+
+def verify_dataset(command: dataset_flags.Verify, reporter: Reporter) -> int:
+    """Check a dataset."""
+    sample = Sample(command.share, command.seed) if command.share > 0.0 else None
+    faults = verify(command.dataset, sample)
+    for fault in faults[:TABLE_ROWS]:
+        reporter.warn(fault)
+    say_cut(len(faults), reporter)
+    reporter.say(
+        f"{command.dataset}: {'nothing is wrong' if not faults else f'faults: {len(faults)}'}"
+    )
+    reporter.document({"dataset": str(command.dataset), "faults": faults})
+    return Exit.NEGATIVE if faults else Exit.GOOD
+
+
+def export_dataset(command: dataset_flags.Export, reporter: Reporter) -> int:
+    """Write a dataset in another format."""
+    with reporter.progress("exporting") as steps:
+        done = export(command.dataset, command.to, command.out, command.split, steps.update)
+    counts = ", ".join(f"{count} {name}" for name, count in done.rows.items())
+    reporter.say(f"{command.out}: {done.files} files, {counts}")
+    if not done.rows["grasps"]:
+        reporter.warn(f"{command.dataset}: no grasps in {command.split or 'it'}")
+    asked = {"dataset": str(command.dataset), "to": command.to, "split": command.split}
+    reporter.document({**asked, "out": str(command.out), **asdict(done)})
+    return Exit.GOOD
+
+
+def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
+    """Say what the description will lack, before the work begins: it cannot be given later."""
+    missing = missing_fields(config)
+    if missing and not reporter.quiet:
+        given = ", ".join(f"--{setting}" for setting in missing.values())
+        reporter.warn(
+            f"{CROISSANT} will lack {', '.join(missing)}, which Croissant requires: give {given}, "
+            "or the same settings in a TOML file"
+        )
+
+
+def _asked(command: dataset_flags.Build) -> DatasetConfig:
+    """What a TOML file or the flags say a dataset is made of.
+
+    Raises:
+        InputError: A setting or the file is refused, or there are flags beside a file.
+    """
+    first = Path(command.objects[0]) if command.objects else Path()
+    if first.suffix == ".toml":
+        unsaid = (dataset_flags.Planning(), dataset_flags.Settings())
+        if len(command.objects) > 1 or (command.planning, command.settings) != unsaid:
+            raise InputError(f"{first} says what the dataset is made of: give nothing beside it")
+        config = config_from_toml(first)
+        return replace(config, objects=_listed(config.objects))
+    return DatasetConfig(
+        objects=_listed(command.objects),
+        families=command.planning.family or METHODS,
+        limit=command.planning.limit,
+        cones=command.planning.cones,
+        **_settings(command.settings),
+    )
+
+
+def _settings(settings: dataset_flags.Settings) -> dict[str, Any]:
+    """Settings by the names of the configuration."""
+    given = {each.name: getattr(settings, each.name) for each in fields(settings)}
+    return {"frictions": given.pop("friction") or (FRICTION,), **given}
+
+
+def is_mesh(path: Path) -> bool:
+    """Whether a file of a folder is taken for a mesh: by its ending, hidden ones not."""
+    return path.suffix.lower()[1:] in FORMATS and not path.name.startswith(".")
+
+
+def _listed(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Objects by name; folders stand for the mesh files in them.
+
+    Raises:
+        InputError: A folder holds none.
+    """
+    found: list[str] = []
+    if not names:
+        raise InputError("objects: expected mesh files, folders of them, or built-in objects")
+    for name in names:
+        folder = Path(name)
+        if not folder.is_dir():
+            found.append(name)
+            continue
+        meshes = sorted(path for path in folder.iterdir() if is_mesh(path))
+        if not meshes:
+            raise InputError(f"{name}: holds no mesh file ({', '.join(FORMATS)})")
+        found += map(str, meshes)
+    return tuple(found)

@@ -1,0 +1,179 @@
+"""The command that plans: from an object to certified grasps, a file and tables."""
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.planner import plan
+from grasp_core.planning.request import methods_for
+from grasp_core.planning.result import Plan
+from grasp_core.records.grasps_json import Moved, plan_to_json
+from grasp_core.values import FaceQuadruple, Grasp
+from sim_validate.cli import command_flags, flag_groups
+from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.commands.asked_objects import asked_finger, object_to_plan
+from sim_validate.files.folder_lock import alone_in
+from sim_validate.files.reading import write_text
+from sim_validate.files.stale_results import remove_results
+from sim_validate.parallel.certifying import Asked, Found, certified, wider
+from sim_validate.parallel.improving import improved
+from sim_validate.records.regions import write_regions
+
+
+def plan_object(
+    body: Polyhedron, planning: flag_groups.Planning, jobs: int, reporter: Reporter
+) -> tuple[Plan, tuple[Moved, ...]]:
+    """The grasps of an object, moved if that is asked for, and how they were moved.
+
+    Raises:
+        InputError: A setting is refused.
+    """
+    with reporter.progress("planning") as steps:
+        found = plan(
+            body,
+            planning.friction,
+            families=planning.family or methods_for(body),
+            cones=planning.cones,
+            theta_deg=planning.theta_deg,
+            limit=planning.limit,
+            rank_by=planning.rank_by,
+            seed=planning.seed,
+            cells=planning.cells,
+            complete=planning.complete,
+            finger=asked_finger(planning),
+            clearance=planning.edge_clearance_m,
+            share_faces=planning.share_faces_m,
+            progress=lambda done, total, grasps: steps.update(done, total, f"({grasps} grasps)"),
+        )
+    moves: tuple[Moved, ...] = ()
+    if planning.optimize and found.grasps:
+        with reporter.progress("optimising") as steps:
+            found, moves = improved(
+                body, found, finger_radius=planning.finger_radius_m, parts=planning.ceiling,
+                jobs=jobs, progress=steps.update,
+            )  # fmt: skip
+        if left_out := len(moves) - len(found.grasps):
+            reporter.say(f"{left_out} optimised grasps are left out: others have the same contacts")
+    return found, moves
+
+
+def with_regions(
+    body: Polyhedron, found: Plan, planning: flag_groups.Planning, folder: Path | None, jobs: int,
+    reporter: Reporter,
+) -> Plan:  # fmt: skip
+    """The plan with certified regions, where that is asked for; proofs go to the folder."""
+    if not (planning.regions and found.grasps):
+        return found
+    asked = Asked(found.friction, clearance=planning.edge_clearance_m)
+    grasps = list[Grasp]()
+
+    def kept(each: Iterator[Found]) -> Iterator[Found]:
+        for grasp, proved in each:
+            grasps.append(wider(grasp, proved))
+            yield grasp, proved
+
+    with reporter.progress("certifying") as steps:
+        each = certified(body, found.grasps, asked, jobs=jobs, progress=steps.update)
+        write_regions(folder, body, asked, kept(each))
+    widened = sum(new is not old for new, old in zip(grasps, found.grasps, strict=True))
+    reporter.say(f"{widened} of {len(grasps)} grasps got regions with proofs of their own")
+    return replace(found, grasps=tuple(grasps))
+
+
+def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
+    """Plan, write the grasps, and show the best."""
+    body = object_to_plan(command.object, command.planning, reporter)
+    with alone_in(command.out):
+        found, moves = plan_object(body, command.planning, command.jobs, reporter)
+        if command.out:
+            remove_results(command.out)
+        found = with_regions(body, found, command.planning, command.out, command.jobs, reporter)
+        text = plan_to_json(body, found, moves)
+        if command.out:
+            path = write_text(command.out / "grasps.json", text)
+            reporter.say(f"wrote {path}")
+    if reporter.json_only:
+        print(text, end="")  # noqa: T201 - the document itself
+    say_counts(body, found, reporter)
+    if found.absence:
+        reporter.say(found.absence)
+        return Exit.NONE
+    rows = [
+        (g.id, g.family, f"{1e3 * g.radius:.3g}" if g.radius else "-", f"{g.critical_friction:.4f}",
+         f"{math.degrees(g.span_angle):.2f}", f"{g.closure_margin:.4f}",
+         f"{g.ferrari_canny[0]:.4f}")
+        for g in found.grasps[:TABLE_ROWS]
+    ]  # fmt: skip
+    columns = ("grasp", "family", "radius mm", "mu*", "theta* deg", "margin", "quality N")
+    reporter.table(f"{len(found.grasps)} grasps of {body.name}", columns, rows)
+    say_cut(len(found.grasps), reporter)
+    if moves:
+        show_gains(moves, reporter)
+    return Exit.GOOD
+
+
+def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
+    """What was tried, and how it ended."""
+    counts = found.counts
+    reporter.say(
+        f"{body.name}: {counts.faces} faces, {counts.quadruples} face quadruples, "
+        + (f"normals of {counts.spanning} span (P3), " if counts.spanning is not None else "")
+        + f"friction {found.friction:g}, "
+        f"theta {math.degrees(found.theta):.4g} deg"
+    )
+    known = found.outcomes
+    reporter.say(
+        f"face quadruples: {known.held} with a certified grasp, {known.absent} proved to have "
+        f"none, {len(found.undecided)} undecided, {known.open - len(found.undecided)} left open"
+        + (f", {known.out_of_reach} out of reach" if found.unreached else "")
+    )
+    for method, tally in counts.families.items():
+        undecided = f"{tally.undecided} undecided, " if method == "free" else ""
+        undecided += f"{tally.unreachable} out of reach, " if found.unreached else ""
+        reporter.say(
+            f"{method}: {tally.tried} tried, {tally.pruned} pruned, {tally.infeasible} "
+            f"infeasible, {undecided}{tally.duplicates} duplicates, {tally.found} found, "
+            f"{tally.rejected} rejected, {found.seconds[method]:.2f} s"
+        )
+    if found.undecided:
+        named = [f"{_listed(faces)} ({100.0 * share:.3g} % open)"
+                 for faces, share in found.undecided.items()]  # fmt: skip
+        reporter.say(f"undecided faces: {', '.join(named[:TABLE_ROWS])}")
+        say_cut(len(named), reporter)
+    reasons = Counter(_whoever(why) for why in found.unreached.values())
+    for why, count in reasons.most_common():
+        reporter.say(f"out of reach: {why}, on {count} face quadruples")
+
+
+def _whoever(why: str) -> str:
+    """A reason without the numbers of the fingers."""
+    why = re.sub(r"fingertips \d+ and \d+", "two fingertips", why)
+    return re.sub(r"(finger(?:tip)?) \d+", r"a \1", why)
+
+
+def _listed(faces: FaceQuadruple) -> str:
+    return "-".join(str(face) for face in faces)
+
+
+def show_gains(moves: Sequence[Moved], reporter: Reporter) -> None:
+    """Tell how the quality changed: grasp by grasp, then how the gains are distributed."""
+    rows = [
+        (move.id, f"{move.before[0]:.4f}", f"{move.after[0]:.4f}", f"{move.gain:.3f}",
+         "" if move.ceiling is None else f"{move.ceiling:.4f}")
+        for move in moves[:TABLE_ROWS]
+    ]  # fmt: skip
+    columns = ("grasp", "quality before", "after", "gain", "none above")
+    reporter.table("Ferrari-Canny l1 [N]", columns, rows)
+    gains = np.array([move.gain for move in moves])
+    low, quarter, middle, upper, high = np.percentile(gains, [0, 25, 50, 75, 100])
+    reporter.say(
+        f"{int((gains > 1.0).sum())} of {len(gains)} grasps raised; gain from {low:.3f} to "
+        f"{high:.3f}, median {middle:.3f}, half of them between {quarter:.3f} and {upper:.3f}"
+    )

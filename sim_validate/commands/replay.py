@@ -1,0 +1,119 @@
+"""The command that simulates one trial of a file again: its trace, and a clip."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from scenes.drawing.clips import RATE, GraphicsError, magnified, write_clip
+from scenes.mjcf import write_scene
+from sim_validate.cli import command_flags
+from sim_validate.cli.console import Reporter
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.files.reading import write_text
+from sim_validate.records.verdicts_json import finite
+from sim_validate.replaying.recorded import Recorded, Wanted
+from sim_validate.replaying.replay import Replayed, replayed
+from sim_validate.replaying.sources import recorded_in
+from sim_validate.simulation.hold_verdict import LET_GO, Outcome
+
+SHOWN = 12
+"""Rows of the trace that are shown; its file has all."""
+MICRO = 1e6
+SLOWER = 1.0 / (RATE * 0.01)
+"""Clips show a sample of ten milliseconds in each frame."""
+
+
+def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
+    """Simulate a trial again and compare it with what the file says."""
+    wanted = Wanted(command.grasp, command.control, command.trial, command.grasps)
+    recorded = recorded_in(command.source, wanted)
+    found = replayed(recorded, command.wrench)
+    said = recorded.outcome_of(found.name)
+    _show(recorded, found, said, reporter)
+    files = [] if command.out is None else list(_written(found, command, reporter))
+    record = _record(recorded, found, said) | {"files": [str(path) for path in files]}
+    reporter.document(finite(record))
+    return Exit.GOOD if _as_it_must(found, said) else Exit.NEGATIVE
+
+
+def _as_it_must(found: Replayed, said: str | None) -> bool:
+    """Whether a trial ended as the file says, or else as the analysis does."""
+    outcome, limit = found.hold.outcome, found.predicted_limit
+    if said is not None:
+        return outcome.value == said
+    return outcome is Outcome.HELD if limit is not None and limit >= 1.0 else outcome in LET_GO
+
+
+def _show(recorded: Recorded, found: Replayed, said: str | None, reporter: Reporter) -> None:
+    trace, hold = found.watched.trace, found.hold
+    step = max(1, len(trace.times_s) // SHOWN)
+    rows = [
+        (f"{trace.times_s[row]:.3f}",
+         *(f"{MICRO * value[row]:.3g}" for value in (trace.displacements_m, trace.rotations_rad)),
+         *(f"{MICRO * value[row].max():.3g}" for value in (trace.slips_m, trace.gaps_m)))
+        for row in range(0, len(trace.times_s), step)
+    ]  # fmt: skip
+    columns = ("s", "um moved", "urad turned", "um slid at most", "um off a face at most")
+    reporter.table(f"{recorded.name}: {found.name}, from when friction is lowered", columns, rows)
+    limit = found.predicted_limit
+    predicted = "nothing resists it" if limit is None else f"{limit:.4g} times as much is resisted"
+    needs = found.required_friction
+    friction = "no forces balance it" if needs is None else f"planned forces need {needs:.4g}"
+    reporter.say(f"wrench {found.load.wrench.tolist()} N, N m: by analysis {predicted}")
+    reporter.say(f"friction {found.friction:.6g}: {friction}")
+    ended = f"{hold.outcome.value}{f': {hold.reason}' if hold.reason else ''}"
+    reporter.say(f"{ended} (the file says {said or 'nothing'})")
+
+
+def _written(found: Replayed, command: command_flags.Replay, reporter: Reporter) -> Iterator[Path]:
+    """Scene, trace and clip."""
+    folder = command.out or Path()
+    folder.mkdir(parents=True, exist_ok=True)
+    yield write_scene(found.scene, folder / "scene.xml")
+    yield write_text(folder / "trace.csv", trace_text(found))
+    known = np.isfinite(found.watched.joints).all(axis=1)
+    joints, factor = magnified(found.watched.joints[known], found.scene)
+    motion = f"motion {factor:g} times as large" if factor > 1.0 else "true to scale"
+    motion += f", {SLOWER:g} times slower"
+    caption = f"{found.name}: {found.hold.outcome.value}, {motion}"
+    try:
+        yield write_clip(found.scene, joints, folder / "clip.gif", caption)
+    except GraphicsError as error:
+        reporter.warn(f"no clip: {error}")
+    reporter.say(f"wrote {folder}")
+
+
+def trace_text(found: Replayed) -> str:
+    """The trace as CSV: a row for each sample from when friction was lowered."""
+    trace = found.watched.trace
+    fingers = range(trace.slips_m.shape[1])
+    names = ["time_s", "displacement_m", "shift_m", "rotation_rad",
+             *(f"slip{finger}_m" for finger in fingers),
+             *(f"gap{finger}_m" for finger in fingers)]  # fmt: skip
+    table = (
+        trace.times_s, trace.displacements_m, trace.shifts_m, trace.rotations_rad,
+        *trace.slips_m.T, *trace.gaps_m.T,
+    )  # fmt: skip
+    rows = [",".join(repr(float(value)) for value in row) for row in zip(*table, strict=True)]
+    return "\n".join([",".join(names), *rows]) + "\n"
+
+
+def _record(recorded: Recorded, found: Replayed, said: str | None) -> dict[str, object]:
+    hold = found.hold
+    return {
+        "name": recorded.name,
+        "wrench": found.name,
+        "wrench_n_nm": found.load.wrench.tolist(),
+        "friction": found.friction,
+        "predicted_limit": found.predicted_limit,
+        "required_friction": found.required_friction,
+        "outcome": hold.outcome.value,
+        "reason": hold.reason,
+        "recorded_outcome": said,
+        "displacement_m": hold.displacement_m,
+        "start_displacement_m": hold.start_displacement_m,
+        "rotation_rad": hold.rotation_rad,
+        "slip_m": hold.slip_m.tolist(),
+        "failed_after_s": hold.failed_after_s,
+    }

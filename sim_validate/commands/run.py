@@ -1,0 +1,95 @@
+"""The command that plans and simulates: from an object to grasps, scenes and verdicts."""
+
+import re
+from pathlib import Path
+
+from grasp_core.errors import GraspError
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.records.grasps_json import SavedGrasps, plan_to_json
+from sim_validate.cli import command_flags
+from sim_validate.cli.console import Reporter
+from sim_validate.cli.exit_codes import Exit, reason_of
+from sim_validate.cli.showing_flags import Report
+from sim_validate.commands.asked_objects import asked_finger, object_to_plan
+from sim_validate.commands.asked_trials import prepared
+from sim_validate.commands.plan import (
+    plan_object,
+    say_counts,
+    show_gains,
+    with_regions,
+)  # fmt: skip
+from sim_validate.commands.report import shown_report
+from sim_validate.commands.validate import simulate_grasps
+from sim_validate.files.folder_lock import alone_in
+from sim_validate.files.reading import write_text
+from sim_validate.files.stale_results import REPORT, remove_results, require_report_folder
+from sim_validate.simulation.gate.gate import require_faithful
+from sim_validate.simulation.setup import Agenda, Setup
+
+RESULTS = Path("graspproof-out")
+"""Where results go, a folder for each object, if not told otherwise."""
+HASHED = 8
+"""Digits of a hash that tell objects apart whose names look alike."""
+NAMED = 60
+"""Characters of a name that its folder has: with four bytes each, as many as file systems take."""
+REPORTED = 200
+"""Most grasps that a run draws by itself, in a minute; `report` draws all."""
+
+
+def run_object(command: command_flags.Run, reporter: Reporter) -> int:
+    """Plan on an object, simulate its grasps, write and show everything."""
+    planning = command.planning
+    trials = prepared(
+        command.testing, asked_finger(planning), planning.seed, command.out or RESULTS
+    )
+    body = object_to_plan(command.object, planning, reporter)
+    folder = command.out or RESULTS / _folder_name(body)
+    with alone_in(folder):
+        if not command.no_report:
+            require_report_folder(folder / REPORT)
+        require_faithful(trials[0], planning.friction, body.radius)
+        return _run_in(folder, body, command, trials, reporter)
+
+
+def _run_in(
+    folder: Path,
+    body: Polyhedron,
+    command: command_flags.Run,
+    trials: tuple[Setup, Agenda],
+    reporter: Reporter,
+) -> int:
+    (setup, agenda), jobs = trials, command.testing.jobs
+    found, moves = plan_object(body, command.planning, jobs, reporter)
+    remove_results(folder)
+    found = with_regions(body, found, command.planning, folder, jobs, reporter)
+    write_text(folder / "grasps.json", plan_to_json(body, found, moves))
+    say_counts(body, found, reporter)
+    if found.absence:
+        reporter.say(found.absence)
+        reporter.document({"absence": found.absence, "out": str(folder)})
+        return Exit.NONE
+    if moves:
+        show_gains(moves, reporter)
+    for grasp in found.grasps:
+        scene = setup.scene(body, grasp, found.friction)
+        write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
+    saved = SavedGrasps(body, found.friction, found.seed, found.grasps, found.finger)
+    code = simulate_grasps(saved, setup, agenda, jobs=jobs, folder=folder, reporter=reporter)
+    reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
+    if not command.no_report:
+        _report(folder, jobs, reporter)
+    return code
+
+
+def _report(folder: Path, jobs: int, reporter: Reporter) -> None:
+    """Show the results as pages; what has been found stands without them, too."""
+    try:
+        shown_report(Report(folder, limit=REPORTED, jobs=jobs), reporter)
+    except (GraspError, OSError) as error:
+        reporter.warn(f"no report: {reason_of(error)}")
+
+
+def _folder_name(body: Polyhedron) -> str:
+    """A file name that is one plain part of a path; of names that are not, with a hash."""
+    plain = re.sub(r"[^\w-]+", "_", body.name)[:NAMED] or "object"
+    return plain if plain == body.name else f"{plain}-{body.content_sha256[:HASHED]}"

@@ -1,0 +1,210 @@
+"""The commands that simulate: grasps on the bench, verdicts to files and tables."""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.values import Grasp
+from sim_validate.cli import command_flags
+from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.commands.asked_trials import prepared
+from sim_validate.files.folder_lock import alone_in
+from sim_validate.files.reading import write_arrays, write_text
+from sim_validate.files.stale_results import remove_verdicts
+from sim_validate.records.grasps import read_grasps
+from sim_validate.records.verdicts_json import summary, trace_arrays, verdicts_to_json
+from sim_validate.simulation.gate.gate import require_faithful
+from sim_validate.simulation.hold_verdict import Outcome
+from sim_validate.simulation.other_rules import RULES
+from sim_validate.simulation.setup import Agenda, Setup
+from sim_validate.validation.grasp_verdict import Verdict
+from sim_validate.validation.jobs import Job, validated
+from sim_validate.validation.wrench_verdict import WrenchVerdict
+
+
+def validate_file(command: command_flags.Validate, reporter: Reporter) -> int:
+    """Simulate the grasps of a file."""
+    saved = read_grasps(command.grasps)
+    if not saved.grasps:
+        absence = f"{command.grasps} holds no grasp"
+        reporter.say(absence)
+        reporter.document({"absence": absence})
+        return Exit.NONE
+    chosen = SavedGrasps(
+        saved.body,
+        saved.friction if command.friction is None else command.friction,
+        saved.seed if command.seed is None else command.seed,
+        saved.grasps[: command.limit],
+        saved.finger,
+    )
+    setup, agenda = prepared(command.testing, saved.finger, chosen.seed, command.out)
+    with alone_in(command.out):
+        return simulate_grasps(
+            chosen, setup, agenda, jobs=command.testing.jobs, folder=command.out, reporter=reporter
+        )
+
+
+def simulate_grasps(
+    saved: SavedGrasps, setup: Setup, agenda: Agenda, *, jobs: int, folder: Path | None,
+    reporter: Reporter,
+) -> int:  # fmt: skip
+    """Validate grasps, write what is done even when interrupted, and show the verdicts.
+
+    Raises:
+        InputError: A grasp is refused.
+        UnfaithfulError: The simulator fails the gate; no grasp is simulated then.
+    """
+    gate = require_faithful(setup, saved.friction, saved.body.radius)
+    for check in gate.checks:
+        reporter.detail(str(check))
+    if folder:
+        remove_verdicts(folder)
+    tasks = [Job(saved.body, g, saved.friction, agenda, setup) for g in saved.grasps]
+    verdicts: list[Verdict] = []
+    try:
+        with reporter.progress("simulating") as steps:
+            for verdict in validated(tasks, jobs):
+                verdicts.append(verdict)
+                if folder and agenda.keep_traces:
+                    write_arrays(folder / "traces" / f"{verdict.id}.npz", trace_arrays(verdict))
+                held = sum(verdict.held for verdict in verdicts)
+                steps.update(len(verdicts), len(tasks), f"({held} held)")
+    finally:
+        complete = len(verdicts) == len(tasks)
+        text = verdicts_to_json(saved.body, saved.friction, verdicts, gate, complete=complete)
+        if folder and verdicts:
+            path = write_text(folder / "verdicts.json", text)
+            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
+    if reporter.json_only:
+        print(text, end="")  # noqa: T201 - the document itself
+    _show(saved.grasps, verdicts, setup, reporter)
+    return Exit.GOOD if all(verdict.good for verdict in verdicts) else Exit.NEGATIVE
+
+
+def _show(
+    grasps: Sequence[Grasp], verdicts: Sequence[Verdict], setup: Setup, reporter: Reporter
+) -> None:
+    rows: list[tuple[str, ...]] = []
+    for grasp, verdict in zip(grasps[:TABLE_ROWS], verdicts, strict=False):
+        worst = np.max([trial.hold.displacement_m for trial in verdict.wrenches])  # NaN if one is
+        let_go = sum(control.failed for control in verdict.controls)
+        friction = verdict.critical_friction
+        rows.append(
+            (grasp.id, grasp.family, f"{friction.predicted:.4f}",
+             "-" if friction.simulated is None else f"{friction.simulated:.4f}",
+             *([_limit_range(verdict)] if verdict.agenda.limits != "none" else []),
+             verdict.outcome.value, f"{1e6 * worst:.2g}", f"{let_go} of {len(verdict.controls)}")
+        )  # fmt: skip
+    limits = ("limits",) if verdicts and verdicts[0].agenda.limits != "none" else ()
+    columns = (
+        "grasp",
+        "family",
+        "mu*",
+        "in sim",
+        *limits,
+        "outcome",
+        "um moved",
+        "controls let go",
+    )
+    reporter.table("verdicts", columns, rows)
+    say_cut(len(verdicts), reporter)
+    _show_bounds(verdicts, reporter)
+    _show_robustness(verdicts, reporter)
+    _show_rules(verdicts, reporter)
+    totals = summary(verdicts)
+    reporter.say(
+        f"{totals['grasps_held']} of {totals['grasps']} grasps held all wrenches, at "
+        f"{100.0 * setup.hold.load_share:g} % of what they resist; {totals['controls_let_go']} of "
+        f"{totals['controls']} negative controls were let go (all should), "
+        f"{totals['controls_held']} held"
+    )
+    for line in _surprises(verdicts):
+        reporter.warn(line)
+    if not totals["controls"]:
+        reporter.warn("there were no negative controls: nothing shows that this test can fail")
+
+
+def _limit_range(verdict: Verdict) -> str:
+    """Simulated over predicted limits: the least and the largest."""
+    shares = [trial.simulated_limit.share for trial in verdict.wrenches if trial.simulated_limit]
+    return f"{min(shares):.3f}-{max(shares):.3f}" if shares else "-"
+
+
+def _show_bounds(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
+    """What was found without planned forces, if asked for."""
+    rows: list[tuple[str, ...]] = []
+    for verdict in verdicts[:TABLE_ROWS]:
+        if (found := verdict.bounds) is None:
+            return
+        held = found.friction_at_most
+        rows.append(
+            (verdict.id, f"{verdict.critical_friction.predicted:.4f}",
+             "-" if held is None else f"{held:.4f}",
+             f"{min(found.limit_shares):.1f}-{max(found.limit_shares):.1f}",
+             f"{found.residual:.3f}")
+        )  # fmt: skip
+    columns = ("grasp", "mu*", "rigid tips", "fixed squeeze", "residual")
+    reporter.table("without planned forces (bounds)", columns, rows)
+
+
+def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
+    """How often grasps held with noise, if asked for."""
+    rows: list[tuple[str, ...]] = []
+    for verdict in verdicts[:TABLE_ROWS]:
+        if (found := verdict.robustness) is None:
+            return
+        lower, upper = found.interval
+        count = len(found.trials)
+        failed = (trial for trial in found.trials if trial.outcome is not Outcome.HELD)
+        first = next((f"{one.number}: {one.wrench or one.outcome.value}" for one in failed), "")
+        rows.append(
+            (verdict.id, f"{found.held} of {count}", str(found.predicted),
+             f"{100.0 * lower:.3g} to {100.0 * upper:.3g} %", first)
+        )  # fmt: skip
+    columns = ("grasp", "held", "predicted", "95 % interval", "first that did not")
+    reporter.table("repeats with noise", columns, rows)
+
+
+def _show_rules(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
+    """How many grasps and controls the rules of other tools accept, if asked for."""
+    names = verdicts[0].agenda.rules if verdicts else ()
+    controls = [control for verdict in verdicts for control in verdict.controls]
+    rows = [
+        (name,
+         f"{sum(verdict.accepted_by[name] for verdict in verdicts)} of {len(verdicts)}",
+         f"{sum(control.accepted_by[name] for control in controls)} of {len(controls)}",
+         RULES[name].source)
+        for name in names
+    ]  # fmt: skip
+    if rows:
+        columns = ("rule", "grasps accepted", "controls accepted", "rule of")
+        reporter.table("rules of other tools", columns, rows)
+
+
+def _expected(trial: WrenchVerdict) -> str:
+    over = trial.predicted_limit < 1.0
+    return f" as predicted, the limit is {trial.predicted_limit:.3g} of this" if over else ""
+
+
+def _surprises(verdicts: Sequence[Verdict]) -> Iterable[str]:
+    """What did not end as it should, a line each."""
+    lines = [
+        f"{verdict.id}: {trial.name}: {trial.hold.outcome.value}{_expected(trial)}: "
+        f"{trial.hold.reason}"
+        for verdict in verdicts
+        for trial in verdict.wrenches
+        if trial.hold.outcome is not Outcome.HELD
+    ]
+    lines += [f"{verdict.id}: {what}" for verdict in verdicts for what in verdict.mismatches]
+    lines += [
+        f"{verdict.id}: control {control.control.name}: {trial.name}: {trial.hold.outcome.value}"
+        for verdict in verdicts
+        for control in verdict.controls
+        for trial in control.tried
+        if not control.failed
+    ]
+    more = [f"and {len(lines) - TABLE_ROWS} more lines"] if len(lines) > TABLE_ROWS else []
+    return lines[:TABLE_ROWS] + more

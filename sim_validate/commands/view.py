@@ -1,0 +1,122 @@
+"""The command that shows one grasp: in MuJoCo's viewer, or in files."""
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.errors import InputError
+from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.values import Grasp
+from scenes.drawing.clips import GraphicsError, has_display, write_clip
+from scenes.drawing.pictures import write_picture
+from scenes.drawing.turning_clips import write_turning_clip
+from scenes.fingertips import FingerSettings
+from scenes.mjcf import Scene, build_scene
+from sim_validate.cli import showing_flags
+from sim_validate.cli.console import Reporter
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.files.reading import write_text
+from sim_validate.records.grasps import grasp_with_id, read_grasps
+from sim_validate.reports.run_folder import GRASPS
+from sim_validate.reports.turntable import turntable_page
+from sim_validate.simulation.setup import with_planned_radius
+
+COMING, RESTING = 60, 20
+"""Frames in which fingers come in, and stay."""
+SWING_DEG, ELEVATION_DEG = 120.0, 25.0
+"""How far the camera goes around meanwhile, and how high it is."""
+
+
+def view_grasp(command: showing_flags.View, reporter: Reporter) -> int:
+    """Show a grasp."""
+    path = command.grasps / GRASPS if command.grasps.is_dir() else command.grasps
+    saved = read_grasps(path)
+    if not saved.grasps:
+        raise InputError(f"{path}: holds no grasp")
+    grasp = grasp_with_id(path, saved, command.grasp or saved.grasps[0].id)
+    friction = saved.friction if command.friction is None else command.friction
+    if friction <= grasp.critical_friction:
+        reporter.warn(
+            f"{grasp.id} is not in force closure at friction {friction:g}: it needs more than "
+            f"{grasp.critical_friction:.4g}"
+        )
+    if command.picture is None and command.page is None and command.clip is None:
+        _in_viewer(_scene(saved, grasp, friction), grasp, reporter)
+        reporter.document({"id": grasp.id, "files": []})
+        return Exit.GOOD
+    files = [str(path) for path in _written(command, saved, grasp, friction, reporter)]
+    reporter.document({"id": grasp.id, "files": files})
+    return Exit.GOOD
+
+
+def _scene(saved: SavedGrasps, grasp: Grasp, friction: float) -> Scene:
+    fingers = with_planned_radius(FingerSettings(), saved.finger)
+    return build_scene(saved.body, grasp, friction, fingers=fingers)
+
+
+def _in_viewer(scene: Scene, grasp: Grasp, reporter: Reporter) -> None:
+    """Open MuJoCo's own viewer, and wait until it is closed.
+
+    Raises:
+        InputError: There is no display.
+    """
+    if not has_display():
+        raise InputError(
+            "there is no display for MuJoCo's viewer (neither DISPLAY nor WAYLAND_DISPLAY is set): "
+            "give --picture FILE.png, --page FILE.html or --clip FILE.webp"
+        )
+    reporter.say(f"{grasp.id} in MuJoCo's viewer; load the keyframe `approach` to see it close")
+    with tempfile.TemporaryDirectory() as folder:
+        path = write_text(Path(folder) / f"{grasp.id}.xml", scene.xml)
+        command = [sys.executable, "-m", "mujoco.viewer", f"--mjcf={path}"]
+        ended = subprocess.run(command, check=False).returncode  # noqa: S603 - MuJoCo's own
+    if ended:
+        raise GraphicsError(f"MuJoCo's viewer ended with {ended}: give --picture, --page or --clip")
+
+
+def _written(
+    command: showing_flags.View, saved: SavedGrasps, grasp: Grasp, friction: float,
+    reporter: Reporter,
+) -> Iterator[Path]:  # fmt: skip
+    body = saved.body
+    if command.picture is not None:
+        yield write_picture(body, grasp, command.picture, friction)
+        reporter.say(f"wrote {command.picture}")
+    if command.page is not None:
+        yield write_text(command.page, turntable_page(body, grasp, friction))
+        reporter.say(f"wrote {command.page}")
+    if command.clip is not None:
+        try:
+            yield write_closing_clip(_scene(saved, grasp, friction), grasp, command.clip)
+        except GraphicsError as error:
+            reporter.warn(f"no graphics for MuJoCo's renderer, the picture turns instead: {error}")
+            yield write_turning_clip(body, grasp, command.clip, friction)
+        reporter.say(f"wrote {command.clip}")
+
+
+def write_closing_clip(scene: Scene, grasp: Grasp, path: Path) -> Path:
+    """Draw fingers coming in to their contacts while the camera goes around them.
+
+    Raises:
+        InputError: The file's name does not end in gif or webp.
+        GraphicsError: No graphics library draws here.
+    """
+    joints = closing(scene)
+    azimuths = np.linspace(0.0, SWING_DEG, len(joints))
+    angles = np.column_stack([azimuths, np.full(len(joints), ELEVATION_DEG)])
+    return write_clip(scene, joints, path, grasp.id, angles_deg=angles)
+
+
+def closing(scene: Scene) -> Array:
+    """Joint positions while fingertips come in along their ways, and then stay, (n, 7 + 3k)."""
+    layout = scene.layout
+    away = np.einsum("kij,ki->kj", layout.frames, layout.approach).ravel()
+    left = np.linspace(1.0, 0.0, COMING) ** 2
+    slides = np.vstack([left[:, None] * away, np.zeros((RESTING, len(away)))])
+    home = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    return np.column_stack([np.tile(home, (len(slides), 1)), slides])

@@ -1,0 +1,110 @@
+"""A work unit -> rows and files: grasps are planned, or taken as given, and tried in simulation."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from grasp_core.errors import InputError, UndecidedError
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.given_contacts import grasp_of, seat
+from grasp_core.planning.planner import plan
+from grasp_core.values import Grasp
+from sim_validate.datasets.given_contacts import GivenGrasp
+from sim_validate.datasets.meshes import mesh_path, mesh_text
+from sim_validate.datasets.rows import GIVEN, GraspRows, Rows, object_row
+from sim_validate.datasets.units import WorkUnit
+from sim_validate.simulation.setup import Agenda, Setup
+from sim_validate.validation.control_trials import try_control
+from sim_validate.validation.controls import Control
+from sim_validate.validation.grasp_verdict import Verdict
+from sim_validate.validation.validation import validate
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """What comes of a unit."""
+
+    object_id: str
+    split: str
+    rows: Rows
+    files: Mapping[str, str]
+    """Texts by their paths in the dataset's folder."""
+
+
+def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
+    """Plan the grasps of a unit or take those given, try each, and write down everything.
+
+    Args:
+        unit: What to do.
+        body: Its object.
+
+    Raises:
+        GraspError: The simulator fails its gate.
+    """
+    making = _Making(unit, body)
+    if unit.given:
+        making.judge()
+    else:
+        making.plan()
+    row = object_row(body, unit)
+    found = making.found
+    rows: Rows = {
+        "objects": (row,), "grasps": tuple(found.grasps), "trials": tuple(found.trials),
+    }  # fmt: skip
+    return Made(body.content_sha256, row["split"], rows, making.files)
+
+
+class _Making:
+    """What comes of a unit as it grows."""
+
+    def __init__(self, unit: WorkUnit, body: Polyhedron) -> None:
+        self.unit, self.body = unit, body
+        self.found = GraspRows(body, unit)
+        path = mesh_path(Path(), body.content_sha256)
+        self.files = {path.as_posix(): mesh_text(body)}
+        config = unit.config
+        self.agenda = Agenda(
+            random_wrenches=config.random_wrenches, limits=config.limits, seed=config.seed
+        )
+
+    def plan(self) -> None:
+        """The best grasps of each family by itself."""
+        config = self.unit.config
+        for family in config.families:
+            planned = plan(
+                self.body, self.unit.friction, families=(family,), cones=config.cones,
+                limit=config.limit, seed=config.seed,
+            )  # fmt: skip
+            for grasp in planned.grasps:
+                self.found.add(grasp, self._tried(grasp, self.body))
+
+    def judge(self) -> None:
+        """The given grasps, those that can be tried."""
+        for given in self.unit.given:
+            try:
+                self._judge(given)
+            except (InputError, UndecidedError) as error:
+                self.found.add_untried(given, str(error))
+
+    def _judge(self, given: GivenGrasp) -> None:
+        """Try a given grasp, as a grasp if its contacts are closed, else as a control.
+
+        Raises:
+            InputError: A contact is not on the object, or fingertips find no room.
+            UndecidedError: Closure is too close to call.
+        """
+        friction = self.unit.friction
+        seated = seat(self.body, given.points, given.normals)
+        grasp = grasp_of(seated, friction, given.id)
+        if isinstance(grasp, Grasp):
+            self.found.add_given(given, grasp, self._tried(grasp, seated.body), seated.moved_m)
+            return
+        control = Control(GIVEN, seated.contacts, friction, grasp)
+        verdict = try_control(seated.body, control, self.agenda, Setup())
+        self.found.add_open(given, verdict, seated.moved_m)
+
+    def _tried(self, grasp: Grasp, body: Polyhedron) -> Verdict:
+        verdict = validate(body, grasp, self.unit.friction, agenda=self.agenda)
+        if self.unit.config.scenes:
+            self.files[f"scenes/{self.found.name(grasp.id)}.xml"] = verdict.scene.xml
+        return verdict

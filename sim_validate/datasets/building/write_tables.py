@@ -1,0 +1,114 @@
+"""From the rows of all units to the files of a dataset, an object at a time.
+
+Rows are sorted by object, then by their table's key, so the files do not depend on which unit was
+done when, where, or in which run; nothing but the rows of one object, and those that wait to be
+written, is in memory.
+"""
+
+import json
+import shutil
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import groupby
+from pathlib import Path
+
+from grasp_core.provenance import arithmetic
+from sim_validate.datasets.building.staging import Finished, Staging
+from sim_validate.datasets.columns import TABLES
+from sim_validate.datasets.config import DatasetConfig, config_to_toml
+from sim_validate.datasets.describing.card import CARD, card_text
+from sim_validate.datasets.describing.croissant import CROISSANT, croissant_text
+from sim_validate.datasets.given_contacts import given_text
+from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest, listed, write_manifest
+from sim_validate.datasets.parquet import TableFiles
+from sim_validate.datasets.units import WorkUnit, provenance, units_sha256
+from sim_validate.files.reading import write_text
+
+DATA = "data"
+TWIN = "the same object as"
+"""How the reason begins why an object's rows are not there a second time."""
+CONTACTS = "contacts.json"
+"""Contacts that were judged, if any, as a contacts file with normals into the object."""
+CONFIG, QUARANTINE = "config.toml", "quarantine.jsonl"
+EXTRAS = ("meshes", "scenes")
+"""Folders of files that units make beside their rows."""
+
+
+def finish(
+    config: DatasetConfig, units: Sequence[WorkUnit], staging: Staging, folder: Path
+) -> None:
+    """Put the rows of all units into tables, list all files, and remove what was staged."""
+    for name in (DATA, *EXTRAS):
+        shutil.rmtree(folder / name, ignore_errors=True)
+    good, quarantined = _sorted_out(units, staging)
+    tables = _write_tables(config, good, staging, folder)
+    for each in good:
+        staging.copy_files(each.unit, folder)
+    lines = "".join(json.dumps(each, sort_keys=True) + "\n" for each in quarantined)
+    given = {each.id: each for unit in units for each in unit.given}
+    if given:
+        in_order = [given[name] for name in sorted(given)]
+        write_text(folder / CONTACTS, given_text(in_order))
+    others = [
+        write_text(folder / CONFIG, config_to_toml(config)),
+        write_text(folder / QUARANTINE, lines),
+        *([folder / CONTACTS] if given else []),
+        *(path for name in EXTRAS for path in sorted((folder / name).glob("*"))),
+    ]
+    manifest = Manifest(
+        config_sha256=config.sha256,
+        versions=dict(provenance()),
+        arithmetic=arithmetic(),
+        units=len(units),
+        units_sha256=units_sha256(units),
+        quarantined=len(quarantined),
+        files=(*tables, *(listed(folder, path) for path in others)),
+    )
+    for name, text_of in ((CARD, card_text), (CROISSANT, croissant_text)):
+        written = write_text(folder / name, text_of(config, manifest))
+        manifest = replace(manifest, files=(*manifest.files, listed(folder, written)))
+    write_manifest(folder, manifest)
+    staging.remove()
+
+
+def _sorted_out(
+    units: Sequence[WorkUnit], staging: Staging
+) -> tuple[list[Finished], list[dict[str, object]]]:
+    """Units with rows of their own, by object, and why others have none."""
+    good, quarantined = list[Finished](), list[dict[str, object]]()
+    first: dict[tuple[str, float], str] = {}
+    for unit in sorted(units, key=lambda each: (each.object, each.friction)):
+        found = staging.result(unit)
+        if isinstance(found, Finished):
+            other = first.setdefault((found.object_id, unit.friction), unit.object)
+            if other == unit.object:
+                good.append(found)
+                continue
+            found = f"{TWIN} {other}"
+        quarantined.append(
+            {
+                "object": unit.object,
+                "source_sha256": unit.source_sha256,
+                "friction": unit.friction,
+                "given": [each.id for each in unit.given],
+                "reason": found,
+            }
+        )
+    return sorted(good, key=lambda each: (each.object_id, each.unit.friction)), quarantined
+
+
+def _write_tables(
+    config: DatasetConfig, good: Sequence[Finished], staging: Staging, folder: Path
+) -> list[Listed]:
+    about = {"schema": str(SCHEMA), "config_sha256": config.sha256}
+    with TableFiles(folder / DATA, about) as files:
+        for _, same in groupby(good, key=lambda each: each.object_id):
+            of_object = list(same)
+            for name in TABLES:
+                chosen = of_object[:1] if name == "objects" else of_object
+                paths = [staging.table(each.unit, name) for each in chosen]
+                files.add(name, of_object[0].split, paths)
+        return [
+            replace(listed(folder, each.path), table=each.name, split=each.split, rows=each.rows)
+            for each in files.close()
+        ]

@@ -1,0 +1,30 @@
+"""Grasps of a dataset -> MuJoCo scenes with keyframes, one file each."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from scenes.mjcf import build_scene
+from sim_validate.datasets.columns import Name
+from sim_validate.datasets.exports.stored_grasps import grasped_objects, is_grasp, new_path
+from sim_validate.datasets.open_dataset import Selection
+from sim_validate.files.reading import write_text
+
+
+def write_mjcf(
+    chosen: Selection, folder: Path, report: Callable[[int, int], None]
+) -> dict[Name, int]:
+    """Write the scene in which each grasp was simulated, made again from mesh and contacts.
+
+    Raises:
+        InputError: The dataset is damaged.
+    """
+    total = sum(map(is_grasp, chosen.rows("grasps")))
+    objects = grasps = 0
+    for each in grasped_objects(chosen):
+        objects += 1
+        for grasp in each.grasps:
+            scene = build_scene(each.body, grasp.contacts, grasp.friction)
+            write_text(new_path(folder, grasp.id, "xml"), scene.xml)
+            grasps += 1
+            report(grasps, total)
+    return {"objects": objects, "grasps": grasps}

@@ -1,0 +1,131 @@
+"""Contacts of other tools, from a JSON or npz file; every four of them are one grasp to judge."""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.errors import InputError
+from grasp_core.files.strict_json import value_of
+from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
+from grasp_core.values import FINGERS
+from sim_validate.files.npz import arrays_of
+from sim_validate.files.reading import read_bytes, text_of
+
+POINTS, NORMALS, NAMES = "contact_points_m", "contact_normals", "grasp_id"
+"""Arrays of an npz file: (n, 4, 3) [m], (n, 4, 3), and perhaps names, (n,)."""
+NO_FRICTION = 1.0
+"""Stands where a file need not state one: a dataset's configuration does."""
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class GivenGrasp:
+    """Four contacts as someone gives them, in the object's frame."""
+
+    id: str
+    """Ours, fit for the name of a file."""
+    name: str
+    """What the file calls it."""
+    points: tuple[Triple, ...]
+    """[m]"""
+    normals: tuple[Triple, ...]
+    """Unit vectors into the object."""
+
+
+def read_given(path: Path, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
+    """Read contacts to judge.
+
+    Args:
+        path: A contacts file (JSON, see docs/files.md), or an npz file with the arrays above.
+        outward: Whether normals in the file point out of the object.
+
+    Raises:
+        InputError: The file cannot be read, or is not of this form; the message names the field.
+    """
+    try:
+        data = read_bytes(path)
+        text = contacts_text(data) if path.suffix == ".npz" else text_of(data)
+        return given_from_json(text, outward=outward)
+    except InputError as error:
+        raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
+
+
+def given_text(given: Sequence[GivenGrasp]) -> str:
+    """A contacts file of the same grasps, normals into the object."""
+    grasps = [
+        {
+            "id": grasp.name,
+            "contacts": [
+                {"position_m": point, "normal": normal}
+                for point, normal in zip(grasp.points, grasp.normals, strict=True)
+            ],
+        }
+        for grasp in given
+    ]
+    return json.dumps({"grasps": grasps}, indent=1) + "\n"
+
+
+def given_sha256(given: Sequence[GivenGrasp]) -> str:
+    """A hash of names and numbers."""
+    return hashlib.sha256(json.dumps([astuple(grasp) for grasp in given]).encode()).hexdigest()
+
+
+def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
+    """Contacts to judge, from the text of a contacts file.
+
+    Raises:
+        InputError: It is none of four contacts each without friction; the message names the field.
+    """
+    sets = contact_sets_from_json(text, Overrides(NO_FRICTION, outward=outward))
+    stated = value_of(text)
+    planned = "schema" in stated  # by us, and judged at any friction
+    own = any((each.friction != NO_FRICTION).any() for each in sets)
+    if not planned and ("friction" in stated or own):
+        raise InputError("friction: expected none in the file; a dataset has its own frictions")
+    for each in sets:
+        if len(each.positions) != FINGERS:
+            raise InputError(f"grasp {each.id}: expected 4 contacts, got {len(each.positions)}")
+    return tuple(
+        GivenGrasp(f"given-{i:06}", each.id, _rows(each.positions), _rows(each.normals))
+        for i, each in enumerate(sets)
+    )
+
+
+def contacts_text(data: bytes) -> str:
+    """A contacts file with the arrays of the bytes of an npz file.
+
+    Raises:
+        InputError: They are none, or not of such arrays.
+    """
+    arrays = arrays_of(data, (POINTS, NORMALS, NAMES))
+    for name in (POINTS, NORMALS):
+        if name not in arrays:
+            raise InputError(f"no array {name}; expected {POINTS} and {NORMALS}, (n, 4, 3) each")
+        array = arrays[name]
+        if array.dtype.kind not in "fiu" or not (array.ndim and array.shape[1:] == (FINGERS, 3)):
+            raise InputError(
+                f"{name}: expected numbers, (n, 4, 3), got {array.dtype} {array.shape}"
+            )
+    points, normals = arrays[POINTS], arrays[NORMALS]
+    names = arrays.get(NAMES, np.arange(len(points)))
+    if names.ndim != 1 or not len(points) == len(normals) == len(names):
+        raise InputError(
+            f"expected arrays of one length, got {points.shape}, {normals.shape} and {names.shape}"
+        )
+    if not (np.isfinite(points).all() and np.isfinite(normals).all()):
+        raise InputError(f"{POINTS} and {NORMALS}: expected finite numbers")
+    return given_text(
+        [GivenGrasp("", str(name), _rows(p), _rows(n))
+         for name, p, n in zip(names, points, normals, strict=True)]
+    )  # fmt: skip
+
+
+def _rows(array: NDArray[np.floating[Any]]) -> tuple[Triple, ...]:
+    return tuple((float(x), float(y), float(z)) for x, y, z in array)

@@ -1,0 +1,192 @@
+"""Plan and simulate a sample of a dataset again: do the same rows come out?
+
+With the same packages and code, on processors that round alike, every cell must be the same. Else
+there must be as many grasps of each family, and those that come out with the same contacts must
+have the same verdict and critical friction.
+"""
+
+import hashlib
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from grasp_core.errors import GraspError
+from grasp_core.provenance import arithmetic
+from sim_validate.datasets.building.make_unit import made_of
+from sim_validate.datasets.building.write_tables import CONFIG, CONTACTS, QUARANTINE, TWIN
+from sim_validate.datasets.columns import KEYS, TABLES, Name
+from sim_validate.datasets.config import config_from_toml
+from sim_validate.datasets.given_contacts import read_given
+from sim_validate.datasets.manifest import Manifest
+from sim_validate.datasets.meshes import stored_body
+from sim_validate.datasets.open_dataset import Selection
+from sim_validate.datasets.parquet import as_read
+from sim_validate.datasets.quarantine import read_left_out
+from sim_validate.datasets.rows import id_beginning
+from sim_validate.datasets.units import WorkUnit, provenance
+from sim_validate.datasets.verifying.rows_by_object import ObjectRows, Row, by_object
+from sim_validate.files.reading import read_text
+
+ROUNDING = 1e-6
+"""How far numbers may be apart that other packages or processors round, relative to the larger."""
+MOST_NAMED = 20
+"""Faults of one unit that are listed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Which units to do again."""
+
+    share: float
+    """Of all units; at least one is done."""
+    seed: int = 0
+    """For which ones."""
+
+
+def sample_faults(folder: Path, manifest: Manifest, sample: Sample) -> Iterator[str]:
+    """What comes out otherwise, a line each.
+
+    Args:
+        folder: Of the dataset.
+        manifest: What made it.
+        sample: Which units to do again.
+
+    Raises:
+        InputError: A file of the dataset is damaged.
+    """
+    redoing = _Redoing(folder, manifest)
+    everything = Selection(folder, manifest, None)
+    units = [
+        (row["object_id"], friction)
+        for row in everything.rows("objects")
+        for friction in redoing.frictions(row)
+    ]
+    chosen = set(drawn(sorted(units), sample))
+    splits = sorted({each.split for each in manifest.files if each.split is not None})
+    for split in splits:
+        for rows in by_object(Selection(folder, manifest, split)):
+            for row in rows["objects"]:
+                yield from redoing.faults(row, rows, chosen)
+
+
+class _Redoing:
+    """Units of a dataset, done again."""
+
+    def __init__(self, folder: Path, manifest: Manifest) -> None:
+        self._folder = folder
+        self._config = config_from_toml(folder / CONFIG)
+        same = (dict(provenance()), arithmetic())
+        self._exact = (manifest.versions, manifest.arithmetic) == same
+        self._given = read_given(folder / CONTACTS) if self._config.contacts else ()
+        self._left_out = _left_out(folder)
+
+    def frictions(self, row: Mapping[str, Any]) -> list[float]:
+        """At which frictions an object has rows, though perhaps no grasp."""
+        return [f for f in self._config.frictions if not self._all_left_out(row, f)]
+
+    def faults(
+        self, row: Mapping[str, Any], rows: ObjectRows, chosen: Set[tuple[str, float]]
+    ) -> Iterator[str]:
+        """What is wrong with an object at the chosen frictions."""
+        for friction in self._config.frictions:
+            stored = _of_unit(rows, row["object_id"], friction)
+            where = f"{row['source_name']} at friction {friction}"
+            if self._all_left_out(row, friction):
+                if stored["grasps"]:
+                    yield f"{where}: is quarantined, but has rows"
+            elif (row["object_id"], friction) in chosen:
+                found = islice(self._unit_faults(row, friction, stored), MOST_NAMED)
+                yield from (f"{where}: {fault}" for fault in found)
+
+    def _all_left_out(self, row: Mapping[str, Any], friction: float) -> bool:
+        gone = self._left_out.get((row["source_sha256"], friction))
+        return gone is not None and len(gone) == len(self._given)
+
+    def _unit_faults(
+        self, row: Mapping[str, Any], friction: float, stored: ObjectRows
+    ) -> Iterator[str]:
+        name, source = row["source_name"], row["source_sha256"]
+        gone = self._left_out.get((source, friction), set())
+        given = tuple(each for each in self._given if each.id not in gone)
+        try:
+            body = stored_body(self._folder, row["object_id"], name, self._config.faces)
+            made = made_of(WorkUnit(name, None, source, friction, self._config, given), body)
+        except GraspError as error:
+            yield f"cannot be done again ({error})"
+            return
+        now: ObjectRows = {table: as_read(table, made.rows[table]) for table in TABLES}
+        if not self._exact:
+            yield from _loose_differences(stored, now)
+            return
+        for table in TABLES:
+            yield from _differences(table, stored[table], now[table])
+        for path, text in made.files.items():
+            if read_text(self._folder / path) != text:
+                yield f"{path}: is not what comes out again"
+
+
+def _left_out(folder: Path) -> dict[tuple[str, float], set[str]]:
+    """Units that have no rows, with the given grasps that are missing if they are some."""
+    found: dict[tuple[str, float], set[str]] = {}
+    for each in read_left_out(folder / QUARANTINE):
+        if not each.reason.startswith(TWIN):
+            found.setdefault((each.source_sha256, each.friction), set()).update(each.given)
+    return found
+
+
+def drawn(units: Sequence[tuple[str, float]], sample: Sample) -> list[tuple[str, float]]:
+    """Units in an order that only the seed decides, so that a larger share holds a smaller one."""
+
+    def place(unit: tuple[str, float]) -> bytes:
+        return hashlib.sha256(f"{sample.seed} {unit}".encode()).digest()
+
+    return sorted(units, key=place)[: math.ceil(sample.share * len(units))]
+
+
+def _of_unit(rows: ObjectRows, object_id: str, friction: float) -> ObjectRows:
+    beginning = id_beginning(object_id, friction)
+    return {
+        "objects": [row for row in rows["objects"] if row["object_id"] == object_id],
+        "grasps": [row for row in rows["grasps"] if row["grasp_id"].startswith(beginning)],
+        "trials": [row for row in rows["trials"] if row["grasp_id"].startswith(beginning)],
+    }
+
+
+def _differences(name: Name, stored: Sequence[Row], made: Sequence[Row]) -> Iterator[str]:
+    """Cells that are not the same, and rows that are in one only."""
+    before = {tuple(row[key] for key in KEYS[name]): row for row in stored}
+    after = {tuple(row[key] for key in KEYS[name]): row for row in made}
+    yield from (f"{name}: {key[-1]} is not found again" for key in before.keys() - after.keys())
+    yield from (
+        f"{name}: {key[-1]} is found, but not there" for key in after.keys() - before.keys()
+    )
+    for key in before.keys() & after.keys():
+        for column in TABLES[name]:
+            one, other = before[key][column.name], after[key][column.name]
+            if one != other:
+                yield f"{name}: {key}: {column.name} is {one}, done again {other}"
+
+
+def _loose_differences(stored: ObjectRows, made: ObjectRows) -> Iterator[str]:
+    """What cannot come from other rounding: of equally good grasps it may choose others."""
+    before = {row["grasp_id"]: row for row in stored["grasps"] if row["control_of"] is None}
+    after = {row["grasp_id"]: row for row in made["grasps"] if row["control_of"] is None}
+    counts = [Counter(row["family"] for row in rows.values()) for rows in (before, after)]
+    if counts[0] != counts[1]:
+        yield f"grasps: {dict(counts[0])} by family, done again {dict(counts[1])}"
+    for name in sorted(before.keys() & after.keys()):
+        one, other = before[name], after[name]
+        points = [np.array(row["contact_points_m"], dtype=np.float64) for row in (one, other)]
+        if not np.allclose(*points, rtol=ROUNDING, atol=0.0):
+            continue  # the best contacts are not unique
+        if one["held"] != other["held"] or one["force_closed"] != other["force_closed"]:
+            yield f"grasps: {name}: is {one['outcome']}, done again {other['outcome']}"
+        frictions = [float(row["critical_friction"] or 0.0) for row in (one, other)]
+        if not np.isclose(*frictions, rtol=ROUNDING, atol=0.0):
+            yield f"grasps: {name}: critical friction {frictions[0]}, done again {frictions[1]}"

@@ -1,0 +1,234 @@
+"""Is a dataset what its manifest says, and do its rows keep the laws of what they describe?"""
+
+from collections.abc import Iterator, Mapping, Sequence, Set
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.errors import GraspError, InputError, UndecidedError
+from grasp_core.files.strict_json import shown
+from grasp_core.geometry.on_mesh import Surface
+from grasp_core.values import FINGERS
+from sim_validate.datasets.building.write_tables import CONFIG, QUARANTINE
+from sim_validate.datasets.columns import KEYS, TABLES
+from sim_validate.datasets.config import config_from_toml
+from sim_validate.datasets.manifest import MANIFEST, Listed, Manifest, listed, read_manifest
+from sim_validate.datasets.meshes import stored_surface
+from sim_validate.datasets.open_dataset import Selection
+from sim_validate.datasets.parquet import require_pyarrow
+from sim_validate.datasets.quarantine import read_left_out
+from sim_validate.datasets.rows import GIVEN, NOT_TRIED
+from sim_validate.datasets.verifying.redo import Sample, sample_faults
+from sim_validate.datasets.verifying.rows_by_object import ObjectRows, by_object
+from sim_validate.files.paths import path_inside
+
+SAME_MARGIN = 1e-6
+"""How far a closure margin may be from that of the contacts, relative to the friction."""
+ON_SURFACE, NEAR_SURFACE = 1e-5, 0.05
+"""How far contacts may be from the object's mesh, relative to its size: planar faces are as flat as
+six digits tell. Controls are moved in the planes of patches, which a curved surface leaves."""
+UNIT = 1e-9
+"""How far normals may be from unit length."""
+
+
+def verify(folder: Path, sample: Sample | None = None) -> list[str]:
+    """What is wrong with a dataset, a line each; nothing where all is well.
+
+    Hashes, sizes and page checksums of all files; counts, keys and references of rows; of each
+    contact set its normals, its closure proved again, and that its trials say what it says; and
+    of a sample, whether planning and simulating again gives the same rows.
+
+    Args:
+        folder: Of the dataset.
+        sample: What to plan and simulate again; nothing if not given.
+
+    Raises:
+        InputError: The folder holds no finished dataset, or pyarrow is not installed.
+    """
+    require_pyarrow()
+    manifest = read_manifest(folder)
+    if faults := list(_file_faults(folder, manifest.files)):
+        return faults
+    faults: list[str] = []
+    try:
+        faults += _manifest_faults(folder, manifest)
+        faults += _content_faults(folder, manifest)
+        if sample is not None and not faults:
+            faults += sample_faults(folder, manifest, sample)
+    except InputError as error:
+        faults.append(str(error))
+    except (TypeError, KeyError, ValueError) as error:  # of cells that are null and must not be
+        faults.append(f"data: a row is not such as are written ({shown(str(error))})")
+    return faults
+
+
+def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
+    """What is wrong with rows and meshes, an object at a time.
+
+    Raises:
+        InputError: A file is damaged, or has not as many rows as the manifest says.
+    """
+    frictions = config_from_toml(folder / CONFIG).frictions
+    for each in manifest.files:
+        if each.table and not Path(each.path).name.startswith(f"{each.split}-"):
+            yield f"{each.path}: is listed as of split {each.split}"
+    for split in sorted({each.split for each in manifest.files if each.split is not None}):
+        for rows in by_object(Selection(folder, manifest, split)):
+            yield from _split_faults(split, rows)
+            yield from _row_faults(rows, frictions)
+            yield from _mesh_faults(folder, rows)
+
+
+def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
+    names = {each.path for each in files}
+    there = {
+        path.relative_to(folder).as_posix()
+        for path in folder.rglob("*")
+        if path.is_file() and path.name != MANIFEST
+    }
+    there = {name for name in there if not name.startswith("staging/")}  # of no more use
+    yield from (f"{path}: not in the manifest" for path in sorted(there - names))
+    for each in files:
+        if each.path not in there:
+            yield f"{each.path}: missing"
+            continue
+        try:
+            found = listed(folder, path_inside(folder, each.path))
+        except InputError as error:
+            yield str(error)
+            continue
+        if found.bytes != each.bytes:
+            yield f"{each.path}: {found.bytes} bytes, listed are {each.bytes}"
+        elif found.sha256 != each.sha256:
+            yield f"{each.path}: its contents are not what was written (sha256 differs)"
+
+
+def _split_faults(split: str, rows: ObjectRows) -> Iterator[str]:
+    """Whether rows are in files of their split."""
+    for name in ("objects", "grasps"):
+        if any(row["split"] != split for row in rows[name]):
+            yield f"{name}: files of {split} have rows of another split"
+
+
+def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
+    """Whether the manifest's numbers are those of the files it lists."""
+    config = config_from_toml(folder / CONFIG)
+    if config.sha256 != manifest.config_sha256:
+        yield f"{CONFIG}: is not the configuration that the manifest names"
+    lines = len(read_left_out(folder / QUARANTINE))
+    if lines != manifest.quarantined:
+        yield f"{QUARANTINE}: {lines} lines, the manifest says {manifest.quarantined}"
+
+
+def _row_faults(rows: ObjectRows, frictions: Sequence[float]) -> Iterator[str]:
+    for name in TABLES:
+        keys = [tuple(row[key] for key in KEYS[name]) for row in rows[name]]
+        if len(set(keys)) < len(keys):
+            yield f"{name}: rows with the same {' and '.join(KEYS[name])}"
+    splits = {row["object_id"]: row["split"] for row in rows["objects"]}
+    names = {row["grasp_id"] for row in rows["grasps"]}
+    ended: dict[str, list[str]] = {}
+    for trial in rows["trials"]:
+        ended.setdefault(trial["grasp_id"], []).append(trial["outcome"])
+    yield from (f"trials: {name} is no grasp" for name in sorted(ended.keys() - names))
+    for row in rows["grasps"]:
+        name = row["grasp_id"]
+        faults = [
+            *_reference_faults(row, splits, names),
+            *_outcome_faults(row, ended.get(name, [])),
+        ]
+        if row["control_of"] is None and row["friction"] not in frictions:
+            faults.append(f"friction {row['friction']} is none of the configuration's")
+        if row["outcome"] != NOT_TRIED:
+            faults += _contact_faults(row)
+        yield from (f"grasps: {name}: {fault}" for fault in faults)
+
+
+def _outcome_faults(row: Mapping[str, Any], trials: Sequence[str]) -> Iterator[str]:
+    """Whether a row says what its trials say; one that was not tried claims nothing."""
+    if row["outcome"] == NOT_TRIED:
+        claims = [row[name] for name in ("held", "force_closed", "closure_margin")]
+        if row["label"] != GIVEN or any(claim is not None for claim in claims) or trials:
+            yield "was not tried, but claims something"
+        return
+    held = all(one == "held" for one in trials)
+    if not trials or len(trials) != row["trials"] or row["held"] != held:
+        yield "its trials say something else"
+    elif (row["outcome"] == "held") != held:
+        yield f"outcome {row['outcome']!r}, but held is {held}"
+
+
+def _mesh_faults(folder: Path, rows: ObjectRows) -> Iterator[str]:
+    """Whether meshes are those of their objects, and contacts are on them."""
+    claimed: dict[str, list[tuple[Array, Array | None, float]]] = {
+        row["object_id"]: [] for row in rows["objects"]
+    }
+    for row in rows["grasps"]:
+        of_object = claimed.get(row["object_id"])
+        if row["outcome"] == NOT_TRIED or of_object is None:
+            continue
+        points, normals = row["contact_points_m"], row["contact_normals"]
+        for point, normal in list(zip(points, normals, strict=True))[: row["contacts"]]:
+            if row["control_of"] is None:
+                of_object.append((np.array(point), np.array(normal), ON_SURFACE))
+            else:  # some have a normal turned
+                of_object.append((np.array(point), None, NEAR_SURFACE))
+    for row in rows["objects"]:
+        try:
+            vertices, triangles = stored_surface(folder, row["object_id"])
+        except InputError as error:
+            yield str(error)
+            continue
+        surface = Surface(vertices, triangles)
+        on_it = [
+            surface.holds(point, normal, slack * row["radius_m"])
+            for point, normal, slack in claimed[row["object_id"]]
+        ]
+        if off := on_it.count(False):
+            yield (
+                f"grasps: {off} contacts of {row['source_name']} are not on the object, or not "
+                "with its normals"
+            )
+
+
+def _reference_faults(
+    row: Mapping[str, Any], splits: Mapping[str, str], names: Set[str]
+) -> Iterator[str]:
+    """What a row names that is not there."""
+    if splits.get(row["object_id"]) != row["split"]:
+        yield "its object is not there, or in another split"
+    if row["control_of"] is not None and row["control_of"] not in names:
+        yield f"{row['control_of']} is no grasp"
+
+
+def _contact_faults(row: Mapping[str, Any]) -> Iterator[str]:
+    """Normals, and closure from the contacts alone."""
+    count = row["contacts"]
+    closed = row["force_closed"]
+    if not 1 <= count <= FINGERS or closed is None or (closed and row["closure_margin"] is None):
+        yield "its contacts, or what is claimed of them, are missing"
+        return
+    points = np.array(row["contact_points_m"][:count], dtype=np.float64)
+    normals = np.array(row["contact_normals"][:count], dtype=np.float64)
+    if not (np.abs(np.linalg.norm(normals, axis=1) - 1.0) <= UNIT).all():
+        yield "a normal is no unit vector"
+        return
+    try:
+        certificate = force_closure(points, normals, row["friction"])
+    except UndecidedError as error:
+        if row["force_closed"]:
+            yield f"closure cannot be decided ({error})"
+        return
+    except GraspError as error:
+        yield f"closure cannot be asked for ({error})"
+        return
+    if certificate.closed != row["force_closed"]:
+        yield f"force-closed is {row['force_closed']}, the contacts say {certificate.closed}"
+    elif certificate.closed and not np.isclose(
+        certificate.margin, row["closure_margin"], rtol=0.0, atol=SAME_MARGIN * row["friction"]
+    ):
+        stated = row["closure_margin"]
+        yield f"closure margin {stated:.9g}, the contacts say {certificate.margin:.9g}"

@@ -1,0 +1,110 @@
+"""The bytes of an npz file -> arrays, each refused before anything large is made of it.
+
+An archive may claim any size, hold names twice, or members whose headers lie; only arrays of
+numbers, truth values and text are read, as many bytes as their shapes need and no more.
+"""
+
+import io
+import math
+import zipfile
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.errors import InputError
+from grasp_core.files.strict_json import shown
+from sim_validate.files.reading import read_bytes
+
+MOST_BYTES = 256 * 2**20
+"""Of all arrays of a file."""
+MOST_MEMBERS = 256
+MOST_HEADER = 10_000
+"""Letters of an array's header, as numpy takes them."""
+KINDS = "biufU"
+"""Of what arrays may be: truth values, numbers, text."""
+BEGINNING, ENDING = b"PK\x03\x04", ".npy"
+"""Of an archive, and of the names in it."""
+LARGEST_LETTER, FIRST_HALF, LAST_HALF = 0x10FFFF, 0xD800, 0xDFFF
+"""Codes of letters, and of halves of letters, which are none."""
+
+
+def read_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[Any]]:
+    """Arrays of an npz file, those that are there; nothing in it is run.
+
+    Raises:
+        InputError: It cannot be read, is too large, or holds anything but plain arrays.
+    """
+    data = read_bytes(path, MOST_BYTES)
+    try:
+        return arrays_of(data, names)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def arrays_of(data: bytes, names: Collection[str]) -> dict[str, NDArray[Any]]:
+    """The same from the bytes of a file.
+
+    Raises:
+        InputError: It is too large, or holds anything but plain arrays.
+    """
+    if not data.startswith(BEGINNING):
+        raise InputError("cannot be read as npz (it does not begin as archives do)")
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = _checked(archive.infolist())
+            return {
+                name: _array(archive, members[name + ENDING], name)
+                for name in names
+                if name + ENDING in members
+            }
+    except InputError:
+        raise
+    except Exception as error:  # whatever a foreign file makes zipfile and numpy raise
+        raise InputError(f"cannot be read as npz ({shown(str(error))}); write it again") from error
+
+
+def _checked(listed: list[zipfile.ZipInfo]) -> dict[str, zipfile.ZipInfo]:
+    """The members of an archive by name, refused for what they claim."""
+    if len(listed) > MOST_MEMBERS:
+        raise InputError(f"{len(listed)} members; an npz file has up to {MOST_MEMBERS} arrays")
+    claimed = sum(each.file_size for each in listed)
+    if claimed > MOST_BYTES:
+        raise InputError(f"{claimed} bytes of arrays are over the limit of {MOST_BYTES}")
+    members = {each.filename: each for each in listed}
+    if len(members) < len(listed):
+        raise InputError("two members have the same name; write the file again")
+    return members
+
+
+def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> NDArray[Any]:
+    with archive.open(member) as stream:
+        version = np.lib.format.read_magic(stream)
+        readers = {(1, 0): np.lib.format.read_array_header_1_0,
+                   (2, 0): np.lib.format.read_array_header_2_0}  # fmt: skip
+        if version not in readers:
+            raise InputError(f"{name}: arrays of format {version} are not read; save it again")
+        shape, by_columns, dtype = readers[version](stream, max_header_size=MOST_HEADER)
+        if dtype.kind not in KINDS or dtype.subdtype is not None:
+            raise InputError(f"{name}: expected numbers or text, got {shown(str(dtype))}")
+        size = math.prod(shape) * dtype.itemsize
+        if min(shape, default=0) < 0 or size > member.file_size:
+            raise InputError(f"{name}: its shape {shown(str(shape))} is not that of its numbers")
+        held = stream.read(size)
+        if len(held) < size or stream.read(1):
+            raise InputError(f"{name}: has not as many numbers as its shape {shape}")
+    array = np.ndarray(shape, dtype, held, order="F" if by_columns else "C")
+    _check_letters(array, name)
+    return array
+
+
+def _check_letters(array: NDArray[Any], name: str) -> None:
+    """Refuse text with letters that there are not, which numpy would hand on."""
+    if array.dtype.kind != "U" or not array.size or not array.dtype.itemsize:
+        return
+    codes = np.frombuffer(array.tobytes(), array.dtype.str[0].replace("|", "=") + "u4")
+    halves = (codes >= FIRST_HALF) & (codes <= LAST_HALF)
+    if codes.max() > LARGEST_LETTER or halves.any():
+        raise InputError(f"{name}: holds text that is none")

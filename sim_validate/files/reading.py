@@ -1,0 +1,117 @@
+"""Files in and out: whole or not at all."""
+
+import io
+import shutil
+import tempfile
+import zipfile
+from collections.abc import Generator, Iterable, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.errors import InputError
+from grasp_core.files.whole_files import bounded_bytes, write_parts
+
+MAX_TEXT_BYTES = 256 * 2**20
+MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
+"""Byte order marks, of UTF-8 and of UTF-16."""
+
+
+class NotTextError(InputError):
+    """Bytes are not UTF-8 text."""
+
+
+def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
+    """The bytes of a regular file: never of a pipe or a device, which may have no end.
+
+    Raises:
+        InputError: It cannot be read, is no regular file, or is larger than `most` bytes.
+    """
+    try:
+        data = bounded_bytes(path, most)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); give a file") from error
+    if len(data) > most:
+        raise InputError(f"{path}: larger than {most} bytes; give a smaller file")
+    return data
+
+
+def read_text(path: Path, most: int = MAX_TEXT_BYTES) -> str:
+    """The text of a file.
+
+    Raises:
+        InputError: It cannot be read, is too large, or is not UTF-8.
+    """
+    try:
+        return text_of(read_bytes(path, most))
+    except NotTextError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def text_of(data: bytes) -> str:
+    """The text that a file's bytes are; pairs of line breaks are one.
+
+    Raises:
+        NotTextError: They are not UTF-8.
+    """
+    if data.startswith(MARKS):
+        raise NotTextError("begins with a byte order mark; save it as UTF-8 without one")
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise NotTextError(
+            f"not UTF-8 text ({error.reason} at byte {error.start}); save it as UTF-8"
+        ) from error
+    return text.replace("\r\n", "\n")
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a file by renaming a complete one into place; folders are made as needed."""
+    return write_parts(path, [text.encode()])
+
+
+def write_bytes(path: Path, data: bytes) -> Path:
+    """As `write_text`."""
+    return write_parts(path, [data])
+
+
+def write_lines(path: Path, lines: Iterable[str]) -> Path:
+    """As `write_text`, of lines that are not all in memory; each ends with its line break."""
+    return write_parts(path, (line.encode() for line in lines))
+
+
+def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
+    """Write arrays by name, compressed, as `numpy.load` reads them."""
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, array in arrays.items():
+            member = zipfile.ZipInfo(
+                f"{name}.npy"
+            )  # of no date, so that equal arrays give equal files
+            with archive.open(member, "w") as stream:
+                np.lib.format.write_array(stream, array, allow_pickle=False)
+    return write_parts(path, [held.getvalue()])
+
+
+@contextmanager
+def whole_folder(folder: Path) -> Generator[Path]:
+    """A place to write to, which becomes the folder when everything is written, and else goes.
+
+    Raises:
+        InputError: The folder is there and not empty.
+    """
+    if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
+        raise InputError(f"{folder}: is there, and no empty folder; give another --out")
+    named = folder.resolve()
+    named.parent.mkdir(parents=True, exist_ok=True)
+    temporary = Path(tempfile.mkdtemp(dir=named.parent, prefix=".unfinished-"))
+    try:
+        yield temporary
+        temporary.chmod(0o755)
+        temporary.replace(named)
+    except BaseException:
+        shutil.rmtree(temporary, ignore_errors=True)
+        raise

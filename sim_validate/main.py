@@ -1,0 +1,130 @@
+"""The `graspproof` command: arguments become flags, flags a command, errors an exit code.
+
+Nothing heavy is imported here, so that help and usage errors answer at once.
+"""
+
+import sys
+import traceback
+from collections.abc import Sequence
+from pkgutil import resolve_name
+from typing import Any
+
+import tyro
+from tyro.conf import FlagCreatePairsOff
+
+from grasp_core.errors import GraspError, InputError
+from sim_validate.cli import baseline_flags, command_flags, dataset_flags, showing_flags
+from sim_validate.cli.baseline_flags import Baseline
+from sim_validate.cli.command_flags import COMMANDS, Command
+from sim_validate.cli.config_file import with_config
+from sim_validate.cli.dataset_flags import Dataset
+from sim_validate.cli.examples import examples_for
+from sim_validate.cli.exit_codes import Exit, exit_code, reason_of
+from sim_validate.cli.flag_bounds import FlagsError, check
+
+ACTIONS: dict[type[Any], str] = {
+    command_flags.Run: "run:run_object",
+    command_flags.Plan: "plan:plan_file",
+    command_flags.Validate: "validate:validate_file",
+    command_flags.Scene: "scene:write_scenes",
+    showing_flags.View: "view:view_grasp",
+    showing_flags.Report: "report:report_folder",
+    command_flags.Regions: "regions:certify_file",
+    command_flags.Replay: "replay:replay_trial",
+    command_flags.Analyze: "analyze:analyze_file",
+    dataset_flags.Build: "dataset:build_dataset",
+    dataset_flags.Import: "dataset:import_dataset",
+    dataset_flags.Verify: "dataset:verify_dataset",
+    dataset_flags.Export: "dataset:export_dataset",
+    baseline_flags.Record: "baseline:record_baseline",
+    baseline_flags.Check: "baseline:check_baseline",
+    command_flags.Inspect: "objects:inspect_object",
+    command_flags.Objects: "objects:list_objects",
+    command_flags.Doctor: "doctor:check_installation",
+}
+"""By name, as planning must not wait for a simulator to be imported."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Args:
+        argv: Arguments without the program's name; those of the process when None.
+
+    Returns:
+        An exit code, see `Exit`.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    try:
+        if "" in arguments:
+            said = "a word of the command line is empty, as of a variable that is not set"
+            raise FlagsError(f"{said}; leave it out, or give a value")
+        flags = with_config(arguments, COMMANDS)
+    except InputError as error:
+        return _complain(str(error), exit_code(error))
+    try:
+        command: Command = tyro.cli(
+            FlagCreatePairsOff[Command],  # type: ignore[valid-type]
+            prog="graspproof",
+            description=(
+                "Four-finger force-closure grasps, proved and simulated. Every command also takes "
+                "--config FILE.toml, whose keys are flags; flags given override it."
+            ),
+            args=flags,
+        )
+        check(command)
+    except SystemExit as stop:
+        sys.stdout.write(examples_for(arguments))
+        return stop.code if isinstance(stop.code, int) else Exit.USAGE
+    except InputError as error:
+        return _complain(str(error), Exit.USAGE)
+    except KeyboardInterrupt:
+        return _complain("interrupted", Exit.INTERRUPTED)
+    return _dispatch(command)
+
+
+def execute(command: Command) -> int:
+    """Carry out a command and return its exit code."""
+    from sim_validate.cli.console import Reporter
+
+    speech = command.speech
+    reporter = Reporter(speech.quiet, speech.verbose, speech.json)
+    asked = command.action if isinstance(command, Dataset | Baseline) else command
+    return resolve_name(f"sim_validate.commands.{ACTIONS[type(asked)]}")(asked, reporter)
+
+
+def _dispatch(command: Command) -> int:
+    try:
+        from sim_validate.parallel import interrupts
+
+        with interrupts.noted():
+            code = execute(command)
+            if sys.stdout is not None:  # pyright: ignore[reportUnnecessaryComparison] - may be closed
+                sys.stdout.flush()
+            return code
+    except KeyboardInterrupt:
+        return _complain("interrupted", Exit.INTERRUPTED)
+    except (GraspError, OSError) as error:
+        return _complain(reason_of(error), exit_code(error))
+    except Exception as error:
+        if command.speech.verbose:
+            traceback.print_exc()
+        return _complain(f"internal error: {error!r}; -v shows where", Exit.INTERNAL)
+
+
+def _complain(message: str, code: Exit) -> int:
+    from sim_validate.cli.console import printable
+
+    if sys.stderr is not None:  # pyright: ignore[reportUnnecessaryComparison] - may be closed
+        sys.stderr.write(f"graspproof: {printable(message)}\n")
+    return int(code)
+
+
+def run_and_exit() -> None:
+    """Entry point of the `graspproof` command."""
+    from sim_validate.cli import streams
+
+    streams.steady()
+    code = main()
+    streams.end()
+    sys.exit(code)

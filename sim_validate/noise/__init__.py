@@ -1,1 +1,0 @@
-"""Grasps when nothing is quite as planned: seeded noise, and how often they hold with it."""

@@ -1,0 +1,97 @@
+"""Regions certified for many grasps, in parallel."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.errors import SolverError, UndecidedError
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.regions.certificates import CertifiedRegions
+from grasp_core.regions.certify_regions import CONES, Balance, certify_regions
+from grasp_core.values import Grasp
+from sim_validate.parallel.processes import each
+
+Found: TypeAlias = tuple[Grasp, CertifiedRegions | str]
+"""A grasp with its regions, or why it has none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """How regions are certified; see `certify_regions`."""
+
+    friction: float
+    reserve: float = 0.0
+    balance: Balance = "radius"
+    recenter: bool = False
+    clearance: float = 0.0
+    cones: int = CONES
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Task:
+    """One grasp, as it travels to a worker."""
+
+    body: Polyhedron
+    grasp: Grasp
+    asked: Asked
+
+
+def certified(
+    body: Polyhedron, grasps: Sequence[Grasp], asked: Asked, *, jobs: int,
+    progress: Callable[[int, int], None],
+) -> Iterator[Found]:  # fmt: skip
+    """Yield each grasp with its regions, or why there are none, in order.
+
+    Args:
+        body: The object.
+        grasps: Grasps of it.
+        asked: How regions are certified.
+        jobs: Largest number of processes.
+        progress: Called with (done, total) after each grasp.
+    """
+    tasks = [_Task(body, grasp, asked) for grasp in grasps]
+    for done, found in enumerate(zip(grasps, each(_certify, tasks, jobs=jobs), strict=True)):
+        progress(done + 1, len(tasks))
+        yield found
+
+
+def _certify(task: _Task) -> CertifiedRegions | str:
+    asked, grasp = task.asked, task.grasp
+    left = asked.friction * (1.0 - asked.reserve)
+    try:
+        if not force_closure(grasp.positions, grasp.normals, left).closed:
+            return f"not in force closure at friction {left:.6g}"
+        proved = certify_regions(
+            task.body, grasp, asked.friction, reserve=asked.reserve, balance=asked.balance,
+            recenter=asked.recenter, clearance=asked.clearance, cones=asked.cones,
+        )  # fmt: skip
+    except (UndecidedError, SolverError) as error:
+        return str(error)
+    return "no radius could be proved" if proved is None else proved
+
+
+def wider(grasp: Grasp, proved: CertifiedRegions | str) -> Grasp:
+    """A grasp with certified regions where their discs around its contacts are larger."""
+    if isinstance(proved, str):
+        return grasp
+    radius = min(
+        _room(region.polygon, contact.position, normal)
+        for region, contact, normal in zip(
+            proved.regions, grasp.contacts, proved.normals, strict=True
+        )
+    )
+    if radius <= grasp.radius and grasp.regions[0].kind != "point":
+        return grasp
+    return replace(grasp, regions=proved.regions, radius=max(radius, 0.0))
+
+
+def _room(polygon: Array, point: Array, normal: Array) -> float:
+    """How far a point is inside of a convex polygon (c, 3), across its plane or not [m]."""
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    inward = np.cross(normal, edges)
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    return float(np.einsum("ci,ci->c", inward, point - polygon).min())

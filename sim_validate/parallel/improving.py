@@ -1,0 +1,89 @@
+"""Grasps of a plan moved to better contacts on their faces, in parallel, with what that gained."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.optimizing.better_contacts import Improvement, optimize_contacts
+from grasp_core.optimizing.ceiling import quality_ceiling
+from grasp_core.planning.result import Plan
+from grasp_core.records.grasps_json import Moved
+from grasp_core.values import Grasp
+from sim_validate.parallel.processes import each
+
+SAME_CONTACTS = 0.01
+"""Contacts closer than this, in object radii, are the same optimum: searches end some
+thousandths from it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Task:
+    """One grasp to move, as it travels to a worker."""
+
+    body: Polyhedron
+    grasp: Grasp
+    friction: float
+    finger_radius: float | None
+    seed: int
+    parts: int | None
+    """How many parts of the faces to bound; None for no bound."""
+
+
+def improved(
+    body: Polyhedron, found: Plan, *, finger_radius: float | None, parts: int | None, jobs: int,
+    progress: Callable[[int, int, str], None],
+) -> tuple[Plan, tuple[Moved, ...]]:  # fmt: skip
+    """The plan with its grasps moved, best quality first, and how each one changed.
+
+    The plan keeps one of several grasps that end at the same contacts.
+
+    Args:
+        body: The object.
+        found: A plan for it.
+        finger_radius: How far contacts stay from edges [m].
+        parts: How many parts of the faces to bound the best quality on; None for no bound.
+        jobs: Largest number of processes.
+        progress: Called with (done, total, how many are raised) after each grasp.
+    """
+    tasks = [
+        _Task(body, grasp, found.friction, finger_radius, found.seed, parts)
+        for grasp in found.grasps
+    ]
+    done: list[tuple[Grasp, Moved]] = []
+    for grasp, moved in each(_improve, tasks, jobs=jobs):
+        done.append((grasp, moved))
+        raised = sum(one.gain > 1.0 for _, one in done)
+        progress(len(done), len(tasks), f"({raised} raised)")
+    done.sort(key=lambda pair: -pair[0].ferrari_canny[0])
+    kept: list[Grasp] = []
+    for grasp, _ in done:
+        if not any(_same_contacts(grasp, other, SAME_CONTACTS * body.radius) for other in kept):
+            kept.append(grasp)
+    return replace(found, grasps=tuple(kept)), tuple(moved for _, moved in done)
+
+
+def _same_contacts(one: Grasp, two: Grasp, slack: float) -> bool:
+    """Whether two grasps touch the same faces at the same points, in whatever order."""
+    order, other = np.argsort(one.faces), np.argsort(two.faces)
+    faces = np.array_equal(np.array(one.faces)[order], np.array(two.faces)[other])
+    return faces and float(np.abs(one.positions[order] - two.positions[other]).max()) <= slack
+
+
+def _improve(task: _Task) -> tuple[Grasp, Moved]:
+    found: Improvement = optimize_contacts(
+        task.body, task.grasp, task.friction, finger_radius=task.finger_radius, seed=task.seed
+    )
+    ceiling = None
+    if task.parts is not None:
+        ceiling = quality_ceiling(
+            task.body, task.grasp.faces, task.friction, known=found.after.lower,
+            finger_radius=found.clearances, parts=task.parts,
+        ).upper  # fmt: skip
+    before, after = found.before, found.after
+    moved = Moved(
+        found.grasp.id, task.grasp.id, (before.lower, before.upper), (after.lower, after.upper),
+        ceiling,
+    )  # fmt: skip
+    return found.grasp, moved

@@ -1,0 +1,47 @@
+"""Reading a file of grasps, so that a refusal names the file."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from grasp_core.errors import InputError
+from grasp_core.records.grasps_json import SavedGrasps, grasps_from_json
+from grasp_core.values import Grasp
+from sim_validate.files.reading import read_text
+
+NAMED = 5
+"""Names that a message lists."""
+
+
+def read_grasps(path: Path) -> SavedGrasps:
+    """The grasps of a `grasps.json`.
+
+    Raises:
+        InputError: The file is missing, or is no such file; the message names it and the field.
+    """
+    text = read_text(path)
+    try:
+        return grasps_from_json(text)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def grasp_with_id(path: Path, saved: SavedGrasps, wanted: str | None) -> Grasp:
+    """The grasp that is wanted; where there is only one it need not be named.
+
+    Raises:
+        InputError: It is not there; the message, which begins with the path, lists some that are.
+    """
+    if wanted is None and len(saved.grasps) == 1:
+        return saved.grasps[0]
+    found = next((grasp for grasp in saved.grasps if grasp.id == wanted), None)
+    if found is None:
+        asked = "give --grasp ID" if wanted is None else f"no grasp {wanted}"
+        raise InputError(f"{path}: {asked}; there is {some(grasp.id for grasp in saved.grasps)}")
+    return found
+
+
+def some(names: Iterable[str]) -> str:
+    """The first of many names, for a message."""
+    listed = list(names)
+    more = f" and {len(listed) - NAMED} more" if len(listed) > NAMED else ""
+    return (", ".join(listed[:NAMED]) or "none") + more

@@ -1,0 +1,222 @@
+"""Certified regions in files: a proof per grasp, and one document for all."""
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.arrays import Array, frozen, frozen_indices, frozen_units
+from grasp_core.checked import path_of
+from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.errors import InputError, SolverError
+from grasp_core.geometry.flat_polygons import FEWEST_CORNERS
+from grasp_core.objects.face_pieces import inscribed_disc_radius_of
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.provenance import versions
+from grasp_core.regions.certificates import CertifiedRegions
+from grasp_core.regions.proof import TwistCover
+from grasp_core.values import FINGERS, ContactRegion, Grasp, four
+from sim_validate.files.npz import read_arrays
+from sim_validate.files.reading import write_arrays, write_text
+from sim_validate.parallel.certifying import Asked, Found
+
+SCHEMA = 3
+REGIONS, PROOFS = "regions.json", "proofs"
+POLYGONS = tuple(f"region{i}_m" for i in range(FINGERS))
+BORDERS = tuple(f"border{i}_m" for i in range(FINGERS))
+SHAPES: Mapping[str, tuple[int | None, ...]] = {
+    "axes": (6, 6), "codes": (None,), "forces": (None, FINGERS, 3), "normals": (FINGERS, 3),
+    "friction": (FINGERS,), "origin_m": (3,), "depths_m": (FINGERS,), "centers_m": (FINGERS, 3),
+    "open_choice_m": (None, 3), "open_wrench": (None,), "scale_m": (), "disc_radius_m": (),
+    "open_radius_m": (),
+    **dict.fromkeys((*POLYGONS, *BORDERS), (None, 3)),
+}  # fmt: skip
+"""Of the arrays of a proof."""
+MOST_CORNERS = 1000
+"""Of a region's polygon in a file."""
+SMALLEST_SCALE, LARGEST = 1e-6, 1e6
+"""Of proofs: of what lengths are relative to, and of any length [m]."""
+
+
+def write_regions(
+    folder: Path | None,
+    body: Polyhedron,
+    asked: Asked,
+    found: Iterable[Found],
+) -> Mapping[str, Any]:
+    """Write proofs as they come, and then what was found; nothing where there is no folder.
+
+    Args:
+        folder: For regions.json and the proofs.
+        body: The object.
+        asked: How regions were certified.
+        found: Each grasp with its regions.
+
+    Returns:
+        What is in regions.json.
+    """
+    records = [_record(grasp, proved, body, folder) for grasp, proved in found]
+    document = {
+        "schema": SCHEMA,
+        "object": {"name": body.name, "content_sha256": body.content_sha256},
+        "friction": asked.friction,
+        "reserve": asked.reserve,
+        "balance": asked.balance,
+        "recenter": asked.recenter,
+        "edge_clearance_m": asked.clearance,
+        "cones": asked.cones,
+        "versions": versions(),
+        "grasps": records,
+    }
+    if folder is not None:
+        write_text(folder / REGIONS, json.dumps(document, allow_nan=False, indent=1) + "\n")
+    return document
+
+
+def _record(
+    grasp: Grasp, proved: CertifiedRegions | str, body: Polyhedron, folder: Path | None
+) -> Mapping[str, Any]:
+    """What is told of a grasp; its proof is written, or one of before is removed."""
+    named = {
+        "id": grasp.id,
+        "contacts_sha256": contacts_sha256(grasp.contacts),
+        "family": grasp.family,
+        "planned_radius_m": grasp.radius,
+    }
+    name = f"{PROOFS}/{grasp.id}.npz"
+    if isinstance(proved, str):
+        if folder is not None:
+            (folder / name).unlink(missing_ok=True)
+        return {**named, "disc_radius_m": None, "regions": None, "reason": proved}
+    proof = None
+    if folder is not None:
+        path = write_arrays(folder / name, proof_arrays(proved, grasp, body))
+        proof = {"file": name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+    return {
+        **named,
+        "disc_radius_m": proved.radius,
+        "centers_m": proved.centers.tolist(),
+        "friction": proved.friction.tolist(),
+        "open_radius_m": proved.limit if proved.open_choice is not None else None,
+        "open_choice_m": None if proved.open_choice is None else proved.open_choice.tolist(),
+        "cones": len(proved.cover.forces),
+        "proof": proof,
+        "regions": [
+            {
+                "kind": region.kind,
+                "polygon_m": region.polygon.tolist(),
+                "inscribed_radius_m": region.inscribed_radius,
+                "area_m2": area_of(region),
+            }
+            for region in proved.regions
+        ],
+    }
+
+
+def area_of(region: ContactRegion) -> float:
+    """Area of a convex region [m^2]."""
+    sides = region.polygon[1:] - region.polygon[0]
+    crossed = np.cross(sides[:-1], sides[1:])
+    return 0.5 * float(np.linalg.norm(crossed.sum(axis=0)))
+
+
+def proof_arrays(
+    proved: CertifiedRegions, grasp: Grasp, body: Polyhedron
+) -> dict[str, NDArray[Any]]:
+    """Regions and their proof as arrays by name."""
+    cover, choice, wrench = proved.cover, proved.open_choice, proved.open_wrench
+    polygons = [region.polygon for region in proved.regions]
+    return {
+        "grasp": np.array(grasp.id),
+        "object_sha256": np.array(body.content_sha256),
+        "axes": cover.axes,
+        "codes": cover.codes.astype(np.uint8),
+        "forces": cover.forces,
+        "normals": proved.normals,
+        "friction": proved.friction,
+        "origin_m": proved.origin,
+        "depths_m": proved.depths,
+        "scale_m": np.array(proved.scale),
+        "centers_m": proved.centers,
+        "disc_radius_m": np.array(proved.radius),
+        "open_radius_m": np.array(proved.limit),
+        "open_choice_m": np.zeros((0, 3)) if choice is None else choice,
+        "open_wrench": np.zeros(0) if wrench is None else wrench,
+        **dict(zip(POLYGONS, polygons, strict=True)),
+        **dict(zip(BORDERS, proved.borders, strict=True)),
+    }
+
+
+def read_regions(path: str | Path) -> CertifiedRegions:
+    """Regions and their proof from a file that `graspproof regions` has written; not yet verified.
+
+    Raises:
+        InputError: The file is not such a one.
+    """
+    path = path_of(path, "path")
+    try:
+        return regions_of(read_arrays(path, SHAPES))
+    except InputError as error:
+        raise InputError(f"{path}: not the proof of a grasp's regions: {error}") from error
+
+
+def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
+    """The same from arrays by name.
+
+    Raises:
+        InputError: One is missing, or of another shape.
+    """
+    if missing := [name for name in SHAPES if name not in kept]:
+        raise InputError(f"no array {missing[0]}; `graspproof regions` writes it")
+    limit = kept["open_radius_m"]  # infinite where nothing was found
+    finite = {
+        **kept,
+        "open_radius_m": np.where(np.isposinf(limit), 0.0, limit)
+        if limit.dtype.kind == "f"
+        else limit,
+    }
+    numbers = {name: frozen(finite[name], shape, name) for name, shape in SHAPES.items()}
+    scale = numbers["scale_m"].item()
+    if not SMALLEST_SCALE <= scale <= LARGEST:
+        raise InputError(f"scale_m: expected {SMALLEST_SCALE:g} to {LARGEST:g}, got {scale:g}")
+    normals = frozen_units(numbers["normals"], (FINGERS, 3), "normals")
+    choice, wrench = numbers["open_choice_m"], numbers["open_wrench"]
+    return CertifiedRegions(
+        regions=four(
+            _region(name, numbers[name], normal, scale)
+            for name, normal in zip(POLYGONS, normals, strict=True)
+        ),
+        borders=four(numbers[name] for name in BORDERS),
+        radius=numbers["disc_radius_m"].item(),
+        centers=numbers["centers_m"],
+        limit=limit.item(),
+        open_choice=choice if len(choice) else None,
+        open_wrench=wrench if len(wrench) else None,
+        friction=numbers["friction"],
+        origin=numbers["origin_m"],
+        normals=normals,
+        depths=numbers["depths_m"],
+        cover=TwistCover(numbers["axes"], frozen_indices(kept["codes"], (None,), "codes"),
+                         numbers["forces"]),
+        scale=scale,
+    )  # fmt: skip
+
+
+def _region(name: str, polygon: Array, normal: Array, scale: float) -> ContactRegion:
+    if not FEWEST_CORNERS <= len(polygon) <= MOST_CORNERS or np.abs(polygon).max() > LARGEST:
+        raise InputError(
+            f"{name}: expected {FEWEST_CORNERS} to {MOST_CORNERS} corners within {LARGEST:g} m"
+        )
+    try:
+        with np.errstate(invalid="ignore", divide="ignore"):  # edges without length have no answer
+            return ContactRegion("certified", polygon, _inscribed(polygon, normal, scale))
+    except SolverError as error:
+        raise InputError(f"{name}: its corners are those of no convex polygon") from error
+
+
+def _inscribed(polygon: Array, normal: Array, scale: float) -> float:
+    return scale * inscribed_disc_radius_of(polygon / scale, normal)

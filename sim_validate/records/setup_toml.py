@@ -1,0 +1,98 @@
+"""A setup in TOML: tables `physics`, `fingers`, `hold`, `limit`, `friction`, any part of each."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any, cast
+
+from pydantic import TypeAdapter, ValidationError
+
+from grasp_core.errors import InputError
+from grasp_core.files.complaints import complaint
+from grasp_core.files.strict_json import shown
+from scenes.fingertips import FingerSettings
+from scenes.physics import PhysicsSettings
+from sim_validate.files.toml_tables import read_tables
+from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
+from sim_validate.simulation.setup import Setup
+
+OURS = ("drive", "indentation")
+"""Fields of the fingers that trials set themselves."""
+OF_USERS = {
+    table: tuple(field.name for field in fields(kind) if field.name not in OURS)
+    for table, kind in (
+        ("physics", PhysicsSettings),
+        ("fingers", FingerSettings),
+        ("hold", HoldProtocol),
+        ("limit", LimitProtocol),
+        ("friction", FrictionProtocol),
+    )
+}
+"""What a file may set, by table."""
+
+
+def setup_from_file(path: Path, setup: Setup) -> Setup:
+    """The setup, with the numbers of a file in place of its own.
+
+    Args:
+        path: A TOML file.
+        setup: What holds where the file says nothing.
+
+    Raises:
+        InputError: It is not such a file; the message names the field.
+    """
+    return setup_from_tables(read_tables(path), setup, str(path))
+
+
+def setup_from_tables(tables: Mapping[str, Any], setup: Setup, path: str) -> Setup:
+    """The setup, with the numbers of tables in place of its own.
+
+    Args:
+        tables: Settings by table.
+        setup: What holds where they say nothing.
+        path: Where they come from, for messages.
+
+    Raises:
+        InputError: There is no such setting, or its value is refused.
+    """
+    for name, given in tables.items():
+        if name not in OF_USERS or not isinstance(given, dict):
+            raise InputError(f"{path}: tables are {', '.join(OF_USERS)}; got {shown(name)}")
+        table = cast("dict[str, Any]", given)
+        filled = _filled(path, name, getattr(setup, name), table)
+        try:
+            setup = replace(setup, **{name: filled})
+        except InputError as error:  # of a part that suits no prediction
+            raise InputError(f"{path}: [{name}] {error}") from error
+    return setup
+
+
+def tables_of(setup: Setup) -> dict[str, dict[str, Any]]:
+    """What a file would say to have this setup."""
+    return {
+        table: {name: getattr(getattr(setup, table), name) for name in names}
+        for table, names in OF_USERS.items()
+    }
+
+
+def _filled(path: str, table: str, values: Any, given: dict[str, Any]) -> Any:
+    """A frozen value with some of its fields replaced, each checked against its type."""
+    for name in given:
+        if name not in OF_USERS[table]:
+            raise InputError(
+                f"{path}: [{table}] has {', '.join(OF_USERS[table])}; got {shown(name)}"
+            )
+    kind = cast("type[Any]", type(values))
+    try:
+        text = json.dumps({**_as_dict(values), **given})
+        checked: Any = TypeAdapter(kind).validate_json(text, strict=True)
+    except ValidationError as error:
+        raise InputError(f"{path}: [{table}] {complaint(error, kind)}") from error
+    except InputError as error:  # of the value's own checks
+        raise InputError(f"{path}: [{table}] {error}") from error
+    return checked
+
+
+def _as_dict(values: Any) -> dict[str, Any]:
+    return {field.name: getattr(values, field.name) for field in fields(values)}

@@ -1,0 +1,203 @@
+"""Verdicts -> JSON text, with units in the keys and every setting that was in force."""
+
+import json
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from typing import Any, cast
+
+from grasp_core.arrays import Array
+from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.provenance import versions
+from sim_validate.records.setup_toml import OF_USERS
+from sim_validate.simulation.gate.gate import Gate
+from sim_validate.simulation.hold_verdict import HoldVerdict, Outcome
+from sim_validate.validation.control_trials import ControlVerdict
+from sim_validate.validation.grasp_verdict import Verdict
+from sim_validate.validation.repeats import Robustness
+from sim_validate.validation.wrench_verdict import WrenchVerdict
+
+SCHEMA = 1
+
+
+def verdicts_to_json(
+    body: Polyhedron, friction: float, verdicts: Iterable[Verdict], gate: Gate, *, complete: bool
+) -> str:
+    """The text of `verdicts.json`: the same for the same verdicts.
+
+    Args:
+        body: The object.
+        friction: Coulomb coefficient tested.
+        verdicts: One per grasp.
+        gate: What the simulator made of known cases.
+        complete: Whether every grasp of the plan was tested.
+    """
+    listed = list(verdicts)
+    document = {
+        "schema": SCHEMA,
+        "object": {
+            "name": body.name,
+            "source_sha256": body.source_sha256,
+            "content_sha256": body.content_sha256,
+        },
+        "friction": friction,
+        "complete": complete,
+        "gate": gate_record(gate),
+        "summary": summary(listed),
+        "verdicts": [_verdict_record(body, verdict) for verdict in listed],
+    }
+    return json.dumps(finite(document), allow_nan=False, indent=1) + "\n"
+
+
+def gate_record(gate: Gate) -> dict[str, object]:
+    """The gate's figures."""
+    return {
+        "passed": gate.passed,
+        "mujoco": gate.mujoco,
+        "checks": [asdict(check) for check in gate.checks],
+    }
+
+
+def finite(value: Any) -> Any:
+    """The same tree with null for numbers that JSON does not have: what could not be measured."""
+    if isinstance(value, dict):
+        return {name: finite(part) for name, part in cast("dict[str, Any]", value).items()}
+    if isinstance(value, list | tuple):
+        return [finite(part) for part in cast("list[Any]", value)]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def summary(verdicts: Iterable[Verdict]) -> dict[str, int]:
+    """How many grasps and controls there were, how many of each held, and what was contradicted."""
+    listed = list(verdicts)
+    controls = [control for verdict in listed for control in verdict.controls]
+    return {
+        "grasps": len(listed),
+        "grasps_held": sum(verdict.held for verdict in listed),
+        "controls": len(controls),
+        "controls_held": sum(control.held for control in controls),
+        "controls_let_go": sum(control.failed for control in controls),
+        "mismatches": sum(len(verdict.mismatches) for verdict in listed),
+    }
+
+
+def _verdict_record(body: Polyhedron, verdict: Verdict) -> dict[str, object]:
+    bounds = verdict.bounds
+    return {
+        "id": verdict.id,
+        "contacts_sha256": contacts_sha256(verdict.contacts),
+        "outcome": verdict.outcome.value,
+        "held": verdict.held,
+        "mismatches": list(verdict.mismatches),
+        "critical_friction": asdict(verdict.critical_friction),
+        "wrenches": [_wrench_record(trial) for trial in verdict.wrenches],
+        "controls": {
+            control.control.name: _control_record(body, control) for control in verdict.controls
+        },
+        "bounds": None if bounds is None else asdict(bounds),
+        "robustness": _robustness_record(verdict.robustness),
+        "accepted_by": verdict.accepted_by,
+        "settings": _settings(verdict),
+        "versions": versions(),
+    }
+
+
+def _wrench_record(trial: WrenchVerdict) -> dict[str, object]:
+    found, predicted = trial.simulated_limit, trial.predicted_limit
+    return {
+        "name": trial.name,
+        "wrench": trial.wrench.tolist(),
+        "predicted_limit": predicted,
+        "simulated_limit": None if found is None else found.share * predicted,
+        "simulated_limit_bracket": (
+            None if found is None else [found.lower * predicted, found.upper * predicted]
+        ),
+        "required_friction": trial.required_friction,
+        **_hold_record(trial.hold),
+    }
+
+
+def _hold_record(hold: HoldVerdict) -> dict[str, object]:
+    return {
+        "outcome": hold.outcome.value,
+        "reason": hold.reason,
+        "displacement_m": hold.displacement_m,
+        "start_displacement_m": hold.start_displacement_m,
+        "rotation_rad": hold.rotation_rad,
+        "slip_m": hold.slip_m.tolist(),
+        "failed_after_s": hold.failed_after_s,
+    }
+
+
+def _control_record(body: Polyhedron, verdict: ControlVerdict) -> dict[str, object]:
+    control = verdict.control
+    return {
+        "held": verdict.held,
+        "friction": control.friction,
+        "contacts": [
+            {"position_m": contact.position.tolist(), "normal": contact.normal.tolist()}
+            for contact in control.contacts
+        ],
+        "closure_margin": control.certificate.margin,
+        "separating_wrench": control.separating_wrench(body.center_of_mass).tolist(),
+        "wrenches": [
+            {
+                "name": trial.name,
+                "wrench": trial.wrench.tolist(),
+                "required_friction": trial.required_friction,
+                **_hold_record(trial.hold),
+            }
+            for trial in verdict.tried
+        ],
+        "accepted_by": verdict.accepted_by,
+    }
+
+
+def _robustness_record(found: Robustness | None) -> dict[str, object] | None:
+    if found is None:
+        return None
+    return {
+        "trials": len(found.trials),
+        "held": found.held,
+        "predicted": found.predicted,
+        "pass_rate": found.held / len(found.trials),
+        "pass_rate_interval": list(found.interval),
+        "noise": asdict(found.noise),
+        "not_held": [
+            {"trial": each.number, "predicted": each.predicted, "outcome": each.outcome.value,
+             "wrench": each.wrench, "reason": each.reason}
+            for each in found.trials if each.outcome is not Outcome.HELD
+        ],
+    }  # fmt: skip
+
+
+def _settings(verdict: Verdict) -> dict[str, object]:
+    layout, setup = verdict.scene.layout, verdict.setup
+    return {
+        "physics": asdict(setup.physics),
+        "fingers": {name: getattr(setup.fingers, name) for name in OF_USERS["fingers"]},
+        "hold": asdict(setup.hold),
+        "limit": asdict(setup.limit),
+        "friction": asdict(setup.friction),
+        "flags": setup.physics.flags(),
+        "drive": asdict(layout.drive),
+        "surface": setup.surface,
+        "grasp_size_m": layout.grasp_size_m,
+        "object_mass_kg": layout.mass_kg,
+        "object_inertia_kg_m2": layout.inertia_kg_m2.tolist(),
+        "random_wrenches": verdict.agenda.random_wrenches,
+        "limits": verdict.agenda.limits,
+        "seed": verdict.agenda.seed,
+    }
+
+
+def trace_arrays(verdict: Verdict) -> dict[str, Array]:
+    """How every contact moved over time in the trials of a grasp: arrays by trial and quantity."""
+    fields = ("times_s", "displacements_m", "shifts_m", "rotations_rad", "slips_m", "gaps_m")
+    kept: Sequence[tuple[str, Any]] = [
+        *((trial.name, trial.trace) for trial in verdict.wrenches if trial.trace is not None),
+        *((f"{control.control.name}.{trial.name}", trial.trace)
+          for control in verdict.controls for trial in control.tried if trial.trace is not None),
+    ]  # fmt: skip
+    return {f"{name}.{field}": getattr(trace, field) for name, trace in kept for field in fields}

@@ -1,0 +1,61 @@
+"""A row of a dataset as a contact set to replay, with how its trials ended."""
+
+from itertools import islice
+from pathlib import Path
+
+from grasp_core.errors import InputError
+from grasp_core.planning.given_contacts import seat
+from grasp_core.values import Contact
+from sim_validate.datasets.meshes import stored_body
+from sim_validate.datasets.open_dataset import Selection, select
+from sim_validate.datasets.rows import GIVEN, NOT_TRIED
+from sim_validate.records.grasps import NAMED, some
+from sim_validate.replaying.recorded import Recorded, Wanted
+from sim_validate.simulation.setup import Agenda, Setup
+
+
+def from_dataset(folder: Path, wanted: Wanted) -> Recorded:
+    """What the tables of a dataset say about a grasp or a control.
+
+    Raises:
+        InputError: It is damaged, or has no such row.
+    """
+    chosen = select(folder)
+    if wanted.grasp is None or wanted.trial is not None or wanted.grasps is not None:
+        raise InputError(f"{folder}: give --grasp GRASP_ID of its table of grasps, and no --trial")
+    name = wanted.grasp if wanted.control is None else f"{wanted.grasp}:{wanted.control}"
+    row = next((row for row in chosen.rows("grasps") if row["grasp_id"] == name), None)
+    if row is None or row["outcome"] == NOT_TRIED:
+        there = some(row["grasp_id"] for row in islice(chosen.rows("grasps"), NAMED))
+        raise InputError(
+            f"{folder}: {name} is no grasp of it that was tried; there is {there}, ..."
+        )
+    config = chosen.config()
+    contacts = [
+        Contact(point, normal)
+        for point, normal in zip(row["contact_points_m"], row["contact_normals"], strict=True)
+        if point[0] is not None
+    ]
+    source = _source_name(chosen, row["object_id"])
+    body = stored_body(folder, row["object_id"], source, config.faces)
+    if row["label"] == GIVEN:  # on curved surfaces such contacts have faces of their own
+        body = seat(body, row["contact_points_m"], row["contact_normals"]).body
+    return Recorded(
+        name=name,
+        body=body,
+        contacts=tuple(contacts),
+        friction=row["friction"],
+        setup=Setup(),
+        agenda=Agenda(random_wrenches=config.random_wrenches, seed=config.seed),
+        control=None if row["force_closed"] else str(row["label"]),
+        outcomes={
+            each["name"]: each["outcome"]
+            for each in chosen.rows("trials")
+            if each["grasp_id"] == name
+        },
+    )
+
+
+def _source_name(chosen: Selection, object_id: str) -> str:
+    rows = chosen.rows("objects")
+    return next((row["source_name"] for row in rows if row["object_id"] == object_id), object_id)

@@ -1,0 +1,87 @@
+"""What became of grasps in a run of tests -> a folder with a page and the same as JSON.
+
+A line is a dictionary of plain values, as it travels from test processes.
+"""
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from sim_validate.baselines.explain import number
+from sim_validate.files.reading import write_text
+from sim_validate.reports.pages import asset, page
+
+Line: TypeAlias = Mapping[str, Any]
+PAGE, DATA = "index.html", "report.json"
+COLUMNS = ("test", "grasp", "what became of it", "outcome", "critical friction", "in simulation",
+           "weakest wrench, N", "in simulation", "moved, um", "held with noise")  # fmt: skip
+MEASURED = ("outcome", "critical_friction", "simulated_critical_friction", "limit_n",
+            "simulated_limit_n", "displacement_m")  # fmt: skip
+CALM = ("same", "within bands", "stable", "blessed")
+
+
+def write_report(folder: Path, lines: Iterable[Line]) -> Path:
+    """Write the page and the data.
+
+    Args:
+        folder: Is made if it is not there.
+        lines: What became of each grasp: `test`, `grasp`, `status`, `why`, `before` and `after` as
+            baselines keep them, or None, `mesh_file` or None, and `mesh_note`, which may be empty.
+
+    Returns:
+        The path of the page.
+    """
+    listed = sorted(lines, key=lambda line: (line["test"], line["grasp"]))
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / DATA, json.dumps({"schema": 1, "grasps": listed}, indent=1) + "\n")
+    return write_text(folder / PAGE, _page(listed))
+
+
+def _page(lines: Sequence[Line]) -> str:
+    rows = [{"number": number, **_row(line)} for number, line in enumerate(lines)]
+    told = [row for row in rows if row["why"]]
+    counts = Counter(str(line["status"]) for line in lines)
+    return page(
+        "stability.html",
+        style=asset("style.css"),
+        counts=", ".join(f"{count} {name}" for name, count in sorted(counts.items())),
+        notes=sorted({line["mesh_note"] for line in lines if line["mesh_note"]}),
+        reasons=(
+            ("To look at", [row for row in told if not row["calm"]]),
+            ("Differs as versions and rounding do", [row for row in told if row["calm"]]),
+        ),
+        columns=COLUMNS,
+        rows=rows,
+    )
+
+
+def _row(line: Line) -> dict[str, Any]:
+    """What a row of the table says."""
+    after: Line = line["after"] or {}
+    before: Line = line["before"] or {}
+    trials = after.get("noisy_trials")
+    held = trials - len(after["noisy_not_held"]) if trials else 0
+    return {
+        "calm": line["status"] in CALM,
+        "test": line["test"],
+        "grasp": line["grasp"],
+        "status": line["status"],
+        "measured": [_measured(name, before, after) for name in MEASURED],
+        "repeats": f"{held} of {trials}" if trials else "",
+        "why": line["why"],
+    }
+
+
+def _measured(name: str, before: Line, after: Line) -> tuple[str, str]:
+    """A figure, and what it was if that is another one."""
+    now, was = _said(name, after), _said(name, before)
+    return now, was if before and was != now else ""
+
+
+def _said(name: str, entry: Line) -> str:
+    value = entry.get(name)
+    if not entry or isinstance(value, str):
+        return value or ""
+    return number(1e6 * value if name == "displacement_m" and value is not None else value)

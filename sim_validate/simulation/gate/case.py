@@ -1,0 +1,83 @@
+"""What the gate's known cases are measured with, and the figures that they give."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure.contact_arrays import contact_frictions
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches
+from grasp_core.values import Contact
+from scenes.example_objects import example_object
+from sim_validate.simulation.rig import Rig, squeezed
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.setup import Setup
+from sim_validate.simulation.simulate import Bench
+
+LEAST_OFFSET, LARGEST_OFFSET = 0.01, 1.0
+"""Critical frictions for which the box has room."""
+PUSH = 0.6
+"""Normal force of the fingers on the box, in largest normal forces."""
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One figure, and where it must lie."""
+
+    name: str
+    value: float
+    """NaN where nothing could be measured."""
+    least: float
+    largest: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether the figure is where it must be."""
+        return self.least <= self.value <= self.largest
+
+    def __str__(self) -> str:
+        state = "ok" if self.passed else "OUT OF TOLERANCE"
+        return (
+            f"{self.name}: {self.value:.6g} (from {self.least:.6g} to {self.largest:.6g}) {state}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """What the known cases are measured with."""
+
+    setup: Setup
+    friction: float
+    radius_m: float
+
+    @property
+    def offset_friction(self) -> float:
+        """The friction under test, or the nearest that fingers on a box can be made to need."""
+        return min(max(self.friction, LEAST_OFFSET), LARGEST_OFFSET)
+
+    def body(self, name: str) -> Polyhedron:
+        """An example object of the size under test, about its centre of mass."""
+        example = example_object(name)
+        vertices = (example.vertices - example.center_of_mass) * self.radius_m / example.radius
+        return Polyhedron.from_mesh(vertices, example.triangles, name=name)
+
+    def squeezed(
+        self, body: Polyhedron, contacts: Sequence[Contact], forces: Array, friction: float
+    ) -> Rig:
+        """Fingers that push on a body with planned forces."""
+        bench = Bench(self.setup.scene(body, contacts, friction))
+        return squeezed(bench, self.setup, forces, friction)
+
+
+def tetrahedron(case: Case) -> tuple[Rig, list[Load]]:
+    """A tetrahedron held at the centres of its faces, and its limits along twelve axes."""
+    body, largest = case.body("tetrahedron"), case.setup.fingers.max_normal_force_n
+    contacts = [Contact(face.centroid, face.normal) for face in body.faces]
+    rig = case.squeezed(body, contacts, PUSH * largest * body.normals, case.friction)
+    arms = np.array([contact.position for contact in contacts]) - body.center_of_mass
+    frictions = contact_frictions(case.friction, len(contacts))
+    resisted = WrenchBody(arms, body.normals, frictions, largest)
+    found = [resisted.limit(wrench) for wrench in axis_wrenches(body.radius)]
+    return rig, [Load(limit.limit * limit.wrench, limit.forces) for limit in found]

@@ -1,0 +1,97 @@
+"""Whether the solver goes far enough: going on to the last digit must not move anything elsewhere.
+
+A solver that stops early lets contacts slip that would hold. It shows first where fingers push so
+lightly that hardly anything keeps the object from turning about the line between two others, and
+on small objects, as tolerances are absolute. Both are compared over whole trials: a tetrahedron
+under load, and a box whose offset fingers need its friction, with two more that hardly push. The
+box is released at the friction under test and at a low one as well: however high the former, the
+critical friction of a grasp may be low, and it is there that friction is lowered to.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.values import Contact
+from sim_validate.simulation.gate.case import LEAST_OFFSET, PUSH, Case, Check, tetrahedron
+from sim_validate.simulation.rig import Rig
+from sim_validate.simulation.wrench_limits import part
+
+GAP_LIMIT = 1e-9
+"""Largest difference of a position or angle, in grasp sizes: a ten-thousandth of the finest
+threshold. Usual solvers differ by 2e-10 at most, on a millimetre at friction 0.02, else by 1e-15;
+those that are known to slip falsely by 1.6e-9 and more."""
+LOW_GAP_LIMIT = 1e-7
+"""The same at low friction: a hundredth of the finest threshold. Usual solvers differ by 2e-8 at
+most, on a millimetre; those under which boxes of that size were seen to let go far above their
+critical friction, implicit integrators among them, by 4e-5."""
+SHARE = 0.8
+"""Load on the tetrahedron, in limits."""
+LIGHT = 1e-3
+"""Push of the light fingers, in that of the others."""
+ABOVE = (1.01, 1.05, 2.0)
+"""Frictions at which the box is released, over the one that it needs: it stays."""
+
+
+def solver_gaps(case: Case) -> tuple[Check, Check]:
+    """How far from the motions of a solver that goes on to the last digit those of this one are."""
+    physics = replace(
+        case.setup.physics, solver="Newton", jacobian="dense", tolerance=1e-18, iterations=300,
+        ls_iterations=100, ls_tolerance=1e-3,
+    )  # fmt: skip
+    exact = replace(case, setup=replace(case.setup, physics=physics))
+    here = [(_held(each), _released(each, case.offset_friction)) for each in (case, exact)]
+    low = [(_released(each, LEAST_OFFSET),) for each in (case, exact)]
+    name = "motion that a solver to the last digit changes"
+    return (
+        Check(name, _gap(*here), 0.0, GAP_LIMIT),
+        Check(f"{name}, at friction {LEAST_OFFSET:g}", _gap(*low), 0.0, LOW_GAP_LIMIT),
+    )
+
+
+def _gap(motions: Sequence[Array], others: Sequence[Array]) -> float:
+    gaps = [np.max(np.abs(one - other)) for one, other in zip(motions, others, strict=True)]
+    return float(np.max(gaps))  # NaN if one is
+
+
+def _held(case: Case) -> Array:
+    """Positions of the tetrahedron in all samples, (trials, n, q), in grasp sizes."""
+    rig, limits = tetrahedron(case)
+    held = rig.motions_of_holds([part(rig.idle, limit, SHARE) for limit in limits])
+    return _in_sizes(held, rig)
+
+
+def _released(case: Case, needed: float) -> Array:
+    """Positions of a box that needs a friction, released above it, (trials, n, q), grasp sizes."""
+    box = _lightly_held_box(case, needed)
+    settling = case.setup.friction.settling_friction * needed
+    released = box.motions_of_releases(settling, [above * needed for above in ABOVE])
+    return _in_sizes(released, box)
+
+
+def _in_sizes(joints: Array, rig: Rig) -> Array:
+    scale = np.full(joints.shape[-1], rig.bench.scene.layout.grasp_size_m)
+    scale[3:7] = 1.0  # a quaternion
+    return joints / scale
+
+
+def _lightly_held_box(case: Case, friction: float) -> Rig:
+    """Fingers above and below a box push along an oblique line; two at the sides hardly push."""
+    body = case.body("box")
+    _, width, height = np.ptp(body.vertices, axis=0)
+    shift = 0.5 * friction * height
+    contacts = [
+        *(Contact(np.array([s * shift, 0.0, s * height / 2]), np.array([0.0, 0.0, -s]))
+          for s in (-1.0, 1.0)),
+        *(Contact(np.array([0.13 * height, s * width / 2, 0.07 * height]), np.array([0.0, -s, 0.0]))
+          for s in (-1.0, 1.0)),
+    ]  # fmt: skip
+    normals = np.array(
+        [contact.normal for contact in contacts]
+    )  # off centre: symmetry hides faults
+    pushes = np.array([1.0, 1.0, LIGHT, LIGHT])[:, None] * normals
+    pushes[:2, 0] = friction * np.array([1.0, -1.0])
+    largest = PUSH * case.setup.fingers.max_normal_force_n
+    return case.squeezed(body, contacts, largest * pushes, friction)

@@ -1,0 +1,69 @@
+"""Is this simulator faithful? Known cases are measured before any grasp is certified."""
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+from grasp_core.errors import UnfaithfulError
+from grasp_core.provenance import versions
+from sim_validate.simulation.gate.case import Case, Check
+from sim_validate.simulation.gate.known_cases import known_answers, mesh_touches
+from sim_validate.simulation.setup import Setup
+
+USUAL_FRICTION, USUAL_RADIUS_M = 0.5, 0.07
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """What the simulator made of the known cases."""
+
+    checks: tuple[Check, ...]
+    mujoco: str
+    """Version of the simulator."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether all figures are where they must be."""
+        return all(check.passed for check in self.checks)
+
+
+def require_faithful(
+    setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
+) -> Gate:
+    """The gate's figures.
+
+    Raises:
+        UnfaithfulError: One is out of tolerance; nothing simulated with this setup would count.
+    """
+    gate = measured_gate(setup, friction, radius_m)
+    if not gate.passed:
+        failed = "; ".join(str(check) for check in gate.checks if not check.passed)
+        raise UnfaithfulError(
+            f"the simulator is not faithful with these settings, so nothing is certified: {failed}"
+        )
+    return gate
+
+
+def measured_gate(
+    setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
+) -> Gate:
+    """Measure the known cases, once per process for the same settings.
+
+    Args:
+        setup: How trials are simulated.
+        friction: Coulomb coefficient under test.
+        radius_m: Of the object under test; the known cases get its size to two digits.
+    """
+    fingers = replace(setup.fingers, radius_m=None, approach=None)
+    setup = replace(setup, fingers=fingers, threads=1, timeout_s=math.inf)
+    return _measured(Case(setup, friction, float(f"{radius_m:.1e}")))
+
+
+@lru_cache(maxsize=32)
+def _measured(case: Case) -> Gate:
+    pads = replace(case, setup=replace(case.setup, surface="pads"))  # controls are always on pads
+    checks = known_answers(pads)
+    if case.setup.surface == "mesh":
+        meshes = (*mesh_touches(case), *known_answers(case))
+        checks += tuple(replace(check, name=f"on a mesh: {check.name}") for check in meshes)
+    return Gate(checks, versions()["mujoco"])

@@ -1,0 +1,224 @@
+"""Known answers of statics, as this simulator gives them.
+
+With mu the friction, N the normal force of a contact:
+
+* a box on a slope of four contacts slides when the tangential load passes mu times the normal one,
+  whatever the direction;
+* a box between two pairs of fingers slips when it is pulled with more than 4 mu N, whatever the
+  direction across the normals;
+* a grasp under a part of the load that it resists does not creep;
+* fingers that push on two opposite faces a height h apart, from a distance w, hold down to the
+  friction h / w;
+* what the thresholds of displacement let pass is, by the stiffness of the servos, a small force;
+* a solver that goes on to the last digit moves nothing elsewhere;
+* a blow-up is reported, and does not put everything back to the start.
+
+The loads and frictions at which the boxes slip are found and judged exactly as those of grasps are,
+by holds, ramps and releases, so that thresholds too loose to notice a slip are refused with
+settings that slip falsely. The cases have the friction and the size of what is under test.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.values import Contact
+from sim_validate.simulation.critical_friction import bisected, forces_just_above, released_friction
+from sim_validate.simulation.gate.case import PUSH, Case, Check, tetrahedron
+from sim_validate.simulation.gate.convergence import solver_gaps
+from sim_validate.simulation.gate.mesh_contacts import DEPTH_ERROR, NORMAL_ERROR, worst_touch
+from sim_validate.simulation.hold_verdict import holds
+from sim_validate.simulation.rig import Rig
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.simulate import Bench
+from sim_validate.simulation.traces import CLOCK_SLACK_S, Trace
+from sim_validate.simulation.wrench_limits import (
+    SimulatedLimit,
+    bisected_limits,
+    part,
+    ramped_limits,
+)
+
+AZIMUTHS_DEG = (0.0, 22.5, 45.0, 67.5)
+SLIP_TOLERANCE = 0.005
+"""How far the load at which a box slips may be off, relative to statics."""
+CREEP_LIMIT = 1e-4
+"""Fastest creep under load, in grasp sizes per second: good settings show a twentieth."""
+CREEP_SHARE = 0.2
+"""Most that creep may use up of the threshold of a hold."""
+CREEP_LOAD = 0.8
+HIDDEN_LIMIT = 0.01
+"""Largest force that thresholds may let pass, over the largest normal force: ten times what the
+usual ones do."""
+NEAR = 0.01
+"""How far from the critical friction a hold must tell whether the object stays."""
+MANY_FACED, FINGERS = "random-100-1", 20
+"""A mesh with many faces, and how many fingertips touch it at a time."""
+BLOW_UP = 1e14
+"""A load that no simulation survives [N]."""
+
+
+def known_answers(case: Case) -> tuple[Check, ...]:
+    """What the simulator makes of the known cases."""
+    return (
+        *_incline(case), *_pulled_box(case), *_offset_fingers(case), _creep(case), _hidden(case),
+        *solver_gaps(case), _blow_up(case),
+    )  # fmt: skip
+
+
+def _incline(case: Case) -> list[Check]:
+    """Four rigid supports under a box that weighs on them and is pulled at their level."""
+    body = case.body("box")
+    length, width, height = np.ptp(body.vertices, axis=0)
+    corners = [(s * length / 4, t * width / 4) for s in (-1, 1) for t in (-1, 1)]
+    contacts = [Contact(np.array([x, y, -height / 2]), np.array([0, 0, 1.0])) for x, y in corners]
+    rigid = replace(case.setup, fingers=replace(case.setup.fingers, drive="rigid"))
+    weight = case.setup.fingers.max_normal_force_n
+    resting = Load(np.array([0, 0, -weight, 0, 0, 0.0]), np.zeros((4, 3)))
+    bench = Bench(rigid.scene(body, contacts, case.friction))
+    rig = Rig(bench, case.setup, case.friction, resting, None)
+    pulls = [case.friction * weight * np.array([*way, 0.0]) for way in _ways()]
+    torques = [np.cross([0.0, 0.0, -height / 2], pull) for pull in pulls]  # so that it cannot tip
+    limits = [
+        Load(resting.wrench + np.concatenate([pull, torque]), resting.forces)
+        for pull, torque in zip(pulls, torques, strict=True)
+    ]
+    return _slips("slope at which a box slides, over friction", bisected_limits(rig, limits))
+
+
+def _pulled_box(case: Case) -> list[Check]:
+    """Four fingers on two opposite faces of a box that is pulled across their normals."""
+    body = case.body("box")
+    length, width, _ = np.ptp(body.vertices, axis=0)
+    contacts = [
+        Contact(np.array([s * length / 2, t * width / 4, 0.0]), np.array([-s, 0.0, 0.0]))
+        for s in (-1.0, 1.0)
+        for t in (-1.0, 1.0)
+    ]
+    push = PUSH * case.setup.fingers.max_normal_force_n
+    forces = push * np.array([contact.normal for contact in contacts])
+    rig = case.squeezed(body, contacts, forces, case.friction)
+    largest = 4.0 * case.friction * push
+    limits = [
+        Load(np.array([0, *(largest * way), 0, 0, 0]), forces - np.array([0, *(largest * way / 4)]))
+        for way in _ways()
+    ]
+    name = "pull at which a held box slips, over 4 mu N"
+    return [
+        *_slips(f"{name}, by holds", bisected_limits(rig, limits)),
+        *_slips(f"{name}, by ramps", ramped_limits(rig, limits)),
+    ]
+
+
+def _ways() -> list[Array]:
+    turns = np.radians(AZIMUTHS_DEG)
+    return list(np.column_stack([np.cos(turns), np.sin(turns)]))
+
+
+def _slips(name: str, found: Sequence[SimulatedLimit | None]) -> list[Check]:
+    """How the loads at which a box slips compare with those of statics."""
+    tolerance = (1.0 - SLIP_TOLERANCE, 1.0 + SLIP_TOLERANCE)
+    return [
+        Check(f"{name}, at {azimuth:g} deg", math.nan if at is None else at.share, *tolerance)
+        for azimuth, at in zip(AZIMUTHS_DEG, found, strict=True)
+    ]
+
+
+def _offset_fingers(case: Case) -> list[Check]:
+    """Two fingers on each of two opposite faces; the line between the nearest two is oblique."""
+    body = case.body("box")
+    length, _, distance = np.ptp(body.vertices, axis=0)
+    critical = case.offset_friction
+    gap = length / 20.0
+    shift = 0.5 * critical * distance + gap
+    contacts = [
+        Contact(np.array([s * shift + t * gap, 0.0, s * distance / 2]), np.array([0.0, 0.0, -s]))
+        for s in (-1.0, 1.0)
+        for t in (-1.0, 1.0)
+    ]
+    positions = np.array([contact.position for contact in contacts])
+    normals = np.array([contact.normal for contact in contacts])
+    bench = Bench(case.setup.scene(body, contacts, critical))
+    released = released_friction(bench, positions, normals, critical, case.setup).simulated
+    largest = PUSH * case.setup.fingers.max_normal_force_n
+    rig = case.squeezed(
+        body, contacts, largest * forces_just_above(positions, normals, critical), critical
+    )
+
+    def stays(frictions: list[float]) -> list[bool | None]:
+        traces = [replace(rig, friction=each).hold([rig.idle])[0] for each in frictions]
+        return [holds(trace, rig.bench.scene.layout, case.setup.hold) for trace in traces]
+
+    held = bisected(stays, critical, case.setup.friction)
+    name = "friction at which offset fingers let go, over h / w"
+    return [
+        Check(
+            f"{name}, by releases", math.nan if released is None else released / critical,
+            1.0 - SLIP_TOLERANCE, 1.0 + SLIP_TOLERANCE,
+        ),
+        Check(
+            f"{name}, by holds", math.nan if held is None else sum(held) / (2.0 * critical),
+            1.0 - NEAR, 1.0 + NEAR,
+        ),
+    ]  # fmt: skip
+
+
+def _creep(case: Case) -> Check:
+    """The fastest creep of a tetrahedron held at the centres of its faces, under twelve loads."""
+    rig, limits = tetrahedron(case)
+    traces = rig.hold([part(rig.idle, limit, CREEP_LOAD) for limit in limits])
+    fastest = np.abs([_speed(trace) for trace in traces]).max()  # NaN if one is
+    speed = float(fastest) / rig.bench.scene.layout.grasp_size_m
+    noticed = case.setup.hold.hold_threshold / case.setup.hold.hold_s
+    limit = min(CREEP_LIMIT, CREEP_SHARE * noticed)
+    return Check("creep under load, in grasp sizes per second", speed, 0.0, limit)
+
+
+def _hidden(case: Case) -> Check:
+    """The force that servos give way by before a threshold notices that something moved."""
+    rig, _ = tetrahedron(case)
+    layout, setup = rig.bench.scene.layout, case.setup
+    threshold = max(
+        setup.hold.hold_threshold, setup.hold.total_threshold, setup.hold.gap_threshold,
+        setup.limit.ramp_threshold, setup.friction.threshold,
+    )  # fmt: skip
+    hidden = layout.drive.stiffness_n_per_m * threshold * layout.grasp_size_m
+    share = hidden / setup.fingers.max_normal_force_n
+    name = "force hidden below the thresholds, over the largest normal force"
+    return Check(name, share, 0.0, HIDDEN_LIMIT)
+
+
+def mesh_touches(case: Case) -> tuple[Check, Check]:
+    """How fingertips touch the faces of a mesh with many of them."""
+    body = case.body(MANY_FACED)
+    contacts = [Contact(face.centroid, face.normal) for face in body.faces]
+    groups = [contacts[start : start + FINGERS] for start in range(0, len(contacts), FINGERS)]
+    touches = [worst_touch(body, group, case.setup) for group in groups]
+    turned = np.max([touch.normal_error_rad for touch in touches])  # NaN if one is
+    deep = np.max([touch.depth_error for touch in touches])
+    return (
+        Check("angle between a contact's normal and its face's", float(turned), 0.0, NORMAL_ERROR),
+        Check("error of a contact's depth, relative to it", float(deep), 0.0, DEPTH_ERROR),
+    )
+
+
+def _speed(trace: Trace) -> float:
+    """Mean speed of a trace's second half [m/s]; NaN if it says nothing."""
+    half = len(trace.times_s) // 2
+    if trace.fault or not half:
+        return math.nan
+    moved = trace.displacements_m[-1] - trace.displacements_m[half - 1]
+    return float(moved / (trace.times_s[-1] - trace.times_s[half - 1]))
+
+
+def _blow_up(case: Case) -> Check:
+    """By how much the clock is off after a load that makes numbers overflow."""
+    rig, _ = tetrahedron(case)
+    (trace,) = rig.hold([Load(np.full(6, BLOW_UP), rig.idle.forces)])
+    seen = not trace.finite or trace.warnings > 0
+    error = trace.clock_error_s if seen else math.nan
+    name = "simulated less stepped time after a blow-up, in seconds"
+    return Check(name, error, -CLOCK_SLACK_S, CLOCK_SLACK_S)

@@ -1,0 +1,132 @@
+"""Which wrenches a grasp is tested with, how far each is resisted, and the planned forces."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array, to_digits
+from grasp_core.closure.contact_arrays import contact_frictions, stacked
+from grasp_core.closure.wrenches import normal_and_tangential
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit, axis_wrenches
+from grasp_core.values import Contact
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, Setup
+from sim_validate.simulation.wrench_limits import part
+
+NO_PUSH = 1e-9
+"""Normal forces below this, in largest ones, are none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlannedLoad:
+    """One wrench to hold, and what the analysis says about it."""
+
+    name: str
+    load: Load
+    """What is applied, and the forces planned for it."""
+    predicted_limit: float
+    """Largest multiple of the wrench that the analysis says is resisted."""
+    limit: Load
+    """The wrench at that multiple, and the forces that balance it."""
+    required_friction: float
+    """What the planned forces need."""
+
+
+def planned_loads(
+    body: Polyhedron,
+    contacts: Sequence[Contact],
+    friction: float,
+    idle: Load,
+    agenda: Agenda,
+    setup: Setup,
+) -> tuple[PlannedLoad, ...]:
+    """The loads of an agenda, in its order: axes, weakest, random, a user's own.
+
+    Args:
+        body: The object.
+        contacts: In force closure at this friction.
+        friction: Coulomb coefficient at every contact.
+        idle: No wrench, and the forces of the gentle grasp.
+        agenda: Which wrenches.
+        setup: The largest normal force, and the share of the limit that is applied.
+    """
+    resisted, (_, normals) = _resisted(body, contacts, friction, setup), stacked(contacts)
+    share = setup.hold.load_share
+    relative = [
+        _load(name, found, share * found.limit, idle, normals)
+        for name, found in _relative(resisted, body.radius, agenda)
+    ]
+    named = [(each.name, each.wrench) for each in agenda.wrenches]
+    own = loads_as_they_are(body, contacts, friction, idle, named, setup)
+    return (*relative, *own)
+
+
+def loads_as_they_are(
+    body: Polyhedron,
+    contacts: Sequence[Contact],
+    friction: float,
+    idle: Load,
+    wrenches: Sequence[tuple[str, Array]],
+    setup: Setup,
+) -> tuple[PlannedLoad, ...]:
+    """Given wrenches as loads on contacts.
+
+    Args:
+        body: The object.
+        contacts: In force closure at this friction.
+        friction: Coulomb coefficient at every contact.
+        idle: No wrench, and the forces of the gentle grasp.
+        wrenches: To hold as they are, by name, (6,) each [N, N m].
+        setup: The largest normal force.
+    """
+    resisted, (_, normals) = _resisted(body, contacts, friction, setup), stacked(contacts)
+    return tuple(
+        _load(name, resisted.limit(wrench), 1.0, idle, normals) for name, wrench in wrenches
+    )
+
+
+def _resisted(
+    body: Polyhedron, contacts: Sequence[Contact], friction: float, setup: Setup
+) -> WrenchBody:
+    positions, normals = stacked(contacts)
+    return WrenchBody(
+        positions - body.center_of_mass,
+        normals,
+        contact_frictions(friction, len(contacts)),
+        setup.fingers.max_normal_force_n,
+    )
+
+
+def _relative(
+    resisted: WrenchBody, torque_scale: float, agenda: Agenda
+) -> list[tuple[str, WrenchLimit]]:
+    """Wrenches that are applied at a share of what is resisted, with that limit."""
+    axes = [resisted.limit(wrench) for wrench in axis_wrenches(torque_scale)]
+    weakest = resisted.weakest_from(axes, torque_scale)
+    rng = np.random.default_rng(agenda.seed)
+    scale = np.array([1.0] * 3 + [torque_scale] * 3)
+    drawn = rng.normal(size=(agenda.random_wrenches, 6))
+    units = scale * drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
+    others = [(RANDOM.format(place), resisted.limit(unit)) for place, unit in enumerate(units)]
+    return [*zip(AXIS_NAMES, axes, strict=True), (WEAKEST, weakest), *others]
+
+
+def _load(
+    name: str, found: WrenchLimit, multiple: float, idle: Load, normals: Array
+) -> PlannedLoad:
+    """A multiple of a wrench with forces between those at rest and those at the limit."""
+    wrench = to_digits(multiple * found.wrench)
+    predicted = found.limit / multiple
+    limit = Load(predicted * wrench, to_digits(found.forces))
+    planned = part(idle, limit, 1.0 / predicted) if predicted > 0.0 else Load(wrench, idle.forces)
+    load = Load(wrench, planned.forces)
+    return PlannedLoad(name, load, predicted, limit, _needed(load.forces, normals))
+
+
+def _needed(forces: Array, normals: Array) -> float:
+    """Friction that forces (k, 3) need."""
+    along, across = normal_and_tangential(forces, normals)
+    pushing = along > NO_PUSH * along.max()
+    return float(to_digits((across[pushing] / along[pushing]).max()))

@@ -1,0 +1,148 @@
+"""Seeded noise on a grasp: where the object stands, how its surface leans, friction, mass.
+
+The fingers come along their planned lines, but the object stands a little elsewhere, so each
+contact is where such a line enters the same face (on a curved object, the surface near it), if it
+does. There the surface leans a little from its model. Friction is the same at all contacts; mass
+scales the simulated mass and every load. Loads turn with the object.
+
+All is drawn from normal distributions; friction and mass are multiplied by the exponential of
+what is drawn. The draws of a trial depend on the seed and its number only, so that they are the
+same for every grasp, and only larger with more noise.
+"""
+
+import math
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import number
+from grasp_core.closure.wrenches import contact_frames
+from grasp_core.objects.on_faces import within
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact, Grasp
+from sim_validate.simulation.traces import rotated
+
+STREAM = 1
+"""Of random numbers; others with the same seed share none of them."""
+LARGEST = {"shift": 1.0, "turn_deg": 45.0, "normal_deg": 45.0, "friction": 1.0, "mass": 1.0}
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """How uncertain things are, as standard deviations.
+
+    Raises:
+        InputError: A number is negative or out of its range.
+    """
+
+    shift: float = 0.01
+    """Of the object's position along each axis, in object radii."""
+    turn_deg: float = 1.0
+    """Of its orientation about each axis, through its centre of mass."""
+    normal_deg: float = 1.0
+    """Of the surface at each contact, about two axes in it."""
+    friction: float = 0.05
+    """Of the friction, relative to it."""
+    mass: float = 0.05
+    """Of the mass and with it of every load, relative to them."""
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            number(value, name, least=0.0, most=LARGEST[name])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Disturbed:
+    """A grasp as noise makes it."""
+
+    landed: tuple[Contact, ...]
+    """Where fingers meet the surface, with the model's normals; fewer if some miss it."""
+    contacts: tuple[Contact, ...]
+    """The same with the normals of the trial."""
+    missed: tuple[int, ...]
+    """Fingers whose lines pass beside their faces."""
+    friction: float
+    mass: float
+    """Relative to what was planned."""
+
+
+def disturbed(
+    body: Polyhedron, grasp: Grasp, friction: float, noise: Noise, draw: tuple[int, int]
+) -> Disturbed:
+    """A grasp with noise.
+
+    Args:
+        body: The object.
+        grasp: On its faces.
+        friction: Coulomb coefficient that was planned with.
+        noise: How much of it.
+        draw: The seed, and the number of the trial.
+    """
+    seed, number = draw
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(STREAM, number)))
+    shift, turn = noise.shift * body.radius * rng.normal(size=3), rng.normal(size=3)
+    slipperiness, heaviness = rng.normal(size=2)
+    leaning = math.radians(noise.normal_deg) * rng.normal(size=(len(grasp.contacts), 2))
+    back = _quaternion(-math.radians(noise.turn_deg) * turn)
+    center = body.center_of_mass
+    points = rotated(back, grasp.positions - center - shift) + center
+    ways = rotated(back, grasp.normals)
+    found = [
+        _landing(body, face, point, way)
+        for face, point, way in zip(grasp.faces, points, ways, strict=True)
+    ]
+    return Disturbed(
+        landed=tuple(contact for contact in found if contact is not None),
+        contacts=tuple(
+            Contact(contact.position, _leaning(contact.normal, lean))
+            for contact, lean in zip(found, leaning, strict=True)
+            if contact is not None
+        ),
+        missed=tuple(finger for finger, contact in enumerate(found) if contact is None),
+        friction=friction * math.exp(noise.friction * slipperiness),
+        mass=math.exp(noise.mass * heaviness),
+    )
+
+
+def _quaternion(rotation: Array) -> Array:
+    """Unit quaternion wxyz of a rotation vector [rad], (4,)."""
+    angle = float(np.linalg.norm(rotation))
+    return np.append(math.cos(0.5 * angle), 0.5 * np.sinc(0.5 * angle / math.pi) * rotation)
+
+
+def _leaning(normal: Array, lean: Array) -> Array:
+    """A normal turned about an axis across it, given along the tangents [rad]."""
+    tangents = contact_frames(normal[None])[0, :, 1:]
+    return rotated(_quaternion(tangents @ lean), normal)
+
+
+def _landing(body: Polyhedron, face: int, point: Array, way: Array) -> Contact | None:
+    """Where a line enters a face, or a curved object's surface, next to a point."""
+    if body.patches is None:
+        plane = body.faces[face]
+        at = _crossing(plane.centroid[None], plane.normal[None], point, way)[0]
+        inside = np.isfinite(at).all() and any(
+            within(at, piece, plane.normal, 0.0) for piece in plane.pieces
+        )
+        return Contact(at, plane.normal) if inside else None
+    corners = body.vertices[body.triangles[:, ::-1]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sizes = np.linalg.norm(normals, axis=1)
+    corners, normals = corners[sizes > 0.0], (normals[sizes > 0.0].T / sizes[sizes > 0.0]).T
+    at = _crossing(corners[:, 0], normals, point, way)
+    edges = np.roll(corners, -1, axis=1) - corners
+    beside = np.einsum("tei,tei->te", np.cross(normals[:, None], edges), at[:, None] - corners)
+    hit = np.flatnonzero((beside >= 0.0).all(axis=1))
+    if not hit.size:
+        return None
+    first = hit[np.linalg.norm(at[hit] - point, axis=1).argmin()]
+    return Contact(at[first], normals[first])
+
+
+def _crossing(points: Array, normals: Array, point: Array, way: Array) -> Array:
+    """Where a line enters each of n planes, (n, 3); NaN where it does not."""
+    falling = normals @ way
+    entering = falling > 0.0
+    share = np.einsum("ni,ni->n", normals, points - point) / np.where(entering, falling, np.nan)
+    return point + share[:, None] * way

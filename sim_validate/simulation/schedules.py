@@ -1,0 +1,117 @@
+"""What is applied to an object over the time of one trial, sample by sample: no simulator here.
+
+Every trial is a schedule: the forces planned for the fingers, the external wrench and the
+friction in each sample. Between loads they change smoothly, for with a sudden start long objects
+spring loose.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Load:
+    """An external wrench with the contact forces planned to balance it."""
+
+    wrench: Array
+    """(6,) [N, N m], about the centre of mass, world axes."""
+    forces: Array
+    """(k, 3) [N], world axes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Schedule:
+    """Loads and friction in the n samples of a trial."""
+
+    wrenches: Array
+    """(n, 6)"""
+    forces: Array
+    """(n, k, 3)"""
+    friction: Array
+    """(n,)"""
+    watched: int
+    """First sample in which the object must stay where it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """Durations in samples."""
+
+    sample_s: float
+
+    def samples(self, duration_s: float) -> int:
+        """The whole number of samples nearest to a duration, at least one."""
+        return max(1, round(duration_s / self.sample_s))
+
+
+def squeeze(forces: Array, friction: float, clock: Clock, protocol: HoldProtocol) -> Schedule:
+    """Close the fingers on the unloaded object."""
+    shares = smooth(clock.samples(protocol.squeeze_s))
+    closing = shares[:, None, None] * forces
+    count = len(shares)
+    return Schedule(np.zeros((count, 6)), closing, np.full(count, friction), count)
+
+
+def hold(
+    idle: Load, load: Load, frictions: tuple[float, float], clock: Clock, protocol: HoldProtocol
+) -> Schedule:
+    """Apply a load to the squeezed object at high friction, settle, lower the friction, watch."""
+    rise, rest = clock.samples(protocol.load_s), clock.samples(protocol.settle_s)
+    shares = np.concatenate([smooth(rise), np.ones(rest + clock.samples(protocol.hold_s))])
+    return _between(idle, load, shares, frictions, rise + rest)
+
+
+def ramp(
+    idle: Load, limit: Load, shares: tuple[float, float], friction: float, clock: Clock,
+    protocols: tuple[HoldProtocol, LimitProtocol],
+) -> tuple[Schedule, Array]:  # fmt: skip
+    """Raise a load through the largest one that is resisted.
+
+    Up to the first share of the limit as in `hold`, then slowly to the second. The forces balance
+    the load all the way, whether the fingers can apply them or not.
+
+    Returns:
+        The schedule, and the share of the limit that is applied in each watched sample.
+    """
+    hold_protocol, limit_protocol = protocols
+    rise, rest = clock.samples(hold_protocol.load_s), clock.samples(hold_protocol.settle_s)
+    lower, upper = shares
+    count = clock.samples(limit_protocol.ramp_s)
+    climb = lower + (upper - lower) * np.arange(1, count + 1) / count
+    applied = np.concatenate([lower * smooth(rise), np.full(rest, lower), climb])
+    high = hold_protocol.settling_friction * friction
+    return _between(idle, limit, applied, (high, friction), rise + rest), climb
+
+
+def release(
+    forces: Array, settling_friction: float, friction: float, clock: Clock,
+    protocol: FrictionProtocol,
+) -> Schedule:  # fmt: skip
+    """Lower the friction of a squeezed object that bears no load, and watch."""
+    rest, watched = clock.samples(protocol.settle_s), clock.samples(protocol.hold_s)
+    still = Load(np.zeros(6), forces)
+    shares = np.ones(rest + watched)
+    return _between(still, still, shares, (settling_friction, friction), rest)
+
+
+def smooth(count: int) -> Array:
+    """Shares from zero to one that start and end gently, (count,)."""
+    time = np.arange(1, count + 1) / count
+    return time**2 * (3.0 - 2.0 * time)
+
+
+def _between(
+    start: Load, end: Load, shares: Array, frictions: tuple[float, float], watched: int
+) -> Schedule:
+    friction = np.full(len(shares), frictions[0])
+    friction[watched:] = frictions[1]
+    return Schedule(
+        wrenches=start.wrench + shares[:, None] * (end.wrench - start.wrench),
+        forces=start.forces + shares[:, None, None] * (end.forces - start.forces),
+        friction=friction,
+        watched=watched,
+    )

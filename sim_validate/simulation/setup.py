@@ -1,0 +1,187 @@
+"""How trials are simulated, and which trials a grasp goes through: the choices of a user."""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+
+from grasp_core.arrays import Array, frozen, to_digits
+from grasp_core.checked import (
+    LARGEST,
+    MOST_RANDOM_WRENCHES,
+    MOST_TRIALS,
+    SMALLEST,
+    instance,
+    number,
+    one_of,
+    seed_of,
+    several,
+    switch,
+    text,
+    whole,
+)
+from grasp_core.errors import InputError
+from grasp_core.files.strict_json import shown
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.reach import Finger
+from grasp_core.values import Contact, Grasp
+from scenes.fingertips import FingerSettings
+from scenes.mjcf import Scene, Surface, build_scene
+from scenes.physics import PhysicsSettings
+from sim_validate.simulation.noise import Noise
+from sim_validate.simulation.other_rules import rules_named
+from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
+
+AXIS_NAMES = tuple(
+    f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"
+)
+NAME = re.compile(r"[\w+\- ]{1,100}")
+WEAKEST = "weakest"
+RANDOM = "random_{}"
+
+
+PARTS = {
+    "fingers": FingerSettings,
+    "physics": PhysicsSettings,
+    "hold": HoldProtocol,
+    "limit": LimitProtocol,
+    "friction": FrictionProtocol,
+}
+MOST_THREADS = 1024
+HARD_FINGER = 3
+"""Dimension of a contact whose force has a normal and two tangential parts."""
+LimitSearch: TypeAlias = Literal["none", "ramp", "bisection"]
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """How trials are simulated.
+
+    Raises:
+        InputError: A part is none, a number is out of its range, or the physics is not that of the
+            predictions.
+    """
+
+    fingers: FingerSettings = field(default_factory=FingerSettings)
+    physics: PhysicsSettings = field(default_factory=PhysicsSettings)
+    surface: Surface = "pads"
+    """What fingertips touch: pads, exact on any object, or the mesh of a convex one."""
+    hold: HoldProtocol = field(default_factory=HoldProtocol)
+    limit: LimitProtocol = field(default_factory=LimitProtocol)
+    friction: FrictionProtocol = field(default_factory=FrictionProtocol)
+    threads: int = 1
+    """Of the simulator; results do not depend on it."""
+    timeout_s: float = math.inf
+    """Trials of one contact set that run longer are stopped."""
+
+    def __post_init__(self) -> None:
+        for name, kind in PARTS.items():
+            instance(getattr(self, name), kind, name)
+        _check_model(self.physics)
+        one_of(self.surface, get_args(Surface), "surface")
+        whole(self.threads, "threads", least=1, most=MOST_THREADS)
+        number(self.timeout_s, "timeout_s", above=0.0, most=math.inf)
+
+    def scene(self, body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float) -> Scene:
+        """The scene of a grasp with these settings."""
+        return build_scene(
+            body, grasp, friction, fingers=self.fingers, physics=self.physics, surface=self.surface
+        )
+
+
+def _check_model(physics: PhysicsSettings) -> None:
+    """Refuse physics in which forces act that the predictions do not know."""
+    if any(physics.gravity):
+        raise InputError(
+            f"physics.gravity must be zero, got {physics.gravity}: masses are scaled, so it would "
+            "not be the object's weight; give that as a wrench (--weight-n, or Agenda.wrenches)"
+        )
+    if physics.condim != HARD_FINGER:
+        raise InputError(
+            f"physics.condim must be {HARD_FINGER}, got {physics.condim}: predictions are for hard "
+            "fingers, whose contacts have friction and no torsion"
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NamedWrench:
+    """An external wrench from a user."""
+
+    name: str
+    wrench: Array
+    """(6,) [N, N m], torque about the centre of mass, in the object's frame."""
+
+    def __post_init__(self) -> None:
+        """Refuse what could not be tested, or not be told apart in a file."""
+        text(self.name, "name")
+        given = frozen(self.wrench, (6,), "wrench")
+        object.__setattr__(self, "wrench", frozen(to_digits(given), (6,), "wrench"))
+        size = float(np.abs(self.wrench).max())
+        if not SMALLEST <= size <= LARGEST:
+            raise InputError(
+                f"wrench {shown(self.name)}: the largest part must be from {SMALLEST:g} to "
+                f"{LARGEST:g} (N or N m), got {size:g}"
+            )
+        if not NAME.fullmatch(self.name):
+            raise InputError(
+                f"a wrench's name has up to 100 letters, digits, '_', '+', '-' and spaces; "
+                f"got {shown(self.name)}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Agenda:
+    """Which trials a grasp goes through.
+
+    The twelve axis wrenches and the weakest one are always held, at a share of what the analysis
+    says is resisted; so are random ones. A user's wrenches are held as they are.
+    """
+
+    random_wrenches: int = 0
+    wrenches: tuple[NamedWrench, ...] = ()
+    critical_friction: bool = True
+    """Find the critical friction in simulation."""
+    limits: LimitSearch = "none"
+    """Find the largest multiple of each wrench in simulation."""
+    independent: bool = False
+    """Also try what does not know the planned forces (`independent`)."""
+    controls: bool = True
+    rules: tuple[str, ...] = ()
+    """Acceptance rules of other tools by which the same traces are also judged."""
+    trials: int = 0
+    """Repeat all holds so many times with noise."""
+    noise: Noise = field(default_factory=Noise)
+    keep_traces: bool = False
+    seed: int = 0
+    """Chooses random wrenches, noise, and how contacts are moved for a negative control."""
+
+    def __post_init__(self) -> None:
+        """Refuse what no trial can be made of, and names that two would share."""
+        one_of(self.limits, get_args(LimitSearch), "limits")
+        whole(self.random_wrenches, "random_wrenches", most=MOST_RANDOM_WRENCHES)
+        whole(self.trials, "trials", most=MOST_TRIALS)
+        seed_of(self.seed)
+        for name in ("critical_friction", "independent", "controls", "keep_traces"):
+            switch(getattr(self, name), name)
+        instance(self.noise, Noise, "noise")
+        several(self.rules, partial(text, name="rules"), "rules", "names")
+        rules_named(self.rules)
+        each = partial(instance, kind=NamedWrench, name="wrenches")
+        several(self.wrenches, each, "wrenches", "NamedWrench values")
+        drawn = (RANDOM.format(place) for place in range(self.random_wrenches))
+        taken = {*AXIS_NAMES, WEAKEST, *drawn}
+        for each in self.wrenches:
+            if each.name in taken:
+                raise InputError(f"two wrenches are named {each.name!r}: rename yours")
+            taken.add(each.name)
+
+
+def with_planned_radius(fingers: FingerSettings, planned: Finger | None) -> FingerSettings:
+    """Fingertips of the radius that was planned for, unless they have one of their own."""
+    if planned is None or fingers.radius_m is not None:
+        return fingers
+    return replace(fingers, radius_m=planned.radius_m)

@@ -1,0 +1,232 @@
+"""Scene and schedules -> motions; the only module that steps MuJoCo.
+
+The scene's text is compiled, never a model built otherwise, so that the text is the whole
+experiment. All trials of a scene run together on MuJoCo's own threads; each is bit for bit what
+a plain loop over `mj_step` gives, whatever the number of threads.
+"""
+
+# pyright: basic, reportAttributeAccessIssue=false
+# MuJoCo ships no types for its core; plain arrays and numbers leave this module.
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from grasp_core.arrays import Array, to_digits
+from grasp_core.errors import InputError
+from scenes.mjcf import Scene
+from sim_validate.simulation.schedules import Clock, Schedule
+
+try:
+    import mujoco  # noqa: TID251 - this is the door
+    from mujoco import batch as mujoco_batch  # noqa: TID251
+except (ImportError, RuntimeError, AttributeError, OSError) as error:
+    raise InputError(  # it looks for graphics when it is imported, which nothing here needs
+        f"MuJoCo cannot be imported ({error}); is MUJOCO_GL set to graphics that are not here? "
+        "Unset it, or install the package anew"
+    ) from error
+
+CHUNK = 5
+"""Steps between changes of load and samples of motion."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Where everything was after each of the n samples of one trial, in the world frame."""
+
+    times_s: Array
+    """(n,)"""
+    joints: Array
+    """Position (3) and quaternion (4) of the object's frame, then the slides (3) of each fingertip
+    along the axes of its contact's frame if it has any, (n, 7 or 7 + 3k) [m]."""
+    state: Array
+    """Everything that a further trial can start from."""
+    finite: bool
+    """Whether every number of the state stayed finite."""
+    warnings: int
+    """How many warnings the simulator raised."""
+    clock_error_s: float
+    """Simulated time minus the time stepped: not zero after a silent reset."""
+    error: str
+    """The simulator's own words, if it gave up."""
+    timed_out: bool
+    """Whether it was stopped before its end."""
+
+    def after(self, earlier: "Motion") -> "Motion":
+        """The same, with the faults of the motion whose state it started from."""
+        return replace(
+            self,
+            finite=earlier.finite and self.finite,
+            warnings=earlier.warnings + self.warnings,
+            clock_error_s=earlier.clock_error_s + self.clock_error_s,
+            error=earlier.error or self.error,
+            timed_out=earlier.timed_out or self.timed_out,
+        )
+
+
+class Bench:
+    """A compiled scene on which many trials run at once."""
+
+    def __init__(self, scene: Scene, *, threads: int = 1, timeout_s: float = math.inf) -> None:
+        """Compile a scene.
+
+        Args:
+            scene: What to simulate.
+            threads: Of the simulator; results do not depend on it.
+            timeout_s: Trials that still run after so long, counted from now, are stopped.
+        """
+        self.scene, self.threads = scene, threads
+        self.deadline = time.monotonic() + timeout_s
+        self.model = _compiled(scene)
+        self.clock = Clock(CHUNK * self.model.opt.timestep)
+        self.body = self.model.body("object").id
+        self.touching = np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
+
+    def run(self, schedules: Sequence[Schedule], start: Array | None = None) -> tuple[Motion, ...]:
+        """Simulate trials of equal length, all from the same state.
+
+        Args:
+            schedules: What is applied in each trial.
+            start: A motion's state; fingertips at their contacts, all at rest, if None.
+        """
+        trials = mujoco_batch.Batch(self.model, len(schedules), self.threads)
+        if start is None:
+            trials.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        else:
+            trials.state[:] = start
+        clock = trials.bind("time")
+        begun = float(clock[0])
+        joints, errors = self._step_through(trials, schedules)
+        steps = CHUNK * np.arange(1, joints.shape[1] + 1)
+        expected = begun + CHUNK * joints.shape[1] * self.model.opt.timestep
+        return tuple(
+            Motion(
+                times_s=self.model.opt.timestep * steps,
+                joints=joints[trial],
+                state=trials.state[trial].copy(),
+                finite=bool(
+                    np.isfinite(trials.state[trial]).all() & np.isfinite(joints[trial]).all()
+                ),
+                warnings=int(trials.warning[trial, :, 1].sum()),
+                clock_error_s=float(clock[trial] - expected),
+                error=errors.get(trial, ""),
+                timed_out=joints.shape[1] < len(schedules[trial].friction),
+            )
+            for trial in range(len(schedules))
+        )
+
+    def _step_through(
+        self, trials: mujoco_batch.Batch, schedules: Sequence[Schedule]
+    ) -> tuple[Array, dict[int, str]]:
+        """All joint positions of m trials in the samples done, (m, n, q), and errors by trial."""
+        layout = self.scene.layout
+        wrenches = np.array([schedule.wrenches for schedule in schedules])
+        wrenches[..., 3:] -= np.cross(layout.center, wrenches[..., :3])
+        forces = np.array([schedule.forces for schedule in schedules])
+        pushes = np.einsum("kij,mnki->mnkj", layout.frames, forces)
+        for trial in range(len(schedules)):  # like the scene (see `layout.arrange`)
+            for part in (wrenches[trial, :, :3], wrenches[trial, :, 3:], pushes[trial]):
+                part[...] = to_digits(part)
+        controls = pushes.reshape(*pushes.shape[:2], -1) / layout.drive.stiffness_n_per_m
+        frictions = np.array([to_digits(schedule.friction) for schedule in schedules])
+        applied, servos = trials.bind("xfrc_applied"), trials.bind("ctrl")
+        friction, joints = trials.expand("geom_friction"), trials.bind("qpos")
+        done: list[Array] = []
+        errors: dict[int, str] = {}
+        with _unlogged():
+            for sample in range(frictions.shape[1]):
+                if time.monotonic() > self.deadline:
+                    break
+                applied[:, self.body] = wrenches[:, sample]
+                if not layout.drive.rigid:
+                    servos[:] = controls[:, sample]
+                friction[:, self.touching, 0] = frictions[:, sample, None]
+                _step(trials, errors)
+                done.append(joints.copy())
+        return np.array(done).reshape(-1, *joints.shape).transpose(1, 0, 2), errors
+
+
+def _compiled(scene: Scene) -> mujoco.MjModel:
+    try:
+        return mujoco.MjModel.from_xml_string(scene.xml)
+    except ValueError as error:
+        raise InputError(f"the simulator refuses the scene: {error}") from error
+
+
+def _step(trials: mujoco_batch.Batch, errors: dict[int, str]) -> None:
+    """One sample of all trials but those that an error ended."""
+    running = np.setdiff1d(np.arange(trials.nsim), list(errors)) if errors else None
+    try:
+        trials.step(running, nstep=CHUNK)
+    except mujoco_batch.SimulationError as failure:
+        errors.update({int(trial): trials.error(int(trial)) for trial in failure.ids})
+
+
+@contextmanager
+def _unlogged() -> Iterator[None]:
+    """Keep the simulator from writing warnings to a file in the working directory.
+
+    They are counted in its data, and `Motion.warnings` reports them.
+    """
+    before, quiet = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
+    quiet.logto_file = quiet.logto_console = False
+    mujoco.MjLogConfig.set(quiet)
+    try:
+        yield
+    finally:
+        mujoco.MjLogConfig.set(before)
+
+
+def first_touch(scene: Scene) -> tuple[Array, Array]:
+    """What each fingertip touches before anything moves.
+
+    Args:
+        scene: With rigid fingertips that are put into the object.
+
+    Returns:
+        Normals out of the fingertips, (k, 3), world axes, and depths, (k,) [m]; NaN for a fingertip
+        that has not exactly one contact.
+    """
+    model = _compiled(scene)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    count = len(scene.layout.contacts)
+    tips = [model.geom(f"finger{finger}").id for finger in range(count)]
+    normals, depths = np.full((count, 3), np.nan), np.full(count, np.nan)
+    for finger, tip in enumerate(tips):
+        own = [contact for contact in data.contact if tip in contact.geom]
+        if len(own) == 1:
+            (contact,) = own
+            normals[finger] = contact.frame[:3] * (1.0 if contact.geom[0] == tip else -1.0)
+            depths[finger] = -contact.dist
+    return normals, depths
+
+
+def acceleration(scene: Scene, wrenches: Array) -> Array:
+    """What acceleration of the object each of several wrenches causes at once, unloaded fingers.
+
+    Args:
+        scene: With rigid fingertips that touch the object.
+        wrenches: (n, 6) [N, N m], torque about the centre of mass, world axes.
+
+    Returns:
+        Force and torque that are left over, mass times acceleration, (n, 6), torque about
+        the centre of mass.
+    """
+    model = _compiled(scene)
+    data = mujoco.MjData(model)
+    body, mass = model.body("object").id, np.zeros((model.nv, model.nv))
+    left = np.empty((len(wrenches), 6))
+    with _unlogged():
+        for place, wrench in enumerate(wrenches):
+            mujoco.mj_resetData(model, data)
+            torque = wrench[3:] - np.cross(scene.layout.center, wrench[:3])
+            data.xfrc_applied[body] = np.concatenate([wrench[:3], torque])
+            mujoco.mj_forward(model, data)
+            mujoco.mj_fullM(model, data, mass)
+            left[place] = (mass @ data.qacc)[:6]
+    return left

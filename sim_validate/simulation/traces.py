@@ -1,0 +1,137 @@
+"""Motion -> trace: how far the object turned and moved, and what each contact did meanwhile.
+
+Displacements are measured on the object's pose against the pose at the moment when it had to stay
+where it was, not on contact counts. A rotation counts as the path of a point one grasp size away.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure.wrenches import normal_and_tangential
+from scenes.layout import Layout
+from sim_validate.simulation.simulate import Motion
+
+CLOCK_SLACK_S = 1e-9
+"""Simulated time is a sum of equal steps; a reset would put it off by milliseconds."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trace:
+    """Motion of the object and fingertips in the n samples from the moment watching began."""
+
+    times_s: Array
+    """(n,)"""
+    displacements_m: Array
+    """Motion of the point between the contacts plus grasp size times rotation, (n,)."""
+    shifts_m: Array
+    """Motion of that point alone, (n,)."""
+    rotations_rad: Array
+    """(n,)"""
+    slips_m: Array
+    """Tangential motion of each fingertip over its face, (n, k)."""
+    gaps_m: Array
+    """Distance of each fingertip from its face, negative in contact, (n, k)."""
+    touched_m: Array
+    """Where each fingertip touches, in the object's frame about its centre of mass, (n, k, 3)."""
+    start_m: float
+    """Displacement from the planned pose at that moment."""
+    finite: bool
+    """Whether every number of the state stayed finite."""
+    warnings: int
+    """How many warnings the simulator raised."""
+    clock_error_s: float
+    """Simulated time minus the time stepped: not zero after a silent reset."""
+    error: str = ""
+    """The simulator's own words, if it gave up."""
+    timed_out: bool = False
+    """Whether it was stopped before its end."""
+
+    @property
+    def fault(self) -> str:
+        """Why it says nothing about the object; empty if it does."""
+        if self.error:
+            return self.error
+        if self.timed_out:
+            return "stopped before its end"
+        if not self.finite:
+            return "a number of the state is not finite"
+        if self.warnings:
+            return f"the simulator raised {self.warnings} warnings"
+        if abs(self.clock_error_s) > CLOCK_SLACK_S:
+            return f"the simulator's clock is off by {self.clock_error_s:.3g} s: it was reset"
+        return ""
+
+    def stayed(self, threshold_m: float) -> bool | None:
+        """Whether no displacement reached a threshold; None if the trace says nothing."""
+        return None if self.fault else bool((self.displacements_m < threshold_m).all())
+
+
+def trace(motion: Motion, layout: Layout, watched: int) -> Trace:
+    """What a motion amounts to.
+
+    Args:
+        motion: Of one trial.
+        layout: What was simulated.
+        watched: First sample in which the object had to stay where it was.
+    """
+    before = min(watched, len(motion.joints)) - 1
+    planned = np.concatenate([np.zeros(3), [1.0, 0.0, 0.0, 0.0]])
+    at_start = motion.joints[before] if before >= 0 else planned
+    joints = motion.joints[before + 1 :]
+    shifts, rotations = _moved(joints, at_start, layout)
+    start_shift, start_turn = _moved(at_start[None], planned, layout)
+    normals = layout.frames[:, :, 0]
+    tips = _tips(joints, layout)
+    _, slips = normal_and_tangential(tips - _tips(at_start[None], layout), normals)
+    heights = np.einsum("ki,nki->nk", normals, layout.contacts - tips)
+    size = layout.grasp_size_m
+    return Trace(
+        times_s=motion.times_s[: len(joints)],
+        displacements_m=shifts + size * rotations,
+        shifts_m=shifts,
+        rotations_rad=rotations,
+        slips_m=slips,
+        gaps_m=heights - layout.drive.radius_m,
+        touched_m=tips + layout.drive.radius_m * normals,
+        start_m=float(start_shift[0] + size * start_turn[0]),
+        finite=motion.finite,
+        warnings=motion.warnings,
+        clock_error_s=motion.clock_error_s,
+        error=motion.error,
+        timed_out=motion.timed_out,
+    )
+
+
+def _moved(joints: Array, start: Array, layout: Layout) -> tuple[Array, Array]:
+    """Motion of the point between the contacts [m] and rotation [rad] since a start, (n,) each."""
+    ahead = joints[:, :3] + rotated(joints[:, 3:7], layout.center)
+    shifts = np.linalg.norm(ahead - start[:3] - rotated(start[None, 3:7], layout.center), axis=1)
+    return shifts, rotation_angles(joints[:, 3:7], start[3:7])
+
+
+def _tips(joints: Array, layout: Layout) -> Array:
+    """Fingertip centres in the object's frame, (n, k, 3)."""
+    slides = joints[:, 7:].reshape(len(joints), (joints.shape[1] - 7) // 3, 3)
+    if not slides.shape[1]:  # rigid fingertips
+        slides = np.zeros((1, len(layout.contacts), 3))
+    slid = np.einsum("kij,nkj->nki", layout.frames, slides)
+    centers = layout.tip_centers + slid - joints[:, None, :3]
+    backwards = joints[:, None, 3:7] * np.array([1.0, -1.0, -1.0, -1.0])
+    return rotated(backwards, centers)
+
+
+def rotated(quaternions: Array, vectors: Array) -> Array:
+    """Vectors (..., 3) turned by quaternions (..., 4) wxyz, of any length but zero."""
+    w, v = quaternions[..., :1], quaternions[..., 1:]
+    twice = 2.0 * np.cross(v, vectors) / np.sum(quaternions**2, axis=-1, keepdims=True)
+    return vectors + w * twice + np.cross(v, twice)
+
+
+def rotation_angles(quaternions: Array, start: Array) -> Array:
+    """Angles [rad] between orientations (n, 4) and one (4,), exact for small angles, (n,)."""
+    w, v = quaternions[:, 0], quaternions[:, 1:]
+    along = np.abs(quaternions @ start)
+    across = start[0] * v - w[:, None] * start[1:] - np.cross(v, start[1:])
+    return 2.0 * np.arctan2(np.linalg.norm(across, axis=1), along)

@@ -1,0 +1,158 @@
+"""What simulation says about a grasp without knowing the forces that were planned for it.
+
+Forces planned for a load presume the analysis that they are to confirm. These three have none:
+
+* rigid fingertips, each put equally deep into its face: what squeezes the object is elasticity
+  alone. The least friction at which the object stays is never below the critical friction: where
+  all fingers push and it rests, balanced forces in the cones exist. It may be far above, as equal
+  depths need not give the best forces.
+* a fixed squeeze: the fingers keep the forces of the gentle grasp, whatever the load. The
+  largest multiple of a wrench that is resisted is never above the predicted limit, as the forces
+  at rest are within the cones and the limit on the push. It may be far below.
+* the acceleration that an axis wrench causes in the first instant, with rigid fingertips that just
+  touch: nothing is left over in any direction if contacts can oppose all of them. Contacts that
+  only touch must be pressed first, so a small share is always left.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.wrench_limits import axis_wrenches
+from grasp_core.values import Grasp
+from sim_validate.simulation.rig import Rig, squeezed
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.setup import Setup
+from sim_validate.simulation.simulate import Bench, acceleration
+from sim_validate.simulation.traces import Trace
+
+INDENTATION = 2e-5
+"""Depth of rigid fingertips, in grasp sizes. Much deeper ones let the object turn and adapt, and
+accept frictions below the critical one; with none, contacts open and nothing holds."""
+TOUCH = 2e-6
+"""Depth of rigid fingertips for the first instant: vertices of a mesh have single precision."""
+STEPS = (0.98, 1.02, 1.05, 1.1, 1.2, 1.4, 1.7, 2.0, 3.0, 5.0)
+"""Frictions at which rigid fingertips are tried, relative to the critical one."""
+STIFFER = 20.0
+"""Stiffness of servos that keep a fixed squeeze, relative to those that follow planned forces."""
+RISE_S = 2.0
+LARGEST_SHARE = 1.2
+"""With a fixed squeeze the load rises so slowly to this share of the predicted limit."""
+SLIDING = 1e-3
+"""How far a fingertip may slide before a fixed squeeze has given way, in grasp sizes."""
+SLACK = 0.05
+"""By how much a fixed squeeze may seem to pass a limit: the object moves under the load, by some
+per cent of the grasp size."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """What was found without planned forces."""
+
+    friction_at_most: float | None
+    """Rigid fingertips hold the object at this friction; None where they did at none tried."""
+    friction_slipped: float | None
+    """And did not at this one; None where they did at all tried. Never below the critical friction
+    may the object stay."""
+    limit_shares: tuple[float, ...]
+    """Share of the predicted limit of each wrench at which a fixed squeeze gives way."""
+    residual: float
+    """Largest share of an axis wrench that is left to accelerate the object in the first instant.
+    Below about 0.3 every wrench is opposed; near one some wrench is not."""
+
+    def agree(self, critical: float) -> bool:
+        """Whether they are on the side of the predictions on which they must be."""
+        lowest = self.friction_at_most is None or self.friction_at_most >= critical
+        return lowest and max(self.limit_shares) <= 1.0 + SLACK
+
+
+def independent_bounds(
+    body: Polyhedron, grasp: Grasp, critical: float, rig: Rig, limits: Sequence[Load]
+) -> Bounds:
+    """Bounds from rigid fingertips, a fixed squeeze and the first instant.
+
+    Args:
+        body: The object.
+        grasp: On its faces.
+        critical: Its predicted critical friction.
+        rig: The object squeezed by servos with the forces of a gentle grasp.
+        limits: Wrenches at their predicted limits.
+    """
+    slipped, stayed = _rigid_friction(body, grasp, critical, rig.setup)
+    return Bounds(
+        friction_at_most=stayed,
+        friction_slipped=slipped,
+        limit_shares=_fixed_squeeze(body, grasp, rig, limits),
+        residual=first_residual(body, grasp, rig.friction, rig.setup),
+    )
+
+
+def _rigid_friction(
+    body: Polyhedron, grasp: Grasp, critical: float, setup: Setup
+) -> tuple[float | None, float | None]:
+    """The largest friction tried at which the object slipped, and the least at which it stayed."""
+    protocol = setup.friction
+    frictions = [step * max(critical, protocol.least_friction) for step in STEPS]
+    high = protocol.settling_friction * max(frictions)
+    rig = _rigid(body, grasp, high, setup, INDENTATION)
+    size = rig.bench.scene.layout.grasp_size_m
+    stays = [trace.stayed(protocol.threshold * size) for trace in rig.release(high, frictions)]
+    first = stays.index(True) if True in stays else len(stays)
+    slipped = frictions[first - 1] if first and stays[first - 1] is False else None
+    return slipped, frictions[first] if first < len(stays) else None
+
+
+def _rigid(
+    body: Polyhedron, grasp: Grasp, friction: float, setup: Setup, indentation: float
+) -> Rig:
+    fingers = replace(setup.fingers, drive="rigid", indentation=indentation)
+    scene = replace(setup, fingers=fingers).scene(body, grasp, friction)
+    nothing = Load(np.zeros(6), np.zeros((len(grasp.contacts), 3)))
+    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+    return Rig(bench, setup, friction, nothing, None)
+
+
+def _fixed_squeeze(
+    body: Polyhedron, grasp: Grasp, rig: Rig, limits: Sequence[Load]
+) -> tuple[float, ...]:
+    """The share of each limit at which a finger begins to slide, with unchanged forces.
+
+    The servos are stiffer than usual: they give way to the load instead of the planned forces.
+    """
+    usual = rig.bench.scene.layout.drive.stiffness_n_per_m
+    fingers = replace(rig.setup.fingers, stiffness_n_per_m=STIFFER * usual)
+    slow = replace(rig.setup.limit, ramp_s=RISE_S)
+    setup = replace(rig.setup, fingers=fingers, limit=slow)
+    scene = setup.scene(body, grasp, rig.friction)
+    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+    stiff = squeezed(bench, setup, rig.idle.forces, rig.friction)
+    kept = [Load(limit.wrench, rig.idle.forces) for limit in limits]
+    traces, shares = stiff.ramp(kept, (0.0, LARGEST_SHARE))
+    threshold = SLIDING * scene.layout.grasp_size_m
+    return tuple(_until(trace, shares, threshold) for trace in traces)
+
+
+def _until(trace: Trace, shares: Array, threshold: float) -> float:
+    """Share that is applied before a finger slides over its face, or leaves it."""
+    moved = np.maximum(trace.slips_m, trace.gaps_m).max(axis=1)
+    sliding = np.flatnonzero(~(moved < threshold))
+    count = int(sliding[0]) if sliding.size else len(trace.times_s)
+    return float(shares[count - 1]) if count else 0.0
+
+
+def first_residual(body: Polyhedron, grasp: Grasp, friction: float, setup: Setup) -> float:
+    """Largest share of an axis wrench that accelerates the object before anything can move."""
+    physics = replace(
+        setup.physics, diagexact=True, solref=(0.02, 1.0), tolerance=1e-15,
+        solimp=(0.9999, 0.9999, 0.001, 0.5, 2.0),
+    )  # fmt: skip
+    rig = _rigid(body, grasp, friction, replace(setup, physics=physics), TOUCH)
+    layout = rig.bench.scene.layout
+    scale = np.array([1.0] * 3 + [layout.grasp_size_m] * 3)
+    wrenches = axis_wrenches(layout.grasp_size_m) * rig.setup.fingers.max_normal_force_n
+    left = acceleration(rig.bench.scene, wrenches)
+    sizes = np.linalg.norm(wrenches / scale, axis=1)
+    return float((np.linalg.norm(left / scale, axis=1) / sizes).max())

@@ -1,0 +1,139 @@
+"""The largest multiple of each wrench that a grasp resists in simulation, by ramp or by bisection.
+
+Both load the object with a share of the predicted limit and the forces planned for it: those of
+the gentle squeeze plus that share of the way to the forces at the limit. They balance the load,
+because both ends do. Below the limit they are inside the cones and the limits on the push, again
+because both ends are. Above it, up to twice the limit, they still balance, on paper: what lets go
+is friction, or a finger that cannot push harder.
+
+A ramp passes the limit slowly. The load left over grows in proportion to the time since, so the
+displacement grows with its third power and the ramp ends late. A displacement eight times as
+large is reached when twice as much time has passed since the limit; where
+the two lead back to is a bound from below.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from sim_validate.simulation.hold_verdict import holds
+from sim_validate.simulation.rig import Rig
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.traces import Trace
+
+LATER = 8.0
+"""Displacement at the second reading of a ramp, in thresholds."""
+OVERLOAD = 2.0
+"""Forces are planned for loads up to this share of the limit; for larger ones they stay."""
+HELD, SLID, UNKNOWN = 1, 0, -1
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedLimit:
+    """Where between two shares of the predicted limit the object lets go."""
+
+    lower: float
+    upper: float
+    share: float
+    """The best guess: where a ramp passed its threshold, or the middle of a bisection."""
+
+
+def ramped_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | None, ...]:
+    """Shares of the predicted limits at which ramps let go; None where none did in any span.
+
+    Args:
+        rig: The squeezed object.
+        limits: The wrench at each predicted limit, and the forces that balance it.
+    """
+    threshold = rig.setup.limit.ramp_threshold * rig.bench.scene.layout.grasp_size_m
+
+    def search(chosen: Sequence[Load], span: float) -> list[SimulatedLimit | None]:
+        traces, shares = rig.ramp(chosen, (1.0 - span, 1.0 + span))
+        return [_onset(trace, shares, threshold) for trace in traces]
+
+    return _in_some_span(rig, limits, search)
+
+
+def _in_some_span(
+    rig: Rig,
+    limits: Sequence[Load],
+    search: Callable[[Sequence[Load], float], Sequence[SimulatedLimit | None]],
+) -> tuple[SimulatedLimit | None, ...]:
+    """What a search finds near each predicted limit, or farther away."""
+    found: dict[int, SimulatedLimit] = {}
+    for span in rig.setup.limit.spans:
+        rest = [place for place in range(len(limits)) if place not in found]
+        if not rest:
+            break
+        answers = search([limits[place] for place in rest], span)
+        found |= {place: at for place, at in zip(rest, answers, strict=True) if at is not None}
+    return tuple(found.get(place) for place in range(len(limits)))
+
+
+def _onset(trace: Trace, shares: Array, threshold: float) -> SimulatedLimit | None:
+    """Where a ramp lets go, if it does, and not at its very start.
+
+    Within a sample the displacement grows with the third power of time.
+    """
+    moved = trace.displacements_m
+    passed = np.flatnonzero(moved >= threshold)
+    if not passed.size or passed[0] == 0 or trace.fault:
+        return None
+    first = int(passed[0])
+    before, after = shares[first - 1], shares[first]
+    roots = np.cbrt([moved[first - 1], threshold, moved[first]])
+    at = before + (after - before) * (roots[1] - roots[0]) / (roots[2] - roots[0])
+    later = np.flatnonzero(moved >= LATER * threshold)
+    lower = 2.0 * before - shares[later[0]] if later.size else shares[0]
+    return SimulatedLimit(lower=float(lower), upper=float(after), share=float(at))
+
+
+def bisected_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | None, ...]:
+    """Shares of the predicted limits between holding and letting go; None where in no span.
+
+    Args:
+        rig: The squeezed object.
+        limits: The wrench at each predicted limit, and the forces that balance it.
+    """
+
+    def search(chosen: Sequence[Load], span: float) -> list[SimulatedLimit | None]:
+        held, let_go = np.full(len(chosen), 1.0 - span), np.full(len(chosen), 1.0 + span)
+        inside = (_ends(rig, chosen, held) == HELD) & (_ends(rig, chosen, let_go) == SLID)
+        for _ in range(rig.setup.limit.rounds):
+            open_places = np.flatnonzero(inside)
+            if not open_places.size:
+                break
+            middle = 0.5 * (held + let_go)[open_places]
+            ends = _ends(rig, [chosen[int(place)] for place in open_places], middle)
+            held[open_places[ends == HELD]] = middle[ends == HELD]
+            let_go[open_places[ends == SLID]] = middle[ends == SLID]
+            inside[open_places[ends == UNKNOWN]] = False
+        return [
+            SimulatedLimit(float(low), float(high), float(0.5 * (low + high))) if found else None
+            for low, high, found in zip(held, let_go, inside, strict=True)
+        ]
+
+    return _in_some_span(rig, limits, search)
+
+
+def _ends(rig: Rig, limits: Sequence[Load], shares: Array) -> Indices:
+    """Whether shares of loads hold; `UNKNOWN` where a trial says nothing about the object."""
+    loads = [part(rig.idle, limit, share) for limit, share in zip(limits, shares, strict=True)]
+    layout, protocol = rig.bench.scene.layout, rig.setup.hold
+    ends = [holds(trace, layout, protocol) for trace in rig.hold(loads)]
+    return np.array([UNKNOWN if end is None else int(end) for end in ends])
+
+
+def part(idle: Load, limit: Load, share: float) -> Load:
+    """A share of a limiting wrench, with forces between those without load and at the limit.
+
+    Args:
+        idle: Forces that squeeze the unloaded object.
+        limit: The largest wrench that is resisted, and the forces that do it.
+        share: Of that wrench.
+    """
+    planned = min(float(share), OVERLOAD)
+    wrench = idle.wrench + share * (limit.wrench - idle.wrench)
+    return Load(wrench, (1.0 - planned) * idle.forces + planned * limit.forces)

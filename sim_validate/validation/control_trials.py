@@ -1,0 +1,172 @@
+"""Negative controls on the bench: contact sets proved open must not hold what nothing can balance.
+
+A control is loaded with the wrench of its certificate, which no contact force within the cones
+opposes, and, where not even the bare squeeze can be balanced, with nothing. The fingers do their
+best: forces that need the least friction, or where nothing balances, the closest ones.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from grasp_core.arrays import Array, to_digits
+from grasp_core.forces.contact_forces import closest_forces, least_friction_forces
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.wrench_limits import axis_wrenches
+from sim_validate.simulation.hold_verdict import LET_GO, HoldVerdict, Outcome, judge
+from sim_validate.simulation.other_rules import FORCE_AXES, accepted, rules_named
+from sim_validate.simulation.rig import Rig, squeezed
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.setup import AXIS_NAMES, Agenda, Setup
+from sim_validate.simulation.simulate import Bench
+from sim_validate.simulation.traces import Trace
+from sim_validate.validation.controls import Control
+
+SEPARATING = "separating"
+"""The wrench that a control's certificate says is not resisted."""
+UNLOADED = "unloaded"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ControlLoad:
+    """A load that a control is to let go."""
+
+    name: str
+    load: Load
+    settling: float
+    """Friction while things settle."""
+    required_friction: float | None
+    """What the planned forces need; None where no forces balance the wrench."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ControlTrial:
+    """One load on a control."""
+
+    name: str
+    wrench: Array
+    """Applied external wrench, (6,) [N, N m], torque about the centre of mass."""
+    required_friction: float | None
+    """What the planned forces need; None where no forces balance the wrench."""
+    hold: HoldVerdict
+    trace: Trace | None
+    """Kept on request."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ControlVerdict:
+    """A contact set proved not to be force-closed, and what the simulator made of it."""
+
+    control: Control
+    tried: tuple[ControlTrial, ...]
+    """Loads that no contact forces can balance."""
+    accepted_by: dict[str, bool]
+    """What rules of other tools say, by name."""
+
+    @property
+    def held(self) -> bool:
+        """Whether any of them held: none must."""
+        return any(trial.hold.outcome is Outcome.HELD for trial in self.tried)
+
+    @property
+    def failed(self) -> bool:
+        """Whether all of them ended as they must, by the object moving."""
+        return all(trial.hold.outcome in LET_GO for trial in self.tried)
+
+
+def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup) -> ControlVerdict:
+    """Simulate a control.
+
+    Args:
+        body: The object.
+        control: With its proof.
+        agenda: Rules of other tools that also judge it, and whether traces are kept.
+        setup: How trials are simulated.
+    """
+    rig, loads = control_case(body, control, setup)
+    rules = rules_named(agenda.rules)
+    pulls = _pulls(body, control, setup) if rules else ()
+    every = (*loads, *pulls)
+    traces = rig.hold([each.load for each in every], [each.settling for each in every])
+    layout = rig.bench.scene.layout
+    tried = tuple(
+        ControlTrial(
+            each.name, each.load.wrench, each.required_friction, judge(trace, layout, setup.hold),
+            trace if agenda.keep_traces else None,
+        )
+        for each, trace in zip(loads, traces, strict=False)
+    )  # fmt: skip
+    others = traces[len(loads) :]
+    return ControlVerdict(
+        control, tried, {rule.name: accepted(rule, others, layout, setup.hold) for rule in rules}
+    )
+
+
+def control_case(
+    body: Polyhedron, control: Control, setup: Setup
+) -> tuple[Rig, tuple[ControlLoad, ...]]:
+    """A control in the grip of its fingers, and the loads that it must not hold.
+
+    Args:
+        body: The object.
+        control: With its proof.
+        setup: How trials are simulated.
+    """
+    fingers = replace(setup.fingers, radius_m=None)
+    on_pads = replace(setup, fingers=fingers, surface="pads")
+    scene = on_pads.scene(body, control.contacts, control.friction)
+    plan = _Planner(body, control, setup)
+    idle = plan.load(UNLOADED, np.zeros(6))
+    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+    rig = squeezed(bench, setup, idle.load.forces, control.friction, idle.settling)
+    hopeless = _hopeless(body, control, setup)
+    return rig, tuple(plan.load(name, wrench) for name, wrench in hopeless)
+
+
+def _hopeless(body: Polyhedron, control: Control, setup: Setup) -> list[tuple[str, Array]]:
+    """The separating wrench, and no wrench at all where not even that can be balanced."""
+    scale = np.array([1.0] * 3 + [body.radius] * 3)
+    facing = -control.separating_wrench(body.center_of_mass) * scale**2
+    size = setup.hold.control_load * setup.fingers.max_normal_force_n
+    loads = [(SEPARATING, to_digits(size * facing / float(np.linalg.norm(facing / scale))))]
+    if control.certificate.margin < -setup.hold.least_excess:
+        loads.append((UNLOADED, np.zeros(6)))
+    return loads
+
+
+def _pulls(body: Polyhedron, control: Control, setup: Setup) -> tuple[ControlLoad, ...]:
+    """The six forces that other tools apply, as large as the separating wrench."""
+    plan = _Planner(body, control, setup)
+    size = setup.hold.control_load * setup.fingers.max_normal_force_n
+    named = zip(AXIS_NAMES, axis_wrenches(body.radius), strict=True)
+    return tuple(plan.load(name, size * wrench) for name, wrench in named if name in FORCE_AXES)
+
+
+class _Planner:
+    """Forces for a control: of least friction, or the closest to balance."""
+
+    def __init__(self, body: Polyhedron, control: Control, setup: Setup) -> None:
+        self.contacts = (
+            np.array([contact.position for contact in control.contacts]),
+            np.array([contact.normal for contact in control.contacts]),
+            control.friction,
+        )
+        largest = setup.fingers.max_normal_force_n
+        self.limits = (setup.hold.least_normal_share * largest, largest)
+        self.center, self.protocol = body.center_of_mass, setup.hold
+
+    def load(self, name: str, wrench: Array) -> ControlLoad:
+        """A wrench with forces planned for it."""
+        forces, needed = self._forces(wrench)
+        settling = self.protocol.settling_friction * max(self.contacts[2], needed or 0.0)
+        return ControlLoad(name, Load(wrench, forces), settling, needed)
+
+    def _forces(self, wrench: Array) -> tuple[Array, float | None]:
+        """Planned forces, (k, 3), and the friction they need; None where nothing balances."""
+        limits, center = self.limits, self.center
+        balanced = least_friction_forces(*self.contacts, wrench, normal_force=limits, center=center)
+        if balanced is not None:
+            return to_digits(balanced[0]), float(to_digits(np.array(balanced[1])))
+        return to_digits(
+            closest_forces(*self.contacts, wrench, normal_force=limits, center=center)
+        ), None

@@ -1,0 +1,144 @@
+"""Negative controls: contact sets made from a grasp that are proved not to be force-closed.
+
+A validator that cannot say no proves nothing. Each control carries the certificate of its
+failure, and its separating wrench is the first thing it is tested with: no contact force
+within the cones can oppose that wrench, whatever the fingers do.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure.contact_arrays import stacked
+from grasp_core.closure.critical_friction import critical_friction
+from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.errors import SolverError, UndecidedError
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact, Grasp
+from sim_validate.validation.paper_as_printed import uncorrected_contacts
+
+FRICTION_SHARE = 0.9
+"""Share of the critical friction that the low-friction control gets."""
+LEAST_FRICTION = 1e-4
+"""Simulated friction cannot be lower than 1e-5."""
+SEARCH = 64
+"""How many random displacements of the contacts are tried."""
+TOWARD_CORNER = 0.95
+"""How far towards a corner of its face a moved contact goes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Control:
+    """Contacts that must not hold, and the proof."""
+
+    name: str
+    contacts: tuple[Contact, ...]
+    friction: float
+    certificate: ClosureCertificate
+
+    def separating_wrench(self, center: Array) -> Array:
+        """The certificate's wrench with its torque about a centre, (6,)."""
+        wrench = self.certificate.separating_wrench
+        assert wrench is not None  # noqa: S101 - controls are refuted by construction
+        return np.concatenate([wrench[:3] + np.cross(wrench[3:], center), wrench[3:]])
+
+
+def negative_controls(
+    body: Polyhedron, grasp: Grasp, friction: float, seed: int
+) -> tuple[Control, ...]:
+    """The controls that exist for a grasp, one of each kind at most.
+
+    Friction below the critical one, fingers removed, a normal flipped, contacts moved on their
+    faces, which takes them out of the grasp's region, and the paper's uncorrected constructions on
+    the same faces.
+    """
+    rng = np.random.default_rng(seed)
+    candidates = (
+        _low_friction(grasp),
+        _fingers_removed(grasp, friction),
+        _normal_flipped(grasp, friction),
+        _contacts_moved(body, grasp, friction, rng),
+        _uncorrected(body, grasp, friction),
+    )
+    return tuple(found for tries in candidates if (found := next(tries, None)) is not None)
+
+
+def _low_friction(grasp: Grasp) -> Iterator[Control]:
+    friction = FRICTION_SHARE * grasp.critical_friction
+    if friction >= LEAST_FRICTION:
+        yield from _refuted("low_friction", grasp.contacts, friction)
+
+
+def _fingers_removed(grasp: Grasp, friction: float) -> Iterator[Control]:
+    """Three contacts that lose closure, at less friction if they must be made to, or else two.
+
+    Without friction no three contacts are in closure, so three are open below some friction. Two
+    are at any, as they can always be turned about the line between them.
+    """
+    threes = list(combinations(grasp.contacts, 3))
+    for rest in threes:
+        yield from _refuted("fingers_removed", rest, friction)
+    for rest in threes:
+        lower = FRICTION_SHARE * _critical(rest)
+        if LEAST_FRICTION <= lower <= friction:
+            yield from _refuted("fingers_removed", rest, lower)
+    for rest in combinations(grasp.contacts, 2):
+        yield from _refuted("fingers_removed", rest, friction)
+
+
+def _critical(contacts: Sequence[Contact]) -> float:
+    """The critical friction of contacts; infinite where it is not decided."""
+    try:
+        return critical_friction(*stacked(contacts))
+    except (SolverError, UndecidedError):
+        return math.inf
+
+
+def _normal_flipped(grasp: Grasp, friction: float) -> Iterator[Control]:
+    """A finger that pulls where it should push, as with a normal of the wrong sign in a file."""
+    for finger, contact in enumerate(grasp.contacts):
+        contacts = list(grasp.contacts)
+        contacts[finger] = replace(contact, normal=-contact.normal)
+        yield from _refuted("normal_flipped", contacts, friction)
+
+
+def _uncorrected(body: Polyhedron, grasp: Grasp, friction: float) -> Iterator[Control]:
+    """Contacts that the paper's programs as printed call a grasp, though they are none."""
+    try:
+        for supposed, contacts in uncorrected_contacts(body, grasp, friction):
+            yield from _refuted("uncorrected", contacts, supposed)
+    except SolverError:
+        return
+
+
+def _contacts_moved(
+    body: Polyhedron, grasp: Grasp, friction: float, rng: np.random.Generator
+) -> Iterator[Control]:
+    pieces = [body.faces[face].pieces for face in grasp.faces]
+    for _ in range(SEARCH):
+        moved = [
+            Contact(_near_corner(choice, rng), contact.normal)
+            for choice, contact in zip(pieces, grasp.contacts, strict=True)
+        ]
+        yield from _refuted("contacts_moved", moved, friction)
+
+
+def _near_corner(pieces: Sequence[Array], rng: np.random.Generator) -> Array:
+    """A point of a face next to one of its corners."""
+    piece = pieces[int(rng.integers(len(pieces)))]
+    corner, middle = piece[int(rng.integers(len(piece)))], piece.mean(axis=0)
+    return middle + TOWARD_CORNER * (corner - middle)
+
+
+def _refuted(name: str, contacts: Sequence[Contact], friction: float) -> Iterator[Control]:
+    """The control, if the analysis proves that it is not in force closure."""
+    try:
+        certificate = force_closure(*stacked(contacts), friction)
+    except UndecidedError:
+        return
+    if not certificate.closed:
+        yield Control(name, tuple(contacts), friction, certificate)

@@ -1,0 +1,86 @@
+"""What simulation says about a grasp: every wrench, every control, and where analysis is wrong."""
+
+from dataclasses import dataclass
+
+from grasp_core.values import Contact
+from scenes.mjcf import Scene
+from sim_validate.simulation.critical_friction import CriticalFriction
+from sim_validate.simulation.gate.gate import Gate
+from sim_validate.simulation.hold_verdict import Outcome
+from sim_validate.simulation.setup import Agenda, Setup
+from sim_validate.simulation.unplanned_bounds import Bounds
+from sim_validate.validation.control_trials import ControlVerdict
+from sim_validate.validation.repeats import Robustness
+from sim_validate.validation.wrench_verdict import AGREEMENT, WrenchVerdict
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdict:
+    """What simulation says about a grasp."""
+
+    id: str
+    contacts: tuple[Contact, ...]
+    friction: float
+    critical_friction: CriticalFriction
+    wrenches: tuple[WrenchVerdict, ...]
+    controls: tuple[ControlVerdict, ...]
+    bounds: Bounds | None
+    """What was found without planned forces, if asked for."""
+    robustness: Robustness | None
+    """What noise makes of it, if asked for."""
+    accepted_by: dict[str, bool]
+    """What rules of other tools say, by name."""
+    gate: Gate
+    scene: Scene
+    setup: Setup
+    agenda: Agenda
+
+    @property
+    def failures(self) -> tuple[WrenchVerdict, ...]:
+        """The wrenches that were not held, in order."""
+        return tuple(trial for trial in self.wrenches if trial.hold.outcome is not Outcome.HELD)
+
+    @property
+    def outcome(self) -> Outcome:
+        """`held`, or how the first wrench that was not held ended."""
+        return self.failures[0].hold.outcome if self.failures else Outcome.HELD
+
+    @property
+    def held(self) -> bool:
+        """Whether every wrench held."""
+        return self.outcome is Outcome.HELD
+
+    @property
+    def controls_failed(self) -> bool:
+        """Whether the simulator let go of every control."""
+        return all(control.failed for control in self.controls)
+
+    @property
+    def mismatches(self) -> tuple[str, ...]:
+        """Where simulation contradicts the analysis, in words."""
+        found = [trial.contradiction for trial in self.wrenches if trial.contradiction]
+        if self.agenda.critical_friction and (fault := _disagreement(self.critical_friction)):
+            found.append(f"critical friction: {fault}")
+        if self.agenda.limits != "none":
+            found += [f"{trial.name}: the limit was not found near the predicted one"
+                      for trial in self.wrenches if trial.simulated_limit is None]  # fmt: skip
+        if self.bounds is not None and not self.bounds.agree(self.critical_friction.predicted):
+            found.append("bounds found without planned forces are on the wrong side")
+        if self.robustness is not None:
+            found += self.robustness.contradictions
+        return tuple(found)
+
+    @property
+    def good(self) -> bool:
+        """Whether every wrench held, every control was let go, and nothing was contradicted."""
+        return self.held and self.controls_failed and not self.mismatches
+
+
+def _disagreement(friction: CriticalFriction) -> str:
+    """What is wrong with a simulated critical friction, if something is."""
+    simulated, predicted = friction.simulated, friction.predicted
+    if simulated is None:
+        return "not found near the predicted one"
+    if simulated > 0.0 and abs(simulated - predicted) > AGREEMENT * predicted:
+        return f"{simulated:.4g} in simulation, {predicted:.4g} predicted"
+    return ""

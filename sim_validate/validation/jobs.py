@@ -1,0 +1,53 @@
+"""Grasps of one object, validated one after another or on several processes, in order."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Grasp
+from sim_validate.parallel.processes import each, processes
+from sim_validate.simulation.setup import Agenda, Setup
+from sim_validate.validation.grasp_verdict import Verdict
+from sim_validate.validation.validation import validate
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One grasp to validate, as it travels to a worker."""
+
+    body: Polyhedron
+    grasp: Grasp
+    friction: float
+    agenda: Agenda
+    setup: Setup
+
+
+def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
+    """Verdicts as they become ready, in order; they do not depend on how many processors there are.
+
+    Args:
+        jobs: What to validate.
+        processors: How many to use: as processes, and as threads of the simulator where there are
+            too few grasps for so many processes.
+
+    Raises:
+        InputError: A grasp is refused.
+        UnfaithfulError: The simulator fails the gate.
+    """
+    return each(verdict_of, with_threads(jobs, processors), jobs=processors)
+
+
+def with_threads(jobs: Sequence[Job], processors: int) -> list[Job]:
+    """Jobs whose simulations share the processors that are too many for so few of them."""
+    threads = max(1, processors // processes(len(jobs), processors))
+    return [replace(job, setup=replace(job.setup, threads=threads)) for job in jobs]
+
+
+def verdict_of(job: Job) -> Verdict:
+    """Validate one grasp.
+
+    Raises:
+        InputError: The grasp is refused.
+        UnfaithfulError: The simulator fails the gate.
+    """
+    return validate(job.body, job.grasp, job.friction, agenda=job.agenda, setup=job.setup)

@@ -1,0 +1,176 @@
+"""The paper's pencil and regulus programs as printed: a source of negative controls.
+
+Sections 3.2 and 3.3 of Sudsang & Ponce read simpler than the constructions in `grasp_core`. The
+printed pencil program leaves the order of the foci open, so its discs hold contacts out of
+equilibrium; the printed regulus program lacks the equation of equal pitch, so its four lines
+are independent and often cannot balance. Their answers look like grasps, which makes them good
+controls. Nothing but controls and tests may use them.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.cones.spanning import balancing_weights, span_angle
+from grasp_core.families.concurrent import inscribed_facets
+from grasp_core.families.constructions import PAIRINGS
+from grasp_core.families.regulus import LEAST_DEPTH
+from grasp_core.objects.face_pieces import FacePiece, unit_pieces
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
+from grasp_core.values import Contact, ForceCone, Grasp
+
+LEAST = 1e-3
+"""Smallest disc of the printed pencil program, in object radii."""
+PAIR = (0, 0, 1, 1)
+"""Pair i of each finger, from zero."""
+BELOW_SPAN = 0.99
+"""Half-angle that is planned with, relative to the angle at which the normals stop spanning."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Discs:
+    """One disc per face, all of one radius, in object radii."""
+
+    centers: Array
+    radii: Array
+    foci: Array
+    """(2, 3)"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lines:
+    """Contacts and forces of the printed regulus program, and the largest offset t."""
+
+    positions: Array
+    forces: Array
+    offset: float
+
+
+def uncorrected_contacts(
+    body: Polyhedron, grasp: Grasp, friction: float
+) -> Iterator[tuple[float, tuple[Contact, ...]]]:
+    """What the printed programs call grasps on the faces of a grasp, and the friction they suppose.
+
+    Args:
+        body: The object.
+        grasp: Its faces count.
+        friction: Whose cones the programs may use, as far as the faces' normals span with them.
+    """
+    theta = min(math.atan(friction), BELOW_SPAN * span_angle(grasp.normals))
+    if theta <= 0.0:
+        return
+    pieces = unit_pieces(body)
+    for order in PAIRINGS:
+        chosen = [grasp.faces[finger] for finger in order]
+        quad = [next(piece for piece in pieces if piece.face == face) for face in chosen]
+        cones = [ForceCone(piece.normal, theta) for piece in quad]
+        if (lines := printed_regulus(quad, cones, LEAST_DEPTH)) is not None:
+            yield math.tan(theta), _contacts(body, quad, lines.positions)
+        discs = printed_pencil(quad, theta)
+        if discs is not None and focus_gap(quad, discs.foci) < 0.0:
+            for border in _border_points(quad, discs):
+                yield math.tan(theta), _contacts(body, quad, border)
+
+
+def _contacts(body: Polyhedron, quad: Sequence[FacePiece], positions: Array) -> tuple[Contact, ...]:
+    true = body.center_of_mass + body.radius * positions
+    return tuple(Contact(at, piece.normal) for at, piece in zip(true, quad, strict=True))
+
+
+def _border_points(quad: Sequence[FacePiece], discs: Discs) -> Iterator[Array]:
+    """Contacts on the borders of the discs that push the farthest out of the plane of each pair."""
+    N, _ = focus_line(quad)
+    for signs in product((1.0, -1.0), repeat=4):
+        flat = [piece.frame @ (piece.frame.T @ N[i]) for i, piece in zip(PAIR, quad, strict=True)]
+        away = np.array([sign * unit(way) for sign, way in zip(signs, flat, strict=True)])
+        yield discs.centers + discs.radii[:, None] * away
+
+
+def focus_line(quad: Sequence[FacePiece]) -> tuple[list[Array], Array]:
+    """N_1, N_2 and u = N_1 x N_2; the paper leaves the sign of u open, as k is free."""
+    n = [piece.normal for piece in quad]
+    N = [unit(np.cross(n[0], n[1])), unit(np.cross(n[2], n[3]))]
+    return N, unit(np.cross(N[0], N[1]))
+
+
+def focus_gap(quad: Sequence[FacePiece], foci: Array) -> float:
+    """(c_2 - c_1).w / |w|, not negative where the foci are in the right order (cell A).
+
+    w is what pair 1 contributes to a combination of the normals that vanishes.
+    """
+    normals = np.array([piece.normal for piece in quad])
+    w = balancing_weights(normals)[:2] @ normals[:2]
+    return float((foci[1] - foci[0]) @ unit(w))
+
+
+def unit(vector: Array) -> Array:
+    """A vector over its length."""
+    return vector / np.linalg.norm(vector)
+
+
+def printed_pencil(quad: Sequence[FacePiece], theta: float) -> Discs | None:
+    """Section 3.2 with R = r, over (x0, k, r): None without a disc of radius `LEAST`."""
+    _, u = focus_line(quad)
+    foci = [np.column_stack([np.eye(3), sign * u]) for sign in (1.0, -1.0)]
+    rows, limits = [np.array([[0.0] * 4 + [-1.0]])], [np.array([-LEAST])]
+    for i, piece in zip(PAIR, quad, strict=True):
+        T, n = piece.frame, piece.normal
+        edges = piece.E @ T.T @ foci[i]
+        rows += [
+            np.column_stack([edges, np.ones(len(edges))]),
+            np.array([[*(-math.sin(theta) * n @ foci[i]), 1.0 + math.cos(theta)]]),
+        ]
+        limits += [
+            piece.b + piece.E @ T.T @ piece.origin,
+            np.array([-math.sin(theta) * n @ piece.origin]),
+        ]
+    v = _best(np.array([0.0] * 4 + [1.0]), rows, limits)
+    if v is None:
+        return None
+    c = np.array([C @ v[:4] for C in foci])
+    depths = [p.normal @ (c[i] - p.origin) for i, p in zip(PAIR, quad, strict=True)]
+    centers = [c[i] - d * p.normal for i, d, p in zip(PAIR, depths, quad, strict=True)]
+    return Discs(np.array(centers), np.full(4, v[4]), c)
+
+
+def printed_regulus(
+    quad: Sequence[FacePiece], cones: Sequence[ForceCone], least_depth: float
+) -> Lines | None:
+    """Section 3.3 over (x0, k, l_1, l_2, (x_i, y_i, z_i), t), and n.f >= least_depth."""
+    v, least = np.eye(13), np.array([-least_depth])
+    N, u = focus_line(quad)
+    rows, limits, A_eq, b_eq = list[Array](), list[Array](), list[Array](), list[float]()
+    D, F = list[Array](), list[Array]()
+    for finger, (piece, cone) in enumerate(zip(quad, cones, strict=True)):
+        i, sign = PAIR[finger], 1.0 if finger % 2 == 0 else -1.0
+        n, T, middle = piece.normal, piece.frame, piece.frame.T @ piece.origin
+        c = np.eye(3, 13) + (1.0 - 2.0 * i) * u[:, None] * v[3]
+        D.append(c + sign * N[i][:, None] * v[4 + i])
+        x, y, z = v[6 + 3 * i : 9 + 3 * i]
+        across = np.asarray(np.cross(N[i], u), dtype=np.float64)
+        F.append(u[:, None] * x + sign * (across[:, None] * y + N[i][:, None] * z))
+        contact = D[-1] - F[-1]
+        flat, G = T.T @ contact, inscribed_facets(cone, T[:, 0])
+        rows += [piece.E @ flat, flat - v[12], -flat - v[12], -G @ F[-1], -(n @ F[-1])[None]]
+        limits += [piece.b + piece.E @ middle, middle, -middle, np.zeros(len(G)), least]
+        A_eq.append(n @ contact)
+        b_eq.append(float(n @ piece.origin))
+    best = _best(-v[12], rows, limits, np.array(A_eq), np.array(b_eq))
+    if best is None:
+        return None
+    forces = np.array(F) @ best
+    return Lines(np.array(D) @ best - forces, forces, float(best[12]))
+
+
+def _best(
+    c: Array, rows: Sequence[Array], limits: Sequence[Array], A_eq: Array | None = None,
+    b_eq: Array | None = None,
+) -> Array | None:  # fmt: skip
+    program = LinearProgram(c, np.vstack(rows), np.concatenate(limits), A_eq, b_eq)
+    answer = maximize(program)
+    return answer.x if isinstance(answer, Optimum) else None

@@ -1,0 +1,222 @@
+"""A grasp and its negative controls, from analysis through simulation to a verdict.
+
+For each test wrench the analysis predicts the largest multiple that is resisted; a share of
+it is applied in simulation, with forces between those at rest and those at the limit. The
+critical friction is found in simulation too, and on request the limits. The grasp is confirmed
+when all wrenches hold, and the run can be trusted when the simulator is faithful (`gate`) and no
+control holds.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from grasp_core.checked import coefficient, instance
+from grasp_core.closure.critical_friction import critical_friction
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.errors import InputError, UndecidedError
+from grasp_core.objects.on_faces import check_on_faces
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Grasp
+from scenes.fingertips import clashes
+from scenes.mjcf import Scene
+from sim_validate.simulation.critical_friction import CriticalFriction, released_friction
+from sim_validate.simulation.gate.gate import require_faithful
+from sim_validate.simulation.gate.mesh_contacts import require_touch
+from sim_validate.simulation.hold_verdict import invalid_start, judge
+from sim_validate.simulation.loads import PlannedLoad, planned_loads
+from sim_validate.simulation.other_rules import FORCE_AXES, accepted, rules_named
+from sim_validate.simulation.rig import Rig, squeezed
+from sim_validate.simulation.setup import Agenda, Setup
+from sim_validate.simulation.simulate import Bench
+from sim_validate.simulation.traces import Trace
+from sim_validate.simulation.unplanned_bounds import Bounds, independent_bounds
+from sim_validate.simulation.wrench_limits import SimulatedLimit, bisected_limits, ramped_limits
+from sim_validate.validation.control_trials import ControlVerdict, try_control
+from sim_validate.validation.controls import negative_controls
+from sim_validate.validation.grasp_verdict import Verdict
+from sim_validate.validation.repeats import Robustness, for_repeats, robustness
+from sim_validate.validation.wrench_verdict import WrenchVerdict
+
+Chosen = TypeVar("Chosen")
+
+
+def validate(
+    body: Polyhedron,
+    grasp: Grasp,
+    friction: float = 0.5,
+    *,
+    agenda: Agenda | None = None,
+    setup: Setup | None = None,
+) -> Verdict:
+    """Test a grasp and its negative controls in simulation.
+
+    Args:
+        body: The object.
+        grasp: A grasp in force closure at this friction.
+        friction: Coulomb coefficient at every contact.
+        agenda: Which trials.
+        setup: How they are simulated.
+
+    Raises:
+        InputError: The contacts are not on the body's faces, or not closed at this friction.
+        UnfaithfulError: The simulator fails the gate with these settings.
+    """
+    check_on_faces(body, grasp)
+    coefficient(friction)
+    agenda, setup = _given(agenda, Agenda(), "agenda"), _given(setup, Setup(), "setup")
+    critical = critical_friction(grasp)
+    if not (friction > critical and force_closure(grasp, friction=friction).closed):
+        raise InputError(
+            f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got {friction}"
+        )
+    gate = require_faithful(setup, friction, body.radius)
+    require_touch(body, grasp.contacts, setup)
+    scene = setup.scene(body, grasp, friction)
+    trial = _Bout(body, replace(grasp, critical_friction=critical), friction, scene, agenda, setup)
+    wrenches = trial.wrenches()
+    return Verdict(
+        id=grasp.id,
+        contacts=grasp.contacts,
+        friction=friction,
+        critical_friction=trial.critical(),
+        wrenches=wrenches,
+        controls=trial.controls(),
+        bounds=trial.bounds(),
+        robustness=trial.robustness(),
+        accepted_by=trial.accepted_by(),
+        gate=gate,
+        scene=scene,
+        setup=setup,
+        agenda=agenda,
+    )
+
+
+def simulated_critical_friction(
+    body: Polyhedron, grasp: Grasp, setup: Setup | None = None
+) -> float:
+    """Smallest friction at which a squeezed object stays where it is in simulation.
+
+    Args:
+        body: The object.
+        grasp: On its faces.
+        setup: How trials are simulated.
+
+    Returns:
+        The friction; zero if less than `FrictionProtocol.least_friction` is enough; infinity
+        if it was not found within the widest of `FrictionProtocol.spans` around the prediction.
+
+    Raises:
+        InputError: The contacts are not on the body's faces, or never in force closure.
+        UnfaithfulError: The simulator fails the gate with these settings.
+    """
+    check_on_faces(body, grasp)
+    setup = _given(setup, Setup(), "setup")
+    predicted = critical_friction(grasp)
+    if not np.isfinite(predicted):
+        raise InputError(f"grasp {grasp.id}: no friction gives force closure")
+    friction = max(predicted, setup.friction.least_friction)
+    require_faithful(setup, radius_m=body.radius)
+    require_touch(body, grasp.contacts, setup)
+    scene = setup.scene(body, grasp, friction)
+    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+    found = released_friction(bench, grasp.positions, grasp.normals, predicted, setup)
+    return np.inf if found.simulated is None else found.simulated
+
+
+def _given(value: Chosen | None, default: Chosen, name: str) -> Chosen:
+    """What was given, or else the default, which says of what class it must be."""
+    if value is None:
+        return default
+    instance(value, type(default), name)
+    return value
+
+
+class _Bout:
+    """A grasp on the bench, and the trials of an agenda."""
+
+    def __init__(
+        self, body: Polyhedron, grasp: Grasp, friction: float, scene: Scene,
+        agenda: Agenda, setup: Setup,
+    ) -> None:  # fmt: skip
+        self.body, self.grasp, self.friction = body, grasp, friction
+        self.agenda, self.setup, self.layout = agenda, setup, scene.layout
+        self.bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+        self.rig: Rig = squeezed(self.bench, setup, self.layout.squeeze_forces, friction)
+        self.loads = planned_loads(body, grasp.contacts, friction, self.rig.idle, agenda, setup)
+        self.traces = self.rig.hold([planned.load for planned in self.loads])
+
+    def wrenches(self) -> tuple[WrenchVerdict, ...]:
+        """Every load, held and, if asked for, raised to its limit."""
+        radius = self.layout.drive.radius_m
+        overlap = clashes(self.body, self.grasp.positions, self.grasp.normals, radius)
+        return tuple(
+            self._wrench(planned, trace, limit, overlap)
+            for planned, trace, limit in zip(self.loads, self.traces, self._limits(), strict=True)
+        )
+
+    def _wrench(
+        self, planned: PlannedLoad, trace: Trace, limit: SimulatedLimit | None,
+        overlap: Sequence[str],
+    ) -> WrenchVerdict:  # fmt: skip
+        verdict = judge(trace, self.layout, self.setup.hold)
+        return WrenchVerdict(
+            name=planned.name,
+            wrench=planned.load.wrench,
+            predicted_limit=planned.predicted_limit,
+            required_friction=planned.required_friction,
+            hold=invalid_start(verdict, overlap) if overlap else verdict,
+            simulated_limit=limit,
+            trace=trace if self.agenda.keep_traces else None,
+        )
+
+    def _limits(self) -> tuple[SimulatedLimit | None, ...]:
+        limits = [planned.limit for planned in self.loads]
+        if self.agenda.limits == "ramp":
+            return ramped_limits(self.rig, limits)
+        if self.agenda.limits == "bisection":
+            return bisected_limits(self.rig, limits)
+        return (None,) * len(limits)
+
+    def critical(self) -> CriticalFriction:
+        """Critical friction, predicted and, if asked for, simulated."""
+        predicted = self.grasp.critical_friction
+        if not self.agenda.critical_friction:
+            return CriticalFriction(predicted)
+        grasp, setup = self.grasp, self.setup
+        try:
+            return released_friction(self.bench, grasp.positions, grasp.normals, predicted, setup)
+        except UndecidedError:
+            return CriticalFriction(predicted)
+
+    def controls(self) -> tuple[ControlVerdict, ...]:
+        """What must not hold."""
+        if not self.agenda.controls:
+            return ()
+        found = negative_controls(self.body, self.grasp, self.friction, self.agenda.seed)
+        return tuple(try_control(self.body, each, self.agenda, self.setup) for each in found)
+
+    def bounds(self) -> Bounds | None:
+        """What is found without planned forces, if asked for."""
+        if not self.agenda.independent:
+            return None
+        limits = [planned.limit for planned in self.loads]
+        critical = self.grasp.critical_friction
+        return independent_bounds(self.body, self.grasp, critical, self.rig, limits)
+
+    def robustness(self) -> Robustness | None:
+        """What noise makes of it, if asked for: the same fingertips hold the same wrenches."""
+        if not self.agenda.trials:
+            return None
+        setup = for_repeats(self.setup, self.bench.scene)
+        loads = [(planned.name, planned.load.wrench) for planned in self.loads]
+        return robustness(self.body, self.grasp, self.friction, loads, self.agenda, setup)
+
+    def accepted_by(self) -> dict[str, bool]:
+        """What rules of other tools make of the same traces."""
+        pulled = [trace for planned, trace in zip(self.loads, self.traces, strict=True)
+                  if planned.name in FORCE_AXES]  # fmt: skip
+        rules = rules_named(self.agenda.rules)
+        return {rule.name: accepted(rule, pulled, self.layout, self.setup.hold) for rule in rules}

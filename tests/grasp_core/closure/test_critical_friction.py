@@ -1,0 +1,217 @@
+import math
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.closure import critical_friction as critical
+from grasp_core.closure import friction_search
+from grasp_core.closure.contact_arrays import unit_sizes
+from grasp_core.compiled import compiled
+from scenes.example_objects import example_object
+from tests.grasp_core.bodies import BODIES
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
+
+BOX_SIDES = (
+    np.array(
+        [[-0.05, 0.01, 0.0], [0.025, -0.035, 0.0], [0.025, 0.01, -0.025], [0.025, 0.01, 0.025]]
+    ),
+    np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]),
+)
+"""Closed at any positive friction, with a margin that grows with its square."""
+
+
+def test_closure_is_certified_just_above_and_refuted_just_below():
+    rng, tested = np.random.default_rng(5), 0
+    for grasp in gc.plan(example_object("random-12-1"), 0.5, families="free", limit=60).grasps:
+        mu = gc.critical_friction(grasp)
+        if mu > 1e-3:
+            step = float(rng.uniform(1e-6, 1e-3))
+            assert gc.force_closure(grasp, friction=mu * (1 + step)).closed
+            assert not gc.force_closure(grasp, friction=mu * (1 - step)).closed
+            tested += 1
+    assert tested >= 40
+
+
+def test_a_margin_that_grows_with_the_square_shows_no_friction():
+    assert gc.force_closure(*BOX_SIDES, 1e-5).closed
+    assert gc.critical_friction(*BOX_SIDES) == 0.0
+
+
+def test_pushes_that_balance_without_friction_need_no_search(monkeypatch):
+    grasp = gc.plan(example_object("wedge"), 0.5, families="pencil", cones="normal").grasps[0]
+    monkeypatch.setattr(critical, "search_interval", None)
+    assert gc.critical_friction(grasp) == 0.0
+    with pytest.raises(TypeError):
+        gc.critical_friction(*BOX_SIDES)
+
+
+def test_few_programs_are_needed(monkeypatch):
+    """Halving 0.5 down to the accuracy of 5e-8 would take 24."""
+    counts = []
+
+    def counted(*contacts):
+        counts[-1] += 1
+        return decide(*contacts)
+
+    grasps = gc.plan(example_object("random-12-1"), 0.5, families="concurrent").grasps
+    decide = friction_search.decide
+    monkeypatch.setattr(friction_search, "decide", counted)
+    for grasp in grasps:
+        counts.append(0)
+        found = friction_search.search_interval(grasp.positions, grasp.normals)
+        assert found.upper < math.inf
+    assert len(counts) >= 30
+    assert np.mean(counts) < 9
+
+
+def contact_sets(count=4):
+    """Contacts of planned grasps, if four, on bodies and about a point, (g, k, 3) each."""
+    rng, both = np.random.default_rng(count), []
+    if count == 4:
+        for name in ("random-12-1", "octahedron", "hex-nut"):
+            grasps = gc.plan(example_object(name), 0.5, limit=30).grasps
+            both += [(grasp.positions, grasp.normals) for grasp in grasps]
+    for body in BODIES:
+        both += [BODIES[body][0](rng, count) for _ in range(20)]
+    both += [random_contacts(rng, count, spread=spread) for spread in (0.3, 1.5) for _ in range(30)]
+    positions, normals = zip(*both, strict=True)
+    return np.array(positions), np.array(normals)
+
+
+@pytest.mark.parametrize("count", [4, 3, 6])
+def test_many_at_once_and_one_by_one_give_intervals_that_overlap(count):
+    """Both are as narrow as the accuracy."""
+    positions, normals = contact_sets(count)
+    quick = critical._at_once(positions, normals)
+    every = gc.critical_frictions(positions, normals)
+    width = 1.0 + 1.1 * critical.FRICTION_ACCURACY
+    for i, (points, units) in enumerate(zip(positions, normals, strict=True)):
+        slow = friction_search.search_interval(points, units)
+        if quick.found[i]:
+            assert every[i] == quick.upper[i]
+            assert slow.lower <= quick.upper[i] <= width * slow.upper
+        else:
+            assert every[i] == (0.0 if slow.upper <= critical.FRICTIONLESS else slow.upper)
+    assert quick.found.mean() >= 0.6
+    assert len(every) >= 140
+
+
+def test_what_the_search_finds_proves_both_ends():
+    """Unit twists miss the cones, and forces lie in them and balance, all but for rounding."""
+    positions, normals = contact_sets()
+    arms, _, _ = unit_sizes(positions)
+    forces, twists, bounds = np.zeros_like(arms), np.zeros((len(arms), 6)), np.zeros((len(arms), 2))
+    compiled(critical.KERNEL).search(arms, normals, 5e-8, forces, twists, bounds)
+    proved = 0
+    for i in np.flatnonzero(critical._at_once(positions, normals).found):
+        lower, upper = bounds[i]
+        if upper - lower > 5e-8 * lower:
+            continue
+        twist = twists[i] / np.linalg.norm(twists[i])
+        for arm, normal in zip(arms[i], normals[i], strict=True):
+            velocity = twist[:3] + np.cross(twist[3:], arm)
+            leaving = velocity @ normal
+            assert leaving + lower * np.linalg.norm(velocity - leaving * normal) <= 1e-12
+        for normal, force in zip(normals[i], forces[i], strict=True):
+            along = force @ normal
+            assert along > 0.0
+            assert np.linalg.norm(force - along * normal) <= upper * (1.0 + 1e-9) * along
+        assert np.abs(forces[i].sum(axis=0)).max() <= 1e-9
+        assert np.abs(np.cross(arms[i], forces[i]).sum(axis=0)).max() <= 1e-9
+        proved += 1
+    assert proved >= 100
+
+
+def test_one_set_of_contacts_is_treated_like_many():
+    positions, normals = contact_sets()
+    every = gc.critical_frictions(positions, normals)
+    for i in range(0, len(every), 7):
+        assert gc.critical_friction(positions[i], normals[i]) == every[i]
+
+
+def test_grasps_are_taken_as_they_are():
+    grasps = gc.plan(example_object("random-12-1"), 0.5, limit=8).grasps
+    arrays = np.array([grasp.positions for grasp in grasps]), [grasp.normals for grasp in grasps]
+    assert (gc.critical_frictions(grasps) == gc.critical_frictions(*arrays)).all()
+    assert len(gc.critical_frictions([])) == 0
+
+
+def test_without_compiled_code_the_search_is_made_program_by_program(without_kernels):
+    positions, normals = (array[::20] for array in contact_sets())
+    quick = gc.critical_frictions(positions, normals)
+    without_kernels()
+    slow = gc.critical_frictions(positions, normals)
+    assert not critical._at_once(positions, normals).found.any()
+    np.testing.assert_allclose(slow, quick, rtol=1e-7, atol=1e-7)
+    assert len(slow) >= 8
+
+
+@pytest.mark.parametrize("spoil", ["forces", "twists", "lower", "numbers"])
+def test_what_the_search_gets_wrong_is_made_program_by_program(monkeypatch, spoil):
+    """Forces that pull, twists that separate nothing, a lower end too high, and no numbers."""
+
+    def search(arms, normals, width, forces, twists, bounds):
+        honest(arms, normals, width, forces, twists, bounds)
+        if spoil == "forces":
+            forces *= -1.0
+        elif spoil == "twists":
+            twists *= -1.0
+        elif spoil == "lower":
+            bounds *= 1.001
+        else:
+            forces[:], twists[:] = np.nan, np.nan
+
+    def deepest(contacts, _, forces, twists, values):
+        forces[:] = np.nan if spoil == "numbers" else -contacts[0]
+        twists[:], values[:] = 1.0, np.nan if spoil == "numbers" else 0.5
+
+    kernel = compiled(critical.KERNEL)
+    honest = kernel.search
+    positions, normals = (array[:12] for array in contact_sets())
+    right = gc.critical_frictions(positions, normals)
+    monkeypatch.setattr(kernel, "search", search)
+    monkeypatch.setattr(kernel, "deepest", deepest)
+    assert not critical._at_once(positions, normals).found.any()
+    np.testing.assert_allclose(
+        gc.critical_frictions(positions, normals), right, rtol=1e-7, atol=1e-7
+    )
+
+
+def test_hopeless_and_frictionless_sets_are_left_to_the_reference():
+    grasp = gc.plan(example_object("wedge"), 0.5, families="pencil", cones="normal").grasps[0]
+    parallel = np.tile([0.0, 0, 1], (4, 1))
+    positions = np.array([grasp.positions, TETRA_CENTERS, TETRA_CENTERS])
+    normals = np.array([grasp.normals, parallel, TETRA_NORMALS])
+    found = gc.critical_frictions(positions, normals)
+    assert found[:2].tolist() == [0.0, math.inf]
+    assert found[2] == gc.critical_friction(TETRA_CENTERS, TETRA_NORMALS) == 0.0
+    assert not critical._at_once(positions, normals).found.any()
+
+
+def test_where_no_program_is_solved_the_upper_end_is_still_one(monkeypatch):
+    """Forces of a linear program need more friction than is needed; the twist stands for less."""
+
+    def unsolved(*_):
+        raise gc.SolverError("no answer")
+
+    monkeypatch.setattr(critical, "compiled", lambda _: None)
+    positions, normals = contact_sets(5)
+    right = gc.critical_frictions(positions[:20], normals[:20])
+    monkeypatch.setattr(friction_search, "decide", unsolved)
+    finite = 0
+    for i, known in enumerate(right):
+        found = gc.critical_friction_interval(positions[i], normals[i])
+        assert found.verify()
+        assert found.lower <= known <= found.upper
+        finite += found.upper < math.inf
+    assert finite >= 15
+
+
+def test_bad_sets_are_refused():
+    with pytest.raises(gc.InputError, match="positions must have shape"):
+        gc.critical_frictions(TETRA_CENTERS, TETRA_NORMALS)
+    with pytest.raises(gc.InputError, match="at least two contacts"):
+        gc.critical_frictions(np.zeros((3, 1, 3)), np.tile([0.0, 0, 1], (3, 1, 1)))
+    with pytest.raises(gc.InputError, match="or give normals"):
+        gc.critical_frictions(TETRA_CENTERS[None])

@@ -1,0 +1,306 @@
+"""The interval of the critical friction: proved at both ends, narrow, and the same everywhere."""
+
+import dataclasses
+import math
+import os
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import clarabel
+import numpy as np
+import pytest
+from scipy import sparse
+
+import grasp_core as gc
+from grasp_core.closure.friction_interval import FRICTIONLESS
+from grasp_core.closure.wrenches import contact_frames, grasp_map
+from scenes.example_objects import example_object
+from tests.grasp_core.exact_judges import closed_exactly, open_exactly
+from tests.grasp_core.grid_contacts import contact_sets
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
+
+WIDTH = 1e-7
+"""Of an interval, in units of the larger of 1 and its upper end, that is bounded."""
+CLEAR = 1e-6
+"""Margins of the interior-point method farther from zero say which side it is on: a thousand times
+what it leaves."""
+LARGEST_FRICTION = 1e3
+X, Y, Z = np.eye(3)
+
+
+def clarabel_margin(positions, normals, friction):
+    """Largest t such that balanced forces, normal parts summing to one, are t inside all cones.
+
+    With exact circular cones. Below zero where nothing balances; None where that is not solved, or
+    the wrenches do not span.
+    """
+    arms = positions - positions.mean(axis=0)
+    arms /= np.linalg.norm(arms, axis=1).max() or 1.0
+    frames, k = contact_frames(normals), len(normals)
+    G = np.einsum("wki,kij->wkj", grasp_map(arms).reshape(6, k, 3), frames).reshape(6, 3 * k)
+    if np.linalg.svd(G, compute_uv=False)[-1] < CLEAR:
+        return None
+    A = np.zeros((7 + 3 * k, 3 * k + 1))
+    A[:6, :-1], A[6, :-1:3] = G, 1.0
+    A[7:, :-1] = -np.diag(np.tile([friction, 1.0, 1.0], k))
+    A[7::3, -1] = 1.0
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    answer = clarabel.DefaultSolver(
+        sparse.csc_matrix((3 * k + 1, 3 * k + 1)), np.eye(3 * k + 1)[-1] * -1.0,
+        sparse.csc_matrix(A), np.eye(len(A))[6],
+        [clarabel.ZeroConeT(7)] + [clarabel.SecondOrderConeT(3)] * k, settings,
+    ).solve()  # fmt: skip
+    if str(answer.status) == "PrimalInfeasible":
+        return -math.inf
+    return answer.x[-1] if str(answer.status) == "Solved" else None
+
+
+def judge_exactly(seen, found):
+    """Of contacts on a grid, whose degeneracies are exact."""
+    contacts = found.positions, found.normals
+    if found.forces is not None:
+        assert closed_exactly(found.forces, *contacts, found.upper)
+        seen["closed exactly"] += 1
+    if found.twist is not None:
+        assert open_exactly(found.twist, *contacts, found.lower)
+        seen["open exactly"] += 1
+
+
+def judge_by_clarabel(seen, found):
+    """Not open anywhere above the interval, and not closed anywhere below."""
+    contacts = found.positions, found.normals
+    for friction in (1.01 * found.upper, 1.0 + found.upper, 0.99 * found.lower, 0.5 * found.lower):
+        if not 1e-3 < friction < 10.0:
+            continue
+        margin, above = clarabel_margin(*contacts, friction), friction > found.upper
+        if margin is not None and abs(margin) > CLEAR:
+            assert (margin > 0.0) == above
+            seen["closed by margin" if above else "open by margin"] += 1
+
+
+def check_sets(count, seed):
+    """Every interval verifies, is narrow, and says what `critical_friction` and the judges say."""
+    seen = Counter()
+    for positions, normals, grid in contact_sets(count, seed):
+        found = gc.critical_friction_interval(positions, normals)
+        assert found.verify()
+        upper = gc.critical_friction(positions, normals)
+        assert upper == found.critical_friction
+        if found.upper == math.inf:
+            assert found.lower >= LARGEST_FRICTION
+            seen["closed by no friction"] += found.lower == math.inf
+        else:
+            assert found.upper - found.lower <= max(WIDTH, FRICTIONLESS * (upper == 0.0)) * max(
+                1.0, found.upper
+            )
+        seen["zero"] += upper == 0.0
+        seen["finite"] += 0.0 < upper < math.inf
+        if grid:
+            judge_exactly(seen, found)
+        judge_by_clarabel(seen, found)
+    print(dict(sorted(seen.items())))
+    return seen
+
+
+AT_LEAST = {
+    "closed by no friction": 0.1, "zero": 0.03, "finite": 0.6, "closed exactly": 0.25,
+    "open exactly": 0.35, "closed by margin": 0.7, "open by margin": 0.7,
+}  # fmt: skip
+"""How many of each are seen per set of contacts."""
+
+
+def test_every_interval_is_proved_narrow_and_as_independent_judges_say():
+    seen = check_sets(250, seed=21)
+    assert all(seen[what] >= share * 250 for what, share in AT_LEAST.items()), seen
+
+
+@pytest.mark.long
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("part", range(4))
+def test_twenty_thousand_intervals_are_proved_narrow_and_as_independent_judges_say(part):
+    seen = check_sets(5_000, seed=(22, part))
+    assert all(seen[what] >= share * 5_000 for what, share in AT_LEAST.items()), seen
+
+
+def test_no_batch_is_lost_to_contacts_that_no_friction_closes():
+    """Those of the first set lie in a plane and cannot push back when it turns about a side."""
+    positions = np.array([[[1.0, -1, -1], [-1, -1, -1], [0, 0, -1], [0, 0, -1]], TETRA_CENTERS])
+    normals = np.array([[-X, X, Z, Z], TETRA_NORMALS])
+    assert gc.critical_frictions(positions, normals).tolist() == [math.inf, 0.0]
+    assert gc.critical_friction_interval(positions[0], normals[0]).lower == math.inf
+    tested = 0
+    for count in (2, 3, 4, 5, 6):
+        sets = [(p, n) for p, n, _ in contact_sets(300, seed=23) if len(p) == count]
+        found = gc.critical_frictions(*(np.array(each) for each in zip(*sets, strict=True)))
+        assert not np.isnan(found).any()
+        tested += len(found)
+    assert tested == 300
+
+
+def test_what_force_closure_proves_enough_is_never_called_too_little():
+    positions = np.array(
+        [[0.0, 1, 1], [0, 1, -1], [1, 1, -1], [-1, 0, 0], [-1, -1, -1], [-1, 1, -1]]
+    )
+    normals = np.array([-Z, Z, -X, X, X, -Y])
+    assert gc.force_closure(positions, normals, 2e-4).verify()
+    assert gc.critical_friction(positions, normals) == 0.0
+
+
+@pytest.mark.parametrize("name", ["l-bracket", "cross", "box"])
+def test_grasps_whose_margin_grows_with_a_power_of_the_friction_need_none(name):
+    """Sides along three axes: any friction holds them, or a friction that shows."""
+    grasps = gc.plan(example_object(name), 0.5, limit=20).grasps
+    found = [gc.critical_friction_interval(grasp) for grasp in grasps]
+    assert all(each.verify() and each.upper - each.lower <= FRICTIONLESS for each in found)
+    assert len(found) >= 10
+
+
+def test_up_to_four_rounds_of_pushes_leave_nothing_to_search():
+    """Each new contact is pushed by what is left of the friction of those before it."""
+    seen = Counter()
+    for positions, normals, grid in contact_sets(1500, seed=24):
+        if grid and len(positions) == 4 and gc.critical_friction(positions, normals) == 0.0:
+            found = gc.critical_friction_interval(positions, normals)
+            pushes = np.sort(np.einsum("ki,ki->k", found.forces, normals) / found.forces.max())
+            seen[int(np.round(-np.log10(pushes[0]) / 6.0))] += 1
+            assert (found.lower, found.upper) == (0.0, FRICTIONLESS)
+            assert closed_exactly(found.forces, positions, normals, FRICTIONLESS)
+    assert min(seen[0], seen[1], seen[2]) >= 3, seen
+
+
+def test_bits_that_do_not_matter_do_not_matter():
+    """The same contacts in another order, of another size and turned, some of them by rounding.
+
+    Thresholds of turned contacts differ by rounding too, which a degenerate one multiplies.
+    """
+    rng, tested = np.random.default_rng(25), 0
+    for positions, normals, _ in contact_sets(120, seed=26):
+        upper = gc.critical_friction(positions, normals)
+        order, turn = rng.permutation(len(positions)), np.eye(3)[:, rng.permutation(3)]
+        for again in (
+            (positions[order], normals[order]),
+            (1024.0 * positions, normals),
+            (positions @ turn, normals @ turn),
+        ):
+            other = gc.critical_friction(*again)
+            assert other == upper or abs(other - upper) <= WIDTH * max(1.0, upper)
+            tested += 1
+    assert tested == 360
+
+
+ELSEWHERE = """
+import sys
+import numpy as np
+import grasp_core as gc
+from tests.grasp_core.grid_contacts import contact_sets
+found = [gc.critical_friction(p, n) for p, n, _ in contact_sets(int(sys.argv[1]), seed=27)]
+np.save(sys.argv[2], found)
+"""
+NO_VECTORS = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX2 FMA3"
+
+
+def frictions_elsewhere(folder, count, environment):
+    """Critical frictions of the same contacts by another process."""
+    root = Path(__file__).parents[3]
+    subprocess.run(
+        [sys.executable, "-c", ELSEWHERE, str(count), str(folder / "found.npy")],
+        check=True, cwd=root, env=os.environ | {"PYTHONPATH": str(root)} | environment,
+    )  # fmt: skip
+    return np.load(folder / "found.npy")
+
+
+def agree_everywhere(folder, count, environment):
+    here = np.array([gc.critical_friction(p, n) for p, n, _ in contact_sets(count, seed=27)])
+    there = frictions_elsewhere(folder, count, environment)
+    assert (np.isinf(here) == np.isinf(there)).all()
+    finite = np.isfinite(here)
+    assert finite.sum() >= 0.6 * count
+    np.testing.assert_allclose(there[finite], here[finite], rtol=WIDTH, atol=WIDTH)
+
+
+def test_another_processors_rounding_changes_no_more_than_the_width(tmp_path):
+    agree_everywhere(tmp_path, 60, {"OPENBLAS_CORETYPE": "Nehalem"})
+
+
+@pytest.mark.long
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {"OPENBLAS_CORETYPE": "Haswell"}, {"OPENBLAS_CORETYPE": "Zen"},
+        {"OPENBLAS_CORETYPE": "Sandybridge"}, {"NPY_DISABLE_CPU_FEATURES": NO_VECTORS},
+        {"NUMBA_CPU_NAME": "generic"},
+    ],
+    ids=lambda environment: "=".join(*environment.items())[:40],
+)  # fmt: skip
+def test_rounding_of_every_kind_changes_no_more_than_the_width(tmp_path, environment):
+    compiled = {"NUMBA_CACHE_DIR": str(tmp_path / "numba")}
+    others = compiled if "NUMBA_CPU_NAME" in environment else {}
+    agree_everywhere(tmp_path, 400, environment | others)
+
+
+def tampered(found):
+    """What a certificate might claim beyond what it proves, and numbers that are none."""
+    k, turn = len(found.positions), random_rotation(np.random.default_rng(0))
+    yield "upper", {"upper": 0.99 * found.upper}
+    yield "lower", {"lower": 1.01 * found.lower}
+    yield "all open", {"lower": math.inf, "upper": math.inf, "forces": None}
+    yield "upside down", {"lower": found.upper, "upper": found.lower}
+    yield "negative", {"lower": -1.0, "twist": None}
+    yield "negative upper", {"lower": 0.0, "twist": None, "upper": -found.upper}
+    yield "beyond all", {"upper": 2e3}
+    yield "no forces", {"forces": None}
+    yield "no twist", {"twist": None}
+    yield "long normals", {"normals": 1.05 * found.normals}
+    yield "other normals", {"normals": found.normals @ turn}
+    yield "other positions", {"positions": found.positions[::-1]}
+    yield "pulls", {"forces": -found.forces}
+    yield "other way", {"twist": -found.twist}
+    yield "nothing", {"twist": np.zeros(6)}
+    for name in ("lower", "upper"):
+        yield f"{name} is no number", {name: math.nan}
+    for name, shape in (("positions", (k, 3)), ("normals", (k, 3)), ("forces", (k, 3)),
+                        ("twist", (6,))):  # fmt: skip
+        for value in (math.nan, math.inf, 1e300):
+            yield f"{name} {value}", {name: np.full(shape, value)}
+        for other in ((), (0,), (0, 3), (k + 1, 3), (k, 4), (3, k), (k, 3, 1), (5,)):
+            yield f"{name} {other}", {name: np.ones(other)}
+
+
+def test_what_is_tampered_with_does_not_verify():
+    rng, refused = np.random.default_rng(28), 0
+    for count in (4, 4, 5, 6):
+        found = gc.critical_friction_interval(*random_contacts(rng, count))
+        assert 1e-3 < found.lower < found.upper < math.inf
+        assert found.verify()
+        for what, change in tampered(found):
+            assert dataclasses.replace(found, **change).verify() is False, what
+            refused += 1
+    assert refused == 4 * (17 + 4 * 11)
+
+
+def test_an_interval_is_read_only():
+    found = gc.critical_friction_interval(TETRA_CENTERS, TETRA_NORMALS)
+    assert not any(
+        array.flags.writeable for array in (found.positions, found.normals, found.forces)
+    )
+    assert found.twist is None
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        found.upper = 0.0
+
+
+def test_a_critical_friction_of_a_few_ten_millionths_is_zero():
+    """Pairs of sides of a prism that face each other but for rounding in a file."""
+    one, two = 0.0230865515768528, 0.004592202603816986
+    a, b = 0.9807853206537729, 0.19509011966287754
+    positions = np.array([
+        [-one, -two, 0.012817831020598976], [-two, -one, -0.000493248572818749],
+        [two, one, 0.00031023244767062347], [one, two, 0.012817831020598972],
+    ])  # fmt: skip
+    normals = np.array([[-a, -b, 0.0], [-b, -a, 0.0], [b, a, 0.0], [a, b, 0.0]])
+    found = gc.critical_friction_interval(positions, normals)
+    assert found.verify()
+    assert found.critical_friction == gc.critical_friction(positions, normals) == 0.0

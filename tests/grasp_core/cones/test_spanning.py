@@ -1,0 +1,159 @@
+import math
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.cones.spanning import (
+    LARGEST_SPAN_ANGLE,
+    count_spanning,
+    positively_span,
+    spanning_quadruples,
+)
+from scenes.example_objects import example_object
+from tests.judges import TETRA_NORMALS, picks_positively_span, random_rotation
+
+
+def test_the_regular_tetrahedron_has_the_largest_span_angle():
+    assert gc.span_angle(TETRA_NORMALS) == pytest.approx(math.asin(1 / 3), abs=1e-12)
+    assert math.asin(1 / 3) == LARGEST_SPAN_ANGLE
+
+
+def test_the_corner_tetrahedron_has_its_closed_form():
+    corner = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], -np.ones(3) / math.sqrt(3.0)])
+    expected = math.asin(1.0 / math.sqrt(9.0 + 4.0 * math.sqrt(3.0)))
+    assert gc.span_angle(corner) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(("phi_deg", "expected_deg"), [(45.0, 18.434949), (60.0, 19.106605)])
+def test_a_one_parameter_family_matches_its_formula(phi_deg, expected_deg):
+    c, s = math.cos(math.radians(phi_deg)), math.sin(math.radians(phi_deg))
+    normals = np.array([[c, s, 0], [c, -s, 0], [-c, 0, s], [-c, 0, -s]])
+    assert math.degrees(gc.span_angle(normals)) == pytest.approx(expected_deg, abs=1e-6)
+    formula = s * c / math.sqrt(s * s + 4 * c * c)
+    assert math.sin(gc.span_angle(normals)) == pytest.approx(formula, abs=1e-12)
+
+
+PLATONIC = {
+    "tetrahedron": {19.4712: 1},
+    "octahedron": {19.4712: 2},
+    "dodecahedron": {10.8123: 30},
+    "icosahedron": {19.4712: 10, 10.8123: 80, 5.4547: 330},
+}
+
+
+@pytest.mark.parametrize("name", PLATONIC)
+def test_platonic_solids_have_the_known_counts(name):
+    found = spanning_quadruples(example_object(name).normals, math.radians(0.1))
+    angles, counts = np.unique(np.degrees(found.span_angles).round(4), return_counts=True)
+    assert dict(zip(angles.tolist(), counts.tolist(), strict=True)) == PLATONIC[name]
+
+
+@pytest.mark.parametrize("name", ["box", "prism", "hex-nut", "l-bracket", "cross"])
+def test_boxes_prisms_and_extrusions_never_span(name):
+    assert not len(spanning_quadruples(example_object(name).normals, 1e-6).indices)
+
+
+def test_the_enumeration_lists_exactly_the_quadruples_that_span():
+    """Against the scalar function on every quadruple of three objects."""
+    from itertools import combinations
+
+    tested = 0
+    for name in ("random-14-1", "random-11-2", "chamfered-box"):
+        normals = example_object(name).normals
+        least = math.radians(1.0)
+        found = spanning_quadruples(normals, least)
+        expected = {}
+        for faces in combinations(range(len(normals)), 4):
+            angle = gc.span_angle(normals[list(faces)])
+            tested += 1
+            if angle > least:
+                expected[faces] = angle
+        assert [tuple(row) for row in found.indices.tolist()] == sorted(expected)
+        np.testing.assert_allclose(
+            found.span_angles, [expected[k] for k in sorted(expected)], atol=1e-12
+        )
+    assert tested > 2000
+
+
+def test_the_span_angle_agrees_with_definition_3_on_ten_thousand_face_quadruples():
+    """Pyramids inscribed just below the angle span; those around it just above do not.
+
+    For pyramids Definition 3 is decided exactly by their edges. The second ones contain
+    the circular cones of 1.001 theta*, because tan grows by 1 / cos(pi / sides).
+    """
+    sides, tested = 12, 0
+    for seed in range(1, 6):
+        normals = example_object(f"random-30-{seed}").normals
+        found = spanning_quadruples(normals, math.radians(0.5))
+        for start in range(0, len(found.indices), 500):
+            rows = found.indices[start : start + 500]
+            axes, angles = normals[rows], found.span_angles[start : start + 500]
+            assert picks_positively_span(axes, 0.999 * angles, sides).all()
+            around = np.arctan(np.tan(1.001 * angles) / math.cos(math.pi / sides))
+            assert not picks_positively_span(axes, around, sides).any()
+            tested += len(rows)
+    assert tested >= 10_000
+
+
+def test_random_picks_below_the_angle_always_span():
+    """Arbitrary directions inside the circular cones, not only edges."""
+    rng = np.random.default_rng(3)
+    normals = example_object("random-20-7").normals
+    found = spanning_quadruples(normals, math.radians(2.0))
+    tested = 0
+    for faces, angle in zip(found.indices[::4], found.span_angles[::4], strict=True):
+        for _ in range(20):
+            tilt = 0.999 * angle * np.sqrt(rng.uniform(size=4))
+            picks = np.array(
+                [_tilted(rng, n, t) for n, t in zip(normals[faces], tilt, strict=True)]
+            )
+            assert positively_span(picks)
+            tested += 1
+    assert tested >= 1000
+
+
+def test_cones_of_unequal_angles_generalise_the_span_angle():
+    angles = [0.99 * LARGEST_SPAN_ANGLE] * 4
+    assert gc.cones_positively_span(TETRA_NORMALS, angles)
+    assert not gc.cones_positively_span(TETRA_NORMALS, [*angles[:3], 1.5 * LARGEST_SPAN_ANGLE])
+    assert gc.cones_positively_span(TETRA_NORMALS, [*np.zeros(3), 1.5 * LARGEST_SPAN_ANGLE])
+    assert not gc.cones_positively_span(TETRA_NORMALS[[0, 0, 1, 2]], np.zeros(4))
+
+
+@pytest.mark.parametrize("angle", [-0.2, 2.9, math.nan])
+def test_angles_that_are_no_half_angles_are_refused(angle):
+    with pytest.raises(gc.InputError, match="half_angles"):
+        gc.cones_positively_span(TETRA_NORMALS, [0.1, 0.1, 0.1, angle])
+
+
+def test_the_span_angle_does_not_depend_on_frame_or_order():
+    rng = np.random.default_rng(5)
+    normals = example_object("random-12-1").normals
+    found = spanning_quadruples(normals, math.radians(1.0))
+    assert len(found.indices) > 50
+    for faces, angle in zip(found.indices, found.span_angles, strict=True):
+        turned = normals[rng.permutation(faces)] @ random_rotation(rng).T
+        assert gc.span_angle(turned) == pytest.approx(angle, abs=1e-12)
+
+
+def test_directions_in_a_half_space_do_not_span():
+    assert gc.span_angle(np.eye(3)[[0, 1, 2, 0]]) == 0.0
+    upward = np.array([[1.0, 0, 1], [-1, 0, 1], [0, 1, 1], [0, -1, 1]]) / math.sqrt(2.0)
+    assert gc.span_angle(upward) == 0.0
+
+
+def _tilted(rng, axis, tilt):
+    across = np.cross(axis, rng.normal(size=3))
+    across /= np.linalg.norm(across)
+    return math.cos(tilt) * axis + math.sin(tilt) * across
+
+
+@pytest.mark.parametrize("name", ["dodecahedron", "prism", "random-40-1"])
+def test_spanning_quadruples_are_counted_without_being_listed(without_kernels, name):
+    normals, least = example_object(name).normals, math.radians(0.5)
+    listed = len(spanning_quadruples(normals, least).indices)
+    assert count_spanning(normals, least) == listed
+    without_kernels()
+    assert count_spanning(normals, least) == listed
+    assert bool(listed) == (name != "prism")

@@ -1,0 +1,122 @@
+import math
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.cones.spanning import cones_positively_span, span_angle, span_sines
+from grasp_core.cones.tilting import tilted_cones, toward, widened
+from grasp_core.families.concurrent import BEFORE, BEHIND, cone_footprint, place_on_sides
+from grasp_core.families.placements import NoPlacement, Placement
+from grasp_core.objects.face_pieces import unit_pieces
+from grasp_core.values import ForceCone
+from scenes.example_objects import example_object
+from tests.judges import random_rotation
+
+
+def quadruples(name):
+    normals = example_object(name).normals
+    return normals[np.array(list(combinations(range(len(normals)), 4)))]
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.5, 0.8])
+def test_cones_lie_inside_the_friction_cones_and_positively_span(friction):
+    theta, tested = math.atan(friction), 0
+    for name in ("box", "prism", "wedge", "random-10-1"):
+        normals = quadruples(name)
+        found = tilted_cones(normals, np.full((len(normals), 4), theta))
+        for units, axes, psi in zip(normals, found.axes, found.half_angles, strict=True):
+            if psi <= 1e-3:
+                continue
+            leaning = np.arccos(np.clip(np.einsum("ki,ki->k", axes, units), -1.0, 1.0))
+            assert (leaning + psi <= theta + 1e-7).all()
+            assert cones_positively_span(axes, [0.999 * psi] * 4)
+            tested += 1
+    assert tested >= 100
+
+
+def test_the_sides_of_a_box_get_nearly_the_widest_cones_there_are():
+    """Friction 0.5, tilts of 14.036 degrees: psi is 12.529 degrees by the closed form."""
+    normals = np.array([[[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]])
+    found = tilted_cones(normals, np.full((1, 4), math.atan(0.5)))
+    assert 11.5 < math.degrees(found.half_angles[0]) <= 12.53
+
+
+def test_normals_that_span_as_widely_as_any_are_kept():
+    units = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / math.sqrt(3.0)
+    found = tilted_cones(units[None], np.full((1, 4), math.atan(0.8)))
+    assert math.degrees(found.half_angles[0]) == pytest.approx(19.4712, abs=0.01)
+
+
+def test_turned_normals_get_turned_cones():
+    rng = np.random.default_rng(5)
+    for name in ("box", "octahedron", "wedge"):
+        normals, R = quadruples(name), random_rotation(rng)
+        thetas = np.full((len(normals), 4), 0.3)
+        here, there = tilted_cones(normals, thetas), tilted_cones(normals @ R.T, thetas)
+        np.testing.assert_allclose(there.half_angles, here.half_angles, atol=1e-6)
+        np.testing.assert_allclose(there.axes, here.axes @ R.T, atol=1e-6)
+
+
+def test_span_sines_are_those_of_single_quadruples():
+    normals = quadruples("random-10-1")
+    expected = [math.sin(span_angle(units)) for units in normals]
+    np.testing.assert_allclose(np.maximum(span_sines(normals), 0.0), expected, atol=1e-12)
+
+
+def test_a_bore_is_held_from_inside_with_the_focus_behind_the_fingers():
+    """Four faces of a nut's bore: any contacts in the footprints are in force closure."""
+    pieces = [p for p in unit_pieces(example_object("hex-nut"))
+              if p.normal @ p.origin > 0.0 and abs(p.normal[2]) < 0.5]  # fmt: skip
+    assert len(pieces) == 16
+    chosen, friction = pieces[::4], 0.5
+    normals = np.array([piece.normal for piece in chosen])
+    sides = normals[np.argsort(np.arctan2(normals[:, 1], normals[:, 0]))][[0, 2, 1, 3]]
+    chosen = [next(p for p in chosen if np.array_equal(p.normal, n)) for n in sides]
+    tilt = math.radians(14.036)
+    up = np.array([0.0, 0, 1.0])
+    axes = [math.cos(tilt) * n + s * math.sin(tilt) * up
+            for n, s in zip(sides, (1, 1, -1, -1), strict=True)]  # fmt: skip
+    found = widened(np.array([axes]), sides[None], np.full((1, 4), math.atan(friction)))
+    cones = [ForceCone(axis, 0.99 * float(found.half_angles[0])) for axis in found.axes[0]]
+    assert isinstance(place_on_sides(chosen, cones, BEFORE, least=1e-3), NoPlacement)
+    placed = place_on_sides(chosen, cones, BEHIND, least=1e-3)
+    assert isinstance(placed, Placement)
+    regions = [cone_footprint(p, c, placed.foci[0], at)
+               for p, c, at in zip(chosen, cones, placed.positions, strict=True)]  # fmt: skip
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        points = [rng.dirichlet(np.full(len(r), 0.3)) @ r for r in regions]
+        assert gc.force_closure(points, sides, friction).closed
+
+
+def test_axes_lean_the_same_way_where_the_point_is_in_a_face_but_for_rounding():
+    normals = quadruples("l-bracket")[:40]
+    rng = np.random.default_rng(3)
+    positions, thetas = rng.normal(size=normals.shape), np.full(normals.shape[:2], math.atan(0.5))
+    ahead = rng.normal(size=(len(normals), 3))
+    ahead -= np.einsum("qi,qi->q", ahead, normals[:, 0])[:, None] * normals[:, 0]
+    points = positions[:, 0] + ahead
+    above, below = (
+        toward(points + side * 1e-9 * normals[:, 0], positions, normals, thetas)
+        for side in (1.0, -1.0)
+    )
+    assert (above.half_angles > 0.0).sum() >= 20
+    np.testing.assert_allclose(above.half_angles, below.half_angles, atol=1e-6)
+    np.testing.assert_allclose(above.axes, below.axes, atol=1e-5)
+
+
+def test_compiled_cones_are_those_of_the_arrays(without_kernels):
+    rng = np.random.default_rng(3)
+    normals = rng.normal(size=(600, 4, 3))
+    normals[:200, :, 2] *= 0.05  # nearly in a plane, as the sides of a box
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    thetas = rng.uniform(0.1, 0.7, size=(600, 4))
+    quick = tilted_cones(normals, thetas)
+    without_kernels()
+    slow = tilted_cones(normals, thetas)
+    np.testing.assert_allclose(quick.half_angles, slow.half_angles, atol=1e-12)
+    np.testing.assert_allclose(quick.axes, slow.axes, atol=1e-10)
+    assert (slow.half_angles > 0.01).sum() >= 300
+    assert (slow.half_angles < 0.0).sum() >= 20

@@ -1,0 +1,166 @@
+import math
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.cones.spanning import balancing_weights, spanning_quadruples
+from grasp_core.families.concurrent import (
+    concurrent_radius_bounds,
+    cone_footprint,
+    inscribed_facets,
+    place_concurrent,
+)
+from grasp_core.families.placements import NoPlacement, Placement
+from grasp_core.objects.face_pieces import unit_pieces
+from grasp_core.values import ForceCone
+from scenes.example_objects import example_object
+from tests.grasp_core.quadruples import tilted_side_cones
+
+TOLERANCE = 1e-7
+"""Ten times the residual at which a program's answer is accepted, in object radii."""
+
+
+def placements(name, theta, limit):
+    """Placements on the spanning quadruples of a convex object, at most `limit`."""
+    body = example_object(name)
+    pieces = unit_pieces(body)
+    found = spanning_quadruples(body.normals, theta)
+    for faces in found.indices[:limit]:
+        quad = [pieces[face] for face in faces]
+        cones = [ForceCone(piece.normal, theta) for piece in quad]
+        yield quad, cones, place_concurrent(quad, cones, least=1e-4)
+
+
+@pytest.mark.parametrize("theta_deg", [5.0, 10.0, 15.0])
+def test_the_tetrahedron_has_four_equal_discs_about_its_centres(theta_deg):
+    """r = rho0 tan(theta) cos(pi / 16), with rho0 = 1/3 of the radius."""
+    theta = math.radians(theta_deg)
+    (quad, _, placed), = placements("tetrahedron", theta, 1)  # fmt: skip
+    expected = math.tan(theta) * math.cos(math.pi / 16) / 3.0
+    assert isinstance(placed, Placement)
+    np.testing.assert_allclose(placed.radii, expected, atol=TOLERANCE)
+    np.testing.assert_allclose(placed.foci[0], 0.0, atol=TOLERANCE)
+    centers = [-piece.normal / 3.0 for piece in quad]
+    np.testing.assert_allclose(placed.positions, centers, atol=TOLERANCE)
+
+
+def test_discs_lie_in_their_faces_and_see_the_focus_within_the_cone():
+    tested = 0
+    for name in ("random-20-7", "icosahedron", "random-12-1"):
+        for quad, cones, placed in placements(name, math.radians(8.0), 150):
+            if isinstance(placed, NoPlacement):
+                continue
+            for piece, cone, center, radius in zip(
+                quad, cones, placed.positions, placed.radii, strict=True
+            ):
+                turns = np.linspace(0, 2 * np.pi, 40)
+                ring = np.column_stack([np.cos(turns), np.sin(turns)]) @ piece.frame.T
+                points = center + radius * ring
+                flat = (points - piece.origin) @ piece.frame
+                assert (flat @ piece.E.T <= piece.b + TOLERANCE).all()
+                lines = placed.foci[0] - points
+                angles = np.arccos(lines @ cone.axis / np.linalg.norm(lines, axis=1))
+                assert angles.max() <= cone.half_angle + 1e-6
+            tested += 1
+    assert tested >= 100
+
+
+def test_contacts_anywhere_in_the_discs_are_in_force_closure():
+    """The independent regions of section 3.1, by the exact circular cones at a slightly larger
+    friction, since contacts on the borders may use the very edge of the force cones.
+    """
+    rng = np.random.default_rng(0)
+    theta, tested = math.radians(9.0), 0
+    for name in ("random-20-7", "icosahedron", "random-30-2"):
+        for quad, _, placed in placements(name, theta, 60):
+            if isinstance(placed, NoPlacement):
+                continue
+            for _ in range(4):
+                turns = rng.uniform(0, 2 * np.pi, 4)
+                reach = placed.radii * np.array(rng.choice([1.0, 1.0, 0.5], 4))
+                points = [
+                    center + length * piece.frame @ [math.cos(turn), math.sin(turn)]
+                    for piece, center, length, turn in zip(
+                        quad, placed.positions, reach, turns, strict=True
+                    )
+                ]
+                normals = [piece.normal for piece in quad]
+                assert gc.force_closure(points, normals, math.tan(theta) + 1e-5).closed
+                tested += 1
+    assert tested >= 200
+
+
+def test_contacts_at_the_corners_of_the_footprints_are_in_force_closure():
+    theta, tested = math.radians(9.0), 0
+    for quad, cones, placed in placements("random-20-7", theta, 40):
+        if isinstance(placed, NoPlacement):
+            continue
+        regions = [
+            cone_footprint(piece, cone, placed.foci[0], at)
+            for piece, cone, at in zip(quad, cones, placed.positions, strict=True)
+        ]
+        for k in range(6):
+            points = [region[k % len(region)] for region in regions]
+            normals = [piece.normal for piece in quad]
+            assert gc.force_closure(points, normals, math.tan(theta) + 1e-5).closed
+            tested += 1
+    assert tested >= 60
+
+
+def test_no_placement_is_larger_than_its_bound_and_refusals_are_bounded():
+    tested = 0
+    for quad, cones, placed in placements("random-20-7", math.radians(6.0), 200):
+        if isinstance(placed, NoPlacement):
+            assert placed.bound < 1e-4
+            continue
+        weights = balancing_weights(np.array([piece.normal for piece in quad]))
+        depth = -sum(w * (p.normal @ p.origin) for w, p in zip(weights, quad, strict=True))
+        half_angle, no_widths = np.array([cones[0].half_angle]), np.full((1, 4, 4), np.inf)
+        bound = concurrent_radius_bounds(np.array([depth]), no_widths, half_angle)
+        assert placed.merit <= bound.item() + TOLERANCE
+        assert placed.merit <= min(piece.inradius for piece in quad) + TOLERANCE
+        tested += 1
+    assert tested >= 50
+
+
+def test_tilted_cones_hold_a_box_by_its_four_sides():
+    """Known optimum for half-size 1, friction 0.5: tilt 14.036, half-angle 12.529 degrees give
+    discs of 0.2284 with 32-sided pyramids; 16 sides give a little less.
+    """
+    box = gc.Polyhedron.from_mesh(*cube_mesh())
+    pieces = [p for p in unit_pieces(box) if abs(p.normal[2]) < 0.5]
+    tilt, half_angle = math.radians(14.036), math.radians(12.529)
+    cones = tilted_side_cones(pieces, tilt, half_angle)
+    assert gc.cones_positively_span([c.axis for c in cones], [half_angle - 1e-4] * 4)
+    placed = place_concurrent(pieces, cones, least=1e-4)
+    assert isinstance(placed, Placement)
+    assert 0.98 * 0.2284 < placed.merit * box.radius < 0.2290
+    rng = np.random.default_rng(4)
+    for turns in rng.uniform(0, 2 * np.pi, (20, 4)):
+        points = [
+            box.radius * (center + radius * piece.frame @ [math.cos(turn), math.sin(turn)])
+            for piece, center, radius, turn in zip(
+                pieces, placed.positions, placed.radii, turns, strict=True
+            )
+        ]
+        assert gc.force_closure(points, [p.normal for p in pieces], 0.5 + 1e-5).closed
+
+
+def test_facets_lie_inside_the_circular_cone():
+    cone = ForceCone(np.array([0.0, 0.6, 0.8]), math.radians(20.0))
+    G = inscribed_facets(cone, np.array([1.0, 0.2, 0.1]))
+    assert (G @ cone.axis > 0).all()
+    for one, two in zip(G, np.roll(G, -1, axis=0), strict=True):
+        edge = np.cross(one, two)
+        edge *= np.sign(edge @ cone.axis) / np.linalg.norm(edge)
+        assert math.acos(edge @ cone.axis) == pytest.approx(cone.half_angle, abs=1e-12)
+        assert (G @ edge >= -1e-12).all()
+
+
+def cube_mesh():
+    corners = np.array([[x, y, z] for x in (-1.0, 1) for y in (-1.0, 1) for z in (-1.0, 1)])
+    from grasp_core.objects.booleans import hull
+
+    solid = hull(corners)
+    return solid.vertices, solid.triangles

@@ -1,0 +1,310 @@
+"""The pencil and regulus programs as the paper prints them, and the contacts that refute them.
+
+Both read simpler than the constructions in `grasp_core`. The printed pencil program lets the
+foci pass each other, so its discs hold contacts out of equilibrium; the printed regulus program
+lacks the pitch equation, so its lines are independent. These tests keep anyone from simplifying
+the constructions back.
+"""
+
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.closure.lines import plucker_vectors
+from grasp_core.cones.spanning import balancing_weights
+from grasp_core.families.pencil import CELL_A, place_pencil
+from grasp_core.families.placements import Placement
+from grasp_core.families.regulus import LEAST_DEPTH, place_regulus
+from sim_validate.validation.paper_as_printed import (
+    LEAST,
+    PAIR,
+    Discs,
+    focus_gap,
+    focus_line,
+    printed_pencil,
+    printed_regulus,
+    unit,
+)
+from tests.grasp_core.quadruples import paired_quadruples
+
+TOLERANCE = 1e-7
+"""Ten times the residual at which a program's answer is accepted, in object radii."""
+BORDER = 1e-6
+"""Friction above that of the force cones: contacts on the borders use their very edge."""
+DEPENDENT = 1e-12
+"""Singular values below this are rounding: some thousand rounding errors at unit size."""
+
+
+def push(normals):
+    """w: what pair 1 contributes to a combination of the normals that vanishes."""
+    return balancing_weights(normals)[:2] @ normals[:2]
+
+
+def in_a_safe_cell(quad, discs):
+    """Whether the foci are in one of the two orders that have a proof."""
+    gap = focus_gap(quad, discs.foci)
+    u = unit(push(np.array([piece.normal for piece in quad])))
+    reach = [
+        p.normal @ (discs.foci[i] - p.origin) * (p.normal @ u) * (1.0 - 2.0 * i)
+        - r * np.linalg.norm(p.frame.T @ u)
+        for i, p, r in zip(PAIR, quad, discs.radii, strict=True)
+    ]
+    return gap >= -TOLERANCE or -gap <= min(reach) + TOLERANCE
+
+
+def closure_margin(quad, discs, turns, friction):
+    """Closure margin of contacts at these angles on the borders; 0 where it is undecided."""
+    border = [p.frame @ [math.cos(t), math.sin(t)] for p, t in zip(quad, turns, strict=True)]
+    points = discs.centers + discs.radii[:, None] * np.array(border)
+    try:
+        return gc.force_closure(points, [p.normal for p in quad], friction).margin
+    except gc.UndecidedError:
+        return 0.0
+
+
+def extremes(quad):
+    """Border angles along the pair-plane normals, then along the focus line."""
+    N, u = focus_line(quad)
+    for along in ([N[i] for i in PAIR], [u] * 4):
+        flat = [p.frame.T @ direction for p, direction in zip(quad, along, strict=True)]
+        angles = np.arctan2([y for _, y in flat], [x for x, _ in flat])
+        yield from angles + math.pi * np.array(list(product((0, 1), repeat=4)))
+
+
+def adversarial_margin(quad, discs, friction):
+    """Coordinate descent of the margin over the four border angles, until it is negative."""
+
+    def margin(turns):
+        return closure_margin(quad, discs, turns, friction)
+
+    best, turns = min(((margin(row), row) for row in extremes(quad)), key=lambda pair: pair[0])
+    step = 0.8
+    while step > 0.1 and best >= 0.0:
+        moves = [turns + step * move for move in np.vstack([np.eye(4), -np.eye(4)])]
+        lowest, where = min(((margin(row), row) for row in moves), key=lambda pair: pair[0])
+        if lowest < best:
+            best, turns = lowest, where
+        else:
+            step *= 0.5
+    return best
+
+
+@pytest.mark.parametrize(
+    ("theta_deg", "printed"), [(5.0, 0.071225), (10.0, 0.134850), (15.0, 0.192237)]
+)
+def test_on_the_tetrahedron_the_printed_pencil_program_prefers_the_wrong_order(theta_deg, printed):
+    """The proved radius is rho0 tan(theta / 2), with rho0 = 1 / sqrt(3) for vertices at distance
+    sqrt(3); the printed program gains almost three times that by crossing the foci over.
+    """
+    theta, scale = math.radians(theta_deg), math.sqrt(3.0)
+    pairings = list(paired_quadruples("tetrahedron", theta))
+    assert len(pairings) == 3
+    for quad, cones in pairings:
+        discs = printed_pencil(quad, theta)
+        assert scale * discs.radii[0] == pytest.approx(printed, abs=1e-6)
+        assert focus_gap(quad, discs.foci) < -1.0
+        assert not in_a_safe_cell(quad, discs)
+        proved = place_pencil(quad, cones, least=LEAST, least_gap=0.0, cells=(CELL_A,))
+        assert isinstance(proved, Placement)
+        assert scale * proved.merit == pytest.approx(math.tan(theta / 2.0) / scale, abs=TOLERANCE)
+
+
+COUNTEREXAMPLE_THETA = math.radians(5.0)
+COUNTEREXAMPLE_RADIUS = math.tan(COUNTEREXAMPLE_THETA / 2.0)
+
+
+def counterexample(order):
+    """Four faces at depth 1 below their foci, c_1 = order * c * e_x = -c_2, as large as you like.
+
+    Returns:
+        Normals (4, 3), N per face (4, 3), foci (2, 3) and disc centres (4, 3).
+    """
+    c = s = math.sqrt(0.5)
+    y, z = math.cos(math.radians(16.0)), math.sin(math.radians(16.0))
+    n = np.array([(c, s, 0.0), (c, -s, 0.0), (-c, s * y, s * z), (-c, -s * y, -s * z)])
+    N = np.array([(0.0, 0.0, 1.0)] * 2 + [(0.0, -z, y)] * 2)
+    foci = np.array([(order * c, 0.0, 0.0), (-order * c, 0.0, 0.0)])
+    return n, N, foci, foci[list(PAIR)] - n
+
+
+def corner_choices(N, centers):
+    """The 16 choices of contacts at a distance r along +-N_i."""
+    for signs in product((1.0, -1.0), repeat=4):
+        yield centers + COUNTEREXAMPLE_RADIUS * np.array(signs)[:, None] * N
+
+
+def test_the_counterexample_meets_all_that_the_paper_asks_of_a_pencil():
+    """P3; the foci on a line parallel to both pair planes; discs about their projections; and
+    a ball of radius R = r about each in the friction cone of every point of its discs.
+    """
+    r = COUNTEREXAMPLE_RADIUS
+    n, N, foci, centers = counterexample(+1.0)
+    assert math.degrees(gc.span_angle(n)) == pytest.approx(5.53996, abs=1e-5)
+    u = unit(np.cross(N[0], N[2]))
+    assert np.abs(np.cross(foci[0] - foci[1], u)).max() < 1e-12
+    rng = np.random.default_rng(0)
+    steepest = []
+    for i, normal, center in zip(PAIR, n, centers, strict=True):
+        sphere = rng.normal(size=(2000, 3))
+        ball = foci[i] + r * sphere / np.linalg.norm(sphere, axis=1, keepdims=True)
+        flat = sphere - np.outer(sphere @ normal, normal)
+        # The border point on the far side of the axis sees a point of the ball steepest.
+        border = center - r * flat / np.linalg.norm(flat, axis=1, keepdims=True)
+        lines = ball - border
+        angles = np.arccos(lines @ normal / np.linalg.norm(lines, axis=1))
+        steepest.append(angles.max())
+    assert max(steepest) <= COUNTEREXAMPLE_THETA + 1e-12
+    assert min(steepest) > 0.99 * COUNTEREXAMPLE_THETA
+
+
+def test_contacts_in_the_discs_of_the_counterexample_cannot_balance():
+    """The lines L_i cross the focus line at one abscissa, where they pass at different heights:
+    the line that joins the crossings never comes near the foci on either side.
+    """
+    n, N, foci, centers = counterexample(+1.0)
+    contacts = np.array(
+        [
+            (0.0, -0.707107, 0.043661),
+            (0.0, 0.707107, 0.043661),
+            (0.0, -0.667680, -0.236875),
+            (0.0, 0.691749, 0.152935),
+        ]
+    )
+    known = min(np.abs(choice - contacts).max() for choice in corner_choices(N, centers))
+    assert known < 1e-6
+    assert np.abs(contacts[:, 0]).max() < TOLERANCE
+    assert foci[0] @ push(n) > 0.0 > foci[1] @ push(n)
+
+    friction = math.tan(COUNTEREXAMPLE_THETA)
+    verdict = gc.force_closure(contacts, n, friction)
+    assert not verdict.closed
+    assert verdict.verify()
+    assert verdict.margin == pytest.approx(-0.0338, abs=1e-4)
+    assert gc.critical_friction(contacts, n) == pytest.approx(0.230244, abs=2e-6)
+    assert gc.force_closure(centers, n, friction).closed
+
+
+def test_swapping_the_foci_of_the_counterexample_closes_every_corner_choice():
+    friction = math.tan(COUNTEREXAMPLE_THETA)
+    lost = {}
+    for order in (+1.0, -1.0):
+        n, N, _, centers = counterexample(order)
+        verdicts = [gc.force_closure(x, n, friction) for x in corner_choices(N, centers)]
+        lost[order] = sum(not verdict.closed for verdict in verdicts)
+        worst = min(verdict.margin for verdict in verdicts)
+    assert lost == {+1.0: 10, -1.0: 0}
+    assert worst == pytest.approx(0.01097, abs=1e-5)
+
+
+def test_an_adversary_breaks_printed_pencils_but_no_corrected_one():
+    """At the centres of all discs the forces along the normals balance, and nearly all random
+    contacts are closed too: only a search over the borders shows what the printed program does.
+    """
+    theta = math.radians(5.0)
+    friction = math.tan(theta) + BORDER
+    printed, broken, corrected = 0, 0, 0
+    for quad, cones in paired_quadruples("random-16-1", theta, 30):
+        discs = printed_pencil(quad, theta)
+        if discs is not None and not in_a_safe_cell(quad, discs):
+            printed += 1
+            broken += adversarial_margin(quad, discs, friction) < -TOLERANCE
+        placed = place_pencil(quad, cones, least=LEAST, least_gap=LEAST)
+        if isinstance(placed, Placement):
+            discs = Discs(placed.positions, placed.radii, placed.foci)
+            assert in_a_safe_cell(quad, discs)
+            assert adversarial_margin(quad, discs, friction) > 0.0
+            corrected += 1
+    assert printed >= 40
+    assert broken >= 2
+    assert corrected >= 60
+
+
+def fourth_singular_value(points, directions):
+    """Zero for dependent lines; points about their mean and of unit spread, unit directions."""
+    lengths = np.linalg.norm(directions, axis=1, keepdims=True)
+    arms = points - points.mean(axis=0)
+    lines = plucker_vectors(arms / np.linalg.norm(arms, axis=1).max(), directions / lengths)
+    return np.linalg.svd(lines, compute_uv=False)[3]
+
+
+def test_lines_of_the_printed_regulus_program_are_independent_and_often_open():
+    """Same quadruples, cones and least depth. The corrected program only adds the equal pitch, by
+    fixed slopes, and a least gap, so it cannot come nearer to the centres of the faces.
+    """
+    theta = math.radians(10.0)
+    friction = math.tan(theta)
+    printed, independent, unclosed, corrected = 0, 0, 0, 0
+    for name in ("random-16-1", "random-20-7", "random-30-1"):
+        for quad, cones in paired_quadruples(name, theta, 160):
+            normals = [piece.normal for piece in quad]
+            loose = printed_regulus(quad, cones, LEAST_DEPTH)
+            if loose is None:
+                continue
+            printed += 1
+            independent += fourth_singular_value(loose.positions, loose.forces) > 10 * TOLERANCE
+            unclosed += not gc.force_closure(loose.positions, normals, friction).closed
+            placed = place_regulus(quad, cones)
+            if isinstance(placed, Placement):
+                assert -placed.merit >= loose.offset - TOLERANCE
+                assert fourth_singular_value(placed.positions, placed.forces) < TOLERANCE
+                assert gc.force_closure(placed.positions, normals, friction).closed
+                corrected += 1
+    assert printed >= 80
+    assert independent >= 0.98 * printed
+    assert unclosed >= 0.3 * printed
+    assert corrected >= 80
+
+
+def test_without_a_least_depth_the_printed_regulus_program_accepts_the_zero_force():
+    """Zero lies in every friction cone. The two forces of a pair then vanish together, the other
+    two cannot balance, and the program calls that a grasp.
+    """
+    theta, vanishing = math.radians(10.0), 0
+    for quad, cones in paired_quadruples("random-16-1", theta):
+        found = printed_regulus(quad, cones, 0.0)
+        if found is None:
+            continue
+        lengths = np.linalg.norm(found.forces, axis=1)
+        if lengths.min() < TOLERANCE:
+            assert (lengths < TOLERANCE).sum() == 2
+            assert printed_regulus(quad, cones, LEAST_DEPTH) is None
+            normals = [piece.normal for piece in quad]
+            assert not gc.force_closure(found.positions, normals, math.tan(theta)).closed
+            assert not isinstance(place_regulus(quad, cones), Placement)
+            vanishing += 1
+    assert vanishing >= 1
+
+
+def regulus_lines(rng):
+    """Random parameters of section 3.3: u, (v_i, n_i), c_i, l_i and (x_i, y_i, z_i)."""
+    frame = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    u, turns = frame[0], rng.uniform(0.0, 2.0 * np.pi, 2)
+    n = [math.cos(turn) * frame[1] + math.sin(turn) * frame[2] for turn in turns]
+    x0, k = rng.normal(size=3), rng.normal()
+    return u, n, [x0 + k * u, x0 - k * u], rng.normal(size=2), rng.normal(size=(2, 3))
+
+
+def assembled(u, n, c, lengths, xyz):
+    points, forces = [], []
+    for i, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
+        x, y, z = xyz[i]
+        points.append(c[i] + sign * lengths[i] * n[i])
+        forces.append(x * u + sign * (y * np.cross(n[i], u) + z * n[i]))
+    return np.array(points), np.array(forces)
+
+
+def test_only_equal_pitch_makes_the_four_lines_dependent():
+    """The paper: "clearly linearly dependent". They are with l_2 = l_1 y_1 x_2 / (x_1 y_2)."""
+    rng, loose, pitched = np.random.default_rng(0), [], []
+    for _ in range(1000):
+        u, n, c, lengths, xyz = regulus_lines(rng)
+        loose.append(fourth_singular_value(*assembled(u, n, c, lengths, xyz)))
+        (x1, y1, _), (x2, y2, _) = xyz
+        equal = lengths[0] * np.array([1.0, y1 * x2 / (x1 * y2)])
+        pitched.append(fourth_singular_value(*assembled(u, n, c, equal, xyz)))
+    assert min(loose) > 10 * TOLERANCE
+    assert max(pitched) < DEPENDENT
+    assert len(loose) == len(pitched) == 1000

@@ -1,0 +1,194 @@
+import math
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.cones.spanning import balancing_weights
+from grasp_core.families.concurrent import place_concurrent
+from grasp_core.families.constructions import AS_LISTED
+from grasp_core.families.pencil import CELL_A, CELL_B, pencil_radius_bounds, place_pencil
+from grasp_core.families.placements import Placement
+from grasp_core.objects.face_pieces import unit_pieces
+from scenes.example_objects import example_object
+from tests.grasp_core.quadruples import paired_quadruples, tilted_side_cones
+
+TOLERANCE = 1e-7
+"""Ten times the residual at which a program's answer is accepted, in object radii."""
+BORDER = 1e-6
+"""Friction above that of the force cones: contacts on the borders use their very edge."""
+LEAST = 1e-3
+
+
+def pencils(name, theta, limit=None, cells=(CELL_A, CELL_B), gap=LEAST):
+    for quad, cones in paired_quadruples(name, theta, limit):
+        placed = place_pencil(quad, cones, least=LEAST, least_gap=gap, cells=cells)
+        if isinstance(placed, Placement):
+            yield quad, cones, placed
+
+
+@pytest.mark.parametrize(
+    ("theta_deg", "radius"), [(5.0, 0.0252077), (10.0, 0.0505116), (15.0, 0.0760096)]
+)
+def test_the_tetrahedron_has_discs_of_half_the_cone_angle_in_all_pairings(theta_deg, radius):
+    """r = rho0 tan(theta / 2) with rho0 = 1 / sqrt(3), for vertices at distance sqrt(3).
+
+    With the foci pushed together, that is; with the foci in the other order, but near enough
+    to each other, discs get larger.
+    """
+    theta = math.radians(theta_deg)
+    found = list(pencils("tetrahedron", theta, cells=(CELL_A,), gap=0.0))
+    assert len(found) == 3
+    for _, _, placed in found:
+        np.testing.assert_allclose(math.sqrt(3.0) * placed.radii, radius, atol=1e-6)
+    near = list(pencils("tetrahedron", theta, cells=(CELL_B,)))
+    assert len(near) == 3
+    for quad, _, placed in near:
+        assert math.sqrt(3.0) * placed.merit > 1.1 * radius
+        assert min(closure_margins(quad, placed, extremes(quad), math.tan(theta) + BORDER)) > 0.0
+
+
+@pytest.mark.parametrize(("theta_deg", "radius"), [(5.0, 0.059163), (10.0, 0.113774)])
+def test_the_double_wedge_bar_has_pencils_of_the_known_radius(theta_deg, radius):
+    """r = sqrt(2) t / (1 + t), t = tan(theta / 2), on the ends; no concurrent grasp there."""
+    theta, unit = math.radians(theta_deg), example_object("double-wedge-bar").radius / 0.02
+    best = max(pencils("double-wedge-bar", theta), key=lambda found: found[2].merit)
+    quad, cones, placed = best
+    assert unit * placed.merit == pytest.approx(radius, abs=1e-6)
+    assert not isinstance(place_concurrent(quad, cones, least=0.0), Placement)
+
+
+def test_every_elongated_quadruple_has_one_feasible_pairing():
+    """Nine quadruples span at ten degrees: the ends, and eight others with smaller discs."""
+    unit = example_object("double-wedge-bar").radius / 0.02
+    found = [unit * p.merit for _, _, p in pencils("double-wedge-bar", math.radians(10.0))]
+    np.testing.assert_allclose(sorted(found), [0.098915] * 8 + [0.113774], atol=1e-6)
+
+
+def test_lines_form_two_flat_pencils_with_foci_on_a_common_line():
+    tested = 0
+    for name in ("random-20-7", "dodecahedron", "double-wedge-bar"):
+        for quad, cones, placed in pencils(name, math.radians(8.0), 60):
+            assert gc.classify_lines(placed.positions, placed.forces) == "pencil"
+            c = placed.foci[[0, 0, 1, 1]]
+            for piece, cone, focus, at, force in zip(
+                quad, cones, c, placed.positions, placed.forces, strict=True
+            ):
+                line = focus - at
+                assert line @ cone.axis == pytest.approx(np.linalg.norm(line))
+                assert np.linalg.norm(np.cross(line, force)) < TOLERANCE
+                assert abs(piece.normal @ (at - piece.origin)) < TOLERANCE
+            np.testing.assert_allclose(placed.forces.sum(axis=0), 0.0, atol=TOLERANCE)
+            torque = np.cross(placed.positions, placed.forces).sum(axis=0)
+            np.testing.assert_allclose(torque, 0.0, atol=TOLERANCE)
+            tested += 1
+    assert tested >= 200
+
+
+def test_discs_lie_in_their_faces():
+    tested = 0
+    for quad, _, placed in pencils("random-20-7", math.radians(6.0), 60):
+        for piece, at, radius in zip(quad, placed.positions, placed.radii, strict=True):
+            flat = piece.frame.T @ (at - piece.origin)
+            assert (piece.E @ flat + radius <= piece.b + TOLERANCE).all()
+            assert radius >= placed.merit - TOLERANCE
+            tested += 1
+    assert tested >= 400
+
+
+def closure_margins(quad, placed, choices, friction):
+    """Closure margin of contacts given by angles on the disc borders, one per row."""
+    normals = [piece.normal for piece in quad]
+    for turns in choices:
+        points = [
+            center + radius * piece.frame @ [math.cos(turn), math.sin(turn)]
+            for piece, center, radius, turn in zip(
+                quad, placed.positions, placed.radii, turns, strict=True
+            )
+        ]
+        yield gc.force_closure(points, normals, friction).margin
+
+
+def extremes(quad):
+    """Border angles along the pair-plane normals and along the focus line, in turn."""
+    N = [np.cross(quad[i].normal, quad[i + 1].normal) for i in (0, 2)]
+    u = np.cross(*N)
+    rows = []
+    for along in ([N[0], N[0], N[1], N[1]], [u] * 4):
+        angle = [math.atan2(*(p.frame.T @ d)[::-1]) for p, d in zip(quad, along, strict=True)]
+        for signs in np.ndindex(2, 2, 2, 2):
+            rows.append([a + math.pi * s for a, s in zip(angle, signs, strict=True)])
+    return rows
+
+
+@pytest.mark.parametrize("theta_deg", [5.0, 10.0])
+def test_any_contacts_on_the_disc_borders_are_in_force_closure(theta_deg):
+    rng = np.random.default_rng(2)
+    theta, grasps = math.radians(theta_deg), 0
+    for name in ("random-30-1", "icosahedron", "double-wedge-bar"):
+        for quad, _, placed in list(pencils(name, theta))[:: 40 if grasps else 25]:
+            choices = [*extremes(quad), *rng.uniform(0, 2 * np.pi, (8, 4))]
+            assert min(closure_margins(quad, placed, choices, math.tan(theta) + BORDER)) > 0.0
+            grasps += 1
+    assert grasps >= 20
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_adversarial_descent_finds_no_contacts_out_of_closure():
+    """Coordinate descent of the closure margin over the four border angles, from the extremes."""
+    theta, grasps = math.radians(10.0), 0
+    for name in ("random-30-1", "random-20-7", "dodecahedron"):
+        for quad, _, placed in list(pencils(name, theta))[::12]:
+            assert descended_margin(quad, placed, math.tan(theta) + BORDER) > 0.0
+            grasps += 1
+    assert grasps >= 60
+
+
+def descended_margin(quad, placed, friction):
+    def margin(turns):
+        return next(closure_margins(quad, placed, [turns], friction))
+
+    best, turns = min((margin(row), row) for row in extremes(quad))
+    step = 0.6
+    while step > 0.02:
+        moves = [
+            [t + sign * step * (i == k) for i, t in enumerate(turns)]
+            for k in range(4)
+            for sign in (1.0, -1.0)
+        ]
+        lowest, where = min((margin(row), row) for row in moves)
+        if lowest < best:
+            best, turns = lowest, where
+        else:
+            step *= 0.5
+    return best
+
+
+def test_no_radius_exceeds_its_bound():
+    tested = 0
+    for quad, cones, placed in pencils("random-30-1", math.radians(6.0), 150):
+        weights = balancing_weights(np.array([piece.normal for piece in quad]))
+        depth = -sum(w * (p.normal @ p.origin) for w, p in zip(weights, quad, strict=True))
+        half_angle, no_widths = np.array([cones[0].half_angle]), np.full((1, 4, 4), np.inf)
+        bound = pencil_radius_bounds(np.array([depth]), no_widths, half_angle, AS_LISTED)
+        assert placed.merit <= bound.item() + TOLERANCE
+        tested += 1
+    assert tested >= 300
+
+
+def test_tilted_cones_hold_a_box_by_its_four_sides():
+    """P3 fails for the normals of a box; cones tilted inside the friction cones satisfy it."""
+    pieces = [p for p in unit_pieces(example_object("box")) if abs(p.normal[2]) < 0.5]
+    tilt, half_angle = math.radians(14.036), math.radians(12.5)
+    cones = tilted_side_cones(pieces, tilt, half_angle)
+    assert gc.cones_positively_span([c.axis for c in cones], [half_angle] * 4)
+    rng, tested = np.random.default_rng(0), 0
+    for order in ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2)):
+        quad = [pieces[i] for i in order]
+        placed = place_pencil(quad, [cones[i] for i in order], least=LEAST, least_gap=LEAST)
+        if isinstance(placed, Placement):
+            choices = [*extremes(quad), *rng.uniform(0, 2 * np.pi, (40, 4))]
+            assert min(closure_margins(quad, placed, choices, 0.5 + BORDER)) > 0.0
+            tested += 1
+    assert tested >= 2

@@ -1,0 +1,176 @@
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.closure.lines import plucker_vectors
+from grasp_core.compiled import compiled
+from grasp_core.families import regulus as regulus_grasps
+from grasp_core.families.placements import NoPlacement, Placement
+from grasp_core.families.regulus import (
+    CHOICES,
+    KERNEL,
+    LEAST_DEPTH,
+    _best_choice,
+    _best_of,
+    nearly_symmetric,
+    place_regulus,
+)
+from tests.grasp_core.quadruples import paired_quadruples
+
+TOLERANCE = 1e-7
+"""Ten times the residual at which a program's answer is accepted, in object radii."""
+OBJECTS = ("random-30-1", "icosahedron", "dodecahedron", "chamfered-box", "double-wedge-bar")
+
+
+@pytest.fixture(scope="module")
+def reguli():
+    theta, found = math.radians(10.0), []
+    for name in OBJECTS:
+        for quad, cones in paired_quadruples(name, theta, 90):
+            placed = place_regulus(quad, cones)
+            if isinstance(placed, Placement):
+                found.append((quad, cones, placed))
+    assert len(found) >= 150
+    return found
+
+
+def test_the_four_lines_lie_on_one_regulus_and_never_meet(reguli):
+    for _, _, placed in reguli:
+        x, f = placed.positions, placed.forces
+        assert gc.classify_lines(x, f) == "regulus"
+        lines = plucker_vectors(x, f / np.linalg.norm(f, axis=1, keepdims=True))
+        assert np.linalg.svd(lines, compute_uv=False)[3] < TOLERANCE
+        for i in range(4):
+            for j in range(i):
+                meeting = (x[i] - x[j]) @ np.cross(f[i], f[j])
+                assert abs(meeting) > 1e-9
+
+
+def test_forces_balance_inside_their_cones(reguli):
+    for quad, cones, placed in reguli:
+        np.testing.assert_allclose(placed.forces.sum(axis=0), 0.0, atol=TOLERANCE)
+        torque = np.cross(placed.positions, placed.forces).sum(axis=0)
+        np.testing.assert_allclose(torque, 0.0, atol=TOLERANCE)
+        for piece, cone, force in zip(quad, cones, placed.forces, strict=True):
+            angle = math.acos(min(1.0, force @ cone.axis / np.linalg.norm(force)))
+            assert angle <= cone.half_angle + 1e-7
+            assert force @ piece.normal > 0.0
+
+
+def test_contacts_lie_on_their_faces_within_the_stated_offset(reguli):
+    for quad, _, placed in reguli:
+        for piece, at in zip(quad, placed.positions, strict=True):
+            flat = piece.frame.T @ (at - piece.origin)
+            assert (piece.E @ flat <= piece.b + TOLERANCE).all()
+            given_up = regulus_grasps.GIVEN_UP * (1.0 - placed.merit)
+            assert np.abs(flat).max() <= -placed.merit + given_up + TOLERANCE
+
+
+def test_every_regulus_is_in_force_closure(reguli):
+    for quad, _, placed in reguli:
+        normals = [piece.normal for piece in quad]
+        assert gc.force_closure(placed.positions, normals, math.tan(math.radians(10.0))).closed
+
+
+def test_some_reguli_are_no_equilibrium_without_friction(reguli):
+    """Their forces lean: the paper's section 3.3 promises such grasps."""
+    leaning = [
+        gc.critical_friction(placed.positions, [piece.normal for piece in quad])
+        for quad, _, placed in reguli[::8]
+    ]
+    assert sum(mu > 0.01 for mu in leaning) >= 5
+
+
+def test_pairs_that_are_far_from_symmetric_have_none():
+    """The construction needs |phi_i1 - phi_i2| <= 2 psi in both pairs."""
+    theta, skewed = math.radians(5.0), 0
+    for quad, cones in paired_quadruples("random-30-1", theta, 60):
+        n = [piece.normal for piece in quad]
+        u = np.cross(np.cross(n[0], n[1]), np.cross(n[2], n[3]))
+        u /= np.linalg.norm(u)
+        apart = [abs(math.acos(n[i] @ u) - math.acos(n[i + 1] @ u)) for i in (0, 2)]
+        if max(apart) > 2.0 * theta:
+            assert not isinstance(place_regulus(quad, cones), Placement)
+            skewed += 1
+    assert skewed >= 100
+
+
+def test_the_passing_points_keep_their_height_over_the_faces(reguli):
+    """A force of length zero would satisfy every row of the paper's program."""
+    for quad, cones, placed in reguli:
+        x, f = placed.positions, placed.forces
+        for finger, piece in enumerate(quad):
+            pair = 2 * (finger // 2)
+            N = np.cross(cones[pair].axis, cones[pair + 1].axis)
+            focus = placed.foci[finger // 2]
+            (share, _), *_ = np.linalg.lstsq(np.column_stack([f[finger], N]), focus - x[finger])
+            assert share * (f[finger] @ piece.normal) >= LEAST_DEPTH - TOLERANCE
+
+
+def test_pairings_that_are_dropped_unseen_have_no_regulus():
+    theta, dropped = math.radians(10.0), 0
+    for quad, cones in paired_quadruples("random-30-1", theta, 60):
+        axes = np.array([[cone.axis for cone in cones]])
+        if not nearly_symmetric(axes, np.array([theta]))[0]:
+            assert not isinstance(place_regulus(quad, cones), Placement)
+            dropped += 1
+    assert dropped >= 100
+
+
+def test_compiled_code_chooses_the_slopes_that_all_programs_choose():
+    if compiled(KERNEL) is None:
+        pytest.skip("no compiled code here")
+    tried = Counter()
+    for name in OBJECTS:
+        for quad, cones in paired_quadruples(name, math.radians(10.0), 30):
+            merit, choices = _best_choice(quad, cones)
+            slow = _best_of(quad, cones, CHOICES)
+            if isinstance(slow, NoPlacement):
+                assert merit == -math.inf
+                assert not choices
+            else:
+                quick = _best_of(quad, cones, choices)
+                assert merit == pytest.approx(slow.merit, abs=1e-8)
+                np.testing.assert_allclose(quick.positions, slow.positions, atol=1e-9)
+            tried[type(slow)] += 1
+    assert tried[Placement] >= 60
+    assert tried[NoPlacement] >= 10
+
+
+@pytest.mark.parametrize("lie", ["better", "worse", "none", "other slopes"])
+def test_what_compiled_code_gets_wrong_is_found_by_all_programs(monkeypatch, lie):
+    def lying(table, attempts, *rest):
+        merits, chosen = honest(table, attempts, *rest)
+        if lie == "other slopes":
+            return merits, np.where(chosen[:, :1] >= 0, 2 - chosen, chosen) % (3, 3, 2)
+        if lie == "none":
+            return np.full_like(merits, np.inf), np.full_like(chosen, -1)
+        return merits + (0.1 if lie == "better" else -0.1), chosen
+
+    pairs = list(paired_quadruples("random-30-1", math.radians(10.0), 12))
+    right = [_best_of(*pair, CHOICES) for pair in pairs]
+    honest = regulus_grasps.regulus_bounds
+    monkeypatch.setattr(regulus_grasps, "regulus_bounds", lying)
+    placed = 0
+    for pair, expected in zip(pairs, right, strict=True):
+        found = place_regulus(*pair)
+        assert type(found) is type(expected)
+        if isinstance(found, Placement):
+            assert found.merit == pytest.approx(expected.merit, abs=1e-8)
+            placed += 1
+    assert placed >= 4
+
+
+def test_without_compiled_code_reguli_are_the_same(without_kernels):
+    pairs = list(paired_quadruples("random-30-1", math.radians(10.0), 12))
+    quick = [place_regulus(*pair) for pair in pairs]
+    without_kernels()
+    slow = [place_regulus(*pair) for pair in pairs]
+    assert len({type(one) for one in quick}) == 2
+    for one, other in zip(quick, slow, strict=True):
+        assert type(one) is type(other)
+        if isinstance(one, Placement):
+            np.testing.assert_allclose(one.positions, other.positions, atol=1e-7)

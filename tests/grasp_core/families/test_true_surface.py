@@ -1,0 +1,134 @@
+import math
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.objects.on_faces import check_on_faces, face_under
+from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
+from tests.grasp_core.curved import curved_body, inside, met
+
+FRICTION = 0.5
+
+
+@pytest.fixture(scope="module", params=[0.0, 0.002])
+def planned(request):
+    body = curved_body(noise=request.param)
+    return body, gc.plan(body, FRICTION, limit=30)
+
+
+def test_contacts_are_on_triangles_of_the_mesh_with_their_normals(planned):
+    body, plan = planned
+    corners = body.vertices[body.triangles]
+    inward = -np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    contacts = 0
+    for grasp in plan.grasps:
+        check_on_faces(body, grasp)
+        for contact, face in zip(grasp.contacts, grasp.faces, strict=True):
+            off = np.abs(np.einsum("ti,ti->t", inward, contact.position - corners[:, 0]))
+            turned = np.abs(inward - contact.normal).max(axis=1)
+            near = np.linalg.norm(corners.mean(axis=1) - contact.position, axis=1)
+            on = (off < 1e-9) & (turned < 1e-9) & (near < 0.1 * body.radius)
+            assert on.any()
+            assert face_under(body, contact) is body.faces[face]
+            contacts += 1
+        assert gc.force_closure(grasp, friction=FRICTION).verify()
+        assert gc.classify_lines(grasp.witness.points, grasp.witness.forces) == grasp.family
+        np.testing.assert_array_equal(grasp.witness.points, grasp.positions)
+    assert contacts >= 80
+    assert all(counts.rejected == 0 for counts in plan.counts.families.values())
+
+
+def test_any_surface_points_over_the_regions_are_in_force_closure(planned):
+    """The regions are planes' polygons; what is claimed is about the true surface over them."""
+    body, plan = planned
+    rng, tested = np.random.default_rng(0), {"concurrent": 0, "pencil": 0}
+    for grasp in plan.grasps:
+        if grasp.radius == 0.0:
+            continue
+        for _ in range(12):
+            points, normals = [], []
+            for face, region in zip(grasp.faces, grasp.regions, strict=True):
+                plane = body.faces[face]
+                point = inside(region.polygon, rng, 1)[0]
+                heights, inward = met(body, plane, point)
+                points.append(point + heights[0] * plane.normal)
+                normals.append(inward[0])
+            assert gc.force_closure(np.array(points), np.array(normals), FRICTION).closed
+            tested[grasp.family] += 1
+    assert tested["concurrent"] >= 60
+    assert tested["pencil"] >= 60
+
+
+def test_force_cones_fit_inside_the_friction_cones_of_all_triangles_over_a_region(planned):
+    body, plan = planned
+    rng, tested, theta = np.random.default_rng(1), 0, math.atan(FRICTION)
+    for grasp in plan.grasps:
+        if grasp.radius == 0.0:
+            continue
+        for face, cone, region in zip(grasp.faces, grasp.force_cones, grasp.regions, strict=True):
+            for point in inside(region.polygon, rng, 5):
+                _, inward = met(body, body.faces[face], point)
+                lean = np.arccos(np.minimum(inward @ cone.axis, 1.0)).max()
+                assert lean + cone.half_angle <= theta + 1e-9
+                tested += 1
+    assert tested >= 300
+
+
+def test_a_curved_object_and_its_grasps_survive_a_file(planned):
+    body, plan = planned
+    saved = grasps_from_json(plan_to_json(body, plan))
+    assert saved.body.patches == body.patches
+    assert len(saved.body.faces) == len(body.faces)
+    for mine, theirs in zip(plan.grasps, saved.grasps, strict=True):
+        np.testing.assert_array_equal(mine.positions, theirs.positions)
+        np.testing.assert_array_equal(mine.normals, theirs.normals)
+
+
+def test_a_contact_off_the_true_surface_is_refused(planned):
+    body, plan = planned
+    text = plan_to_json(body, plan)
+    place = plan.grasps[0].contacts[0].position.tolist()
+    moved = [value + 1e-4 * body.radius for value in place]
+    assert text.count(f"{place[0]!r}") >= 1
+    for value, other in zip(place, moved, strict=True):
+        text = text.replace(repr(value), repr(other))
+    with pytest.raises(gc.InputError, match="does not lie on face"):
+        grasps_from_json(text)
+
+
+def test_the_free_method_works_on_curved_surfaces_and_proves_nothing_there():
+    plan = gc.plan(curved_body(), FRICTION, families="free", limit=6)
+    assert len(plan.grasps) == 6
+    assert not plan.absences
+    for grasp in plan.grasps:
+        assert gc.force_closure(grasp, friction=FRICTION).verify()
+
+
+def test_wide_patches_leave_no_friction_to_plan_with():
+    vertices, triangles = curved_body().vertices, curved_body().triangles
+    wide = gc.Polyhedron.from_mesh(vertices, triangles, patches=gc.PatchLimits(40.0, 0.1, 8))
+    assert min(math.degrees(face.spread) for face in wide.faces[:4]) > 12.0
+    assert not gc.plan(wide, 0.2, families=("concurrent", "pencil")).grasps
+
+
+def test_regions_are_those_of_the_focus_that_is_written(planned):
+    """A concurrent grasp's lines from anywhere over its regions to the focus are in the cones.
+
+    Above or below the planes by all of their depth: more than the surface has.
+    """
+    body, plan = planned
+    tested = 0
+    for grasp in plan.grasps:
+        if grasp.family != "concurrent":
+            continue
+        for face, cone, region in zip(grasp.faces, grasp.force_cones, grasp.regions, strict=True):
+            patch = body.faces[face]
+            for height in (-patch.depth, patch.depth):
+                ways = grasp.focus_points[0] - region.polygon - height * patch.normal
+                cosines = np.abs(ways @ cone.axis) / np.linalg.norm(ways, axis=1)
+                leans = np.arccos(np.minimum(cosines, 1.0))
+                assert leans.max() <= cone.half_angle + 1e-7
+                tested += 1
+    assert tested >= 60

@@ -1,0 +1,96 @@
+"""Even forces against their definition: balance, cones, and that no finger could push more."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import grasp_core as gc
+from grasp_core.closure.wrenches import normal_and_tangential
+from grasp_core.forces.even_forces import even_forces
+
+CUBE = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
+
+
+def pushes(forces, normals):
+    return np.einsum("ki,ki->k", forces, normals)
+
+
+def check(positions, normals, friction, forces):
+    """Balanced, in the cones, and scaled to a largest push of one."""
+    size = float(np.abs(positions - positions.mean(axis=0)).max())
+    along, across = normal_and_tangential(forces, normals)
+    assert (across <= friction * along * (1.0 + 1e-6) + 1e-9).all()
+    assert along.max() == pytest.approx(1.0)
+    assert np.abs(forces.sum(axis=0)).max() < 1e-8
+    assert np.abs(np.cross(positions, forces).sum(axis=0)).max() < 1e-8 * (
+        size + float(np.abs(positions).max())
+    )
+
+
+def test_opposite_pairs_all_push_alike():
+    forces = even_forces(CUBE, -CUBE, 0.3)
+    check(CUBE, -CUBE, 0.3, forces)
+    assert pushes(forces, -CUBE) == pytest.approx(1.0)
+
+
+def test_a_slanted_push_is_shared_as_statics_says():
+    """Two fingers push up at x = -1 and 1, one down at x = 1/2, at height 1: they share it 1 to 3.
+
+    Friction of 0.1 at the top and the bottom is a couple of 0.1, which moves 0.05 from one to the
+    other.
+    """
+    positions = np.array([[-1.0, 0, 0], [1, 0, 0], [0.5, 0, 1]])
+    normals = np.array([[0, 0, 1.0], [0, 0, 1], [0, 0, -1]])
+    forces = even_forces(positions, normals, 0.1)
+    check(positions, normals, 0.1, forces)
+    assert pushes(forces, normals) == pytest.approx([0.3, 0.7, 1.0])
+
+
+def test_fingers_that_cannot_all_push_are_told():
+    with pytest.raises(gc.NoForcesError, match="every finger pushes"):
+        even_forces(CUBE, np.tile([0.0, 0.0, 1.0], (4, 1)), 0.5)
+
+
+def closed_contacts(seed):
+    """Random contacts on a sphere with a friction somewhat above their critical one, or None."""
+    rng = np.random.default_rng(seed)
+    positions = rng.normal(size=(4, 3))
+    positions /= np.linalg.norm(positions, axis=1, keepdims=True)
+    normals = -positions + 0.3 * rng.normal(size=(4, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    critical = gc.critical_friction(positions, normals)
+    if not 1e-3 < critical < 2.0:
+        return None
+    return positions, normals, critical * (1.0 + 10.0 ** rng.uniform(-3, 0))
+
+
+def test_no_finger_pushes_less_than_with_the_deepest_forces():
+    """Those are balanced and in the cones as well, so their least push cannot be larger."""
+    tested = 0
+    for seed in range(200):
+        given_contacts = closed_contacts(seed)
+        if given_contacts is None:
+            continue
+        positions, normals, friction = given_contacts
+        forces = even_forces(positions, normals, friction)
+        check(positions, normals, friction, forces)
+        deepest = pushes(gc.force_closure(positions, normals, friction).forces, normals)
+        assert pushes(forces, normals).min() >= deepest.min() / deepest.max() - 1e-7
+        tested += 1
+    assert tested >= 60
+
+
+@settings(max_examples=20, deadline=None, derandomize=True)
+@given(size=st.floats(1e-4, 1e3), shift=st.floats(-5.0, 5.0), turn=st.floats(0.0, math.tau))
+def test_the_least_push_is_that_of_the_moved_and_scaled_contacts(size, shift, turn):
+    positions, normals, friction = next(filter(None, map(closed_contacts, range(50))))
+    c, s = math.cos(turn), math.sin(turn)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    here = even_forces(positions, normals, friction)
+    there = even_forces(size * (positions @ R.T + shift), normals @ R.T, friction)
+    assert pushes(there, normals @ R.T).min() == pytest.approx(
+        pushes(here, normals).min(), rel=1e-5
+    )

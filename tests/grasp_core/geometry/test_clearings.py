@@ -1,0 +1,55 @@
+import itertools
+
+import numpy as np
+import pytest
+
+from grasp_core.geometry.clearings import clearest_point, clearing
+from grasp_core.geometry.polygons import edge_rows, is_convex, signed_area
+
+GAP = 1e-6
+
+
+def fence(rng, corners=40, stretch=1.0):
+    """A closed border of segments around zero, with teeth, and some loose segments inside."""
+    turns = np.sort(rng.uniform(0.0, 2.0 * np.pi, corners))
+    away = rng.uniform(0.5, 1.0, corners)
+    points = away[:, None] * np.column_stack([stretch * np.cos(turns), np.sin(turns)])
+    border = np.stack([points, np.roll(points, -1, axis=0)], axis=1)
+    ends = rng.uniform(-1.0, 1.0, (6, 1, 2))
+    return np.concatenate([border, ends + rng.uniform(-0.1, 0.1, (6, 2, 2))])
+
+
+@pytest.mark.parametrize("stretch", [1.0, 6.0])
+def test_no_segment_enters_a_clearing(stretch):
+    rng, made = np.random.default_rng(1), 0
+    for _ in range(40):
+        segments = fence(rng, stretch=stretch)
+        start, room = clearest_point(rng.uniform(-0.3, 0.3, (50, 2)), segments)
+        polygon = clearing(start, segments, GAP)
+        assert is_convex(polygon)
+        E, b = edge_rows(polygon)
+        assert (E @ start < b).all()
+        shares = np.linspace(0.0, 1.0, 200)[:, None, None]
+        points = (segments[:, 0] + shares * (segments[:, 1] - segments[:, 0])).reshape(-1, 2)
+        assert (b[:, None] < E @ points.T).any(axis=0).all()
+        assert signed_area(polygon) > 0.9 * np.pi * room**2
+        made += 1
+    assert made == 40
+
+
+def test_a_long_clearing_grows_long():
+    """Between two parallel fences it fills the lane, not a square around the middle."""
+    ticks = np.linspace(-5.0, 5.0, 41)
+    lanes = [np.column_stack([ticks, np.full(41, side)]) for side in (-0.5, 0.5)]
+    ends = [np.array([[end, -0.5], [end, 0.5]]) for end in (-5.0, 5.0)]
+    segments = np.array([[a, b] for line in (*lanes, *ends) for a, b in itertools.pairwise(line)])
+    polygon = clearing(np.array([0.3, 0.1]), segments, GAP)
+    assert signed_area(polygon) == pytest.approx(10.0, rel=1e-3)
+
+
+def test_the_clearest_point_is_the_farthest_of_the_candidates():
+    square = np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+    segments = np.stack([square, np.roll(square, -1, axis=0)], axis=1)
+    point, room = clearest_point(np.array([[0.5, 0.0], [0.1, 0.0], [0.0, -0.9]]), segments)
+    np.testing.assert_array_equal(point, [0.1, 0.0])
+    assert room == pytest.approx(0.9)

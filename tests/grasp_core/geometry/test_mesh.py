@@ -1,0 +1,157 @@
+import numpy as np
+import pytest
+import trimesh
+
+import grasp_core as gc
+from grasp_core.errors import MeshRefusal
+from grasp_core.mesh_files.reading import FORMATS
+from grasp_core.objects.polyhedron import polyhedron_from_mesh
+
+
+@pytest.fixture
+def box():
+    return trimesh.creation.box(extents=(0.1, 0.2, 0.3))
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_every_format_gives_the_same_box(box, kind, tmp_path):
+    path = tmp_path / f"part.{kind}"
+    box.export(path)
+    body = gc.load_polyhedron(path)
+    assert body.name == "part"
+    assert len(body.faces) == 6
+    assert len(body.vertices) == 8
+    assert body.volume == pytest.approx(0.006, rel=1e-6)
+    np.testing.assert_allclose(
+        np.diag(body.inertia) / body.volume, [0.13 / 12, 0.1 / 12, 0.05 / 12], rtol=1e-6
+    )
+
+
+def test_the_unit_scales_lengths(box, tmp_path):
+    box.apply_scale(1000.0).export(tmp_path / "box.stl")
+    body = gc.load_polyhedron(tmp_path / "box.stl", unit="mm")
+    assert body.volume == pytest.approx(0.006, rel=1e-6)
+    with pytest.raises(gc.InputError, match="unit must be one of"):
+        gc.load_polyhedron(tmp_path / "box.stl", unit="furlong")
+
+
+def test_the_content_hash_ignores_names_and_orders(box, tmp_path):
+    rng = np.random.default_rng(0)
+    body = polyhedron_from_mesh(box.vertices, box.faces, name="one")
+    place = rng.permutation(len(box.vertices))
+    shuffled = rng.permutation(np.roll(np.argsort(place)[box.faces], 1, axis=1))
+    other = polyhedron_from_mesh(box.vertices[place], shuffled, name="two")
+    moved = polyhedron_from_mesh(box.vertices + 1e-6, box.faces)
+    assert body.content_sha256 == other.content_sha256
+    assert body.content_sha256 != moved.content_sha256
+    box.export(tmp_path / "a.obj")
+    box.export(tmp_path / "b.obj")
+    hashes = {gc.load_polyhedron(tmp_path / f"{name}.obj").source_sha256 for name in "ab"}
+    assert len(hashes) == 1
+
+
+def test_an_inside_out_mesh_is_turned_and_says_so(box):
+    body = polyhedron_from_mesh(box.vertices, box.faces[:, ::-1])
+    assert body.volume == pytest.approx(0.006)
+    assert "inside out" in body.notes[0]
+    assert not polyhedron_from_mesh(box.vertices, box.faces).notes
+
+
+def test_a_cavity_is_part_of_a_solid(box):
+    inner = box.copy().apply_scale(0.5)
+    vertices = np.vstack([box.vertices, inner.vertices])
+    triangles = np.vstack([box.faces, inner.faces[:, ::-1] + 8])
+    body = polyhedron_from_mesh(vertices, triangles)
+    assert body.volume == pytest.approx(0.006 * 7 / 8)
+    assert len(body.faces) == 12
+
+
+def arrays(box, change):
+    vertices, triangles = box.vertices.copy(), box.faces.copy()
+    return change(vertices, triangles)
+
+
+BAD_ARRAYS = {
+    "not finite": (lambda v, t: (np.where(v == v[0, 0], np.nan, v), t), MeshRefusal.NON_FINITE),
+    "index too large": (lambda v, t: (v, np.where(t == 7, 99, t)), MeshRefusal.INDEX),
+    "index negative": (lambda v, t: (v, np.where(t == 7, -1, t)), MeshRefusal.INDEX),
+    "index fractional": (lambda v, t: (v, t + 0.5), MeshRefusal.INDEX),
+    "no triangles": (lambda v, t: (v, t[:0]), MeshRefusal.EMPTY),
+    "one triangle missing": (lambda v, t: (v, t[1:]), MeshRefusal.OPEN),
+    "a triangle twice": (lambda v, t: (v, np.vstack([t, t[:1]])), MeshRefusal.NON_MANIFOLD),
+    "one triangle turned": (lambda v, t: (v, np.vstack([t[:1, ::-1], t[1:]])), MeshRefusal.WINDING),
+    "flat": (lambda v, t: (v * [1, 1, 0], t), MeshRefusal.ZERO_VOLUME),
+    "two coincident triangles": (
+        lambda v, _: (v, np.array([[0, 1, 2], [2, 1, 0]])), MeshRefusal.ZERO_VOLUME),
+    "a kilometre across": (lambda v, t: (v * 1e4, t), MeshRefusal.SIZE),
+    "a micrometre across": (lambda v, t: (v * 1e-5, t), MeshRefusal.SIZE),
+    "overlapping solids": (
+        lambda v, t: (np.vstack([v, v + 0.04]), np.vstack([t, t + 8])), MeshRefusal.OVERLAP),
+    "nested solids": (
+        lambda v, t: (np.vstack([v, 0.5 * v]), np.vstack([t, t + 8])), MeshRefusal.OVERLAP),
+    "two solids side by side": (
+        lambda v, t: (np.vstack([v, v + 1.0]), np.vstack([t, t + 8])), MeshRefusal.SEPARATE),
+    "a part inside out": (
+        lambda v, t: (np.vstack([v, 0.5 * v + 1]), np.vstack([t, t[:, ::-1] + 8])),
+        MeshRefusal.WINDING),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD_ARRAYS)
+def test_bad_arrays_are_refused_with_their_reason(box, case):
+    change, reason = BAD_ARRAYS[case]
+    with pytest.raises(gc.MeshError) as caught:
+        polyhedron_from_mesh(*arrays(box, change))
+    assert caught.value.reason is reason
+    assert reason.value in str(caught.value)
+
+
+def test_too_many_triangles_are_refused_before_any_work():
+    with pytest.raises(gc.MeshError) as caught:
+        polyhedron_from_mesh(np.zeros((3, 3)), np.zeros((200_001, 3), dtype=int))
+    assert caught.value.reason is MeshRefusal.TOO_MANY
+
+
+def obj(box):
+    return box.export(file_type="obj")
+
+
+BAD_FILES = {
+    "empty.stl": (lambda _: b"", MeshRefusal.EMPTY),
+    "comments.obj": (lambda _: b"# nothing\n" * 5, MeshRefusal.EMPTY),
+    "noise.stl": (lambda _: bytes(range(256)) * 3, MeshRefusal.UNREADABLE),
+    "noise.ply": (lambda _: b"garbage" * 30, MeshRefusal.UNREADABLE),
+    "noise.off": (lambda _: b"garbage" * 30, MeshRefusal.UNREADABLE),
+    "noise.glb": (lambda _: b"garbage" * 30, MeshRefusal.UNREADABLE),
+    "short.stl": (lambda b: b.export(file_type="stl")[:-100], MeshRefusal.UNREADABLE),
+    "short.ply": (lambda b: b.export(file_type="ply")[:-20], MeshRefusal.UNREADABLE),
+    "short.glb": (lambda b: b.export(file_type="glb")[:-20], MeshRefusal.UNREADABLE),
+    "short.off": (lambda b: b.export(file_type="off")[:-30].encode(), MeshRefusal.UNREADABLE),
+    "short.obj": (lambda b: obj(b)[:-30].encode(), MeshRefusal.UNREADABLE),
+    "vertices.obj": (lambda b: obj(b).split("f ")[0].encode(), MeshRefusal.EMPTY),
+    "nan.obj": (lambda b: obj(b).replace("0.05000000", "nan").encode(), MeshRefusal.NON_FINITE),
+    "huge.obj": (lambda b: obj(b).replace("0.05000000", "1e400").encode(), MeshRefusal.NON_FINITE),
+    "words.obj": (lambda b: obj(b).replace("0.05000000", "wide").encode(), MeshRefusal.UNREADABLE),
+    "zero.obj": (lambda b: obj(b).replace("f 1", "f 0").encode(), MeshRefusal.INDEX),
+    "beyond.obj": (lambda b: obj(b).replace("f 2", "f 99").encode(), MeshRefusal.INDEX),
+    "part.step": (lambda _: b"ISO-10303-21;", MeshRefusal.FORMAT),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_bad_files_are_refused_with_their_reason(box, name, tmp_path):
+    content, reason = BAD_FILES[name]
+    path = tmp_path / name
+    path.write_bytes(content(box))
+    with pytest.raises(gc.MeshError) as caught:
+        gc.load_polyhedron(path)
+    assert caught.value.reason is reason, str(caught.value)
+    assert name in str(caught.value)
+
+
+def test_a_missing_file_and_a_folder_are_refused(tmp_path):
+    with pytest.raises(gc.MeshError, match="No such file"):
+        gc.load_polyhedron(tmp_path / "none.stl")
+    (tmp_path / "folder.stl").mkdir()
+    with pytest.raises(gc.MeshError):
+        gc.load_polyhedron(tmp_path / "folder.stl")

@@ -1,0 +1,98 @@
+"""Nearest points of triangles of any size and shape, beside the definition in rational numbers."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.geometry.nearest_points import nearest_on_triangles
+from grasp_core.geometry.on_mesh import Surface
+from tests.grasp_core.curved import bumpy_ellipsoid
+
+ROUNDING = 2.0**-52
+
+
+def exact(values):
+    return [Fraction(float(x)) for x in values]
+
+
+def dot(a, b):
+    return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))
+
+
+def less(a, b):
+    return [x - y for x, y in zip(a, b, strict=True)]
+
+
+def squared_distance(triangle, point):
+    """The square of a point's distance from a triangle, exactly."""
+    a, b, c = map(exact, triangle)
+    point = exact(point)
+    one, other, away = less(b, a), less(c, a), less(point, a)
+    g11, g12, g22 = dot(one, one), dot(one, other), dot(other, other)
+    det = g11 * g22 - g12 * g12
+    if det > 0:
+        v = (dot(away, one) * g22 - dot(away, other) * g12) / det
+        w = (dot(away, other) * g11 - dot(away, one) * g12) / det
+        if v >= 0 and w >= 0 and v + w <= 1:
+            foot = [v * x + w * y for x, y in zip(one, other, strict=True)]
+            return dot(less(away, foot), less(away, foot))
+    return min(on_edge(p, q, point) for p, q in ((a, b), (b, c), (c, a)))
+
+
+def on_edge(start, end, point):
+    along, away = less(end, start), less(point, start)
+    length = dot(along, along)
+    share = min(max(dot(away, along) / length, Fraction(0)), Fraction(1)) if length else Fraction(0)
+    rest = [x - share * y for x, y in zip(away, along, strict=True)]
+    return dot(rest, rest)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("height", [1.0, 1e-3, 1e-7, 0.0])
+def test_distances_are_those_of_rational_arithmetic(size, height):
+    """Points are on, above, beside and far from triangles whose height is a share of their length.
+
+    The bound is the module's: rounding divided by that share, and the share itself, in lengths; and
+    rounding of the corners' own coordinates.
+    """
+    rng, inside = np.random.default_rng(7), 0
+    for _ in range(60):
+        a, b, c = rng.normal(size=(3, 3))
+        c = a + rng.random() * (b - a) + height * (c - a)
+        triangle = size * np.array([a, b, c])
+        weights = rng.dirichlet([1.0, 1.0, 1.0])
+        for point in (
+            weights @ triangle,
+            weights @ triangle + 1e-3 * size * rng.normal(size=3),
+            size * rng.normal(size=3),
+            30.0 * size * rng.normal(size=3),
+        ):
+            length = 4.0 * size + np.linalg.norm(point)
+            slack = 16.0 * length * ROUNDING
+            if height:
+                slack += 4.0 * length * min(4.0 * ROUNDING / height, height)
+            (found,) = nearest_on_triangles(triangle[None], point)
+            truth = float(squared_distance(triangle, point)) ** 0.5
+            assert np.linalg.norm(found - point) == pytest.approx(truth, abs=slack)
+            assert float(squared_distance(triangle, found)) ** 0.5 <= slack
+            inside += truth <= 4.0 * ROUNDING * size
+    assert inside >= 30
+
+
+@pytest.mark.parametrize("diameter", [1e-3, 0.1, 2.0])
+def test_points_inside_of_every_triangle_are_on_the_surface(diameter):
+    """Whatever the size: triangles of an object of 1 mm have some 1e-9 square metres."""
+    body = gc.Polyhedron.from_mesh(*bumpy_ellipsoid(subdivisions=3), patches=gc.PatchLimits(most=4))
+    vertices = body.vertices * (diameter / (2.0 * body.radius))
+    surface = Surface(vertices, body.triangles)
+    rng, slack = np.random.default_rng(3), 1e-9 * diameter
+    corners = vertices[body.triangles]
+    inward = np.cross(corners[:, 2] - corners[:, 0], corners[:, 1] - corners[:, 0])
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    for triangle, normal in zip(corners, inward, strict=True):
+        point = rng.dirichlet([1.0, 1.0, 1.0]) @ triangle
+        assert surface.holds(point, normal, slack)
+        assert not surface.holds(point - 0.01 * diameter * normal, normal, slack)
+    assert len(corners) >= 1000

@@ -1,0 +1,168 @@
+import math
+
+import numpy as np
+import pytest
+import trimesh
+
+import grasp_core as gc
+from grasp_core.errors import MeshRefusal
+from grasp_core.objects.curved_patches import flat_patches
+from tests.grasp_core.curved import bumpy_ellipsoid, curved_body, inside, met
+
+ROUNDING = 1e-9
+"""Relative to the object, of heights and of lines through the edges between triangles."""
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.002])
+def test_over_each_point_of_a_patch_is_one_point_of_the_surface_as_near_as_it_says(noise):
+    rng = np.random.default_rng(3)
+    body = curved_body(noise=noise)
+    lines = 0
+    for face in body.faces:
+        for point in inside(face.polygon, rng, 60):
+            heights, inward = met(body, face, point)
+            np.testing.assert_allclose(heights, heights[:1], atol=1e-7 * body.radius)
+            assert np.abs(heights).max() <= face.depth + ROUNDING * body.radius
+            lean = np.arccos(np.minimum(inward @ face.normal, 1.0)).max()
+            assert lean <= face.spread + ROUNDING
+            lines += 1
+    assert lines >= 600
+
+
+def test_patches_keep_the_limits_and_come_largest_first():
+    vertices, triangles = bumpy_ellipsoid(noise=0.001)
+    extent = np.ptp(vertices, axis=0).max()
+    for limits in (gc.PatchLimits(8.0, 0.02, 12), gc.PatchLimits(25.0, 0.004, 30)):
+        found = flat_patches(vertices, triangles, limits)
+        assert 4 <= len(found) <= limits.most
+        assert max(face.spread for face in found) <= math.radians(limits.spread_deg) + ROUNDING
+        assert max(face.depth for face in found) <= limits.depth * extent
+        rooms = [_room(face) for face in found]
+        assert rooms == sorted(rooms, reverse=True)
+        used = np.concatenate([face.facets for face in found])
+        assert len(np.unique(used)) == len(used)
+
+
+def _room(face):
+    edges = np.roll(face.polygon, -1, axis=0) - face.polygon
+    inward = np.cross(face.normal, edges)
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    return np.einsum("ki,ki->k", inward, face.centroid - face.polygon).min()
+
+
+def test_no_patch_spans_a_hole_in_the_surface():
+    vertices, triangles = bumpy_ellipsoid()
+    middles = vertices[triangles].mean(axis=1)
+    whole = gc.Polyhedron.from_mesh(vertices, triangles)
+    hole = whole.faces[0].centroid
+    open_ = triangles[np.linalg.norm(middles - hole, axis=1) > 0.004]
+    body = gc.Polyhedron.from_mesh(vertices, open_)
+    assert "not a closed surface" in " ".join(body.notes)
+    rng, lines = np.random.default_rng(0), 0
+    for face in body.faces:
+        for point in inside(face.polygon, rng, 40):
+            assert len(met(body, face, point)[0]) >= 1
+            lines += 1
+    assert lines >= 400
+    away = np.linalg.norm(body.center_of_mass - whole.center_of_mass)
+    assert away < 0.05 * whole.radius  # the hull stands for the solid
+
+
+def test_the_centre_of_mass_can_be_given():
+    vertices, triangles = bumpy_ellipsoid()
+    body = gc.Polyhedron.from_mesh(vertices, triangles, center_of_mass=[0.01, 0.0, -0.01])
+    np.testing.assert_array_equal(body.center_of_mass, [0.01, 0.0, -0.01])
+    with pytest.raises(gc.InputError, match="outside the object"):
+        gc.Polyhedron.from_mesh(vertices, triangles, center_of_mass=[1.0, 0.0, 0.0])
+    with pytest.raises(gc.InputError, match="center_of_mass"):
+        gc.Polyhedron.from_mesh(vertices, triangles, center_of_mass=[0.0, np.nan, 0.0])
+
+
+def test_fine_meshes_get_patches_and_coarse_ones_planar_faces_unless_told_otherwise():
+    vertices, triangles = bumpy_ellipsoid(subdivisions=2)
+    coarse = gc.Polyhedron.from_mesh(*bumpy_ellipsoid(subdivisions=1))
+    assert coarse.patches is None
+    assert {len(coarse.faces), len(coarse.triangles)} == {80}
+    assert gc.Polyhedron.from_mesh(vertices, triangles).patches == gc.PatchLimits()
+    exact = gc.Polyhedron.from_mesh(vertices, triangles, faces="planar")
+    assert exact.patches is None
+    assert len(exact.faces) == 320
+    assert {face.spread for face in exact.faces} == {0.0}
+
+
+def test_an_open_mesh_is_refused_where_planar_faces_are_asked_for():
+    vertices, triangles = bumpy_ellipsoid(subdivisions=2)
+    with pytest.raises(gc.MeshError) as refused:
+        gc.Polyhedron.from_mesh(vertices, triangles[:-3], faces="planar")
+    assert refused.value.reason is MeshRefusal.OPEN
+    turned = np.vstack([triangles[:-1], triangles[-1:, ::-1]])
+    with pytest.raises(gc.MeshError) as refused:
+        gc.Polyhedron.from_mesh(vertices, turned)
+    assert refused.value.reason is MeshRefusal.WINDING
+
+
+def test_a_closed_scan_that_is_inside_out_is_turned():
+    vertices, triangles = bumpy_ellipsoid()
+    one, two = (gc.Polyhedron.from_mesh(vertices, t) for t in (triangles, triangles[:, ::-1]))
+    assert "inside out" in " ".join(two.notes)
+    assert one.volume == pytest.approx(two.volume)
+    for face in two.faces:
+        assert face.normal @ (face.centroid - two.center_of_mass) < 0.0
+
+
+def test_of_an_open_surface_in_parts_only_the_largest_is_used_and_never_turned():
+    large, triangles = bumpy_ellipsoid()
+    small = 0.6 * large + [0.2, 0.0, 0.0]
+    both = np.vstack([triangles[3:], triangles[:-2] + len(large)])
+    body = gc.Polyhedron.from_mesh(np.vstack([large, small]), both)
+    assert "separate parts" in " ".join(body.notes)
+    assert body.vertices[:, 0].max() < 0.1
+    inward = [face.normal @ (face.centroid - body.center_of_mass) for face in body.faces]
+    assert max(inward) < 0.0
+    turned = gc.Polyhedron.from_mesh(large, triangles[3:, ::-1])
+    assert "inside out" in " ".join(turned.notes)
+    assert min(face.normal @ (face.centroid - turned.center_of_mass) for face in turned.faces) > 0.0
+
+
+def test_a_coarse_torus_whose_triangles_meet_regions_in_their_corners_is_planned():
+    ring = trimesh.creation.torus(0.04, 0.012, 24, 12)
+    limits = gc.PatchLimits(20.0, 0.02, 10)
+    body = gc.Polyhedron.from_mesh(ring.vertices, ring.faces, patches=limits)
+    plan = gc.plan(body, 0.8, limit=4)
+    assert len(plan.grasps) == 4
+    for grasp in plan.grasps:
+        assert gc.force_closure(grasp, friction=0.8).verify()
+
+
+def test_a_surface_without_flat_parts_is_refused_with_advice():
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    rough = gc.PatchLimits(spread_deg=0.5, depth=1e-5)
+    body = gc.Polyhedron.from_mesh(0.05 * ball.vertices, ball.faces, patches=rough)
+    assert len(body.faces) >= 4  # single triangles
+    corners = 0.1 * np.vstack([np.zeros(3), np.eye(3)])
+    three = [[0, 2, 1], [0, 1, 3], [0, 3, 2]]
+    with pytest.raises(gc.MeshError, match="patch-spread-deg") as refused:
+        gc.Polyhedron.from_mesh(corners, three, faces="patches")
+    assert refused.value.reason is MeshRefusal.NOT_FLAT
+
+
+def test_a_box_with_a_triangle_missing_has_six_flat_patches():
+    box = trimesh.creation.box(extents=(0.1, 0.08, 0.06))
+    body = gc.Polyhedron.from_mesh(box.vertices, box.faces[:-1], faces="patches")
+    assert len(body.faces) == 6
+    assert {round(math.degrees(face.spread), 6) for face in body.faces} == {0.0}
+    assert gc.plan(body, 0.5, families="concurrent", limit=1).grasps
+
+
+@pytest.mark.parametrize(
+    ("limits", "message"),
+    [
+        ({"spread_deg": 0.0}, "spread_deg"),
+        ({"spread_deg": 60.0}, "spread_deg"),
+        ({"depth": 0.5}, "depth"),
+        ({"most": 3}, "most"),
+    ],
+)
+def test_limits_out_of_range_are_refused(limits, message):
+    with pytest.raises(gc.InputError, match=message):
+        gc.PatchLimits(**limits)

@@ -1,0 +1,79 @@
+import numpy as np
+import pytest
+import trimesh
+
+from grasp_core.objects.booleans import hull
+from grasp_core.objects.planar_faces import FlatnessLimits, border_loops, coplanar_groups
+from grasp_core.objects.polyhedron import Polyhedron
+from scenes.example_objects import example_object
+
+
+def cube():
+    return trimesh.creation.box(extents=(0.1, 0.2, 0.3))
+
+
+def test_a_box_has_six_convex_faces_with_inward_normals():
+    mesh = cube()
+    body = Polyhedron.from_mesh(mesh.vertices, mesh.faces)
+    assert len(body.faces) == 6
+    for face in body.faces:
+        assert len(face.pieces) == 1
+        assert len(face.polygon) == 4
+        assert face.normal @ (face.centroid - body.center_of_mass) < 0
+    assert sum(face.area for face in body.faces) == pytest.approx(mesh.area, rel=1e-12)
+
+
+def test_extra_triangles_and_border_points_do_not_change_the_faces():
+    mesh = cube().subdivide().subdivide()
+    body = Polyhedron.from_mesh(mesh.vertices, mesh.faces)
+    assert len(body.triangles) == 192
+    assert sorted(len(face.polygon) for face in body.faces) == [4] * 6
+
+
+def test_a_fine_sphere_keeps_its_facets():
+    """20,480 triangles with 0.6 degrees between neighbours: none may merge."""
+    mesh = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
+    groups = coplanar_groups(mesh.vertices, mesh.faces, FlatnessLimits())
+    assert len(groups) == len(mesh.faces) == 20480
+
+
+@pytest.mark.parametrize(
+    ("limits", "roof_faces"),
+    [
+        (FlatnessLimits(angle=1e-3, distance=1e-3), 1),
+        (FlatnessLimits(angle=1e-5, distance=1e-3), 2),
+        (FlatnessLimits(angle=1e-3, distance=1e-6), 2),
+    ],
+)
+def test_a_shallow_roof_is_one_face_only_within_both_limits(limits, roof_faces):
+    """Two slopes that meet at 2e-4 rad and rise 5e-5 of the extent, on five walls."""
+    ridge = [[0.0, 0.5, 5e-5], [1.0, 0.5, 5e-5]]
+    corners = [[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (-0.3, 0.0)]
+    solid = hull([*corners, *ridge])
+    assert len(coplanar_groups(solid.vertices, solid.triangles, limits)) == 5 + roof_faces
+
+
+def test_a_face_with_a_hole_is_tiled_by_convex_pieces():
+    body = example_object("hex-nut")
+    rings = [face for face in body.faces if face.holes]
+    assert len(rings) == 2
+    for face in rings:
+        assert len(face.pieces) > 1
+        assert sum(_area(piece, face.normal) for piece in face.pieces) == pytest.approx(face.area)
+
+
+def test_two_coplanar_but_separate_parts_are_two_faces():
+    body = example_object("cross")
+    assert len(body.faces) == 30
+
+
+def test_borders_that_touch_in_a_corner_stay_simple_loops():
+    """A square whose triangular hole shares its first corner: 4-5-0 is open."""
+    triangles = np.array([[0, 1, 4], [1, 2, 4], [2, 5, 4], [2, 3, 5], [3, 0, 5]])
+    loops = border_loops(triangles)
+    assert sorted(map(sorted, loops)) == [[0, 1, 2, 3], [0, 4, 5]]
+
+
+def _area(polygon, normal):
+    following = np.roll(polygon, -1, axis=0)
+    return 0.5 * float(normal @ np.cross(polygon, following).sum(axis=0))

@@ -1,0 +1,97 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.optimizing.better_contacts import pieces_under
+from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
+from scenes.example_objects import example_names, example_object
+
+NAMES = tuple(name for name in example_names() if "FACES" not in name)
+
+
+def checked(grasp, found, friction):
+    """Everything a moved grasp must still be; its gain."""
+    assert found.before.verify()
+    assert found.after.verify()
+    assert found.after.lower >= found.before.lower
+    certificate = gc.force_closure(found.grasp, friction=friction)
+    assert certificate.closed
+    assert certificate.verify()
+    assert found.grasp.faces == grasp.faces
+    assert found.gain == found.after.lower / found.before.lower
+    return found.gain
+
+
+@pytest.mark.parametrize("name", ["wedge", "tetrahedron", "double-wedge-bar", "random-20-7"])
+def test_grasps_get_better_and_stay_certified(name):
+    body = example_object(name)
+    plan = gc.plan(body, 0.5, limit=3)
+    found = [gc.optimize_contacts(body, grasp, 0.5) for grasp in plan.grasps]
+    gains = [checked(g, f, 0.5) for g, f in zip(plan.grasps, found, strict=True)]
+    assert min(gains) > 1.01
+    saved = grasps_from_json(plan_to_json(body, replace(plan, grasps=[f.grasp for f in found])))
+    for grasp, improved in zip(saved.grasps, found, strict=True):
+        assert grasp.id.startswith("o-")
+        assert grasp.family == "regulus"
+        low, high = grasp.ferrari_canny
+        assert low == pytest.approx(improved.after.lower, rel=1e-3)
+        assert low < high
+
+
+def test_contacts_keep_a_fingers_radius_from_the_edges():
+    body = example_object("wedge")
+    tested = 0
+    for grasp in gc.plan(body, 0.5, families="concurrent", limit=3).grasps:
+        radius = 0.02 * body.radius
+        found = gc.optimize_contacts(body, grasp, 0.5, finger_radius=radius)
+        pieces = pieces_under(body, found.grasp)
+        points = (found.grasp.positions - body.center_of_mass) / body.radius
+        for piece, point, own in zip(pieces, points, grasp.regions, strict=True):
+            room = float((piece.b - piece.E @ (piece.frame.T @ (point - piece.origin))).min())
+            least = min(0.02, 0.5 * piece.inradius, own.inscribed_radius / body.radius)
+            assert room >= least - 1e-9
+            tested += 1
+    assert tested == 12
+
+
+def test_the_same_seed_gives_the_same_contacts():
+    body = example_object("wedge")
+    grasp = gc.plan(body, 0.5, limit=1).grasps[0]
+    one, two = (gc.optimize_contacts(body, grasp, 0.5, seed=3) for _ in range(2))
+    np.testing.assert_allclose(one.grasp.positions, two.grasp.positions, atol=1e-9)
+
+
+def test_a_grasp_that_is_not_closed_or_not_there_is_refused():
+    body = example_object("wedge")
+    grasp = gc.plan(body, 0.5, limit=1).grasps[0]
+    with pytest.raises(gc.InputError, match=r"not in force closure at friction 0\.001"):
+        gc.optimize_contacts(body, grasp, 0.001)
+    with pytest.raises(gc.InputError, match="face"):
+        gc.optimize_contacts(example_object("tetrahedron"), grasp, 0.5)
+    with pytest.raises(gc.InputError, match="finger_radius must be a number from 1e-09"):
+        gc.optimize_contacts(body, grasp, 0.5, finger_radius=0.0)
+
+
+@pytest.mark.slow
+def test_nearly_all_grasps_of_all_objects_get_better_and_none_worse(capsys):
+    """The best eight grasps of each object; prints how the gains are distributed."""
+    gains = {}
+    for name in NAMES:
+        body = example_object(name)
+        grasps = gc.plan(body, 0.5, limit=8).grasps
+        grasps = grasps or gc.plan(body, 0.5, families="free", limit=8).grasps
+        gains[name] = [
+            checked(grasp, gc.optimize_contacts(body, grasp, 0.5), 0.5) for grasp in grasps
+        ]
+    every = np.array([gain for found in gains.values() for gain in found])
+    with capsys.disabled():
+        for name, found in gains.items():
+            low, middle, high = np.percentile(found, [0, 50, 100])
+            print(f"\n{name}: {len(found)} grasps, gain {low:.3f} {middle:.3f} {high:.3f}", end="")
+        shares = np.percentile(every, [0, 5, 25, 50, 75, 95, 100])
+        print("\nall", len(every), "gains at 0 5 25 50 75 95 100 %:", np.round(shares, 3))
+    assert len(every) >= 80
+    assert every.min() >= 1.0
+    assert (every > 1.0).mean() >= 0.95

@@ -1,0 +1,113 @@
+"""Best-first search: what a limit keeps is the best of everything, whatever kind of object."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.disc_bounds import program_bounds as attempt_bounds
+from grasp_core.disc_bounds.program_bounds import AttemptBounds
+from grasp_core.errors import SolverError
+from grasp_core.families import discs as largest_discs
+from grasp_core.families.constructions import CONSTRUCTIONS
+from grasp_core.planning import best_first as promising_module
+from grasp_core.planning.best_first import Block, promising
+from grasp_core.planning.family_search import SAME_MERIT
+from grasp_core.planning.methods import Searches
+from grasp_core.planning.request import PlanRequest
+from scenes.example_objects import example_object
+from tests.grasp_core.curved import curved_body
+
+CASES = {
+    "convex": (lambda: example_object("random-12-1"), {"friction": 0.4}),
+    "symmetric": (lambda: example_object("chamfered-box"), {"friction": 0.3}),
+    "with angles": (lambda: example_object("l-bracket"), {"friction": 0.5}),
+    "the paper's cones": (lambda: example_object("random-14-1"), {"cones": "normal"}),
+    "two on one face": (lambda: example_object("prism"), {"share_faces": 0.01}),
+    "clear of edges": (lambda: example_object("wedge"), {"clearance": 0.002}),
+    "within reach": (lambda: example_object("wedge"), {"finger": gc.Finger(0.004, 0.03)}),
+    "curved": (curved_body, {"friction": 0.5}),
+}
+
+
+def radii(body, options, family, limit):
+    plan = gc.plan(body, **{"friction": 0.3, **options}, families=family, limit=limit)
+    return [grasp.radius / body.radius for grasp in plan.grasps]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", ["concurrent", "pencil"])
+@pytest.mark.parametrize("name", CASES)
+def test_a_limit_keeps_the_largest_discs_of_all(name, family):
+    make, options = CASES[name]
+    body = make()
+    every = sorted(radii(body, options, family, None), reverse=True)
+    assert len(every) >= 2
+    for limit in (1, 3, 8):
+        best = radii(body, options, family, limit)
+        np.testing.assert_allclose(best, every[:limit], rtol=2.0 * SAME_MERIT)
+
+
+def test_cones_that_are_tilted_late_are_not_missed(monkeypatch):
+    """In chunks so small that many are looked at only when something is worth having."""
+    body = example_object("random-12-1")
+    every = sorted(radii(body, {"friction": 0.4}, "pencil", None), reverse=True)
+    for name, size in (("LARGEST_CHUNK", 40), ("SMALLEST_TILT", 10), ("SMALLEST_CHUNK", 5)):
+        monkeypatch.setattr(promising_module, name, size)
+    for limit in (2, 25, 200):
+        best = radii(body, {"friction": 0.4}, "pencil", limit)
+        np.testing.assert_allclose(best, every[:limit], rtol=2.0 * SAME_MERIT)
+
+
+def opened(body, family, least):
+    """Quadruples as they are handed out, with the tally, and blocks that were made."""
+    request = PlanRequest(0.4, (family,), None, "tilted")
+    searches = Searches(body, request)
+    blocks = searches.tilted_blocks.blocks
+    construction, tally, made = CONSTRUCTIONS[family], Counter(), []
+
+    def make(place):
+        made.append(place)
+        return blocks.make(place)
+
+    listed = [
+        Block(room, lambda place=place: make(place)) for place, room in enumerate(blocks.rooms)
+    ]
+    discs = AttemptBounds(searches.shapes)
+    return promising(construction, listed, discs, lambda _: least[0], tally), made
+
+
+@pytest.mark.parametrize("family", ["concurrent", pytest.param("pencil", marks=pytest.mark.slow)])
+def test_quadruples_come_in_the_order_of_their_bounds_and_only_as_asked_for(family):
+    body, least = example_object("random-40-1"), [1e-3]
+    quadruples, made = opened(body, family, least)
+    first = [next(quadruples) for _ in range(12)]
+    bounds = [each.bound for each in first]
+    assert (np.diff(bounds) <= 1e-7).all()
+    assert len({each.faces for each in first}) == len(first)
+    every, all_made = opened(body, family, least)
+    rest = {each.faces: each.bound for each in every}
+    assert len(made) < len(all_made)
+    assert sorted(rest.values(), reverse=True)[:12] == pytest.approx(bounds, abs=1e-7)
+    least[0] = bounds[-1]  # nothing more is worth having
+    assert next(quadruples, None) is None
+
+
+def test_a_program_that_fails_leaves_its_attempt_to_the_search(monkeypatch):
+    """Without kernels the bounds are whole programs, some of which have no answer here."""
+    body, calls, solve = example_object("random-10-1"), [], largest_discs.maximize_above
+
+    def sometimes(program, cutoff):
+        calls.append(program)
+        if len(calls) % 40 == 0:
+            raise SolverError("a program's answer failed its check")
+        return solve(program, cutoff)
+
+    expected = gc.plan(body, 0.4, families="concurrent", limit=5).grasps
+    monkeypatch.setattr(attempt_bounds, "compiled", lambda _: None)
+    monkeypatch.setattr(largest_discs, "maximize_above", sometimes)
+    plan = gc.plan(body, 0.4, families="concurrent", limit=5)
+    assert len(calls) >= 80
+    assert len(plan.grasps) == 5
+    assert {grasp.id for grasp in plan.grasps} & {grasp.id for grasp in expected}

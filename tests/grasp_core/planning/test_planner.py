@@ -1,0 +1,399 @@
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS
+from grasp_core.objects.face_pieces import face_shapes
+from grasp_core.objects.standard_order import standard
+from grasp_core.planning.blocks import all_blocks
+from grasp_core.planning.candidates import PlannedCones
+from grasp_core.planning.ranking import outlook
+from grasp_core.planning.request import METHODS
+from scenes.example_objects import example_object
+from tests.benchmarks.planning import sphere_hull
+from tests.judges import pyramid_margin, random_rotation
+
+TEN_DEGREES = math.tan(math.radians(10.0))
+RADIUS_ACCURACY = 1e-6
+"""Radii are optima good to 1e-8 in object radii; two may differ by twice that."""
+DISCS = ("concurrent", "pencil")
+"""The families with independent discs."""
+FAMILIES = (*DISCS, "regulus")
+
+
+def remade(body, move, name="moved"):
+    return gc.Polyhedron.from_mesh(move(body.vertices), body.triangles, name=name)
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("tetrahedron", 1), ("octahedron", 2), ("dodecahedron", 30), ("icosahedron", 90)],
+)
+def test_platonic_solids_have_the_known_number_of_quadruples_at_ten_degrees(name, count):
+    """Quadruples with theta* above ten degrees; all of them carry a concurrent grasp."""
+    found = gc.plan(example_object(name), TEN_DEGREES, families=("concurrent",), cones="normal")
+    wide = [grasp for grasp in found.grasps if grasp.span_angle > math.radians(10.0)]
+    assert len(wide) == count
+    assert found.counts.families["concurrent"].rejected == 0
+
+
+def test_the_tetrahedron_is_held_at_its_face_centres():
+    body = example_object("tetrahedron")
+    found = gc.plan(body, TEN_DEGREES, families=("concurrent",))
+    (grasp,) = found.grasps
+    assert grasp.family == "concurrent"
+    assert grasp.critical_friction == 0.0
+    discs = [region.inscribed_radius for region in grasp.regions]
+    np.testing.assert_allclose(discs, grasp.radius, rtol=1e-5)
+    np.testing.assert_allclose(grasp.focus_points, [[0.0, 0, 0]], atol=1e-7 * body.radius)
+    centers = [body.faces[face].centroid for face in grasp.faces]
+    np.testing.assert_allclose(grasp.positions, centers, atol=1e-7 * body.radius)
+
+
+def test_a_bar_whose_ends_are_far_apart_has_no_concurrent_grasp_at_ten_degrees():
+    """Nine quadruples span at ten degrees or more, and no focus serves any of them."""
+    found = gc.plan(
+        example_object("double-wedge-bar"), TEN_DEGREES, families=("concurrent",), cones="normal"
+    )
+    assert found.counts.spanning == 9
+    assert found.counts.families["concurrent"].infeasible == 9
+    assert "9 face quadruples span" in found.absence
+
+
+TILTED = [(name, "tilted") for name in ("wedge", "chamfered-box", "random-10-1", "random-12-1")]
+NORMAL = [(name, "normal") for name in ("icosahedron", "random-20-7", "random-30-2", "screwdriver")]
+
+
+@pytest.mark.slow
+def test_no_returned_grasp_fails_an_independent_pyramid_of_64_sides():
+    """Inner pyramids accept each grasp, so outer ones must as well; critical friction agrees."""
+    tested = 0
+    for name, cones in TILTED + NORMAL:
+        families = ("concurrent",) if name == "screwdriver" else FAMILIES
+        body = example_object(name)
+        for grasp in gc.plan(body, 0.5, limit=40, families=families, cones=cones).grasps:
+            for outer in (False, True):
+                assert pyramid_margin(grasp.positions, grasp.normals, 0.5, 64, outer=outer) > 1e-9
+            below = 0.99 * grasp.critical_friction
+            if below > 1e-3:
+                assert pyramid_margin(grasp.positions, grasp.normals, below, 64, outer=False) < 1e-9
+            tested += 1
+    assert tested >= 150
+
+
+def test_every_grasp_lies_on_its_faces_inside_its_regions():
+    tested = 0
+    for name, cones in TILTED + NORMAL:
+        body = example_object(name)
+        for grasp in gc.plan(body, 0.4, limit=20, families=DISCS, cones=cones).grasps:
+            for face, contact, region in zip(
+                grasp.faces, grasp.contacts, grasp.regions, strict=True
+            ):
+                plane = body.faces[face]
+                off = (region.polygon - plane.centroid) @ plane.normal
+                np.testing.assert_allclose(off, 0.0, atol=1e-9)
+                assert region.inscribed_radius >= grasp.radius * (1 - RADIUS_ACCURACY)
+                assert contact.normal @ plane.normal == pytest.approx(1.0)
+                assert _inside(contact.position, region.polygon, plane.normal)
+            tested += 1
+    assert tested >= 90
+
+
+def test_moving_turning_and_scaling_the_object_moves_its_grasps():
+    rng = np.random.default_rng(1)
+    tested = 0
+    for name in ("wedge", "random-10-1", "octahedron", "box"):
+        body = example_object(name)
+        here = gc.plan(body, 0.3, families=DISCS, cones="tilted")
+        R, scale = random_rotation(rng), float(rng.uniform(0.1, 3.0))
+        there = gc.plan(
+            remade(body, lambda v, R=R, s=scale: s * v @ R.T + 0.4),
+            0.3,
+            families=DISCS,
+            cones="tilted",
+        )
+        assert {g.id for g in here.grasps} == {g.id for g in there.grasps}
+        radii = {g.id: g.radius for g in there.grasps}
+        for grasp in here.grasps:
+            expected = pytest.approx(radii[grasp.id] / scale, rel=RADIUS_ACCURACY)
+            assert grasp.radius == expected
+            tested += 1
+    assert tested >= 60
+
+
+def test_more_friction_never_loses_a_grasp():
+    tested = 0
+    for name in ("wedge", "random-10-1", "random-12-1"):
+        body = example_object(name)
+        frictions = (0.05, 0.1, 0.2, 0.35, 0.7)
+        plans = [gc.plan(body, friction, families=DISCS, cones="normal") for friction in frictions]
+        for less, more in pairwise(plans):
+            radii = {grasp.id: grasp.radius for grasp in more.grasps}
+            for grasp in less.grasps:
+                assert radii[grasp.id] >= grasp.radius * (1 - RADIUS_ACCURACY)
+                tested += 1
+    assert tested >= 200
+
+
+def test_a_smaller_theta_is_allowed_and_gives_smaller_discs():
+    body = example_object("icosahedron")
+    wide, narrow = (
+        gc.plan(body, 0.5, theta_deg=theta_deg, limit=5, cones="normal")
+        for theta_deg in (None, 5.0)
+    )
+    assert narrow.grasps[0].radius < wide.grasps[0].radius
+    assert narrow.grasps[0].force_cones[0].half_angle <= math.radians(5.0)
+
+
+@pytest.mark.parametrize("friction", [0.01, 0.05, 0.144])
+def test_symmetric_objects_are_planned_at_small_friction(friction):
+    found = gc.plan(
+        example_object("dodecahedron"), friction, families=("concurrent",), cones="normal"
+    )
+    assert len(found.grasps) == 30
+    assert {grasp.critical_friction for grasp in found.grasps} == {0.0}
+
+
+@pytest.mark.parametrize("name", ["random-10-1", "octahedron"])
+@pytest.mark.parametrize("family", DISCS)
+def test_a_limit_returns_the_best_of_all_grasps(name, family):
+    """Also where symmetry makes many grasps equally good."""
+    body = example_object(name)
+    everything = gc.plan(body, 0.3, families=family, cones="tilted")
+    few = gc.plan(body, 0.3, limit=7, families=family, cones="tilted")
+    assert len(few.grasps) == 7
+    assert [g.id for g in few.grasps] == [g.id for g in everything.grasps[:7]]
+    fewer = everything.counts.families[family].tried - few.counts.families[family].tried
+    assert fewer > 0 or name == "octahedron"
+
+
+@pytest.mark.parametrize("name", ["wedge", "l-bracket"])
+def test_a_larger_limit_only_adds_grasps(name):
+    kept = [
+        {grasp.id for grasp in gc.plan(example_object(name), 0.5, limit=limit).grasps}
+        for limit in (5, 15, 40)
+    ]
+    assert [len(ids) for ids in kept] == [5, 15, 40]
+    assert kept[0] < kept[1] < kept[2]
+
+
+def test_plans_are_the_same_every_time():
+    one, two = (gc.plan(example_object("wedge"), 0.4) for _ in range(2))
+    assert [g.id for g in one.grasps] == [g.id for g in two.grasps]
+    assert len({g.id for g in one.grasps}) == len(one.grasps)
+    for a, b in zip(one.grasps, two.grasps, strict=True):
+        np.testing.assert_array_equal(a.positions, b.positions)
+
+
+def test_progress_is_reported_as_quadruples_are_tried():
+    seen = []
+    gc.plan(example_object("wedge"), progress=lambda *numbers: seen.append(numbers))
+    done = [each for each, _, _ in seen]
+    assert done == sorted(done)
+    assert seen[-1][0] == seen[-1][1] == len(METHODS) * 70
+    assert len(seen) >= 13
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"friction": 0.0}, "friction must be a number from 1e-09"),
+        ({"friction": math.nan}, "friction must be a number from 1e-09"),
+        ({"theta_deg": 30.0}, "theta_deg must be a number from 1e-09"),
+        ({"theta_deg": -1.0}, "theta_deg must be a number from 1e-09"),
+        ({"limit": 0}, "limit must be a whole number from 1"),
+        ({"families": ["spiral"]}, "families must be among"),
+        ({"families": []}, "families must be among"),
+    ],
+)
+def test_bad_requests_are_refused(arguments, message):
+    with pytest.raises(gc.InputError, match=message):
+        gc.plan(example_object("tetrahedron"), **arguments)
+
+
+def test_an_object_with_too_many_faces_is_refused_at_once():
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
+    with pytest.raises(gc.InputError, match="over the limit of 1000"):
+        gc.plan(gc.Polyhedron.from_mesh(ball.vertices, ball.faces, faces="planar"), limit=4)
+
+
+def test_of_more_than_200_faces_only_the_largest_grasps_of_the_paper_s_families_are_planned():
+    body = sphere_hull(240)
+    for options in ({}, {"limit": 4}, {"families": FAMILIES}):
+        with pytest.raises(gc.InputError, match="above 200 only the largest"):
+            gc.plan(body, 0.2, **options)
+    every = gc.plan(body, 0.2, families=FAMILIES, limit=9).grasps
+    assert {grasp.family for grasp in every} == set(FAMILIES)
+    assert all(gc.force_closure(grasp, friction=0.2).verify() for grasp in every)
+
+
+def test_regions_are_larger_than_discs_but_smaller_than_faces():
+    tested = 0
+    body = example_object("icosahedron")
+    for grasp in gc.plan(body, 0.2, limit=20, families=DISCS).grasps:
+        assert grasp.radius > LEAST_RADIUS * body.radius
+        for face, region in zip(grasp.faces, grasp.regions, strict=True):
+            disc = math.pi * region.inscribed_radius**2
+            listed = 1.0 - 2e-3 * (region.kind == "disc")  # 64 points of a circle
+            assert listed * disc <= _area(region.polygon) <= body.faces[face].area * (1 + 1e-9)
+            tested += 1
+    assert tested >= 80
+
+
+def _area(polygon):
+    fan = np.cross(polygon[1:-1] - polygon[0], polygon[2:] - polygon[0])
+    return 0.5 * np.linalg.norm(fan.sum(axis=0))
+
+
+def _inside(point, polygon, normal):
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    return (np.cross(edges, point - polygon) @ normal >= -1e-12).all()
+
+
+def test_every_family_is_planned_and_every_witness_is_of_its_family():
+    found = gc.plan(example_object("chamfered-box"), TEN_DEGREES, families=FAMILIES, cones="normal")
+    assert list(found.counts.families) == list(FAMILIES)
+    assert {grasp.family for grasp in found.grasps} == set(FAMILIES)
+    for grasp in found.grasps:
+        x, f = grasp.witness.points, grasp.witness.forces
+        assert gc.classify_lines(x, grasp.witness.directions) == grasp.family
+        np.testing.assert_array_equal(x, grasp.positions)
+        np.testing.assert_allclose(f.sum(axis=0), 0.0, atol=1e-9)
+        assert np.einsum("ki,ki->", f, grasp.normals) == pytest.approx(1.0)
+        assert len(grasp.focus_points) == (1 if grasp.family == "concurrent" else 2)
+
+
+@pytest.mark.parametrize("name", ["chamfered-box", "double-wedge-bar", "random-12-1"])
+def test_counts_add_up_and_nothing_is_rejected(name):
+    found = gc.plan(example_object(name), TEN_DEGREES, limit=30, families=FAMILIES, cones="normal")
+    for family, counts in found.counts.families.items():
+        ended = counts.infeasible + counts.found + counts.duplicates + counts.rejected
+        assert counts.tried == ended
+        assert counts.rejected == counts.undecided == 0
+        orders = 1 if family == "concurrent" else 3
+        assert counts.tried + counts.pruned == orders * found.counts.quadruples
+
+
+def test_an_elongated_object_has_pencils_where_it_has_no_concurrent_grasp():
+    found = gc.plan(
+        example_object("double-wedge-bar"), TEN_DEGREES, families=FAMILIES, cones="normal"
+    )
+    families = [grasp.family for grasp in found.grasps]
+    assert families.count("concurrent") == 0
+    assert families.count("pencil") == 9
+    assert found.grasps[0].radius == pytest.approx(0.113774 * 0.02, rel=1e-5)
+    needing_friction = [g for g in found.grasps if g.critical_friction > 0.05]
+    assert {grasp.family for grasp in needing_friction} == {"regulus"}
+
+
+def test_one_family_may_be_chosen_and_gives_the_same_grasps():
+    body = example_object("octahedron")
+    together = {g.id for g in gc.plan(body, 0.3, families=FAMILIES, cones="normal").grasps}
+    apart = [
+        g.id for f in FAMILIES for g in gc.plan(body, 0.3, families=(f,), cones="normal").grasps
+    ]
+    assert len(apart) == len(together)
+    assert set(apart) == together
+
+
+def test_pairings_that_lead_to_the_same_contacts_are_kept_once():
+    counts = gc.plan(example_object("tetrahedron"), 0.3).counts.families["regulus"]
+    assert (counts.tried, counts.duplicates, counts.found) == (3, 2, 1)
+
+
+def test_a_limit_is_shared_between_the_families():
+    found = gc.plan(example_object("icosahedron"), TEN_DEGREES, limit=9)
+    assert [g.family for g in found.grasps].count("regulus") == 3
+    assert [g.family for g in found.grasps].count("pencil") == 3
+    radii = np.array([g.radius for g in found.grasps])
+    assert (np.diff(radii) < 1e-12).all()
+
+
+def test_grasps_are_streamed_as_they_are_found():
+    body = example_object("wedge")
+    streamed = gc.iter_grasps(body, 0.4)
+    first = next(streamed)
+    everything = {first.id} | {grasp.id for grasp in streamed}
+    assert everything == {grasp.id for grasp in gc.plan(body, 0.4).grasps}
+
+
+def test_radii_stay_below_the_bounds_that_prune():
+    given, theta = example_object("random-12-1"), math.radians(8.0)
+    planned = standard(given)
+    body = planned.body
+    cones = PlannedCones(body, face_shapes(body), theta, tilted=True)
+    blocks, tested = all_blocks(cones, len(body.faces), np.empty((0, 4), dtype=int)), 0
+    (room,) = blocks.rooms
+    for family in DISCS:
+        listed = outlook(blocks.make(0), CONSTRUCTIONS[family], LEAST_RADIUS)
+        ranking = listed.ranking(slice(None))
+        coarse = dict(zip(map(tuple, listed.prospects.faces.tolist()), listed.bounds, strict=True))
+        faces = ranking.candidates.faces[ranking.places].tolist()
+        limits = [coarse[tuple(each)] for each in faces]
+        assert (ranking.bounds.max(axis=(1, 2)) <= limits).all()
+        ordered = (ranking.quadruple(row, ranking.bounds[row]) for row in range(len(ranking)))
+        bounds = {
+            tuple(sorted(planned.faces[face] for face in each.faces)): each.bound
+            for each in ordered
+        }
+        assert max(bounds.values()) <= room
+        for grasp in gc.plan(given, 1.0, theta_deg=8.0, families=family, cones="tilted").grasps:
+            assert grasp.radius <= bounds[tuple(sorted(grasp.faces))] * body.radius * (1 + 1e-6)
+            tested += 1
+    assert tested >= 80
+
+
+def test_tilted_cones_never_make_discs_smaller():
+    tested = larger = 0
+    for name in ("wedge", "random-12-1"):
+        body = example_object(name)
+        paper, ours = (
+            {g.id: g.radius for g in gc.plan(body, 0.3, families="concurrent", cones=cones).grasps}
+            for cones in ("normal", "tilted")
+        )
+        assert set(paper) <= set(ours)
+        for name_, radius in paper.items():
+            assert ours[name_] >= 0.8 * radius
+            larger += ours[name_] > 1.01 * radius
+            tested += 1
+    assert tested >= 30
+    assert larger > 0.5 * tested
+
+
+def test_a_focus_before_some_fingers_and_behind_others_gives_regions_where_nothing_else_does():
+    body, mixed = example_object("l-bracket"), 0
+    for grasp in gc.plan(body, 0.5).grasps:
+        if grasp.family != "concurrent":
+            continue
+        heights = np.einsum(
+            "ki,ki->k", grasp.focus_points[0] - grasp.positions,
+            np.array([cone.axis for cone in grasp.force_cones]),
+        )  # fmt: skip
+        if heights.min() < 0.0 < heights.max():
+            rng = np.random.default_rng(0)
+            for _ in range(20):
+                points = [
+                    rng.dirichlet(np.full(len(region.polygon), 0.3)) @ region.polygon
+                    for region in grasp.regions
+                ]
+                assert gc.force_closure(np.array(points), grasp.normals, 0.5).closed
+            mixed += 1
+    assert mixed >= 4
+
+
+@pytest.mark.parametrize("name", ["l-bracket", "hexagonal-pyramid"])
+def test_turned_scaled_and_shaken_objects_have_the_same_faces_and_families(name):
+    """All methods, where much is symmetric and faces are not convex."""
+    rng, body = np.random.default_rng(5), example_object(name)
+    extent = np.ptp(body.vertices, axis=0).max()
+    expected = {(*sorted(g.faces), g.family) for g in gc.plan(body, 0.8).grasps}
+    for size in (1e-3, 0.03, 1.0):
+        noise, R = 1e-9 * rng.uniform(-1.0, 1.0, body.vertices.shape), random_rotation(rng)
+        there = remade(body, lambda v, n=noise, R=R, s=size: s * (v / extent + n) @ R.T + s)
+        assert {(*sorted(g.faces), g.family) for g in gc.plan(there, 0.8).grasps} == expected
+    assert len(expected) >= 35

@@ -1,0 +1,77 @@
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from scenes.example_objects import example_object
+
+
+@pytest.fixture(scope="module")
+def body():
+    return example_object("random-8-3")
+
+
+@pytest.fixture(scope="module")
+def everything(body):
+    return gc.plan(body, 0.5).grasps
+
+
+@pytest.mark.parametrize(
+    ("rank_by", "measure"),
+    [
+        ("friction-margin", lambda grasp: grasp.critical_friction),
+        ("ferrari-canny", lambda grasp: -grasp.ferrari_canny[0]),
+    ],
+)
+def test_the_best_of_all_are_kept_in_order(body, everything, rank_by, measure):
+    kept = gc.plan(body, 0.5, limit=10, rank_by=rank_by).grasps
+    values = [measure(grasp) for grasp in kept]
+    best = sorted(measure(grasp) for grasp in everything)[:10]
+    np.testing.assert_allclose(values, best, rtol=1e-5, atol=1e-9)
+    assert len(everything) > 40
+
+
+def test_diverse_grasps_are_farther_apart_than_the_largest(body, everything):
+    diverse = gc.plan(body, 0.5, limit=8, rank_by="diverse").grasps
+    largest = gc.plan(body, 0.5, limit=8).grasps
+    assert len(diverse) == len(largest) == 8
+    assert diverse[0].radius == pytest.approx(max(grasp.radius for grasp in everything))
+    assert _closest(diverse) > 1.5 * _closest(largest)
+    # greedy: each next one is as far from those before as any grasp is
+    for count in range(1, 8):
+        gaps = [min(_apart(grasp, other) for other in diverse[:count]) for grasp in everything]
+        here = min(_apart(diverse[count], other) for other in diverse[:count])
+        assert here == pytest.approx(max(gaps), rel=1e-6)
+
+
+def _apart(one, two):
+    gaps = np.linalg.norm(one.positions[:, None] - two.positions[None], axis=2)
+    return max(gaps.min(axis=0).max(), gaps.min(axis=1).max())
+
+
+def _closest(grasps):
+    return min(_apart(a, b) for place, a in enumerate(grasps) for b in grasps[:place])
+
+
+@pytest.mark.parametrize("name", ["l-bracket", "wedge"])
+def test_diverse_grasps_begin_with_the_largest_disc(name):
+    """Also where free grasps, which have none, are far from edges."""
+    found = gc.plan(example_object(name), 0.5, rank_by="diverse", limit=3).grasps
+    everything = gc.plan(example_object(name), 0.5).grasps
+    assert found[0].radius == max(grasp.radius for grasp in everything)
+
+
+def test_with_everything_found_families_take_turns_largest_first():
+    """Grasps that the free method found regions for take turns with those of their family."""
+    body = example_object("l-bracket")
+    everything = gc.plan(body, 0.5, complete=True).grasps
+    few = gc.plan(body, 0.5, complete=True, limit=10).grasps
+    for family in ("concurrent", "pencil"):
+        radii = [grasp.radius for grasp in everything if grasp.family == family]
+        kept = [grasp.radius for grasp in few if grasp.family == family]
+        assert len(kept) >= 2
+        np.testing.assert_allclose(kept, sorted(radii, reverse=True)[: len(kept)], rtol=1e-5)
+
+
+def test_an_unknown_order_is_refused(body):
+    with pytest.raises(gc.InputError, match="rank_by must be one of radius"):
+        gc.plan(body, 0.5, rank_by="beauty")

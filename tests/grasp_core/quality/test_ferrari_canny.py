@@ -1,0 +1,249 @@
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+import grasp_core as gc
+from grasp_core.quality import ferrari_canny as module
+from grasp_core.quality.wrench_limits import WrenchBody
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
+
+TETRA = TETRA_CENTERS, TETRA_NORMALS, 0.5
+ALL_NORMS = ("l1", "linf")
+
+
+def cone_wrenches(positions, normals, friction, edges, *, outer=False):
+    """Wrenches of pyramid edges with unit normal force, contact by contact, (k, edges, 6)."""
+    slope = friction / np.cos(np.pi / edges) if outer else friction
+    turns = 2.0 * np.pi * (np.arange(edges) + 0.3) / edges
+    wrenches = []
+    for point, normal in zip(positions, normals, strict=True):
+        one, two = np.linalg.svd(normal[None])[2][1:]
+        forces = normal + slope * (np.outer(np.cos(turns), one) + np.outer(np.sin(turns), two))
+        wrenches.append(np.hstack([forces, np.cross(point, forces)]))
+    return np.array(wrenches)
+
+
+def qhull_distance(points):
+    """Least distance of zero from a facet plane of the hull, negative if outside."""
+    return -ConvexHull(points, qhull_options="QJ Pp").equations[:, -1].max()
+
+
+@pytest.mark.parametrize(
+    ("friction", "low", "high"), [(0.3, 0.124352, 0.124355), (0.5, 0.213195, 0.213202)]
+)
+def test_the_centers_of_a_tetrahedron(friction, low, high):
+    """Values bracketed by repeated qhull with exact support points."""
+    found = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, friction, torque_scale=1.0)
+    assert found.lower <= high
+    assert found.upper >= low
+    assert found.upper - found.lower <= module.GAP * found.upper
+    assert found.verify()
+
+
+@pytest.mark.parametrize(("edges", "expected"), [(8, 0.206318), (16, 0.211806)])
+def test_pyramids_of_a_tetrahedron_are_weaker(edges, expected):
+    """Known to the third digit, which depends on how the pyramids are turned."""
+    found = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.5, torque_scale=1.0)
+    pyramids = qhull_distance(
+        cone_wrenches(TETRA_CENTERS, TETRA_NORMALS, 0.5, edges).reshape(-1, 6)
+    )
+    assert pyramids == pytest.approx(expected, abs=5e-3)
+    assert pyramids < found.lower
+
+
+def test_qhull_on_inner_and_outer_pyramids_lies_on_either_side():
+    rng = np.random.default_rng(21)
+    closed = 0
+    while closed < 25:
+        positions, normals = random_contacts(rng)
+        found = gc.ferrari_canny(positions, normals, 0.6, torque_scale=1.0)
+        if found.lower <= 0.0:
+            continue
+        inner = qhull_distance(cone_wrenches(positions, normals, 0.6, 12).reshape(-1, 6))
+        outer = qhull_distance(
+            cone_wrenches(positions, normals, 0.6, 12, outer=True).reshape(-1, 6)
+        )
+        assert inner <= found.upper + 1e-9
+        assert outer >= found.lower - 1e-9
+        closed += 1
+
+
+def test_qhull_on_sums_of_pyramids_lies_below_the_bounded_forces():
+    """Minkowski sums of three-sided pyramids: 4^4 points."""
+    wrenches = cone_wrenches(TETRA_CENTERS, TETRA_NORMALS, 0.5, 3)
+    choices = [np.vstack([np.zeros(6), each]) for each in wrenches]
+    sums = np.array([np.sum(chosen, axis=0) for chosen in itertools.product(*choices)])
+    found = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.5, torque_scale=1.0, norm="linf")
+    assert qhull_distance(sums) < found.lower
+    assert found.verify()
+
+
+def test_without_friction_the_hull_of_the_normals_is_exact():
+    rng = np.random.default_rng(3)
+    closed = 0
+    while closed < 10:
+        positions, normals = random_contacts(rng, 14, spread=1.5)
+        exact = qhull_distance(np.hstack([normals, np.cross(positions, normals)]))
+        found = gc.ferrari_canny(positions, normals, 0.0, torque_scale=1.0)
+        assert (found.lower > 0.0) == (exact > 0.0)
+        if exact > 0.0:
+            assert found.lower == pytest.approx(exact, rel=1e-9)
+            closed += 1
+
+
+@pytest.mark.parametrize("norm", ALL_NORMS)
+def test_sampled_supports_are_never_below_the_lower_bound(norm):
+    rng = np.random.default_rng(4)
+    tested = 0
+    while tested < 20:
+        positions, normals = random_contacts(rng)
+        found = gc.ferrari_canny(positions, normals, 0.7, torque_scale=0.5, norm=norm)
+        if found.lower <= 0.0:
+            continue
+        y = rng.normal(size=(3000, 6))
+        y = np.vstack([y, found.direction + 0.1 * rng.normal(size=(3000, 6))])
+        y /= np.linalg.norm(y, axis=1, keepdims=True)
+        velocities = y[:, None, :3] + np.cross(y[:, None, 3:], positions / 0.5)
+        along = np.einsum("ski,ki->sk", velocities, normals)
+        across = np.linalg.norm(velocities - along[..., None] * normals, axis=2)
+        each = along + 0.7 * across
+        supports = each.max(axis=1) if norm == "l1" else np.maximum(each, 0.0).sum(axis=1)
+        assert supports.min() >= found.lower
+        tested += 1
+
+
+def test_bounded_forces_resist_the_weakest_wrench_exactly_so_far():
+    """Along the direction found, the largest resisted wrench is the quality."""
+    rng = np.random.default_rng(5)
+    tested = 0
+    while tested < 10:
+        positions, normals = random_contacts(rng)
+        found = gc.ferrari_canny(positions, normals, 0.7, torque_scale=1.0, norm="linf")
+        if found.lower > 0.0:
+            body = WrenchBody(positions, normals, np.full(4, 0.7), 1.0)
+            limit = body.limit(-found.direction).limit
+            assert found.lower * (1 - 1e-9) <= limit <= found.upper * (1 + 1e-6)
+            tested += 1
+
+
+@pytest.mark.parametrize("norm", ALL_NORMS)
+def test_bounds_are_proved_narrow_and_positive_exactly_with_closure(norm):
+    rng = np.random.default_rng(6)
+    seen = {True: 0, False: 0}
+    for _ in range(60):
+        positions, normals = random_contacts(rng)
+        found = gc.ferrari_canny(positions, normals, 0.5, torque_scale=1.3, norm=norm)
+        closed = gc.force_closure(positions, normals, 0.5).closed
+        assert found.verify()
+        assert (found.lower > 0.0) == closed
+        assert found.lower <= found.upper
+        assert found.upper - found.lower <= module.GAP * abs(found.upper) + 1e-9
+        if not closed and norm == "l1":
+            assert found.upper < 0.0
+        seen[closed] += 1
+    assert min(seen.values()) >= 10
+
+
+def test_contacts_that_push_one_way_are_as_far_from_balance_as_they_push():
+    positions = np.array([[1.0, 0, 0], [-0.5, 0.8, 0], [-0.5, -0.8, 0]])
+    normals = np.tile([0.0, 0, 1], (3, 1))
+    found = gc.ferrari_canny(positions, normals, 0.2, torque_scale=1.0)
+    assert found.lower == pytest.approx(-1.0, abs=1e-8)
+    assert found.upper == pytest.approx(-1.0, abs=1e-8)
+    assert found.verify()
+    resting = gc.ferrari_canny(positions, normals, 0.2, torque_scale=1.0, norm="linf")
+    assert (resting.lower, resting.upper) == (0.0, pytest.approx(0.0, abs=1e-9))
+    assert resting.verify()
+
+
+@pytest.mark.parametrize("norm", ALL_NORMS)
+def test_two_fingers_resist_no_turn_about_their_line(norm):
+    positions = np.array([[-1.0, 0, 0], [1, 0, 0]])
+    found = gc.ferrari_canny(positions, -positions, 0.5, torque_scale=1.0, norm=norm)
+    assert found.lower == pytest.approx(0.0, abs=1e-9)
+    assert found.upper == pytest.approx(0.0, abs=1e-9)
+    assert found.verify()
+
+
+def test_turning_moving_reordering_and_units_change_nothing():
+    rng = np.random.default_rng(7)
+    tested = 0
+    while tested < 10:
+        positions, normals = random_contacts(rng)
+        center = rng.normal(size=3) * 0.1
+        here = gc.ferrari_canny(positions, normals, 0.7, center=center, torque_scale=1.0)
+        if here.lower <= 0.0:
+            continue
+        R, order, shift = random_rotation(rng), rng.permutation(4), rng.normal(size=3)
+        there = gc.ferrari_canny(
+            (1000.0 * (positions @ R.T + shift))[order], (normals @ R.T)[order], 0.7,
+            center=1000.0 * (R @ center + shift), torque_scale=1000.0,
+        )  # fmt: skip
+        assert max(here.lower, there.lower) <= min(here.upper, there.upper) * (1 + 1e-9)
+        tested += 1
+
+
+def test_friction_may_differ_between_contacts_and_more_is_never_worse():
+    one = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, [0.3, 0.3, 0.3, 0.6], torque_scale=1.0)
+    less = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.3, torque_scale=1.0)
+    more = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.6, torque_scale=1.0)
+    assert less.lower <= one.upper
+    assert one.lower <= more.upper
+    assert less.upper < more.lower
+
+
+def test_a_full_store_gives_wider_bounds_that_hold(monkeypatch):
+    monkeypatch.setattr(module, "MOST_SIMPLICES", 500)
+    rough = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.5, torque_scale=1.0)
+    assert rough.lower < 0.213195
+    assert rough.upper > 0.213195
+    assert rough.verify()
+
+
+def test_proofs_do_not_survive_tampering():
+    found = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.5, torque_scale=1.0)
+    polytope = found.polytope
+    tampered = (
+        replace(found, lower=found.lower * 1.001),
+        replace(found, upper=found.upper * 0.999),
+        replace(found, direction=-found.direction),
+        replace(found, polytope=replace(polytope, corners=polytope.corners[1:])),
+        replace(found, polytope=replace(polytope, forces=1.01 * polytope.forces)),
+        replace(found, polytope=None),
+    )
+    assert found.verify()
+    assert not any(each.verify() for each in tampered)
+    apart = gc.ferrari_canny(TETRA_CENTERS, np.tile([0.0, 0, 1], (4, 1)), 0.5, torque_scale=1.0)
+    assert apart.verify()
+    assert not replace(apart, lower=0.99 * apart.lower).verify()
+    assert not replace(apart, upper=1.01 * apart.upper).verify()
+
+
+def test_a_ray_through_a_corner_proves_nothing():
+    """A simplex beside zero, one corner on the ray: rounding would decide what is crossed."""
+    ray = np.cos(np.arange(1.0, 7.0))
+    rng = np.random.default_rng(8)
+    wrenches = replace(gc.ferrari_canny(*TETRA, torque_scale=1.0).wrenches, G=np.eye(6))
+    corners = np.array([[i for i in range(7) if i != j] for j in range(7)])
+    for _ in range(50):
+        points = np.vstack([ray, ray + 0.3 * rng.normal(size=(6, 6))])
+        polytope = module.InnerPolytope(points, corners, np.tile(ray, (7, 1)))
+        assert polytope.proved_radius(wrenches) == -np.inf
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"torque_scale": 0.0}, "torque_scale must be a number from 1e-09"),
+        ({"norm": "l2"}, "norm must be one of l1, linf"),
+        ({"gap": -1.0}, "gap must be a number from 1e-07"),
+        ({"gap": 2.0}, "below 1, got 2"),
+        ({"center": [0.0, 1.0]}, "center must have shape"),
+    ],
+)
+def test_bad_arguments_are_refused(changed, message):
+    with pytest.raises(gc.InputError, match=message):
+        gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, **{"torque_scale": 1.0, **changed})

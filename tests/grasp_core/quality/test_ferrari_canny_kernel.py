@@ -1,0 +1,202 @@
+"""The compiled polytope beside the one in NumPy, its proofs, and what becomes of wrong ones."""
+
+import itertools
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+import grasp_core as gc
+from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.compiled import compiled
+from grasp_core.quality import ferrari_canny as module
+from grasp_core.quality.inner_polytope import InnerPolytope
+from scenes.example_objects import example_object
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
+
+CUBE = np.vstack([np.eye(3), -np.eye(3)])
+CORNERS = np.array(list(itertools.product([-1.0, 1.0], repeat=3))) / np.sqrt(3.0)
+FRICTIONS = (0.18, 0.3, 0.5, 0.8)
+NEAR = 1e-9
+
+
+def planned(per_object=10):
+    """Contacts of planned grasps about their mean point and at unit size, with frictions."""
+    for name in ("wedge", "random-20-7", "random-14-1", "dodecahedron"):
+        for grasp in gc.plan(example_object(name), 0.3, limit=per_object).grasps:
+            arms = grasp.positions - grasp.positions.mean(axis=0)
+            for friction in FRICTIONS:
+                yield arms / np.linalg.norm(arms, axis=1).max(), grasp.normals, friction
+
+
+def scattered(count):
+    rng = np.random.default_rng(17)
+    for trial in range(count):
+        yield *random_contacts(rng, 3 + trial % 6), FRICTIONS[trial % len(FRICTIONS)]
+
+
+def by_reference(monkeypatch, contacts, **options):
+    """Quality without the kernel."""
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "compiled", lambda _: None)
+        return gc.ferrari_canny(*contacts, torque_scale=1.0, **options)
+
+
+def forbid_reference(monkeypatch):
+    def refuse(*_):
+        raise AssertionError("left to the reference")
+
+    monkeypatch.setattr(module, "_grown", refuse)
+
+
+@pytest.mark.parametrize(("norm", "count"), [("l1", 400), ("linf", 120)])
+def test_intervals_overlap_those_of_the_reference_and_all_proofs_check(monkeypatch, norm, count):
+    cases = [*planned(10 if norm == "l1" else 2), *scattered(count)]
+    seen = {True: 0, False: 0}
+    for contacts in cases:
+        expected = by_reference(monkeypatch, contacts, norm=norm)
+        with monkeypatch.context() as patch:
+            forbid_reference(patch)
+            found = gc.ferrari_canny(*contacts, torque_scale=1.0, norm=norm)
+        assert max(found.lower, expected.lower) <= min(found.upper, expected.upper) + NEAR
+        assert found.verify()
+        assert (found.lower > 0.0) == (expected.lower > 0.0)
+        if found.lower > 0.0:
+            assert found.upper - found.lower <= module.GAP * found.upper
+        seen[found.lower > 0.0] += 1
+    assert sum(seen.values()) >= (550 if norm == "l1" else 150)
+    assert min(seen.values()) >= 40
+
+
+def test_the_ball_fits_into_the_hull_that_qhull_finds():
+    tested = 0
+    for positions, normals, friction in planned(1):
+        found = gc.ferrari_canny(positions, normals, friction, torque_scale=1.0)
+        points = found.polytope.forces @ found.wrenches.G.T
+        facets = ConvexHull(points).equations
+        assert -facets[:, -1].max() == pytest.approx(found.lower, rel=1e-9)
+        assert (points @ found.direction).max() <= found.upper + NEAR
+        tested += 1
+    assert tested >= 15
+
+
+@pytest.mark.parametrize("norm", ["l1", "linf"])
+@pytest.mark.parametrize("positions", [TETRA_CENTERS, CUBE, CORNERS])
+def test_symmetric_contacts_with_ties_everywhere_are_proved(monkeypatch, positions, norm):
+    normals = -positions / np.linalg.norm(positions, axis=1, keepdims=True)
+    monkeypatch.setattr(module, "MOST_SIMPLICES", 8000)
+    expected = by_reference(monkeypatch, (positions, normals, 0.5), norm=norm)
+    forbid_reference(monkeypatch)
+    found = gc.ferrari_canny(positions, normals, 0.5, torque_scale=1.0, norm=norm)
+    assert found.verify()
+    assert max(found.lower, expected.lower) <= min(found.upper, expected.upper) + NEAR
+    assert found.lower >= 0.99 * expected.lower
+
+
+def test_the_finest_gap_is_reached():
+    found = gc.ferrari_canny(
+        TETRA_CENTERS, TETRA_NORMALS, 0.3, torque_scale=1.0, gap=module.FINEST_GAP
+    )
+    assert found.upper - found.lower <= module.FINEST_GAP * found.upper
+    assert found.verify()
+
+
+def spoiled(status=None, change=None):
+    """The kernel with another status or with other forces, corners, normals and direction."""
+    kernel = compiled(module.KERNEL)
+
+    def grow(*args):
+        true_status, *answer = kernel.grow(*args)
+        if change is not None:
+            answer = change(*answer)
+        return (true_status if status is None else getattr(kernel, status), *answer)
+
+    return SimpleNamespace(**{**vars(kernel), "grow": grow})
+
+
+WRONG_ANSWERS = {
+    "fell apart": spoiled("LOST"),
+    "called flat": spoiled("FLAT", lambda f, c, n, y: (f[:0], c[:0], n[:0], 0.0 * y)),
+    "called outside": spoiled("OUTSIDE"),
+    "a simplex is missing": spoiled(None, lambda f, c, n, y: (f, c[1:], n[1:], y)),
+    "a simplex is doubled": spoiled(
+        None, lambda f, c, n, y: (f, np.vstack([c, c[:1]]), np.vstack([n, n[:1]]), y)
+    ),
+    "a corner is another": spoiled(None, lambda f, c, n, y: (f, (c + (c == 3)) % len(f), n, y)),
+    "no such corner": spoiled(None, lambda f, c, n, y: (f, c + 1, n, y)),
+    "all is there twice": spoiled(
+        None, lambda f, c, n, y: (f, np.vstack([c, c]), np.vstack([n, n]), y)
+    ),
+    "a normal points inward": spoiled(
+        None, lambda f, c, n, y: (f, c, np.vstack([-n[:1], n[1:]]), y)
+    ),
+    "not numbers": spoiled(None, lambda f, c, n, y: (f, c, np.nan * n, y)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kernel", WRONG_ANSWERS.values(), ids=WRONG_ANSWERS.keys())
+def test_wrong_polytopes_are_left_to_the_reference(monkeypatch, kernel):
+    contacts = TETRA_CENTERS, TETRA_NORMALS, 0.3
+    expected = by_reference(monkeypatch, contacts)
+    monkeypatch.setattr(module, "compiled", lambda _: kernel)
+    found = gc.ferrari_canny(*contacts, torque_scale=1.0)
+    assert (found.lower, found.upper) == (expected.lower, expected.upper)
+    assert found.verify()
+
+
+def test_without_the_kernel_the_reference_answers(monkeypatch):
+    expected = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.3, torque_scale=1.0)
+    with monkeypatch.context() as patch:
+        forbid_reference(patch)
+        patch.setattr(module, "compiled", lambda _: None)
+        with pytest.raises(AssertionError, match="left to the reference"):
+            gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.3, torque_scale=1.0)
+    found = by_reference(monkeypatch, (TETRA_CENTERS, TETRA_NORMALS, 0.3))
+    assert max(found.lower, expected.lower) <= min(found.upper, expected.upper)
+
+
+def cross_polytope():
+    """The hull of plus and minus the unit vectors, as a polytope, with its set of wrenches."""
+    points = np.vstack([np.eye(6), -np.eye(6)])
+    signs = list(itertools.product([0, 1], repeat=6))
+    corners = np.array([[i + 6 * s for i, s in enumerate(sign)] for sign in signs])
+    normals = 1.0 - 2.0 * np.array(signs)
+    polytope = InnerPolytope(points, corners, normals / np.sqrt(6.0))
+    return polytope, WrenchSet(np.eye(6), np.ones(2), "l1")
+
+
+def test_what_a_cross_polytope_proves_and_what_its_spoiled_forms_do_not():
+    polytope, wrenches = cross_polytope()
+    assert polytope.radius(wrenches) == pytest.approx(1.0 / np.sqrt(6.0), rel=1e-12)
+    assert polytope.proved_radius(wrenches) == polytope.radius(wrenches)
+    scaled = replace(polytope, normals=3.0 * polytope.normals)
+    assert scaled.proved_radius(wrenches) == pytest.approx(polytope.radius(wrenches), rel=1e-12)
+    corners, normals = polytope.corners, polytope.normals
+    beside = replace(polytope, forces=polytope.forces + 2.0)
+    spoiled_forms = [
+        beside,
+        replace(polytope, corners=corners[1:], normals=normals[1:]),
+        replace(polytope, corners=corners[1:]),
+        replace(polytope, corners=np.tile(corners, (2, 1)), normals=np.tile(normals, (2, 1))),
+        replace(polytope, corners=corners - 6),
+        replace(polytope, corners=corners + 1),
+        replace(polytope, corners=corners[:0], normals=normals[:0]),
+        replace(polytope, normals=-normals),
+        replace(polytope, normals=0.0 * normals),
+        replace(polytope, forces=np.nan * polytope.forces),
+    ]
+    for each in spoiled_forms:
+        assert each.proved_radius(wrenches) == -np.inf
+
+
+def test_simplices_before_zero_do_not_hide_that_it_is_outside():
+    """Moved along one axis, faces that look away from zero are turned towards it."""
+    polytope, wrenches = cross_polytope()
+    away = replace(polytope, forces=polytope.forces + np.array([0.0, 0, 5, 0, 0, 0]))
+    points = away.forces[away.corners]
+    signs = np.sign(np.einsum("mcj,mj->mc", points, away.normals).mean(axis=1))
+    turned = replace(away, normals=signs[:, None] * away.normals)
+    assert turned.radius(wrenches) > 0.0
+    assert turned.proved_radius(wrenches) == -np.inf

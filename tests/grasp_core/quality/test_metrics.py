@@ -1,0 +1,216 @@
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
+
+import grasp_core as gc
+from grasp_core.closure.contact_arrays import many_frames
+from grasp_core.closure.wrenches import contact_frames
+from grasp_core.compiled import compiled
+from grasp_core.quality import metrics
+from scenes.example_objects import example_object
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
+
+
+def edge_wrenches(positions, normals, friction, edges):
+    """Wrenches of n + mu (cos t1 + sin t2), about the origin, with the frames of the package."""
+    rows = []
+    for point, frame in zip(positions, contact_frames(normals), strict=True):
+        for turn in 2.0 * np.pi * np.arange(edges) / edges:
+            force = frame @ [1.0, friction * np.cos(turn), friction * np.sin(turn)]
+            rows.append([*force, *np.cross(point, force)])
+    return np.array(rows)
+
+
+def min_weight_by_definition(W):
+    """The program as FRoGGeR states it: weights and their least are the unknowns."""
+    count = len(W)
+    equalities = np.zeros((7, count + 1))
+    equalities[:6, :count], equalities[6, :count] = W.T, 1.0
+    answer = linprog(
+        np.append(np.zeros(count), -1.0),
+        A_ub=np.hstack([-np.eye(count), np.ones((count, 1))]), b_ub=np.zeros(count),
+        A_eq=equalities, b_eq=np.append(np.zeros(6), 1.0),
+        bounds=[(None, None)] * (count + 1), method="highs",
+    )  # fmt: skip
+    return -answer.fun if answer.status == 0 else -math.inf
+
+
+@pytest.mark.parametrize("edges", [4, 8])
+def test_min_weight_is_what_its_definition_says(edges):
+    rng = np.random.default_rng(edges)
+    signs = {True: 0, False: 0}
+    for _ in range(150):
+        positions, normals = random_contacts(rng)
+        here = gc.min_weight(positions, normals, 0.5, edges=edges)
+        W = edge_wrenches(positions, normals, 0.5, edges)
+        assert here == pytest.approx(min_weight_by_definition(W), abs=1e-9)
+        signs[here > 0.0] += 1
+    assert min(signs.values()) >= 20
+
+
+def test_min_weight_of_generic_contacts_is_positive_only_with_closure():
+    """Of generic ones: two opposite contacts have a positive weight, but no closure."""
+    pair = np.array([[1.0, 0, 0], [-1, 0, 0]])
+    assert gc.min_weight(pair, -pair, 0.5) == pytest.approx(1.0 / 16.0)
+    assert not gc.force_closure(pair, -pair, 0.5).closed
+    rng = np.random.default_rng(1)
+    positive = 0
+    for _ in range(100):
+        positions, normals = random_contacts(rng)
+        if gc.min_weight(positions, normals, 0.4) > 1e-9:
+            assert gc.force_closure(positions, normals, 0.4).closed
+            positive += 1
+    assert positive >= 15
+
+
+def test_weights_of_contacts_that_push_one_way_cannot_balance():
+    normals = np.tile([0.0, 0, 1], (4, 1))
+    assert gc.min_weight(TETRA_CENTERS, normals, 0.5) == -math.inf
+
+
+def test_min_weight_and_singular_value_do_not_depend_on_order():
+    rng = np.random.default_rng(2)
+    positions, normals = random_contacts(rng)
+    order = rng.permutation(4)
+    assert gc.min_weight(positions[order], normals[order]) == pytest.approx(
+        gc.min_weight(positions, normals), abs=1e-12
+    )
+    R = random_rotation(rng)
+    one = gc.smallest_singular_value(positions, torque_scale=2.0)
+    assert gc.smallest_singular_value(positions[order] @ R.T, torque_scale=2.0) == pytest.approx(
+        one
+    )
+
+
+def contact_sets(rng, count):
+    positions, normals = zip(*(random_contacts(rng) for _ in range(count)), strict=True)
+    return np.array(positions), np.array(normals)
+
+
+@pytest.mark.parametrize("edges", [4, 8])
+def test_min_weights_are_those_of_the_definition(edges):
+    """As close as `RESIDUAL` over the number of edges allows either program to be wrong."""
+    rng = np.random.default_rng(edges)
+    positions, normals = contact_sets(rng, 150)
+    friction = rng.uniform(0.1, 1.0, size=(150, 4))
+    found = gc.min_weights(positions, normals, friction, edges=edges)
+    W = metrics._many_pyramid_wrenches(positions, normals, friction, edges)
+    assert np.isfinite(metrics._at_once(W)).sum() >= 145
+    for i, (points, units) in enumerate(zip(positions, normals, strict=True)):
+        one = gc.min_weight(points, units, friction[i], edges=edges)
+        assert found[i] == pytest.approx(one, abs=1e-9)
+        assert found[i] == pytest.approx(min_weight_by_definition(W[i]), abs=1e-9)
+    assert min((found > 0.0).sum(), (found < 0.0).sum()) >= 20
+
+
+def test_friction_is_one_for_all_one_for_each_finger_or_one_each():
+    positions, normals = contact_sets(np.random.default_rng(5), 4)
+    fingers = np.array([0.3, 0.5, 0.7, 0.9])
+    every = gc.min_weights(positions, normals, fingers)
+    assert (every == gc.min_weights(positions, normals, np.tile(fingers, (4, 1)))).all()
+    assert every[1] == pytest.approx(gc.min_weight(positions[1], normals[1], fingers), abs=1e-12)
+    same = gc.min_weights(positions, normals, 0.4)
+    assert (same == gc.min_weights(positions, normals, np.full(4, 0.4))).all()
+    for wrong in (-0.1, [0.5, 0.5], np.full((3, 4), 0.5)):
+        with pytest.raises(gc.InputError, match="friction"):
+            gc.min_weights(positions, normals, wrong)
+
+
+def test_frames_of_many_contacts_are_those_of_one_set():
+    grasps = gc.plan(example_object("random-12-1"), 0.5, limit=20).grasps
+    normals = np.array([grasp.normals for grasp in grasps])
+    normals = np.concatenate([normals, np.eye(3)[[[0, 1, 2, 0]]], -np.eye(3)[[[0, 1, 2, 0]]]])
+    for frames, units in zip(many_frames(normals), normals, strict=True):
+        np.testing.assert_allclose(frames, contact_frames(units), atol=1e-15)
+    assert len(normals) >= 20
+
+
+def test_weights_of_degenerate_sets_are_left_to_the_reference():
+    pair = np.array([[1.0, 0, 0], [-1, 0, 0]])
+    assert gc.min_weights(pair[None], -pair[None], 0.5)[0] == pytest.approx(1.0 / 16.0)
+    normals = np.tile([0.0, 0, 1], (4, 1))
+    positions = np.array([TETRA_CENTERS, TETRA_CENTERS])
+    found = gc.min_weights(positions, np.array([normals, TETRA_NORMALS]))
+    assert found[0] == -math.inf
+    assert found[1] == pytest.approx(gc.min_weight(TETRA_CENTERS, TETRA_NORMALS), abs=1e-12)
+
+
+def test_without_compiled_code_weights_come_from_the_reference(without_kernels):
+    positions, normals = contact_sets(np.random.default_rng(6), 20)
+    quick = gc.min_weights(positions, normals)
+    without_kernels()
+    W = metrics._many_pyramid_wrenches(positions, normals, np.full((20, 4), 0.5), 8)
+    assert np.isnan(metrics._at_once(W)).all()
+    np.testing.assert_allclose(gc.min_weights(positions, normals), quick, atol=1e-9)
+
+
+@pytest.mark.parametrize("spoil", ["twists", "multipliers", "rows", "numbers"])
+def test_wrong_vertices_are_left_to_the_reference(monkeypatch, spoil):
+    def vertices(W, twists, multipliers, rows):
+        honest(W, twists, multipliers, rows)
+        if spoil == "rows":
+            rows[:] = (rows + 1) % W.shape[1]
+        elif spoil == "multipliers":
+            multipliers *= -1.0
+        else:
+            twists *= 1.001 if spoil == "twists" else np.nan
+
+    kernel = compiled(metrics.KERNEL)
+    honest = kernel.vertices
+    positions, normals = contact_sets(np.random.default_rng(7), 20)
+    right = gc.min_weights(positions, normals)
+    monkeypatch.setattr(kernel, "vertices", vertices)
+    W = metrics._many_pyramid_wrenches(positions, normals, np.full((20, 4), 0.5), 8)
+    assert np.isnan(metrics._at_once(W)).all()
+    np.testing.assert_allclose(gc.min_weights(positions, normals), right, atol=1e-9)
+
+
+def test_hull_volume_is_that_of_qhull_on_the_edges():
+    rng = np.random.default_rng(3)
+    for _ in range(10):
+        positions, normals = random_contacts(rng)
+        center, scale = rng.normal(size=3), 0.7
+        W = edge_wrenches((positions - center) / scale, normals, 0.5, 8)
+        volume = gc.hull_volume(positions, normals, 0.5, center=center, torque_scale=scale)
+        assert volume > 0.0
+        assert volume == pytest.approx(ConvexHull(W, qhull_options="QJ Pp").volume, rel=1e-6)
+
+
+def test_the_volume_of_seven_pushes_is_that_of_their_simplex():
+    rng = np.random.default_rng(4)
+    for _ in range(10):
+        positions, normals = random_contacts(rng, 7)
+        W = np.hstack([normals, np.cross(positions, normals)])
+        exact = abs(np.linalg.det(W[1:] - W[0])) / math.factorial(6)
+        volume = gc.hull_volume(positions, normals, 0.0, torque_scale=1.0)
+        assert volume == pytest.approx(exact, rel=1e-6)
+        longer = gc.hull_volume(positions, normals, 0.0, torque_scale=2.0)
+        assert longer == pytest.approx(exact / 2.0**3, rel=1e-6)
+
+
+def test_without_friction_four_contacts_span_no_volume():
+    assert gc.hull_volume(TETRA_CENTERS, TETRA_NORMALS, 0.0, torque_scale=1.0) == 0.0
+
+
+def test_the_singular_value_of_six_unit_contacts_is_known():
+    """At +-1 on each axis: G G' is 6 for forces and 4 for torques."""
+    positions = np.vstack([np.eye(3), -np.eye(3)])
+    assert gc.smallest_singular_value(positions, torque_scale=1.0) == pytest.approx(2.0)
+    assert gc.smallest_singular_value(positions, torque_scale=2.0) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_contacts_on_a_line_leave_a_turn_unopposed(count):
+    positions = np.outer(np.arange(count), [1.0, 2.0, 3.0])
+    value = gc.smallest_singular_value(positions, torque_scale=1.0)
+    assert value == pytest.approx(0.0, abs=1e-12)
+
+
+def test_bad_arguments_are_refused():
+    with pytest.raises(gc.InputError, match="edges must be a whole number from 3"):
+        gc.min_weight(TETRA_CENTERS, TETRA_NORMALS, 0.5, edges=2)
+    with pytest.raises(gc.InputError, match="torque_scale must be a number from 1e-09"):
+        gc.hull_volume(TETRA_CENTERS, TETRA_NORMALS, 0.5, torque_scale=-1.0)

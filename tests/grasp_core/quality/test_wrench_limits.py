@@ -1,0 +1,124 @@
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.closure.wrenches import grasp_map, normal_and_tangential
+from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, max_resisted_wrench
+from scenes.example_objects import example_object
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
+
+
+def test_a_pair_of_opposite_fingers_resists_friction_times_force():
+    """Two contacts at +-x: across the line, twice mu f; along it, f."""
+    positions = np.array([[-1.0, 0, 0], [1, 0, 0]])
+    normals = -positions
+    along = max_resisted_wrench(positions, normals, 0.3, [1, 0, 0, 0, 0, 0], max_normal_force=5.0)
+    across = max_resisted_wrench(positions, normals, 0.3, [0, 0, 2, 0, 0, 0], max_normal_force=5.0)
+    about = max_resisted_wrench(positions, normals, 0.3, [0, 0, 0, 1, 0, 0], max_normal_force=5.0)
+    turning = max_resisted_wrench(positions, normals, 0.3, [0, 0, 0, 0, 0, 1], max_normal_force=5.0)
+    assert along == pytest.approx(5.0, rel=1e-6)
+    assert across == pytest.approx(0.3 * 5.0 * 2 / 2, rel=1e-6)
+    assert about == pytest.approx(0.0, abs=1e-6)
+    assert turning == pytest.approx(2 * 0.3 * 5.0, rel=1e-6)
+
+
+def test_limits_are_attained_by_forces_and_bounded_by_their_facets():
+    """Forces within cones and caps balance the wrench at the limit; no sampled forces pass the
+    facet that the dual names.
+    """
+    rng = np.random.default_rng(0)
+    tested = 0
+    for _ in range(40):
+        positions, normals = random_contacts(rng)
+        body = WrenchBody(positions, normals, np.full(4, 0.4), 3.0)
+        wrench = rng.normal(size=6)
+        found = body.limit(wrench)
+        along, across = normal_and_tangential(found.forces, normals)
+        assert (across <= 0.4 * along + 1e-6).all()
+        assert along.max() <= 3.0 + 1e-6
+        total = grasp_map(positions) @ found.forces.ravel() + found.limit * wrench
+        assert np.abs(total).max() < 1e-5 * (1 + np.abs(found.forces).max())
+        assert found.facet @ wrench == pytest.approx(-1.0, abs=1e-6)
+        assert found.limit <= found.upper <= found.limit * (1.0 + 1e-7) + 1e-7
+        pushes = 3.0 * rng.uniform(size=(50, 4))
+        slides = rng.normal(size=(50, 4, 3))
+        slides -= np.einsum("ski,ki->sk", slides, normals)[..., None] * normals
+        slides *= 0.4 * (pushes / np.linalg.norm(slides, axis=2))[..., None]
+        forces = pushes[..., None] * normals + slides
+        reached = forces.reshape(50, -1) @ grasp_map(positions).T @ found.facet
+        assert reached.max() <= found.limit + 1e-5
+        tested += 1
+    assert tested == 40
+
+
+def test_the_weakest_wrench_is_weaker_than_axes_and_random_wrenches():
+    rng = np.random.default_rng(1)
+    tested = 0
+    for name in ("wedge", "dodecahedron", "random-20-7"):
+        body = example_object(name)
+        for grasp in gc.plan(body, 0.5, limit=4, cones="normal").grasps:
+            scale = np.array([1.0] * 3 + [body.radius] * 3)
+            resisted = WrenchBody(
+                grasp.positions - body.center_of_mass, grasp.normals, np.full(4, 0.5), 10.0
+            )
+            axes = axis_wrenches(body.radius)
+            weakest = resisted.weakest_from(map(resisted.limit, axes), body.radius)
+            assert np.linalg.norm(weakest.wrench / scale) == pytest.approx(1.0)
+            others = rng.normal(size=(30, 6))
+            others = others / np.linalg.norm(others, axis=1, keepdims=True) * scale
+            limits = [resisted.limit(w).limit for w in (*axes, *others)]
+            assert weakest.limit <= min(limits) * (1 + 1e-6)
+            tested += 1
+    assert tested == 12
+
+
+def test_limits_scale_with_force_and_inversely_with_the_wrench():
+    wrench = np.array([1.0, 2, 3, 0.1, 0.2, 0.3])
+    one = max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, wrench, max_normal_force=1.0)
+    ten = max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, wrench / 2, max_normal_force=5.0)
+    assert ten == pytest.approx(10 * one, rel=1e-6)
+
+
+def test_the_weakest_of_several_wrenches_is_above_the_bound_over_all():
+    rng, tested = np.random.default_rng(2), 0
+    while tested < 10:
+        positions, normals = random_contacts(rng)
+        every = gc.ferrari_canny(positions, normals, 0.6, torque_scale=1.0, norm="linf")
+        wrenches = rng.normal(size=(25, 6))
+        wrenches /= np.linalg.norm(wrenches, axis=1, keepdims=True)
+        limits = gc.wrench_limits(positions, normals, 0.6, wrenches, max_normal_force=4.0)
+        weakest = min(limits, key=lambda found: found.limit)
+        assert weakest.limit >= 4.0 * every.lower - 1e-7
+        tested += every.lower > 0.0
+
+
+def test_friction_may_differ_between_contacts():
+    """A force across the line of two fingers, at the second one: only that finger resists it."""
+    positions = np.array([[-1.0, 0, 0], [1, 0, 0]])
+    at_the_second = [[0.0, 0, 1, 0, -1, 0]]
+    for friction, expected in (([0.5, 0.0], 0.0), ([0.0, 0.5], 0.5 * 2.0)):
+        found = gc.wrench_limits(
+            positions, -positions, friction, at_the_second, max_normal_force=2.0
+        )[0]
+        assert found.limit == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("far", [1e2, 1e4, 1e6])
+def test_the_centre_of_torques_may_be_far_away(far):
+    """The same force and turn, with its torque about another point."""
+    wrench = np.array([0.3, -0.2, 0.5, 0.1, 0.2, -0.1])
+    here = max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, wrench, max_normal_force=2.0)
+    center = far * np.array([0.6, 0.0, 0.8])
+    moved = np.append(wrench[:3], wrench[3:] - np.cross(center, wrench[:3]))
+    there = gc.wrench_limits(
+        TETRA_CENTERS, TETRA_NORMALS, 0.5, [moved], max_normal_force=2.0, center=center
+    )[0]
+    assert there.limit == pytest.approx(here, rel=1e-12 * far + 1e-7)
+    assert there.facet @ moved == pytest.approx(-1.0, rel=1e-12 * far + 1e-7)
+
+
+def test_a_zero_wrench_and_a_bad_force_are_refused():
+    with pytest.raises(gc.InputError, match="must not be zero"):
+        max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, np.zeros(6), max_normal_force=1.0)
+    with pytest.raises(gc.InputError, match="max_normal_force must be a number from 1e-09"):
+        max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, np.ones(6), max_normal_force=0.0)

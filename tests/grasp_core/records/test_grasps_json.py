@@ -1,0 +1,146 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
+from scenes.example_objects import example_object
+
+
+@pytest.fixture(scope="module")
+def text():
+    body = example_object("wedge")
+    return plan_to_json(body, gc.plan(body, 0.5, limit=6))
+
+
+def test_a_plan_survives_the_file_to_the_last_bit(text):
+    body = example_object("wedge")
+    plan = gc.plan(body, 0.5, limit=6)
+    saved = grasps_from_json(text)
+    assert saved.body.content_sha256 == body.content_sha256
+    assert saved.friction == 0.5
+    assert [g.id for g in saved.grasps] == [g.id for g in plan.grasps]
+    for one, two in zip(saved.grasps, plan.grasps, strict=True):
+        np.testing.assert_array_equal(one.positions, two.positions)
+        np.testing.assert_array_equal(one.normals, two.normals)
+        assert one.critical_friction == two.critical_friction
+        assert one.family == two.family
+        np.testing.assert_array_equal(one.witness.forces, two.witness.forces)
+        for a, b in zip(one.regions, two.regions, strict=True):
+            np.testing.assert_array_equal(a.polygon, b.polygon)
+
+
+def test_the_ways_of_planned_fingers_survive_the_file():
+    body = example_object("l-bracket")
+    plan = gc.plan(body, 0.5, limit=1, finger=gc.Finger(0.004, 0.05))
+    ways = np.eye(3)[[0, 1, 2, 0]]
+    plan = replace(plan, grasps=(replace(plan.grasps[0], approach_directions=ways),))
+    saved = grasps_from_json(plan_to_json(body, plan))
+    assert saved.finger == gc.Finger(0.004, 0.05)
+    np.testing.assert_array_equal(saved.grasps[0].approach_directions, ways)
+
+
+def test_the_file_has_the_fields_that_users_rely_on(text):
+    document = json.loads(text)
+    assert set(document) == {
+        "schema", "object", "friction", "theta_deg", "seed", "finger", "versions", "counts",
+        "outcomes", "absence", "optimization", "grasps",
+    }  # fmt: skip
+    assert {"name", "source_sha256", "mesh", "center_of_mass_m"} <= set(document["object"])
+    grasp = document["grasps"][0]
+    assert {
+        "id", "family", "faces", "contacts", "focus_points_m", "force_cones", "radius_m", "regions",
+        "critical_friction", "closure_margin", "ferrari_canny",
+    } <= set(grasp)  # fmt: skip
+    assert set(grasp["contacts"][0]) == {"position_m", "normal"}
+
+
+CHANGES = {
+    "not JSON": (lambda _: "{", "not JSON, or not all of it"),
+    "schema from the future": (lambda d: d | {"schema": 2}, "got 2: written by a newer graspproof"),
+    "unknown key": (lambda d: d | {"extra": 1}, "extra"),
+    "missing key": (lambda d: {k: v for k, v in d.items() if k != "seed"}, "seed"),
+    "text for a number": (lambda d: d | {"friction": "much"}, "friction"),
+    "NaN": (lambda d: d | {"friction": float("nan")}, "friction"),
+    "mesh of another object": (
+        lambda d: _set(d, ["object", "mesh", "vertices_m", 0, 0], 0.07),
+        "content",
+    ),
+    "an approach that is no direction": (
+        lambda d: _set(d, ["grasps", 0, "approach_directions"], [[0.0, 0.0, 0.5]] * 4),
+        "approach_directions",
+    ),
+    "three contacts": (lambda d: _set(d, ["grasps", 0, "contacts", 3], None), "contacts"),
+    "contact off its face": (
+        lambda d: _set(d, ["grasps", 0, "contacts", 0, "position_m", 0], 0.5),
+        "face",
+    ),
+    "contact beyond the border": (lambda d: _slid(d, 0.05), "outside the border"),
+    "witness out of balance": (
+        lambda d: _scaled_forces(d, [1.1, 1.0, 1.0, 1.0]),
+        "do not balance",
+    ),
+    "witness so small that nothing seems out of balance": (
+        lambda d: _scaled_forces(d, [1e-7, 1e-7, 2e-8, 5e-7], keep_sum=False),
+        "do not sum to one",
+    ),
+    "witness outside its cone": (
+        lambda d: _set(d, ["grasps", 0, "witness", "forces", 0], [0.1, 0.1, 0.1]),
+        "witness",
+    ),
+    "focus beside the lines": (
+        lambda d: _set(d, ["grasps", 0, "focus_points_m", 0], [0.01, 0.0, 0.0]),
+        "focus points",
+    ),
+    "witness beside the contacts": (
+        lambda d: _set(d, ["grasps", 0, "witness", "points_m", 0], [0.1, 0.1, 0.1]),
+        "witness lines do not pass",
+    ),
+    "witness direction that is not its force's": (
+        lambda d: _set(d, ["grasps", 0, "witness", "directions", 0], [1.0, 0.0, 0.0]),
+        "direction",
+    ),
+    "another family": (
+        lambda d: _set(d, ["grasps", 0, "family"], "regulus"),
+        "witness lines are concurrent, not regulus",
+    ),
+    "id that is a path": (lambda d: _set(d, ["grasps", 0, "id"], "../../x"), "id"),
+    "two equal ids": (lambda d: _set(d, ["grasps", 1, "id"], d["grasps"][0]["id"]), "same id"),
+    "no such face": (lambda d: _set(d, ["grasps", 0, "faces", 0], 99), "names face 99"),
+}
+
+
+@pytest.mark.parametrize("case", CHANGES)
+def test_changed_files_are_refused_by_field(text, case):
+    change, where = CHANGES[case]
+    changed = change(json.loads(text))
+    with pytest.raises(gc.InputError, match=where):
+        grasps_from_json(changed if isinstance(changed, str) else json.dumps(changed))
+
+
+def _slid(document, distance):
+    """Move a contact along its face."""
+    contact = document["grasps"][0]["contacts"][0]
+    along = np.cross(contact["normal"], [0.3, 0.5, 0.7])
+    moved = np.array(contact["position_m"]) + distance * along / np.linalg.norm(along)
+    return _set(document, ["grasps", 0, "contacts", 0, "position_m"], moved.tolist())
+
+
+def _scaled_forces(document, factors, *, keep_sum=True):
+    """Scale each witness force along itself, so that it stays in its cone."""
+    grasp = document["grasps"][0]
+    forces = np.array(grasp["witness"]["forces"]) * np.array(factors)[:, None]
+    if keep_sum:
+        normals = np.array([contact["normal"] for contact in grasp["contacts"]])
+        forces /= np.einsum("ki,ki->", forces, normals)
+    return _set(document, ["grasps", 0, "witness", "forces"], forces.tolist())
+
+
+def _set(document, path, value):
+    place = document
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    return document

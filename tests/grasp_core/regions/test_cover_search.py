@@ -1,0 +1,114 @@
+"""The search for covers: compiled and plain ways agree, and what they find is so."""
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import grasp_core.regions.cover_search as search
+from grasp_core.closure.wrenches import contact_frames
+from grasp_core.regions.proof import SLACK
+from grasp_core.regions.sites import Sites
+from tests.judges import random_rotation
+
+TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
+CONES = 3_000
+
+
+def sites_around(points, normals, *, radius=0.0, sides=0, depth=0.0, friction=0.5):
+    k = len(points)
+    turns = 2.0 * np.pi * np.arange(max(sides, 1)) / max(sides, 1)
+    ring = (0.5 * radius if sides else 0.0) * np.column_stack([np.cos(turns), np.sin(turns)])
+    return Sites(
+        points, np.ascontiguousarray(contact_frames(normals)), np.full(k, friction),
+        np.array([ring] * k), np.full(k, 0.5 * radius if sides else radius), np.full(k, depth),
+    )  # fmt: skip
+
+
+def corners_of(sites, i):
+    """Corners of a polygon around a site, on both sides of its plane."""
+    turns = 2.0 * np.pi * np.arange(64) / 64
+    ring = sites.radii[i] / np.cos(np.pi / 64) * np.column_stack([np.cos(turns), np.sin(turns)])
+    flat = (sites.corners[i][:, None] + ring).reshape(-1, 2) @ sites.frames[i][:, 1:].T
+    off = sites.depths[i] * sites.frames[i][:, 0]
+    return sites.points[i] + np.vstack([flat - off, flat + off])
+
+
+def perturbed(seed):
+    rng = np.random.default_rng(seed)
+    turn = random_rotation(rng)
+    normals = -TETRAHEDRON + 0.15 * rng.normal(size=(4, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return (TETRAHEDRON + 0.1 * rng.normal(size=(4, 3))) @ turn.T, normals @ turn.T
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    "kind", [{"radius": 0.12}, {"radius": 0.1, "sides": 7}, {"radius": 0.08, "depth": 0.03}]
+)
+def test_compiled_and_plain_ways_cut_the_same_cones(kind, seed, monkeypatch):
+    sites = sites_around(*perturbed(seed), **kind)
+    if search.compiled(search.KERNEL) is None:
+        pytest.skip("there is only one way without compiled loops")
+    compiled = search.search_cover(sites, np.eye(6), CONES)
+    monkeypatch.setattr(search, "compiled", lambda _: None)
+    plain = search.search_cover(sites, np.eye(6), CONES)
+    assert compiled.cover is not None
+    np.testing.assert_array_equal(compiled.cover.codes, plain.cover.codes)
+    same = np.isclose(compiled.cover.forces, plain.cover.forces, atol=1e-6)
+    assert same.mean() > 0.99  # ties between answers are broken by rounding
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_cover_that_is_found_passes_its_check(seed):
+    sites = sites_around(*perturbed(seed), radius=0.1, depth=0.02)
+    found = search.search_cover(sites, np.eye(6), CONES)
+    smaller = sites._replace(radii=0.99 * sites.radii)  # corners are outside of the circle
+    regions = [corners_of(smaller, i) for i in range(4)]
+    assert found.cover.verify(regions, sites.frames[:, :, 0], sites.friction)
+    larger = [2.0 * region - region.mean(axis=0) for region in regions]
+    assert not found.cover.verify(larger, sites.frames[:, :, 0], sites.friction)
+
+
+@pytest.mark.skipif(search.compiled(search.KERNEL) is None, reason="only compiled searches look")
+@pytest.mark.parametrize("seed", range(6))
+def test_an_open_choice_is_open_and_in_the_sites(seed):
+    points, normals = perturbed(seed)
+    sites = sites_around(points, normals, radius=0.5)
+    found = search.search_cover(sites, np.eye(6), CONES)
+    assert found.cover is None
+    assert not gc.force_closure(found.choice, normals, 0.5).closed
+    away = found.choice - points
+    assert (np.linalg.norm(away, axis=1) <= 0.5 + 1e-12).all()
+    assert np.abs(np.einsum("ki,ki->k", away, normals)).max() < 1e-12
+
+
+def test_open_contacts_are_never_covered():
+    rng = np.random.default_rng(1)
+    tried = 0
+    for _ in range(60):
+        points, normals = rng.normal(size=(4, 3)), rng.normal(size=(4, 3))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        if gc.force_closure(points, normals, 0.5).closed:
+            continue
+        tried += 1
+        assert search.search_cover(sites_around(points, normals), np.eye(6), 500).cover is None
+    assert tried > 40
+
+
+def test_points_alone_need_hardly_a_cut():
+    """Without regions powers are linear: an orthant is in some half-space of the right side."""
+    sites = sites_around(*perturbed(0))
+    found = search.search_cover(sites, np.eye(6), CONES)
+    assert len(found.cover.forces) < 80
+
+
+def test_lowest_values_are_those_over_dense_points():
+    sites = sites_around(*perturbed(2), radius=0.3, sides=5)
+    rng = np.random.default_rng(0)
+    slopes = rng.normal(size=(20, 2))
+    turns = np.linspace(0.0, 2.0 * np.pi, 2000)
+    disc = sites.radii[1] * np.column_stack([np.cos(turns), np.sin(turns)])
+    dense = (sites.corners[1][:, None] + disc).reshape(-1, 2)
+    lowest = sites.lowest(1, slopes)
+    np.testing.assert_allclose(lowest, (slopes @ dense.T).min(axis=1), rtol=1e-5)
+    assert (lowest <= (slopes @ dense.T).min(axis=1) + SLACK).all()

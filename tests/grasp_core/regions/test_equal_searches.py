@@ -1,0 +1,288 @@
+"""Searches of regions, contacts and ceilings do not depend on last digits where much is equal.
+
+Places are shaken by what another processor makes of them. Regular objects have equal candidates
+everywhere, so that a search that sees last digits takes another way each time.
+"""
+
+from dataclasses import replace
+from functools import cache
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.compiled import compiled
+from grasp_core.objects.face_pieces import inset_piece, unit_pieces
+from grasp_core.optimizing import better_contacts as best_contacts
+from grasp_core.optimizing import ceiling as quality_ceilings
+from grasp_core.optimizing.ascent import ContactFaces
+from grasp_core.optimizing.better_contacts import pieces_under
+from grasp_core.planning.given_contacts import seat
+from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches
+from grasp_core.records.contacts_json import ContactSet
+from grasp_core.regions.centers import larger_inside
+from grasp_core.regions.cover_search import search_cover
+from grasp_core.regions.largest_discs import Grounds, Proved
+from grasp_core.regions.sites import Sites
+from scenes.example_objects import example_object
+from sim_validate import contact_analysis as analysis
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS
+
+SHAKEN = 1e-14
+"""In object radii: what another processor makes of a place, generously."""
+SAME = 1e-9
+TRIALS = 4
+CONES = 600
+
+needs_kernels = pytest.mark.skipif(
+    compiled("grasp_core.regions.cover_kernel") is None,
+    reason="the plain search sums in the order of a library",
+)
+
+
+@cache
+def planned(name, family):
+    body = example_object(name)
+    return body, gc.plan(body, 0.5, families=(family,), limit=1).grasps[0]
+
+
+def shaken(rng, values, size=1.0):
+    return values + SHAKEN * size * rng.uniform(-1.0, 1.0, np.shape(values))
+
+
+def moved(rng, body, grasp):
+    """A grasp whose contacts are shaken in their planes."""
+    contacts = []
+    for contact in grasp.contacts:
+        shift = shaken(rng, np.zeros(3), body.radius)
+        shift -= (shift @ contact.normal) * contact.normal
+        contacts.append(replace(contact, position=contact.position + shift))
+    return replace(grasp, contacts=tuple(contacts))
+
+
+@needs_kernels
+@pytest.mark.parametrize(("name", "family"), [("octahedron", "concurrent"), ("wedge", "pencil")])
+@pytest.mark.parametrize("more", [{}, {"recenter": True}, {"balance": "area"}])
+def test_regions_do_not_depend_on_last_digits(name, family, more):
+    body, grasp = planned(name, family)
+    rng = np.random.default_rng(0)
+    own = gc.certify_regions(body, grasp, 0.5, cones=CONES, **more)
+    for _ in range(TRIALS if not more else 1):
+        found = gc.certify_regions(body, moved(rng, body, grasp), 0.5, cones=CONES, **more)
+        assert found.verify()
+        np.testing.assert_array_equal(found.cover.codes, own.cover.codes)
+        assert found.radius == pytest.approx(own.radius, rel=SAME)
+        for one, two in zip(found.regions, own.regions, strict=True):
+            np.testing.assert_allclose(one.polygon, two.polygon, atol=SAME * body.radius)
+
+
+@needs_kernels
+@pytest.mark.parametrize("corners", [0, 6])
+def test_covers_of_symmetric_contacts_share_all_bits(corners):
+    """Contacts of a regular tetrahedron, with discs and with regular polygons."""
+    rng = np.random.default_rng(1)
+    turns = 2.0 * np.pi * np.arange(max(corners, 1)) / max(corners, 1)
+    ring = (0.25 if corners else 0.0) * np.column_stack([np.cos(turns), np.sin(turns)])
+    frames = np.array([np.column_stack([n, *tangents(n)]) for n in TETRA_NORMALS])
+    radius = 0.0 if corners else 0.25
+    own = None
+    for _ in range(TRIALS):
+        sites = sites_of(shaken(rng, TETRA_CENTERS), shaken(rng, frames), shaken(rng, ring), radius)
+        found = search_cover(sites, np.eye(6), 5000).cover
+        local = np.einsum("kij,mki->mkj", sites.frames, found.forces)
+        own = own or (found.codes, local)
+        np.testing.assert_array_equal(found.codes, own[0])
+        np.testing.assert_allclose(local, own[1], rtol=SAME, atol=SAME)
+    assert len(own[0]) > 64
+
+
+@pytest.mark.parametrize("name", ["octahedron", "wedge", "box"])
+def test_a_climb_does_not_depend_on_last_digits(name):
+    """From contacts of the grasp, which is symmetric on these objects."""
+    body, grasp = planned(name, "concurrent")
+    pieces = pieces_under(body, grasp)
+    rooms = [inset_piece(piece, 0.05) for piece in pieces]
+    points = (grasp.positions - body.center_of_mass) / body.radius
+    y = np.array([p.frame.T @ (at - p.origin) for p, at in zip(pieces, points, strict=True)])
+    faces = ContactFaces(pieces, tuple(room.b for room in rooms), 0.5)
+    rng = np.random.default_rng(2)
+    starts = [0.9 * y, 0.5 * y]
+    for start in starts:
+        end, quality = faces.climbed(start)
+        assert np.abs(end - start).max() > 1e-3
+        for _ in range(2):
+            again, found = faces.climbed(shaken(rng, start))
+            np.testing.assert_allclose(again, end, atol=SAME)
+            assert found.lower == pytest.approx(quality.lower, rel=SAME)
+
+
+def test_contacts_are_moved_only_where_they_are_proved_to_be_better(monkeypatch):
+    """Bounds of equally good contacts overlap, and which lower one is larger is chance."""
+    body, grasp = planned("wedge", "concurrent")
+    exact, asked = best_contacts.ferrari_canny, []
+    own = gc.optimize_contacts(body, grasp, 0.5)
+    assert own.after.lower > own.before.upper
+    assert own.grasp is not grasp
+
+    def doubtful(*given, **more):
+        asked.append(exact(*given, **more))
+        return replace(asked[-1], upper=2.0) if len(asked) == 1 else asked[-1]
+
+    monkeypatch.setattr(best_contacts, "ferrari_canny", doubtful)
+    assert gc.optimize_contacts(body, grasp, 0.5).grasp is grasp
+    assert len(asked) > 1
+
+
+def test_a_ceiling_does_not_depend_on_last_digits(monkeypatch):
+    """Corners of parts shaken, on a cube, where many parts have equal bounds."""
+    body, grasp = planned("box", "concurrent")
+    exact, rng = quality_ceilings.corner_contacts, np.random.default_rng(3)
+
+    def ceiling():
+        return gc.quality_ceiling(body, grasp.faces, 0.5, parts=40)
+
+    def shaken_corners(choice, part):
+        points, normals = exact(choice, part)
+        return shaken(rng, points), normals
+
+    own = ceiling()
+    monkeypatch.setattr(quality_ceilings, "corner_contacts", shaken_corners)
+    for _ in range(TRIALS):
+        found = ceiling()
+        assert [leaf.path for leaf in found.leaves] == [leaf.path for leaf in own.leaves]
+        assert found.upper == pytest.approx(own.upper, rel=SAME)
+
+
+def test_discs_as_large_are_those_named_first():
+    body, grasp = planned("box", "concurrent")
+    pieces = pieces_under(body, grasp)
+    grounds = Grounds(pieces, np.full(4, 0.5), 64)
+    sizes = 0.1, 0.1 + SHAKEN, 0.1 - SHAKEN
+    first, larger, smaller = (Proved(np.zeros((4, 2)), r, None, np.inf, None) for r in sizes)
+    assert larger_inside(grounds, first, larger) is first
+    assert larger_inside(grounds, first, smaller) is first
+    clearly = replace(first, radius=0.11)
+    assert larger_inside(grounds, first, clearly) is clearly
+
+
+def test_discs_that_touch_an_edge_are_cut():
+    """Their radius may be a little more or less than the distance."""
+    body, _ = planned("box", "concurrent")
+    body_pieces = unit_pieces(body)[:4]
+    grounds = Grounds(body_pieces, np.full(4, 0.5), 64)
+    for radius in (0.25, 0.2):
+        ys = np.array([p.corners.mean(axis=0) + (p.inradius - radius) * toward(p)
+                       for p in body_pieces])  # fmt: skip
+        for off in (-SHAKEN, 0.0, SHAKEN):
+            sites = grounds.discs(ys, radius + off)
+            np.testing.assert_array_equal(sites.radii, 0.0)
+        assert (grounds.discs(ys, radius - 1e-6).radii > 0.0).all()
+
+
+def test_a_contact_between_pieces_of_a_face_is_on_the_first_of_them():
+    body = example_object("l-bracket")
+    index = next(i for i, face in enumerate(body.faces) if len(face.pieces) > 1)
+    one, two = body.faces[index].pieces[:2]
+    shared = [p for p in one if (np.linalg.norm(two - p, axis=1) <= SAME * body.radius).any()]
+    assert len(shared) == 2
+    middle = np.mean(shared, axis=0)
+    _, grasp = planned("l-bracket", "concurrent")
+    toward = one.mean(axis=0) - two.mean(axis=0)
+    chosen = set()
+    for step in (-SHAKEN, 0.0, SHAKEN):
+        contact = replace(
+            grasp.contacts[0],
+            position=middle + step * toward,
+            normal=body.faces[index].normal,
+        )
+        there = replace(
+            grasp, contacts=(contact, *grasp.contacts[1:]), faces=(index, *grasp.faces[1:])
+        )
+        piece = pieces_under(body, there)[0]
+        chosen.add(tuple(np.round(piece.origin, 9)))
+    assert len(chosen) == 1
+
+
+def test_a_given_contact_on_an_edge_is_on_the_first_face():
+    """With a normal between those of both faces, which lean less than is allowed."""
+    body, rng, tested = example_object("random-40-7"), np.random.default_rng(4), 0
+    for i, j in combinations(range(len(body.faces)), 2):
+        one, two = body.faces[i], body.faces[j]
+        apart = np.linalg.norm(one.polygon[:, None] - two.polygon[None], axis=2).min(axis=1)
+        ends = one.polygon[apart < SAME * body.radius]
+        between = (one.normal + two.normal) / np.linalg.norm(one.normal + two.normal)
+        if len(ends) < 2 or between @ one.normal < np.cos(np.radians(19.0)):
+            continue
+        for _ in range(TRIALS):
+            points = shaken(rng, np.array([ends.mean(axis=0)] * 4), body.radius)
+            assert set(seat(body, points, [between] * 4).faces) == {i}
+        tested += 1
+    assert tested >= 5
+
+
+def test_the_weakest_wrench_is_sought_from_the_first_of_equally_weak_ones(monkeypatch):
+    body, grasp = planned("octahedron", "pencil")
+    resisted = WrenchBody(
+        grasp.positions - body.center_of_mass, grasp.normals, np.full(4, 0.5), 20.0
+    )
+    monkeypatch.setattr(WrenchBody, "_descend", lambda _self, start, _scale: start)
+    limits = [resisted.limit(wrench) for wrench in axis_wrenches(body.radius)]
+    rng, least = np.random.default_rng(6), min(found.limit for found in limits)
+    equal = [found for found in limits if found.limit <= least * (1.0 + 1e-7)]
+    assert len(equal) >= 3
+    for _ in range(TRIALS):
+        nudged = [replace(f, limit=f.limit + float(1e-9 * rng.uniform(-1, 1))) for f in limits]
+        found = resisted.weakest_from(nudged, body.radius)
+        np.testing.assert_array_equal(found.wrench, equal[0].wrench)
+
+
+def test_the_first_of_equally_weak_axis_wrenches_is_named(monkeypatch):
+    """Four contacts of an octahedron resist several axes equally: limits are shaken."""
+    body, grasp = planned("octahedron", "pencil")
+    contacts = ContactSet(
+        id="o",
+        positions=grasp.positions,
+        normals=grasp.normals,
+        friction=np.full(4, 0.5),
+        center=body.center_of_mass,
+        torque_scale=body.radius,
+        center_from="center of mass",
+        torque_scale_from="object radius",
+    )
+    own = analysis.analyze(contacts, analysis.Question(20.0)).weakest_axis
+    exact, rng = analysis.wrench_limits, np.random.default_rng(5)
+
+    def shaken_limits(*given, **more):
+        limits = exact(*given, **more)
+        near = [found for found in limits if found.limit <= own.limit * (1.0 + 1e-7)]
+        assert len(near) >= 3
+        return tuple(replace(f, limit=f.limit + float(1e-9 * rng.uniform(-1, 1))) for f in limits)
+
+    monkeypatch.setattr(analysis, "wrench_limits", shaken_limits)
+    for _ in range(TRIALS):
+        found = analysis.analyze(contacts, analysis.Question(20.0)).weakest_axis
+        np.testing.assert_array_equal(found.wrench, own.wrench)
+
+
+def toward(piece):
+    """The outward normal of the edge nearest to the middle of a piece."""
+    middle = piece.corners.mean(axis=0)
+    return piece.E[int((piece.b - piece.E @ middle).argmin())]
+
+
+def tangents(normal):
+    aside = np.cross(normal, [0.3, 0.5, 0.8])
+    aside /= np.linalg.norm(aside)
+    return aside, np.cross(normal, aside)
+
+
+def sites_of(points, frames, ring, radius):
+    return Sites(
+        points,
+        np.ascontiguousarray(frames),
+        np.full(4, 0.5),
+        np.array([ring] * 4),
+        np.full(4, radius),
+        np.zeros(4),
+    )

@@ -1,0 +1,257 @@
+from unittest import mock
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+import grasp_core as gc
+from grasp_core.compiled import compiled
+from grasp_core.errors import SolverError
+from grasp_core.solvers import lp
+from grasp_core.solvers.lp import (
+    Below,
+    Infeasible,
+    LinearProgram,
+    Optimum,
+    maximize,
+    maximize_above,
+)
+from scenes.example_objects import example_object
+
+SQUARE = np.vstack([np.eye(2), -np.eye(2)])
+
+
+def test_the_corner_of_a_square_is_found_with_its_multipliers():
+    answer = maximize(LinearProgram(np.array([1.0, 2.0]), SQUARE, np.array([3.0, 4.0, 0, 0])))
+    assert isinstance(answer, Optimum)
+    np.testing.assert_allclose(answer.x, [3.0, 4.0])
+    np.testing.assert_allclose(answer.multipliers, [1.0, 2.0, 0.0, 0.0])
+    assert answer.value == pytest.approx(11.0)
+
+
+def test_equalities_are_met():
+    program = LinearProgram(
+        np.array([1.0, 0.0]),
+        SQUARE,
+        np.array([3.0, 4.0, 0, 0]),
+        np.array([[1.0, 1.0]]),
+        np.array([2.0]),
+    )
+    answer = maximize(program)
+    assert isinstance(answer, Optimum)
+    np.testing.assert_allclose(answer.x, [2.0, 0.0], atol=1e-12)
+
+
+def test_an_empty_set_comes_with_a_proof():
+    answer = maximize(LinearProgram(np.array([1.0, 0]), SQUARE, np.array([1.0, 1, -2, 0])))
+    assert isinstance(answer, Infeasible)
+    y = answer.multipliers
+    assert (y >= 0).all()
+    np.testing.assert_allclose(SQUARE.T @ y, 0.0, atol=1e-12)
+    assert y @ [1.0, 1, -2, 0] < 0
+
+
+def test_an_unbounded_program_is_an_error():
+    with pytest.raises(SolverError):
+        maximize(LinearProgram(np.array([1.0, 1.0]), SQUARE[:1], np.array([1.0])))
+
+
+def test_verdicts_and_values_agree_with_another_route():
+    """Random programs, half of them made infeasible by a contradictory row."""
+    rng = np.random.default_rng(0)
+    seen = {Optimum: 0, Infeasible: 0}
+    for trial in range(400):
+        n, rows = int(rng.integers(2, 12)), int(rng.integers(15, 60))
+        A = rng.normal(size=(rows, n))
+        b = A @ rng.normal(size=n) + rng.uniform(size=rows)
+        if trial % 2:
+            weights = rng.uniform(size=rows)
+            A = np.vstack([A, -weights @ A])
+            b = np.append(b, -weights @ b - 0.01)
+        c = A.T @ rng.uniform(size=len(A))
+        answer = maximize(LinearProgram(c, A, b))
+        judge = linprog(-c, A_ub=A, b_ub=b, bounds=[(None, None)] * n, method="highs-ipm")
+        assert (judge.status == 0) == isinstance(answer, Optimum)
+        seen[type(answer)] += 1
+        if isinstance(answer, Optimum):
+            assert answer.value == pytest.approx(-judge.fun, abs=1e-6)
+    assert min(seen.values()) >= 150
+
+
+def answers_agree(program, answer, cutoff=-np.inf):
+    """Whether HiGHS says the same; a bound below the cutoff is one that its value respects."""
+    judge = lp._by_highs(program)
+    if isinstance(answer, Below):
+        return isinstance(judge, Infeasible) or judge.value <= answer.bound + 1e-8 <= cutoff + 2e-8
+    if isinstance(answer, Infeasible) or isinstance(judge, Infeasible):
+        return type(answer) is type(judge)
+    return abs(answer.value - judge.value) <= 1e-8 * (1.0 + abs(judge.value))
+
+
+def recorded(monkeypatch, name, friction):
+    """All programs of a plan, each with its cutoff and the compiled method's answer."""
+    asked = []
+
+    def record(program, cutoff):
+        try:
+            answer = compiled(program, cutoff)
+        except (SolverError, np.linalg.LinAlgError):
+            asked.append((program, cutoff, None))
+            raise
+        asked.append((program, cutoff, answer))
+        return answer
+
+    compiled = lp._by_simplex
+    with monkeypatch.context() as patch:
+        patch.setattr(lp, "_by_simplex", record)
+        gc.plan(example_object(name), friction, limit=60)
+    return asked
+
+
+@pytest.mark.parametrize(("name", "friction"), [("wedge", 0.3), ("octahedron", 0.5)])
+def test_the_planners_programs_have_the_same_answers_in_both_ways(monkeypatch, name, friction):
+    asked = recorded(monkeypatch, name, friction)
+    left = [answer for _, _, answer in asked if answer is None]
+    assert len(left) <= 0.01 * len(asked)
+    kinds = {type(answer) for _, _, answer in asked}
+    assert {Optimum, Below} <= kinds
+    for program, cutoff, answer in asked:
+        assert answer is None or answers_agree(program, answer, cutoff)
+
+
+def test_degenerate_programs_end_with_the_same_answers():
+    """Small whole numbers: rows repeat, vertices coincide, equalities contradict each other."""
+    rng = np.random.default_rng(1)
+    seen = {Optimum: 0, Infeasible: 0, None: 0}
+    for _ in range(1500):
+        n, rows, equalities = int(rng.integers(2, 7)), int(rng.integers(6, 25)), rng.integers(0, 3)
+        A = rng.integers(-1, 2, (rows, n)).astype(float)
+        A_eq = rng.integers(-1, 2, (equalities, n)).astype(float)
+        box = np.vstack([np.eye(n), -np.eye(n)])
+        program = LinearProgram(
+            rng.integers(-2, 3, n).astype(float), np.vstack([A, box]),
+            np.append(rng.integers(-1, 3, rows), np.full(2 * n, 5.0)), A_eq,
+            rng.integers(-1, 2, equalities).astype(float),
+        )  # fmt: skip
+        try:
+            answer = lp._by_simplex(program, -np.inf)
+        except (SolverError, np.linalg.LinAlgError):
+            seen[None] += 1
+            continue
+        assert answers_agree(program, answer)
+        seen[type(answer)] += 1
+    assert min(seen[Optimum], seen[Infeasible]) >= 300
+    assert seen[None] <= 15
+
+
+def test_a_cutoff_ends_the_search_with_a_bound_below_it():
+    rng, ended = np.random.default_rng(2), 0
+    for _ in range(300):
+        A = rng.normal(size=(40, 5))
+        b = rng.uniform(0.5, 1.5, 40)
+        c = rng.normal(size=5)
+        best = maximize(LinearProgram(c, A, b))
+        if not isinstance(best, Optimum):
+            continue
+        found = maximize_above(LinearProgram(c, A, b), best.value + 0.1)
+        assert isinstance(found, Below)
+        assert best.value - 1e-9 <= found.bound <= best.value + 0.1
+        np.testing.assert_allclose(A.T @ found.multipliers, c, atol=1e-9)
+        assert found.multipliers.min() >= 0.0
+        worth = maximize_above(LinearProgram(c, A, b), best.value - 0.1)
+        assert isinstance(worth, Optimum)
+        ended += 1
+    assert ended >= 250
+
+
+def test_without_compiled_code_the_answers_come_from_the_reference(without_kernels, monkeypatch):
+    program = LinearProgram(np.array([1.0, 2.0]), SQUARE, np.array([3.0, 4.0, 0, 0]))
+    quick = maximize(program)
+    without_kernels()
+    monkeypatch.setattr(lp, "_by_simplex", None)
+    answer = maximize(program)
+    np.testing.assert_allclose(answer.x, quick.x)
+    np.testing.assert_allclose(answer.multipliers, quick.multipliers)
+
+
+@pytest.mark.usefixtures("afresh")
+def test_what_cannot_be_compiled_or_kept_is_left_to_the_reference(monkeypatch):
+    kernel = compiled(lp.KERNEL)
+    for failure in (OSError("disk full"), RuntimeError("no place to keep it")):
+        compiled.cache_clear()
+        monkeypatch.setattr(
+            kernel, "solve", lambda *_, failure=failure: (_ for _ in ()).throw(failure)
+        )
+        assert isinstance(maximize(LinearProgram(np.ones(2), SQUARE, np.ones(4))), Optimum)
+        assert compiled(lp.KERNEL) is None
+
+
+def test_what_the_compiled_method_gets_wrong_is_left_to_the_reference(monkeypatch):
+    wrong = mock.Mock(side_effect=SolverError("a row is violated"))
+    monkeypatch.setattr(lp, "_by_simplex", wrong)
+    answer = maximize(LinearProgram(np.ones(2), SQUARE, np.ones(4)))
+    assert wrong.called
+    assert answer.value == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("rows", "limits"),
+    [([[1.0], [-1.0]], [3e4, -2e4]), ([[1e-5], [-1e-5]], [2.0, -1.0])],
+)
+def test_programs_far_from_order_one_are_not_called_infeasible(rows, limits):
+    program = LinearProgram(np.ones(1), np.array(rows), np.array(limits))
+    assert isinstance(maximize(program), Optimum)
+
+
+def test_numbers_that_are_none_are_an_error():
+    with pytest.raises(SolverError):
+        maximize(LinearProgram(np.ones(2), SQUARE, np.array([1.0, np.nan, 1.0, 1.0])))
+    program = LinearProgram(np.ones(2), SQUARE, np.ones(4))
+    with pytest.raises(SolverError):
+        lp._checked_optimum(program, np.full(2, np.nan), np.ones(4))
+
+
+def kernel_rows(A, b, equalities=0):
+    """A program as compiled code wants it."""
+    simplex = compiled(lp.KERNEL)
+    if simplex is None:
+        pytest.skip("no compiled code here")
+    A, b = np.asarray(A, dtype=float), np.asarray(b, dtype=float)
+    rows = simplex.Rows(np.array(A.T, order="C"), b, np.linalg.norm(A, axis=1), equalities)
+    return simplex, rows
+
+
+def vertex_of(simplex, basis, y):
+    return simplex.Vertex(np.array(basis), np.array(y, dtype=float), np.zeros(len(basis)))
+
+
+def test_compiled_bounds_count_only_what_multipliers_prove():
+    simplex, rows = kernel_rows(SQUARE, [3.0, 4.0, 0.0, 0.0])
+    c = np.array([1.0, 2.0])
+
+    def bound(basis, y, of=rows):
+        return simplex.proved_bound(c, of, vertex_of(simplex, basis, y), 1e-12)
+
+    assert bound([0, 1], [1.0, 2.0]) == pytest.approx(11.0)
+    assert bound([0, 1], [1.0, 1.0]) == np.inf  # something of c is left over
+    assert bound([2, 3], [-1.0, -2.0]) == np.inf  # rows that may not be turned
+    assert bound([0, 4 + 2], [1.0, 2.0]) == np.inf  # a side of the box
+    _, equal = kernel_rows(SQUARE, [3.0, 4.0, 0.0, 0.0], equalities=2)
+    assert bound([2, 3], [-1.0, -2.0], equal) == pytest.approx(0.0)
+    assert bound([0, 1], [1.0, 2.0], kernel_rows(SQUARE, [np.nan, 4.0, 0.0, 0.0])[1]) == np.inf
+
+
+def test_compiled_refutations_count_only_what_the_combination_proves():
+    contradictory = [3.0, 4.0, -5.0, 0.0]  # x <= 3 and x >= 5
+
+    def empty(alpha, basis=(0, 1), b=contradictory, equalities=0):
+        simplex, rows = kernel_rows(SQUARE, b, equalities)
+        return simplex.proved_empty(rows, vertex_of(simplex, basis, alpha), 2, 1e4)
+
+    assert empty([-1.0, 0.0])
+    assert not empty([-1.0, 0.0], b=[3.0, 4.0, -3.0, 0.0])  # they meet
+    assert not empty([-0.9, 0.0])  # something of the row is left over
+    assert not empty([1.0, 0.0])
+    assert not empty([-1.0, 0.1])
+    assert not empty([-1.0, 0.0], basis=(4, 1))  # a side of the box
+    assert not empty([-1.0, 0.0], b=[np.nan, 4.0, -5.0, 0.0])

@@ -1,0 +1,161 @@
+"""What is drawn of a grasp is where the grasp is."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from scenes.drawing.drawings import BAR_LENGTH, MOST_TRIANGLES, drawing_of, glass
+from scenes.drawing.ruled_surfaces import rulings
+from scenes.drawing.shapes import Shape, cone_sides, extent_of, ring, tube
+from tests.scenes.meshes import sphere_mesh
+from tests.sim_validate.rigs import grasps
+
+FAMILIES = [
+    ("wedge", 0.5, "concurrent"), ("double-wedge-bar", 0.3, "pencil"), ("wedge", 0.5, "pencil"),
+    ("tetrahedron", 0.3, "regulus"), ("wedge", 0.5, "free"),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=FAMILIES, ids=lambda case: f"{case[0]} {case[2]}")
+def case(request):
+    """A body, a grasp of a family, the friction, and what is drawn."""
+    name, friction, family = request.param
+    body, (grasp,) = grasps(name, friction, 1, (family,))
+    return body, grasp, friction, drawing_of(body, grasp, friction)
+
+
+def of_role(shapes, role):
+    return [shape for shape in shapes if shape.role == role]
+
+
+def test_bars_stand_on_their_contacts_and_outside(case):
+    body, grasp, _, shapes = case
+    bars = of_role(shapes, "finger")
+    assert [bar.finger for bar in bars] == [0, 1, 2, 3]
+    for bar, contact in zip(bars, grasp.contacts, strict=True):
+        heights = (bar.vertices() - contact.position) @ -contact.normal
+        assert heights.min() == pytest.approx(0.0, abs=1e-12)
+        assert heights.max() == pytest.approx(BAR_LENGTH * body.radius)
+
+
+def test_force_cones_are_inside_friction_cones(case):
+    _, grasp, friction, shapes = case
+    cones = of_role(shapes, "force cone")
+    assert len(cones) == 4
+    for cone, contact in zip(cones, grasp.contacts, strict=True):
+        arms = cone.vertices() - contact.position
+        arms = arms[np.linalg.norm(arms, axis=1) > 0.0]
+        angles = np.arccos(arms @ contact.normal / np.linalg.norm(arms, axis=1))
+        assert angles.max() <= math.atan(friction) + 1e-9
+
+
+def test_friction_cones_have_the_angle_of_friction(case):
+    _, grasp, friction, shapes = case
+    cones = of_role(shapes, "friction cone")
+    assert len(cones) == 4
+    for cone, contact in zip(cones, grasp.contacts, strict=True):
+        arms = cone.lines[0] - contact.position
+        cosines = arms @ contact.normal / np.linalg.norm(arms, axis=1)
+        np.testing.assert_allclose(np.arccos(cosines), math.atan(friction), rtol=1e-9)
+
+
+def test_lines_of_force_are_inside_the_cones_and_pass_the_foci(case):
+    body, grasp, friction, shapes = case
+    lines = of_role(shapes, "line of force")
+    assert len(lines) == 4
+    for finger, (line, contact) in enumerate(zip(lines, grasp.contacts, strict=True)):
+        start, end = line.lines[0]
+        np.testing.assert_array_equal(start, contact.position)
+        way = (end - start) / np.linalg.norm(end - start)
+        leaning = abs(float(way @ contact.normal))  # a focus may be behind the finger
+        assert math.acos(min(leaning, 1.0)) <= math.atan(friction) + 1e-6
+        if grasp.family != "regulus":
+            focus = grasp.focus_points[finger * len(grasp.focus_points) // 4]
+            assert np.linalg.norm(np.cross(focus - start, way)) < 1e-9 * body.radius
+
+
+def test_force_cones_that_do_not_fit_are_left_out():
+    body, (grasp,) = grasps("wedge", 0.5, 1, ("pencil",), "tilted")
+    assert len(of_role(drawing_of(body, grasp, 0.5), "force cone")) == 4
+    assert not of_role(drawing_of(body, grasp, 0.1), "force cone")
+
+
+def test_far_foci_do_not_make_far_lines():
+    body, (grasp,) = grasps("double-wedge-bar", 0.3, 1, ("pencil",))
+    far = replace(grasp, focus_points=body.center_of_mass + 1e6 * np.eye(3)[:2])
+    shapes = drawing_of(body, far, 0.3)
+    assert not of_role(shapes, "plane")
+    for line in of_role(shapes, "line of force"):
+        assert np.linalg.norm(line.lines[0][1] - line.lines[0][0]) <= 5.0 * body.radius
+
+
+def test_planes_of_a_pencil_hold_both_contacts_and_both_foci():
+    body, (grasp,) = grasps("double-wedge-bar", 0.3, 1, ("pencil",))
+    (planes,) = of_role(drawing_of(body, grasp, 0.3), "plane")
+    for first, plane in zip((0, 2), planes.polygons, strict=True):
+        points = np.vstack([plane, grasp.focus_points, grasp.positions[first : first + 2]])
+        flatness = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[2]
+        assert flatness < 1e-9 * body.radius
+
+
+@pytest.mark.parametrize(
+    ("name", "method"), [("tetrahedron", "regulus"), ("mug", "regulus"), ("wedge", "free")]
+)
+def test_the_surface_of_a_regulus_holds_its_fourth_line(name, method):
+    body, (grasp,) = grasps(name, 0.5, 1, (method,))
+    ways = grasp.witness.directions
+    segments = rulings(grasp.positions, ways, body.center_of_mass, body.radius)
+    assert len(segments) >= 10
+    for segment in segments:
+        assert apart(segment, grasp.positions[3], ways[3]) < 1e-9 * body.radius
+    other = np.cross(ways[3], ways[0])
+    other /= np.linalg.norm(other)
+    assert max(apart(each, grasp.positions[3], other) for each in segments) > 1e-3 * body.radius
+
+
+def apart(segment, point, way):
+    """Distance of a segment's line from another line, by their common normal."""
+    along = segment[1] - segment[0]
+    normal = np.cross(along, way)
+    return abs(float((point - segment[0]) @ normal)) / np.linalg.norm(normal)
+
+
+def test_what_is_round_is_round():
+    axis = np.array([0.0, 0.6, 0.8])
+    circle = ring(np.ones(3), axis, 2.0)
+    np.testing.assert_allclose(np.linalg.norm(circle - 1.0, axis=1), 2.0)
+    np.testing.assert_allclose((circle - 1.0) @ axis, 0.0, atol=1e-12)
+    sides = extent_of([Shape("finger", polygons=tube(np.zeros(3), 5.0 * axis, 0.5))])
+    np.testing.assert_allclose(np.linalg.norm(np.cross(sides, axis), axis=1), 0.5)
+    rim = np.array(cone_sides(np.zeros(3), axis, 0.3, 2.0))[:, 1]
+    np.testing.assert_allclose(np.linalg.norm(rim, axis=1), 2.0)
+    np.testing.assert_allclose(rim @ axis, 2.0 * math.cos(0.3))
+
+
+def test_the_glass_covers_the_surface(case):
+    body, _, _, shapes = case
+    surface, edges = glass(body)
+    assert (surface.role, edges.role) == (shapes[0].role, shapes[1].role)
+    area = sum(polygon_area(piece) for piece in surface.polygons)
+    assert area == pytest.approx(sum(face.area for face in body.faces))
+
+
+def polygon_area(corners):
+    arms = corners[1:] - corners[0]
+    return 0.5 * np.linalg.norm(np.cross(arms[:-1], arms[1:]).sum(axis=0))
+
+
+def test_fine_surfaces_are_drawn_coarser_and_stay_where_they_are():
+    vertices, triangles = sphere_mesh(5)
+    assert len(triangles) > 2 * MOST_TRIANGLES
+    body = gc.Polyhedron.from_mesh(vertices, triangles, faces="patches")
+    surface, _ = glass(body)
+    assert 200 < len(surface.polygons) <= 2 * MOST_TRIANGLES
+    distances = np.linalg.norm(surface.vertices() - body.center_of_mass, axis=1)
+    assert 0.85 * body.radius < distances.min()
+    assert distances.max() <= (1.0 + 1e-9) * body.radius
+    area = sum(polygon_area(piece) for piece in surface.polygons)
+    assert area == pytest.approx(4.0 * math.pi * body.radius**2, rel=0.1)

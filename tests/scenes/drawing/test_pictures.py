@@ -1,0 +1,207 @@
+"""Pictures of grasps can be read: from a good side, in colours apart, nothing cut off."""
+
+import io
+import itertools
+import math
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import scenes
+from grasp_core.errors import InputError
+from scenes.drawing import pictures
+from scenes.drawing.canvas import FORMATS, encoded
+from scenes.drawing.drawings import BAR_RADIUS, drawing_of
+from scenes.drawing.painting import painted
+from scenes.drawing.palette import BAD, FINGERS, FOCUS, GOOD, INK, LOOKS, SURFACE, rgb
+from scenes.drawing.pictures import draw_grasp, empty_picture, grasp_figure, write_picture
+from scenes.drawing.shapes import Shape
+from scenes.drawing.turning_clips import FRAMES, write_turning_clip
+from scenes.drawing.views import FORESHORTENED, View, best_view
+from tests.sim_validate.rigs import grasps
+
+FRONT = View.of_angles(0.0, 0.0, scenes.example_object("box"))
+
+
+@pytest.fixture(scope="module")
+def wedge():
+    body, (grasp,) = grasps("wedge", 0.5, 1, ("pencil",))
+    return body, grasp
+
+
+def test_a_view_is_a_right_handed_frame_with_z_upwards(wedge):
+    for azimuth, elevation in itertools.product((0.0, 75.0, 200.0), (0.0, 30.0, 60.0)):
+        axes = View.of_angles(azimuth, elevation, wedge[0]).axes
+        np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+        np.testing.assert_allclose(np.cross(axes[0], axes[1]), axes[2], atol=1e-12)
+        assert axes[0][2] == pytest.approx(0.0, abs=1e-12)
+        assert axes[1][2] > 0.0
+        assert math.degrees(math.asin(axes[2][2])) == pytest.approx(elevation)
+
+
+def test_what_is_nearer_is_larger():
+    towards, right = FRONT.axes[2], FRONT.axes[0]
+    unit = 0.1 * FRONT.distance
+    far, near = (FRONT.center + unit * (right + side * towards) for side in (-1.0, 1.0))
+    places, nearness = FRONT.seen(np.array([far, near, FRONT.center]))
+    assert places[1, 0] > unit > places[0, 0] > 0.0
+    np.testing.assert_allclose(nearness, [-unit, unit, 0.0], atol=1e-12)
+    np.testing.assert_allclose(places[2], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["wedge", "dodecahedron", "box", "mug", "double-wedge-bar"])
+def test_no_finger_points_at_the_viewer(name):
+    """A bar that is seen at FORESHORTENED + 0.1 is still 0.33 object radii long: 0.75 of them
+    times the sine of 26 degrees. Contacts are a bar's width apart.
+    """
+    body, found = grasps(name, 0.5, 3, ("concurrent", "pencil"), cones="tilted")
+    assert len(found) == 3
+    for grasp in found:
+        view = best_view(body, grasp)
+        assert np.abs(grasp.normals @ view.axes[2]).max() < FORESHORTENED + 0.1
+        places, _ = view.seen(grasp.positions)
+        gaps = [np.linalg.norm(a - b) for a, b in itertools.combinations(places, 2)]
+        assert min(gaps) > BAR_RADIUS * body.radius
+
+
+def square(nearness, role="region", finger=0):
+    corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+    points = [FRONT.center + x * FRONT.axes[0] + y * FRONT.axes[1] + nearness * FRONT.axes[2]
+              for x, y in corners]  # fmt: skip
+    return Shape(role, finger, polygons=(np.array(points),))
+
+
+def test_what_is_in_front_is_drawn_later():
+    patches = painted([square(0.3, finger=1), square(-0.3, finger=0)], FRONT, 2.0)
+    assert [patch.colour[:3] for patch in patches] == [rgb(FINGERS[0]), rgb(FINGERS[1])]
+
+
+def test_lines_are_as_wide_and_as_long_as_they_say():
+    ends = np.array([FRONT.center - FRONT.axes[0], FRONT.center + FRONT.axes[0]])
+    for role, share in (("friction cone", 1.0), ("line of force", 0.5)):
+        parts = painted([Shape(role, 0, lines=(ends,))], FRONT, 2.0)
+        lengths = [np.linalg.norm(part.polygon[1] - part.polygon[0]) for part in parts]
+        assert sum(lengths) == pytest.approx(2.0 * share, rel=0.05)
+        widths = [np.linalg.norm(part.polygon[2] - part.polygon[1]) for part in parts]
+        np.testing.assert_allclose(widths, 0.02 * LOOKS[role].line, rtol=1e-9)
+
+
+SEEN_BY = {
+    "all": np.eye(3),
+    "protanopes": np.array([[0.112, 0.888, 0.0], [0.112, 0.888, 0.0], [0.004, -0.004, 1.0]]),
+    "deuteranopes": np.array([[0.292, 0.708, 0.0], [0.292, 0.708, 0.0], [-0.022, 0.022, 1.0]]),
+}
+"""Linear light as dichromats see it, after Vienot, Brettel & Mollon 1999."""
+
+
+@pytest.mark.parametrize("viewer", SEEN_BY)
+@pytest.mark.parametrize("colours", [FINGERS, (GOOD, BAD), (FOCUS, SURFACE, INK)])
+def test_colours_can_be_told_apart(viewer, colours):
+    seen = [(SEEN_BY[viewer] @ np.array(rgb(colour)) ** 2.2).clip(0.0) ** (1 / 2.2)
+            for colour in colours]  # fmt: skip
+    apart = [np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2)]
+    assert min(apart) > 0.2
+    assert np.linalg.norm(np.subtract(*map(rgb, ("#00ff00", "#00ee00")))) < 0.2  # it has teeth
+
+
+@pytest.mark.parametrize("legend", [True, False])
+@pytest.mark.parametrize("family", ["concurrent", "pencil", "regulus"])
+def test_nothing_is_cut_off(family, legend):
+    body, (grasp,) = grasps("tetrahedron", 0.3, 1, (family,), cones="tilted")
+    figure = grasp_figure(body, grasp, 0.3, legend=legend)
+    encoded(figure, "png")  # places what it draws
+    assert_inside(figure)
+
+
+@pytest.mark.parametrize(("name", "family"), [
+    ("wedge", "concurrent"), ("tetrahedron", "pencil"), ("tetrahedron", "regulus"),
+    ("mug", "regulus"), ("double-wedge-bar", "pencil"),
+])  # fmt: skip
+def test_every_finger_is_seen(name, family, monkeypatch):
+    """The picture changes where a bar is left out.
+
+    A bar 0.1 by 0.75 object radii that is seen at the worst angle covers 0.033 square radii, of a
+    picture that is at most 3.7 radii wide 0.25 %.
+    """
+    body, (grasp,) = grasps(name, 0.5, 1, (family,), cones="tilted")
+    whole = pixels_of(grasp_figure(body, grasp, 0.5, legend=False))
+    for finger in range(4):
+        shapes = [shape for shape in drawing_of(body, grasp, 0.5)
+                  if (shape.role, shape.finger) != ("finger", finger)]  # fmt: skip
+        view = best_view(body, grasp)
+        figure, axes = empty_picture()
+        monkeypatch.setattr(pictures, "drawing_of", lambda *_, left=shapes: left)
+        draw_grasp(axes, body, grasp, 0.5, view)
+        monkeypatch.undo()
+        changed = np.abs(whole - pixels_of(figure)).max(axis=2) > 0.15
+        assert changed.mean() > 0.0025
+
+
+def pixels_of(figure):
+    with Image.open(io.BytesIO(encoded(figure, "png"))) as picture:
+        return np.asarray(picture.convert("RGB")) / 255.0
+
+
+def assert_inside(figure):
+    """That every text of a figure is whole, and no label of a tick is on another."""
+    of_ticks = set()
+    for axis in [axis for axes in figure.axes if axes.axison for axis in (axes.xaxis, axes.yaxis)]:
+        low, high = sorted(axis.get_view_interval())
+        shown = [tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
+        of_ticks |= {tick.label1 for tick in shown} | {tick.label2 for tick in shown}
+        boxes = [tick.label1.get_window_extent() for tick in shown if tick.label1.get_visible()]
+        assert not any(one.overlaps(two) for one, two in itertools.combinations(boxes, 2))
+    every = set(figure.findobj(match=lambda each: hasattr(each, "get_text")))
+    hidden = {text for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)
+              for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks())
+              for text in (tick.label1, tick.label2)} - of_ticks  # fmt: skip
+    texts = [text for text in every - hidden if text.get_text().strip() and text.get_visible()]
+    assert texts
+    width, height = figure.canvas.get_width_height()
+    for text in texts:
+        box = text.get_window_extent()
+        assert box.x0 >= -1.0
+        assert box.y0 >= -1.0
+        assert box.x1 <= width + 1.0, text.get_text()
+        assert box.y1 <= height + 1.0, text.get_text()
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_picture_is_the_same_each_time(wedge, tmp_path, form):
+    one, two = (write_picture(*wedge, tmp_path / place / f"a.{form}").read_bytes()
+                for place in ("one", "two"))  # fmt: skip
+    assert one == two
+    assert len(one) > 5000
+    if form in {"png", "webp", "jpg"}:
+        with Image.open(io.BytesIO(one)) as picture:
+            assert min(picture.size) >= 500
+
+
+def test_other_endings_are_refused(wedge, tmp_path):
+    with pytest.raises(InputError, match=r"a\.exe: pictures end in \.png, \.svg"):
+        write_picture(*wedge, tmp_path / "a.exe")
+    with pytest.raises(InputError, match=r"a\.mp4: clips end in \.gif or \.webp"):
+        write_turning_clip(*wedge, tmp_path / "a.mp4", 0.5)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_no_grasp_of_the_object_is_refused(wedge, tmp_path):
+    body, grasp = wedge
+    with pytest.raises(InputError, match="does not lie on face"):
+        write_picture(scenes.example_object("box"), grasp, tmp_path / "a.png")
+    with pytest.raises(InputError, match="friction must be"):
+        write_picture(body, grasp, tmp_path / "a.png", friction=-1.0)
+
+
+@pytest.mark.slow
+def test_a_turning_clip_turns(wedge, tmp_path):
+    path = write_turning_clip(*wedge, tmp_path / "new" / "a.webp", 0.5)
+    with Image.open(path) as clip:
+        assert clip.n_frames == FRAMES
+        frames = []
+        for place in (0, FRAMES // 4, FRAMES // 2):
+            clip.seek(place)
+            frames.append(np.asarray(clip.convert("RGB")).astype(int))
+    for one, two in itertools.combinations(frames, 2):
+        assert (np.abs(one - two).max(axis=2) > 30).mean() > 0.02

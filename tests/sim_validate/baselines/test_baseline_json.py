@@ -1,0 +1,141 @@
+import dataclasses
+import json
+import math
+
+import pytest
+
+import grasp_core as gc
+import sim_validate as sv
+from sim_validate.baselines.baseline_json import (
+    baseline_from_json,
+    baseline_to_json,
+    read_baseline,
+    write_baseline,
+)
+from sim_validate.baselines.entries import entry_of
+from sim_validate.baselines.settings import of_settings, settings_of
+from sim_validate.simulation.hold_verdict import Outcome
+from sim_validate.simulation.setup import Agenda, Setup
+from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY
+from tests.sim_validate.rigs import grasps
+
+
+def test_a_baseline_comes_back_and_has_a_line_for_each_grasp():
+    other = dataclasses.replace(
+        ENTRY, id="p", simulated_limit_n=None, simulated_critical_friction=None
+    )
+    baseline = dataclasses.replace(BEFORE, entries=(ENTRY, other))
+    text = baseline_to_json(baseline)
+    assert baseline_from_json(text, "b.json") == baseline
+    assert baseline_to_json(baseline_from_json(text, "b.json")) == text
+    lines = [line for line in text.splitlines() if '"contacts_sha256"' in line]
+    assert len(lines) == 2
+    assert [json.loads(line.strip().rstrip(","))["id"] for line in lines] == [ENTRY.id, "p"]
+
+
+def spoiled(change):
+    record = json.loads(baseline_to_json(BEFORE))
+    change(record)
+    return json.dumps(record)
+
+
+def with_entry(**changed):
+    return spoiled(lambda record: record["grasps"][0].update(changed))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "not JSON"),
+        ("[]", "expected an object, as a baseline is, got a list"),
+        ("{}", "is no baseline"),
+        (spoiled(lambda r: r.update(schema=2)), "schema: .* by a newer graspproof"),
+        (spoiled(lambda r: r.pop("friction")), "friction: missing"),
+        (spoiled(lambda r: r.update(friction="x")), "friction: expected a number, got"),
+        (spoiled(lambda r: r.update(grasps_file=3)), "grasps_file: expected text, got 3"),
+        (spoiled(lambda r: r.update(versions=[])), "versions: expected an object"),
+        (spoiled(lambda r: r.update(taste=1)), "taste: unknown key; expected are "),
+        (spoiled(lambda r: r.update(grasps=[])), "grasps: expected a list, got null"),
+        (spoiled(lambda r: r.update(grasps=[1])), r"grasps\[0\]: "),
+        (spoiled(lambda r: r["grasps"][0].pop("id")), r"grasps\[0\].id: missing"),
+        (with_entry(limit_n="3"), "grasps\\[0\\].limit_n: expected a number"),
+        (with_entry(limit_n=None), "grasps\\[0\\].limit_n"),
+        (with_entry(limit_n=-1.0), "grasps\\[0\\].limit_n: expected at least 0"),
+        (with_entry(limit_n=float("nan")), "grasps\\[0\\].limit_n"),
+        (with_entry(limit_n=float("inf")), "grasps\\[0\\].limit_n"),
+        (with_entry(mismatches=True), "grasps\\[0\\].mismatches: expected a whole number"),
+        (with_entry(outcome="holds"), "grasps\\[0\\].outcome: expected 'held'"),
+        (with_entry(outcome="slipped"), "grasps\\[0\\]: .*outcome slipped, but not held are"),
+        (with_entry(not_held=["lift"]), "grasps\\[0\\]: .*outcome held, but not held are"),
+        (with_entry(controls_let_go=9), "grasps\\[0\\]: .*more ended in some way than there were"),
+        (with_entry(noisy_not_held=[100]), "grasps\\[0\\]: .*not so many repeats"),
+        (spoiled(lambda r: r["grasps"].append(r["grasps"][0])), "the same id"),
+    ],
+)
+def test_what_is_no_baseline_is_refused_with_the_field(text, message):
+    with pytest.raises(gc.InputError, match=message) as raised:
+        baseline_from_json(text, "b.json")
+    assert str(raised.value).startswith("b.json: ")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"trials": 2.5}, "settings.trials"),
+        ({"trials": True}, "settings.trials"),
+        ({"trials": -1}, "trials"),
+        ({"seed": 1.5}, "settings.seed"),
+        ({"surface": "foo"}, "settings.surface"),
+        ({"limits": "rampp"}, "settings.limits"),
+        ({"wrenches": {"lift": [1, 2]}}, "settings.wrenches.lift"),
+        ({"noise": {"mass": "x"}}, "settings.noise.mass"),
+        ({"noise": {"taste": 0.1}}, "taste"),
+        ({"noise": {"mass": -0.1}}, "mass"),
+        ({"setup": {"physics": {"taste": 1}}}, "taste"),
+        ({"taste": 1}, "settings.taste"),
+    ],
+)
+def test_settings_that_are_none_are_refused(change, message):
+    settings = settings_of(Setup(), Agenda())
+    assert of_settings(settings, "b.json") == (Setup(), Agenda())
+    with pytest.raises(gc.InputError, match=message) as raised:
+        of_settings(settings | change, "b.json")
+    assert str(raised.value).startswith("b.json: ")
+
+
+def test_only_baselines_are_overwritten(tmp_path):
+    path = tmp_path / "grasps.json"
+    path.write_text('{"grasps": []}')
+    with pytest.raises(gc.InputError, match="is no baseline, and will not be overwritten"):
+        write_baseline(path, BEFORE)
+    assert path.read_text() == '{"grasps": []}'
+    write_baseline(tmp_path / "b.json", BEFORE)
+    write_baseline(tmp_path / "b.json", BEFORE)
+    assert read_baseline(tmp_path / "b.json") == BEFORE
+
+
+def test_what_no_number_is_kept_as_none():
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    verdict = sv.validate(body, grasp, 0.5)
+    first, second, *rest = verdict.wrenches
+    for order in ((math.nan, 1.0), (1.0, math.nan), (math.inf, 1.0)):
+        spoilt = [
+            dataclasses.replace(trial, hold=dataclasses.replace(trial.hold, displacement_m=value))
+            for trial, value in zip((first, second), order, strict=True)
+        ]
+        found = dataclasses.replace(verdict, wrenches=(*spoilt, *rest))
+        assert entry_of(grasp, found, body.radius).displacement_m is None
+    assert entry_of(grasp, verdict, body.radius).displacement_m > 0.0
+
+
+def test_controls_that_were_not_let_go_are_counted():
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    verdict = sv.validate(body, grasp, 0.5)
+    control = verdict.controls[0]
+    hold = dataclasses.replace(control.tried[0].hold, outcome=Outcome.ERROR)
+    tried = (dataclasses.replace(control.tried[0], hold=hold), *control.tried[1:])
+    found = dataclasses.replace(
+        verdict, controls=(dataclasses.replace(control, tried=tried), *verdict.controls[1:])
+    )
+    entry = entry_of(grasp, found, body.radius)
+    assert (entry.controls, entry.controls_let_go) == (len(verdict.controls), entry.controls - 1)

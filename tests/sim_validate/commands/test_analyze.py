@@ -1,0 +1,427 @@
+import copy
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from grasp_core.errors import UndecidedError
+from sim_validate import contact_analysis as analysis
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.main import main
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
+
+ROOT = Path(__file__).parents[3]
+CROSS = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
+"""Four contacts that push towards the origin along x and y."""
+
+
+def contacts(positions, normals):
+    pairs = zip(np.asarray(positions).tolist(), np.asarray(normals).tolist(), strict=True)
+    return [{"position_m": position, "normal": normal} for position, normal in pairs]
+
+
+TETRAHEDRON = {
+    "contacts": contacts(TETRA_CENTERS, TETRA_NORMALS), "friction": 0.5,
+    "center_m": [0.0, 0.0, 0.0], "torque_scale_m": 1.0,
+}  # fmt: skip
+
+
+@pytest.fixture
+def analyze(tmp_path, monkeypatch, capsys):
+    """The exit code and the one document of `analyze --json` on a file with this content."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(content, *flags):
+        Path("contacts.json").write_text(json.dumps(content))
+        code = main(["analyze", "contacts.json", "--json", *flags])
+        return code, json.loads(capsys.readouterr().out)
+
+    return run
+
+
+def refused(content, capsys, *flags):
+    """What is said about a file that is refused."""
+    text = content if isinstance(content, str) else json.dumps(content)
+    Path("contacts.json").write_text(text)
+    assert main(["analyze", "contacts.json", *flags]) == Exit.INPUT
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.count("\n") == 1
+    assert shown.err.startswith("graspproof: contacts.json: ")
+    return shown.err
+
+
+def test_the_centers_of_a_tetrahedron(analyze):
+    """By hand: four equal forces n_i / 4 have the margin 0.5 / 4; equal weights balance the 32
+    edges; the torque part of G G' is (4/3 - 4/9) I, and smaller than the force part. The l1
+    quality is bracketed by repeated qhull with exact support points.
+    """
+    code, document = analyze(TETRAHEDRON)
+    (grasp,) = document["grasps"]
+    assert code == Exit.GOOD
+    assert (grasp["id"], grasp["closed"], grasp["outcome"]) == ("0", True, "closed")
+    assert grasp["closure_margin"] == pytest.approx(0.125, abs=1e-9)
+    assert grasp["critical_friction"] == 0.0
+    lower, upper = grasp["ferrari_canny_l1_n"]
+    assert lower <= 0.213202
+    assert upper >= 0.213195
+    assert upper - lower <= 1e-4 * upper
+    assert grasp["verified"] == dict.fromkeys(
+        ("closure", "ferrari_canny_l1_n", "ferrari_canny_linf_n"), True
+    )
+    assert grasp["min_weight"] == pytest.approx(1.0 / 32.0, abs=1e-9)
+    assert grasp["smallest_singular_value"] == pytest.approx(np.sqrt(8.0 / 9.0), rel=1e-12)
+    assert grasp["hull_volume"] > 0.0
+    assert grasp["undecided"] == {}
+    assert document["complete"] is True
+
+
+def test_what_is_resisted_in_every_direction_is_no_more_than_along_the_axes(analyze):
+    _, document = analyze(TETRAHEDRON, "--max-normal-force", "5")
+    (grasp,) = document["grasps"]
+    weakest = grasp["weakest_axis_wrench"]
+    everywhere = grasp["resisted_in_every_direction_n"]
+    assert everywhere == pytest.approx(5.0 * grasp["ferrari_canny_linf_n"][0], rel=1e-12)
+    assert 0.0 < everywhere <= weakest["limit"] <= weakest["upper"]
+    assert np.linalg.norm(weakest["wrench"]) == 1.0
+
+
+def test_forces_and_separating_wrench_prove_themselves_from_the_document(analyze):
+    """In plain sums, with only what the document says."""
+    _, document = analyze({"grasps": [
+        {"id": "closed", "contacts": contacts(TETRA_CENTERS + 2.0, TETRA_NORMALS)},
+        {"id": "open", "contacts": contacts(TETRA_CENTERS[:2] + 2.0, TETRA_NORMALS[:2])},
+    ], "friction": 0.5})  # fmt: skip
+    closed, left = document["grasps"]
+    arms, normals = arms_and_normals(closed)
+    forces = np.array(closed["forces"])
+    pushes = (forces * normals).sum(axis=1)
+    assert np.abs(forces.sum(axis=0)).max() < 1e-9
+    assert np.abs(np.cross(arms, forces).sum(axis=0)).max() < 1e-9
+    assert (np.linalg.norm(forces - pushes[:, None] * normals, axis=1) < 0.5 * pushes).all()
+    assert closed["separating_wrench"] is left["forces"] is None
+    arms, normals = arms_and_normals(left)
+    facing = np.array(left["separating_wrench"])
+    velocities = facing[:3] + np.cross(facing[3:], arms)
+    along = (velocities * normals).sum(axis=1)
+    across = np.linalg.norm(velocities - along[:, None] * normals, axis=1)
+    assert np.linalg.norm(facing) > 0.0
+    assert (along + 0.5 * across <= 1e-9).all()
+
+
+def arms_and_normals(grasp):
+    positions = np.array([contact["position_m"] for contact in grasp["contacts"]])
+    normals = np.array([contact["normal"] for contact in grasp["contacts"]])
+    return positions - grasp["center_m"], normals
+
+
+def test_two_contacts_are_never_closed(analyze):
+    code, document = analyze({"contacts": contacts(CROSS[:2], -CROSS[:2]), "friction": 2.0})
+    (grasp,) = document["grasps"]
+    assert code == Exit.NEGATIVE
+    assert (grasp["closed"], grasp["outcome"]) == (False, "open")
+    assert grasp["critical_friction"] is None
+    assert grasp["verified"]["closure"] is True
+    assert grasp["resisted_in_every_direction_n"] == 0.0
+    assert grasp["hull_volume"] == grasp["smallest_singular_value"] == 0.0
+
+
+def test_both_ends_of_the_critical_friction_are_shown(analyze, capsys):
+    """Contacts on the sides of a box, each 0.2 aside of the middle and by turns 0.3 up and down."""
+    turned = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, -1]])
+    turns = [np.linalg.matrix_power(turned, i) for i in range(4)]
+    sides = contacts([t @ [1.0, 0.2, 0.3] for t in turns], [t @ [-1.0, 0, 0] for t in turns])
+    code, document = analyze({"contacts": sides, "friction": 0.5})
+    (grasp,) = document["grasps"]
+    lower, upper = grasp["critical_friction_interval"]
+    assert code == Exit.GOOD
+    assert lower <= 0.2 <= upper == grasp["critical_friction"]
+    assert upper - lower <= 1e-7
+    main(["analyze", "contacts.json"])
+    words = " ".join(capsys.readouterr().out.split())
+    shown = re.search(r"proved between ([0-9.]+) and ([0-9.]+)", words)
+    assert lower - 1e-7 <= float(shown[1]) <= lower, "rounded down"
+    assert upper <= float(shown[2]) <= upper + 1e-7, "rounded up"
+
+
+def test_a_weight_that_no_weights_balance_is_null(analyze):
+    """Contacts that all push along z."""
+    code, document = analyze({"contacts": contacts(CROSS, [[0.0, 0, 1]] * 4), "friction": 0.0})
+    assert code == Exit.NEGATIVE
+    assert document["grasps"][0]["min_weight"] is None
+
+
+def test_several_grasps_are_judged_one_by_one(analyze, capsys):
+    file = {"grasps": [
+        {"id": "four", "contacts": contacts(CROSS, -CROSS)},
+        {"contacts": contacts(CROSS[:2], -CROSS[:2])},
+        {"contacts": contacts(TETRA_CENTERS, TETRA_NORMALS)},
+    ], "friction": 0.3}  # fmt: skip
+    code, document = analyze(file)
+    assert code == Exit.NEGATIVE
+    assert [g["id"] for g in document["grasps"]] == ["four", "1", "2"]
+    assert [g["closed"] for g in document["grasps"]] == [True, False, True]
+    assert document["summary"] == {"grasps": 3, "closed": 2, "open": 1, "undecided": 0}
+    assert main(["analyze", "contacts.json", "--wrench", "0", "0", "-1", "0", "0", "0"]) == code
+    shown = capsys.readouterr().out
+    for word in ("four", "mu*", "weakest axis", "resisted up to", "2 of 3 grasps closed"):
+        assert word in shown
+
+
+def test_a_load_along_the_axis_of_a_cross(analyze):
+    """By hand: four contacts hold 0.5 x 10 N each, so -z is resisted up to 20 N; the forces of
+    least norm for 2 N share it, 0.5 N each, with 1 N of normal force."""
+    flags = "--wrench 0 0 -2 0 0 0 --wrench 0 0 -25 0 0 0"
+    code, document = analyze({"contacts": contacts(CROSS, -CROSS), "friction": 0.5}, *flags.split())
+    light, heavy = document["grasps"][0]["wrenches"]
+    assert code == Exit.GOOD
+    assert light["wrench"] == [0.0, 0.0, -2.0, 0.0, 0.0, 0.0]
+    assert light["limit"] == pytest.approx(10.0, rel=1e-7)
+    assert light["limit"] <= light["upper"] == pytest.approx(10.0, rel=1e-7)
+    expected = np.array([[-1.0, 0, 0.5], [1, 0, 0.5], [0, -1, 0.5], [0, 1, 0.5]])
+    assert np.array(light["least_norm_forces_n"]) == pytest.approx(expected, abs=1e-6)
+    assert heavy["upper"] == pytest.approx(0.8, rel=1e-7)
+    assert heavy["least_norm_forces_n"] is None
+
+
+def test_friction_is_that_of_the_contact_then_the_flag_then_the_file(analyze):
+    file = {"contacts": contacts(CROSS, -CROSS), "friction": 0.5}
+    file["contacts"][0]["friction"] = 0.9
+
+    def used(*flags):
+        listed = analyze(file, *flags)[1]["grasps"][0]["contacts"]
+        return [contact["friction"] for contact in listed]
+
+    assert used() == [0.9, 0.5, 0.5, 0.5]
+    assert used("--friction", "0.3") == [0.9, 0.3, 0.3, 0.3]
+    del file["friction"]
+    assert used("--friction", "0.2") == [0.9, 0.2, 0.2, 0.2]
+
+
+def test_a_cross_needs_friction_at_both_pairs(analyze):
+    """The pair along y turns nothing about y; without friction the other pair does not either."""
+    file = {"contacts": contacts(CROSS, -CROSS), "friction": 0.5}
+    assert analyze(file)[0] == Exit.GOOD
+    for contact in file["contacts"][:2]:
+        contact["friction"] = 0.0
+    code, document = analyze(file)
+    assert code == Exit.NEGATIVE
+    facing = np.array(document["grasps"][0]["separating_wrench"])
+    assert np.flatnonzero(np.abs(facing) > 1e-9 * np.abs(facing).max()).tolist() == [4]
+
+
+def test_outward_normals_are_turned(analyze):
+    outward = TETRAHEDRON | {"contacts": contacts(TETRA_CENTERS, -TETRA_NORMALS)}
+    assert analyze(outward, "--outward") == analyze(TETRAHEDRON)
+    assert analyze(outward) != analyze(TETRAHEDRON)
+
+
+def test_normals_with_three_digits_are_made_unit_vectors(analyze):
+    file = TETRAHEDRON | {"contacts": contacts(TETRA_CENTERS, np.round(TETRA_NORMALS, 3))}
+    code, document = analyze(file)
+    assert code == Exit.GOOD
+    _, normals = arms_and_normals(document["grasps"][0])
+    assert normals == pytest.approx(TETRA_NORMALS, abs=1e-12)
+
+
+def test_center_and_scale_are_the_contacts_own_unless_given(analyze):
+    """Measured so, moving and scaling the grasp changes nothing, to the gap of the bounds."""
+    given = {"contacts": contacts(TETRA_CENTERS, TETRA_NORMALS), "friction": 0.5}
+    moved = given | {"contacts": contacts(0.1 * TETRA_CENTERS + 3.0, TETRA_NORMALS)}
+    (here,) = analyze(given)[1]["grasps"]
+    (there,) = analyze(moved)[1]["grasps"]
+    assert there["center_m"] == pytest.approx([3.0, 3.0, 3.0], rel=1e-12)
+    assert there["torque_scale_m"] == pytest.approx(0.1 / np.sqrt(3.0), rel=1e-9)
+    assert (there["center_from"], there["torque_scale_from"]) == (
+        "mean contact", "farthest contact",
+    )  # fmt: skip
+    for name in ("ferrari_canny_l1_n", "ferrari_canny_linf_n"):
+        assert there[name] == pytest.approx(here[name], rel=1e-4)
+    (flagged,) = analyze(TETRAHEDRON, "--torque-scale-m", "2")[1]["grasps"]
+    assert (flagged["torque_scale_m"], flagged["torque_scale_from"]) == (2.0, "flag")
+    assert flagged["center_from"] == "file"
+
+
+def test_grasps_of_a_plan_are_measured_by_their_object(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["plan", "wedge", "--limit", "3", "--out", "p", "-q"]) == Exit.GOOD
+    planned = json.loads(Path("p/grasps.json").read_text())
+    assert main(["analyze", "p/grasps.json", "--json"]) == Exit.GOOD
+    document = json.loads(capsys.readouterr().out)
+    assert len(document["grasps"]) == 3
+    center = planned["object"]["center_of_mass_m"]
+    vertices = np.array(planned["object"]["mesh"]["vertices_m"])
+    for grasp, source in zip(document["grasps"], planned["grasps"], strict=True):
+        assert grasp["id"] == source["id"]
+        assert grasp["closure_margin"] == pytest.approx(source["closure_margin"], abs=1e-9)
+        assert grasp["critical_friction"] == pytest.approx(source["critical_friction"], abs=1e-6)
+        assert grasp["center_m"] == pytest.approx(center, abs=1e-15)
+        radius = np.linalg.norm(vertices - center, axis=1).max()
+        assert grasp["torque_scale_m"] == pytest.approx(radius, rel=1e-9)
+        assert grasp["ferrari_canny_l1_n"] == pytest.approx(source["ferrari_canny"], rel=1e-4)
+        assert {contact["friction"] for contact in grasp["contacts"]} == {0.5}
+    assert max(g["critical_friction"] for g in planned["grasps"]) > 0.01
+    assert main(["analyze", "p/grasps.json", "--friction", "0.01", "-q"]) == Exit.NEGATIVE
+    assert main(["analyze", "p/grasps.json", "--outward"]) == Exit.INPUT
+    assert "--outward" in capsys.readouterr().err
+    Path("none.json").write_text(json.dumps(planned | {"grasps": []}))
+    assert main(["analyze", "none.json"]) == Exit.INPUT
+    assert "none.json: grasps: the list is empty" in capsys.readouterr().err
+
+
+def changed(place, value):
+    """The file of the tetrahedron with one entry set, or removed where the value is `...`."""
+    file = copy.deepcopy(TETRAHEDRON)
+    owner = file
+    for key in place[:-1]:
+        owner = owner[key]
+    if value is ...:
+        del owner[place[-1]]
+    else:
+        owner[place[-1]] = value
+    return file
+
+
+ONE = TETRAHEDRON["contacts"][0]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("", "not JSON"),
+        ("[1]", "expected an object, as a contacts file is, got a list"),
+        ('{"contacts": ' * 100_000, "deep inside each other"),
+        (changed(["friction"], None), "friction: null; give a value, or leave the key out"),
+        ("{}", '"contacts" (one grasp) and "grasps" (several)'),
+        (TETRAHEDRON | {"grasps": [{"contacts": [ONE, ONE]}]}, '"contacts" (one grasp)'),
+        ({"grasps": [], "friction": 1}, "grasps: expected at least 1"),
+        (changed(["friction"], ...), 'contacts[0].friction: missing; give it there, as a key "fri'),
+        (changed(["friction"], -0.1), "friction: expected at least 0.0, got -0.1"),
+        (changed(["friction"], 1e4), "friction: expected at most 1000"),
+        (changed(["friction"], "0.5"), 'friction: expected a number, got "0.5"'),
+        (changed(["mu"], 0.5), "mu: unknown key; expected are contacts, grasps, friction"),
+        (changed(["schema"], 1), "schema: unknown key"),
+        (changed(["torque_scale_m"], 0), "torque_scale_m: expected more than 0.0, got 0"),
+        (changed(["center_m"], [0, 0]), "center_m[2]: missing"),
+        (changed(["contacts"], [ONE]), "contacts: expected at least 2 items, got 1"),
+        (changed(["contacts"], [ONE] * 101), "contacts: expected at most 100 items, got 101"),
+        (changed(["contacts"], [ONE] * 3), "contacts: all lie within"),
+        (changed(["contacts", 1, "normal"], ...), "contacts[1].normal: missing"),
+        (changed(["contacts", 2, "normal"], [0, 0, 1.01]), "contacts[2].normal: its length must"),
+        (changed(["contacts", 2, "normal"], [0, 0, 1.01]), "got 1.01; divide it"),
+        (changed(["contacts", 3, "normal", 0], float("nan")), "contacts[3].normal[0]: expected a"),
+        (changed(["contacts", 3, "position_m", 2], 1e7), "contacts[3].position_m[2]: expected at"),
+        (changed(["contacts", 3, "pos"], 1), "contacts[3].pos: unknown key; expected are position"),
+        ({"grasps": [{"contacts": [ONE, ONE | {"normal": 1}]}]}, "grasps[0].contacts[1].normal: "),
+        ({"grasps": [{"contacts": [ONE, ONE], "name": "a"}]}, "expected are id, contacts"),
+        ({"grasps": [TETRAHEDRON | {"friction": 1}]}, "grasps[0].friction: unknown key"),
+        ({"grasps": [{"id": "1", "contacts": [ONE, ONE]}, {"contacts": [ONE, ONE]}]},
+         "grasps[1].id: '1' is also that of grasps[0]"),
+    ],
+)  # fmt: skip
+def test_a_file_is_refused_by_name_and_field(tmp_path, monkeypatch, capsys, content, words):
+    monkeypatch.chdir(tmp_path)
+    assert words in refused(content, capsys)
+
+
+def test_a_file_that_is_missing_or_asks_too_much_is_refused(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["analyze", "none.json"]) == Exit.INPUT
+    assert "none.json: cannot be read" in capsys.readouterr().err
+    Path("contacts.json").write_text(json.dumps(TETRAHEDRON))
+    assert main(["analyze", "contacts.json", "--edges", "2501"]) == Exit.INPUT
+    assert "--edges 2500 or less" in capsys.readouterr().err
+    assert main(["analyze", "contacts.json", "--friction", "1001"]) == Exit.USAGE
+    assert "--friction must be at least 1e-09, at most 1000" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        ("--wrench 0 0 0 0 0 0", "must not be zero"),
+        ("--wrench 0 0 1 0 0", "6 values"),
+        ("--wrench 0 0 1 0 0 inf", "finite"),
+        ("--edges 2", "edges"),
+        ("--friction 0", "friction"),
+        ("--max-normal-force -1", "--max-normal-force must be"),
+        ("--torque-scale-m 0", "--torque-scale-m must be"),
+    ],
+)
+def test_flags_without_sense_are_usage_errors(capsys, flags, words):
+    assert main(["analyze", "contacts.json", *flags.split()]) == Exit.USAGE
+    shown = capsys.readouterr()
+    assert words in shown.err + shown.out
+
+
+def test_what_cannot_be_decided_is_named_and_the_rest_is_answered(analyze, monkeypatch, capsys):
+    def undecided(*_):
+        raise UndecidedError("too close to zero")
+
+    monkeypatch.setattr(analysis, "force_closure", undecided)
+    code, document = analyze(TETRAHEDRON)
+    (grasp,) = document["grasps"]
+    assert code == Exit.NEGATIVE
+    assert (grasp["closed"], grasp["outcome"]) == (None, "undecided")
+    assert grasp["undecided"] == {"closure": "too close to zero"}
+    assert grasp["verified"]["closure"] is False
+    assert grasp["critical_friction"] == 0.0
+    assert grasp["ferrari_canny_l1_n"][0] > 0.2
+    assert document["summary"]["undecided"] == 1
+    assert main(["analyze", "contacts.json"]) == Exit.NEGATIVE
+    assert "closure undecided: too close to zero" in capsys.readouterr().out
+
+
+def test_an_interrupted_analysis_tells_what_is_done(analyze, monkeypatch):
+    def interrupted(contacts, question):
+        if contacts.id == "1":
+            raise KeyboardInterrupt
+        return analysis.analyze(contacts, question)
+
+    monkeypatch.setattr("sim_validate.commands.analyze.analyze", interrupted)
+    grasp = {"contacts": TETRAHEDRON["contacts"]}
+    code, document = analyze({"grasps": [grasp, grasp], "friction": 0.5})
+    assert code == Exit.INTERRUPTED
+    assert document["complete"] is False
+    assert [grasp["id"] for grasp in document["grasps"]] == ["0"]
+
+
+def test_one_and_two_processes_say_the_same(analyze):
+    """Most of them pairs, which are quick; contacts at random, since ties make bounds wider."""
+    rng = np.random.default_rng(3)
+    counts = [2] * 14 + [4] * 2
+    grasps = [{"contacts": contacts(*random_contacts(rng, count))} for count in counts]
+    file = {"grasps": grasps, "friction": 0.8}
+    _, one = analyze(file, "--jobs", "1")
+    _, two = analyze(file, "--jobs", "2")
+    assert len(one["grasps"]) == 16
+    for here, there in zip(one["grasps"], two["grasps"], strict=True):
+        assert (here["id"], here["closed"]) == (there["id"], there["closed"])
+        for name in ("ferrari_canny_l1_n", "ferrari_canny_linf_n"):
+            assert here[name] == pytest.approx(there[name], rel=1e-4, abs=1e-9)
+
+
+def test_a_config_file_gives_wrenches(analyze):
+    Path("c.toml").write_text("wrench = [[0, 0, -1, 0, 0, 0], [1, 0, 0, 0, 0, 0.1]]\nedges = 6\n")
+    _, document = analyze(TETRAHEDRON, "--config", "c.toml")
+    asked = [found["wrench"] for found in document["grasps"][0]["wrenches"]]
+    assert asked == [[0, 0, -1, 0, 0, 0], [1, 0, 0, 0, 0, 0.1]]
+    assert document["edges"] == 6
+
+
+@pytest.mark.usefixtures("analyze")
+def test_control_characters_in_an_id_do_not_reach_the_terminal(capsys):
+    grasp = {"id": "a\x1b[31m", "contacts": TETRAHEDRON["contacts"]}
+    Path("contacts.json").write_text(json.dumps({"grasps": [grasp], "friction": 1}))
+    assert main(["analyze", "contacts.json"]) == Exit.GOOD
+    assert "\x1b[31m" not in capsys.readouterr().out
+
+
+def test_the_page_of_files_shows_one_that_is_read(analyze):
+    page = (ROOT / "docs" / "files.md").read_text()
+    shown = json.loads(re.search(r"```json\n(.*?)```", page, re.DOTALL)[1])
+    code, document = analyze(shown)
+    assert code == Exit.GOOD
+    assert len(document["grasps"][0]["contacts"]) == 4
+    assert document["grasps"][0]["verified"]["closure"] is True

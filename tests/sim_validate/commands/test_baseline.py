@@ -1,0 +1,212 @@
+"""A baseline recorded and checked from the command line; every change is reported as what it is."""
+
+import json
+import shutil
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.records.grasps_json import plan_to_json
+from scenes.example_objects import example_object
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.files.reading import write_text
+from sim_validate.main import main
+
+
+def planned(folder, body=None, friction=0.5, limit=2):
+    body = body or example_object("wedge")
+    plan = gc.plan(body, friction, families=("concurrent",), limit=limit)
+    return write_text(folder / "grasps.json", plan_to_json(body, plan))
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recorded")
+    grasps = planned(folder)
+    line = ["baseline", "record", str(grasps), "-o", str(folder / "base.json"), "--jobs", "1"]
+    assert main([*line, "-q"]) == Exit.GOOD
+    return folder
+
+
+@pytest.fixture
+def copy(recorded, tmp_path):
+    return shutil.copytree(recorded, tmp_path / "copy")
+
+
+def check(folder, *more):
+    return main(["baseline", "check", str(folder / "base.json"), "--jobs", "1", *more])
+
+
+def statuses(capsys):
+    record = json.loads(capsys.readouterr().out)
+    return {each["id"]: (each["status"], " ".join(each["reasons"])) for each in record["grasps"]}
+
+
+def test_an_unchanged_baseline_is_the_same(recorded, capsys):
+    assert check(recorded, "--json") == Exit.GOOD
+    assert {status for status, _ in statuses(capsys).values()} == {"same"}
+
+
+def test_less_friction_is_not_comparable(copy, capsys):
+    path = copy / "grasps.json"
+    record = json.loads(path.read_text())
+    record["friction"] = 0.4
+    path.write_text(json.dumps(record))
+    assert check(copy, "--json") == Exit.INPUT
+    assert {found for found in statuses(capsys).values()} == {
+        ("not comparable", "friction: 0.5 -> 0.4")
+    }
+
+
+def test_a_face_that_moved_by_a_millimetre_is_not_comparable(copy, capsys):
+    body = example_object("wedge")
+    moved = body.vertices - 1e-3 * np.isclose(
+        body.vertices @ body.normals[0], body.faces[0].polygon[0] @ body.normals[0]
+    )[:, None] * body.normals[0]  # fmt: skip
+    planned(copy, gc.Polyhedron.from_mesh(moved, body.triangles))
+    assert check(copy, "--json") == Exit.INPUT
+    for status, why in statuses(capsys).values():
+        assert status == "not comparable"
+        assert "the object is another one" in why
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("[physics]\niterations = 60\n", "setup.physics.iterations: "),
+        ("[fingers]\nradius_m = 0.004\n", "setup.fingers.radius_m: None -> 0.004"),
+    ],
+    ids=["solver settings", "a fingertip's radius"],
+)
+def test_other_settings_are_not_comparable(copy, capsys, text, reason):
+    setup = write_text(copy / "setup.toml", text)
+    assert check(copy, "--setup", str(setup), "--json") == Exit.INPUT
+    for status, why in statuses(capsys).values():
+        assert status == "not comparable"
+        assert why.startswith(reason)
+
+
+def altered(folder, **changed):
+    """The baseline as if the first grasp's verdict had been another one."""
+    path = folder / "base.json"
+    record = json.loads(path.read_text())
+    record["grasps"][0].update(changed)
+    path.write_text(json.dumps(record))
+    return record["grasps"][0]["id"]
+
+
+def test_a_regression_fails_and_says_why_also_in_junit(copy, capsys):
+    name = altered(copy, limit_n=1e3)
+    junit = copy / "junit.xml"
+    assert check(copy, "--junit", str(junit), "--json") == Exit.NEGATIVE
+    status, why = statuses(capsys)[name]
+    assert status == "regressed"
+    assert "limit_n: 1000 -> " in why
+    suite = ElementTree.parse(junit).getroot()  # noqa: S314 - we wrote it
+    assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("2", "1", "0")
+    (failed,) = [case for case in suite if case.find("failure") is not None]
+    assert failed.get("name") == name
+    assert why in failed.find("failure").get("message")
+    kept = {each.get("name"): each.get("value") for each in failed.find("properties")}
+    assert kept["outcome"] == "held"
+
+
+def test_an_improvement_fails_only_where_it_is_asked_for(copy, capsys):
+    name = altered(copy, displacement_m=1.0)
+    assert check(copy, "--json") == Exit.GOOD
+    assert statuses(capsys)[name][0] == "improved"
+    assert check(copy, "--strict", "-q") == Exit.NEGATIVE
+
+
+def test_grasps_without_entry_and_entries_without_grasp_fail(copy, capsys):
+    planned(copy, limit=1)
+    assert check(copy, "--json") == Exit.NEGATIVE
+    assert "missing" in {status for status, _ in statuses(capsys).values()}
+    planned(copy, limit=3)
+    assert check(copy, "--json") == Exit.NEGATIVE
+    assert "new" in {status for status, _ in statuses(capsys).values()}
+
+
+def test_blessing_makes_what_was_measured_the_baseline(copy, recorded):
+    altered(copy, limit_n=1e3)
+    assert check(copy, "--bless", "-q") == Exit.GOOD
+    assert (copy / "base.json").read_text() == (recorded / "base.json").read_text()
+    assert check(copy, "-q") == Exit.GOOD
+
+
+def test_what_is_not_there_is_said(tmp_path, capsys):
+    assert check(tmp_path, "-q") == Exit.INPUT
+    assert "base.json" in capsys.readouterr().err
+    write_text(tmp_path / "empty.json", "{}")
+    line = ["baseline", "record", str(tmp_path / "empty.json"), "-o", str(tmp_path / "b.json")]
+    assert main(line) == Exit.INPUT
+    assert not (tmp_path / "b.json").exists()
+
+
+def test_other_fingertips_planned_for_are_not_comparable_until_blessed(copy, capsys):
+    path = copy / "grasps.json"
+    record = json.loads(path.read_text())
+    record["finger"] = {"radius_m": 0.003, "approach_m": 0.05}
+    for grasp in record["grasps"]:
+        grasp["approach_directions"] = [each["normal"] for each in grasp["contacts"]]
+    path.write_text(json.dumps(record))
+    assert check(copy, "--json") == Exit.INPUT
+    for status, why in statuses(capsys).values():
+        assert status == "not comparable"
+        assert "planned for: radius_m None -> 0.003" in why
+        assert "setup.fingers.radius_m: None -> 0.003" in why
+    assert check(copy, "--bless", "-q") == Exit.GOOD
+    assert check(copy, "-q") == Exit.GOOD
+    blessed = json.loads((copy / "base.json").read_text())
+    assert blessed["settings"]["setup"]["fingers"]["radius_m"] == 0.003
+
+
+def test_the_first_grasps_of_a_file_are_a_baseline_too(tmp_path):
+    grasps, base = planned(tmp_path), tmp_path / "base.json"
+    line = ["baseline", "record", str(grasps), "-o", str(base), "--limit", "1", "-q"]
+    assert main(line) == Exit.GOOD
+    assert check(tmp_path, "-q") == Exit.GOOD
+    assert len(json.loads(base.read_text())["grasps"]) == 1
+
+
+def test_grasps_elsewhere_are_found_again_after_blessing(copy, tmp_path):
+    other = tmp_path / "other"
+    other.mkdir()
+    planned(other, limit=1)
+    asked = ("--grasps", str(other / "grasps.json"), "--bless", "-q")
+    assert check(copy, *asked) == Exit.GOOD
+    assert json.loads((copy / "base.json").read_text())["grasps_file"] == "../other/grasps.json"
+    assert check(copy, "-q") == Exit.GOOD
+
+
+def test_grasps_are_not_overwritten(copy, capsys):
+    grasps = copy / "grasps.json"
+    before = grasps.read_bytes()
+    assert main(["baseline", "record", str(grasps), "-o", str(grasps)]) == Exit.INPUT
+    assert "will not be overwritten" in capsys.readouterr().err
+    assert grasps.read_bytes() == before
+
+
+def test_it_is_said_that_versions_differ(copy, capsys):
+    path = copy / "base.json"
+    record = json.loads(path.read_text())
+    record["versions"]["mujoco"] = "3.3.0"
+    path.write_text(json.dumps(record))
+    assert check(copy) == Exit.GOOD
+    assert "with the bands of other versions: mujoco 3.3.0 -> " in capsys.readouterr().out
+
+
+def test_files_of_another_kind_are_named(copy, capsys):
+    base = str(copy / "base.json")
+    assert check(copy, "--grasps", base) == Exit.INPUT
+    assert base in capsys.readouterr().err
+    assert main(["baseline", "check", str(copy / "grasps.json")]) == Exit.INPUT
+    assert "grasps.json: this is a grasps.json; give the baseline" in capsys.readouterr().err
+
+
+def test_noise_without_repeats_is_refused(copy, capsys):
+    line = ["baseline", "record", str(copy / "grasps.json"), "-o", str(copy / "n.json")]
+    assert main([*line, "--noise-friction", ".2"]) == Exit.USAGE
+    assert "give --trials, too" in capsys.readouterr().err

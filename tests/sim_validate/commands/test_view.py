@@ -1,0 +1,185 @@
+"""The commands that show: a grasp in a viewer or in files, and what the machine can show."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import scenes
+from scenes.drawing import canvas, clips
+from scenes.drawing.canvas import format_of
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.cli.showing_flags import CLIPS, PICTURES
+from sim_validate.commands import view as view_command
+from sim_validate.commands.view import COMING, closing
+from sim_validate.main import main
+from tests.sim_validate.rigs import grasps
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("plan")
+    assert main(["plan", "wedge", "--limit", "2", "--out", str(folder), "-q"]) == Exit.GOOD
+    return folder / "grasps.json"
+
+
+@pytest.fixture(autouse=True)
+def nowhere(monkeypatch):
+    """A machine without a display."""
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+
+
+def test_files_are_written_and_listed(planned, tmp_path, capsys):
+    picture, page = tmp_path / "new" / "a.svg", tmp_path / "new" / "a.html"
+    asked = ["view", str(planned), "--picture", str(picture), "--page", str(page), "--json"]
+    assert main(asked) == Exit.GOOD
+    shown = json.loads(capsys.readouterr().out)
+    first = json.loads(planned.read_text())["grasps"][0]["id"]
+    assert shown == {"id": first, "files": [str(picture), str(page)]}
+    assert picture.read_text().startswith("<?xml")
+    assert f"<h1>{first}</h1>" in page.read_text()
+
+
+def test_without_a_display_files_are_offered(planned, capsys):
+    assert main(["view", str(planned)]) == Exit.INPUT
+    said = capsys.readouterr().err
+    assert "no display" in said
+    assert all(flag in said for flag in ("--picture", "--page", "--clip"))
+
+
+def test_with_a_display_the_viewer_is_opened(planned, monkeypatch):
+    opened = []
+
+    def run(command, **_):
+        path = command[-1].partition("=")[2]
+        with open(path, encoding="utf-8") as scene:  # noqa: PTH123 - while it is there
+            opened.append((command[1:3], scene.read()))
+        return subprocess.CompletedProcess(command, len(opened) - 1)
+
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(view_command.subprocess, "run", run)
+    second = json.loads(planned.read_text())["grasps"][1]["id"]
+    assert main(["view", str(planned), "--grasp", second, "--friction", "0.7"]) == Exit.GOOD
+    ((module, text),) = opened
+    assert module == ["-m", "mujoco.viewer"]
+    assert '0.7 0.0 0.0"' in text
+    assert main(["view", str(planned)]) == Exit.INPUT  # the viewer ends with 1
+
+
+@pytest.mark.parametrize(
+    ("flags", "says"),
+    [
+        (["--picture", "a.bmp"], "--picture must end in .png, .svg"),
+        (["--clip", "a.mp4"], "--clip must end in .gif or .webp, got a.mp4"),
+        (["--picture", "a.png", "--clip", "a.mp4"], "--clip must end in"),
+        (["--picture", "a.png", "--page", "a.png"], "--page must end in .html or .htm"),
+    ],
+)
+def test_what_cannot_be_shown_is_refused(planned, tmp_path, monkeypatch, capsys, flags, says):
+    monkeypatch.chdir(tmp_path)
+    assert main(["view", str(planned), *flags]) == Exit.USAGE
+    assert says in capsys.readouterr().err
+    assert main(["view", str(planned), "--picture", "a.png", "--grasp", "c-9"]) == Exit.INPUT
+    assert "no grasp c-9; there is" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_endings_of_flags_are_those_that_can_be_written():
+    assert {format_of(Path("a" + ending)) for ending in PICTURES} == set(canvas.FORMATS)
+    assert set(CLIPS) == set(clips.FORMATS)
+
+
+def test_friction_that_is_too_low_is_said(planned, tmp_path, capsys):
+    asked = ["view", str(planned.parent), "--friction", "0.01", "--picture"]
+    assert main([*asked, str(tmp_path / "a.png")]) == Exit.GOOD
+    assert "not in force closure at friction 0.01" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_fingers_are_inside_the_clip_and_have_their_colours(tmp_path):
+    try:
+        clips.available_graphics()
+    except clips.GraphicsError as error:
+        pytest.skip(str(error))
+    body, (grasp,) = grasps("tetrahedron", 0.3, 1)
+    scene = scenes.build_scene(body, grasp, 0.3)
+    path = view_command.write_closing_clip(scene, grasp, tmp_path / "a.webp")
+    with Image.open(path) as clip:
+        frame = np.asarray(clip.convert("RGB")).astype(int)
+    edge = np.concatenate([frame[-1], frame[:, 0], frame[:, -1]])
+    assert np.ptp(edge, axis=0).max() < 12  # nothing but sky
+    red, blue = frame[..., 0] - frame[..., 2], frame[..., 2] - frame[..., 0]
+    assert (red > 80).any()  # orange
+    assert (blue > 60).any()  # sky blue
+
+
+def test_fingers_come_in_along_their_ways_and_stay():
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    scene = scenes.build_scene(body, grasp, 0.5)
+    joints = closing(scene)
+    frames = scene.layout.frames
+    slides = np.einsum("kij,nkj->nki", frames, joints[:, 7:].reshape(len(joints), 4, 3))
+    np.testing.assert_allclose(slides[0], scene.layout.approach, atol=1e-12)
+    np.testing.assert_array_equal(slides[COMING - 1 :], 0.0)
+    lengths = np.linalg.norm(slides[:COMING], axis=2)
+    assert (np.diff(lengths, axis=0) < 0.0).all()
+    np.testing.assert_array_equal(joints[:, :7], np.tile([0, 0, 0, 1, 0, 0, 0], (len(joints), 1)))
+
+
+def test_without_graphics_the_picture_turns(planned, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("MUJOCO_GL", "no-such-library")
+    monkeypatch.setattr("scenes.drawing.turning_clips.FRAMES", 4)
+    path = tmp_path / "a.gif"
+    assert main(["view", str(planned), "--clip", str(path)]) == Exit.GOOD
+    assert "the picture turns instead" in capsys.readouterr().err
+    with Image.open(path) as clip:
+        assert clip.n_frames == 4
+
+
+@pytest.mark.slow
+def test_with_graphics_fingers_are_seen_closing(planned, tmp_path):
+    try:
+        clips.available_graphics()
+    except clips.GraphicsError as error:
+        pytest.skip(str(error))
+    path = tmp_path / "a.webp"
+    assert main(["view", str(planned), "--clip", str(path), "-q"]) == Exit.GOOD
+    with Image.open(path) as clip:
+        frames = []
+        for place in (0, COMING):
+            clip.seek(place)
+            frames.append(np.asarray(clip.convert("RGB")).astype(int))
+    red = [(frame[..., 0] > frame[..., 1] + 60).sum() for frame in frames]
+    assert min(red) > 200  # fingertips
+    assert (np.abs(frames[0] - frames[1]).max(axis=2) > 30).mean() > 0.02
+
+
+def test_doctor_says_what_there_is_and_what_to_do(monkeypatch, capsys):
+    def none():
+        raise clips.GraphicsError("egl: no such library")
+
+    monkeypatch.setattr("sim_validate.commands.doctor.available_graphics", none)
+    assert main(["doctor", "--json"]) == Exit.GOOD
+    shown = capsys.readouterr()
+    document = json.loads(shown.out)
+    assert all(document["checks"].values())
+    assert document["gate"]["passed"]
+    assert "egl: no such library" in document["machine"]["graphics"]
+    assert "install libegl1" in document["machine"]["graphics"]
+    assert document["machine"]["display for the viewer"].startswith("no")
+    for word in ("compiled loops", "must be", "all checks passed"):
+        assert word in shown.err
+
+
+def test_doctor_names_what_failed(monkeypatch, capsys):
+    monkeypatch.setattr("sim_validate.commands.doctor.critical_friction", lambda _: 0.1)
+    assert main(["doctor"]) == Exit.INTERNAL
+    shown = capsys.readouterr()
+    assert "FAILED critical friction" in " ".join(shown.out.split())
+    assert "install the package anew" in shown.err

@@ -1,0 +1,200 @@
+"""Grasps of other tools: read, put on the object, judged."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import sim_validate
+from scenes.example_objects import example_object
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.datasets import units as units_module
+from sim_validate.datasets.building.build import build
+from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.exports.formats import export
+from sim_validate.datasets.given_contacts import read_given
+from sim_validate.datasets.verifying.redo import Sample
+from sim_validate.datasets.verifying.verify import verify
+from sim_validate.files.reading import write_arrays
+from sim_validate.main import main
+from tests.sim_validate.datasets.engines import Here, contents, silent
+
+pytest.importorskip("pyarrow")
+BODY = example_object("wedge")
+
+
+@pytest.fixture(scope="module")
+def planned():
+    return gc.plan(BODY, 0.5, families=("concurrent",), limit=4).grasps
+
+
+def write_npz(path, grasps, **more):
+    points = np.array([grasp.positions for grasp in grasps])
+    normals = np.array([grasp.normals for grasp in grasps])
+    np.savez(path, contact_points_m=points, contact_normals=normals, **more)
+    return path
+
+
+def judged(folder, path, **settings):
+    config = DatasetConfig(objects=("wedge",), contacts=str(path), **settings)
+    build(config, folder, Here(), silent)
+    assert verify(folder, Sample(1.0)) == []
+    grasps = sim_validate.load_dataset(folder)["grasps"]
+    mine = grasps["label"] == "given"
+    return {name: column[mine] for name, column in grasps.items()}
+
+
+def test_planned_grasps_that_come_back_are_judged_as_they_were(planned, tmp_path):
+    names = np.array([grasp.id for grasp in planned])
+    found = judged(tmp_path / "ds", write_npz(tmp_path / "g.npz", planned, grasp_id=names))
+    assert list(found["name"]) == list(names)
+    assert found["held"].all()
+    assert found["force_closed"].all()
+    assert found["moved_m"].max() < 1e-12
+    for name in ("closure_margin", "critical_friction", "ferrari_canny_lower_n"):
+        own = [grasp.ferrari_canny[0] if "ferrari" in name else getattr(grasp, name)
+               for grasp in planned]  # fmt: skip
+        # the quality's bounds are a ten-thousandth apart
+        np.testing.assert_allclose(found[name], own, rtol=1e-4 if "ferrari" in name else 1e-6)
+
+
+def test_contacts_beside_the_surface_are_put_on_it(planned, tmp_path):
+    rng = np.random.default_rng(0)
+    off = 0.002 * BODY.radius
+    points = np.array([grasp.positions - off * grasp.normals for grasp in planned])
+    lean = 0.05 * rng.normal(size=points.shape)
+    normals = np.array([grasp.normals for grasp in planned]) + lean
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    np.savez(tmp_path / "g.npz", contact_points_m=points, contact_normals=-normals)
+    found = judged(tmp_path / "ds", tmp_path / "g.npz", outward=True)
+    np.testing.assert_allclose(found["moved_m"], off, rtol=1e-6)
+    for points, normals, grasp in zip(
+        found["contact_points_m"], found["contact_normals"], planned, strict=True
+    ):
+        np.testing.assert_allclose(points, grasp.positions, atol=1e-12)
+        np.testing.assert_allclose(normals, grasp.normals, atol=1e-12)
+
+
+def contacts_file(path, grasps):
+    listed = [
+        {
+            "id": name,
+            "contacts": [
+                {"position_m": list(p), "normal": list(n)}
+                for p, n in zip(points, normals, strict=True)
+            ],
+        }
+        for name, points, normals in grasps
+    ]
+    path.write_text(json.dumps({"grasps": listed}))
+    return path
+
+
+def test_what_is_open_lets_go_and_what_is_off_the_object_is_not_tried(planned, tmp_path):
+    good = planned[0]
+    face = BODY.faces[0]
+    corner = face.polygon[0] - face.centroid
+    spots = face.centroid + np.outer([0.1, -0.1, 0.2, -0.2], corner)
+    far = good.positions + np.array([1.0, 0.0, 0.0])
+    path = contacts_file(
+        tmp_path / "g.json",
+        [
+            ("../../good", good.positions, good.normals),
+            ("one face", spots, [face.normal] * 4),
+            ("far", far, good.normals),
+            ("turned", good.positions, -good.normals),
+        ],
+    )
+    found = judged(tmp_path / "ds", path)
+    assert list(found["name"]) == ["../../good", "one face", "far", "turned"]
+    assert list(found["held"]) == [True, False, None, None]
+    assert list(found["force_closed"]) == [True, False, None, None]
+    assert list(found["outcome"][2:]) == ["not_tried"] * 2
+    assert all("contact 0 is on no face" in note for note in found["note"][2:])
+    assert all(not note for note in found["note"][:2])
+    assert {path.name for path in (tmp_path / "ds").iterdir()} >= {"contacts.json", "meshes"}
+    assert not (tmp_path / "good").exists()
+
+
+def test_rows_do_not_depend_on_how_the_work_is_divided(planned, tmp_path, monkeypatch):
+    path = write_npz(tmp_path / "g.npz", planned)
+    config = DatasetConfig(objects=("wedge",), contacts=str(path), frictions=(0.4, 0.5))
+    whole = build(config, tmp_path / "whole", Here(), silent)
+    monkeypatch.setattr(units_module, "PART", 3)
+    parts = build(config, tmp_path / "parts", Here(), silent)
+    assert (whole.units, parts.units) == (2, 4)
+    one, other = contents(tmp_path / "whole"), contents(tmp_path / "parts")
+    counted = {"manifest.json", "README.md", "croissant.json"}  # they say how many units
+    assert one.keys() == other.keys() > counted
+    assert {path for path in one if one[path] != other[path]} <= counted
+
+
+def test_the_command_judges_a_file(planned, tmp_path):
+    path = write_npz(tmp_path / "g.npz", planned[:1])
+    flags = ["--friction", "0.5", "--out", str(tmp_path / "ds"), "--jobs", "1", "-q"]
+    assert main(["dataset", "import", str(path), "wedge", *flags]) == Exit.GOOD
+    assert main(["dataset", "verify", str(tmp_path / "ds"), "--share", "1"]) == Exit.GOOD
+
+
+POINTS, NORMALS = np.zeros((2, 4, 3)), np.tile([1.0, 0.0, 0.0], (2, 4, 1))
+GOOD = {"contact_points_m": np.eye(4, 3)[None] * 0.01, "contact_normals": NORMALS[:1]}
+
+
+@pytest.mark.parametrize(
+    ("arrays", "message"),
+    [
+        ({"contact_points_m": POINTS}, "no array contact_normals"),
+        ({"contact_points_m": POINTS[:, :3], "contact_normals": NORMALS}, "expected numbers"),
+        ({"contact_points_m": POINTS.astype(str), "contact_normals": NORMALS}, "expected numbers"),
+        ({"contact_points_m": POINTS[:1], "contact_normals": NORMALS}, "of one length"),
+        (GOOD | {"grasp_id": np.array(["a", "b"])}, "of one length"),
+        (GOOD | {"contact_points_m": np.full((1, 4, 3), np.nan)}, "finite"),
+        (GOOD | {"contact_normals": 2.0 * NORMALS[:1]}, "normal"),
+        (GOOD | {"grasp_id": np.array([{}], dtype=object)}, "grasp_id: expected numbers or text"),
+        ({"contact_points_m": POINTS[:0], "contact_normals": NORMALS[:0]}, "grasps"),
+    ],
+)
+def test_bad_arrays_are_refused_with_the_reason(arrays, message, tmp_path):
+    path = tmp_path / "g.npz"
+    np.savez(path, **arrays)
+    with pytest.raises(gc.InputError, match=message) as raised:
+        read_given(path)
+    assert str(path) in str(raised.value)
+
+
+def test_three_contacts_and_files_of_something_else_are_refused(tmp_path):
+    path = tmp_path / "g.npz"
+    path.write_bytes(b"PK\x03\x04 no archive")
+    with pytest.raises(gc.InputError, match="cannot be read as npz"):
+        read_given(path)
+    three = contacts_file(tmp_path / "three.json", [("a", np.eye(3), np.eye(3))])
+    with pytest.raises(gc.InputError, match="expected 4 contacts, got 3"):
+        read_given(three)
+    config = DatasetConfig(objects=("wedge",), contacts=str(three))
+    with pytest.raises(gc.InputError, match="the one that the contacts are on"):
+        dataclasses.replace(config, objects=("wedge", "prism"))
+
+
+def test_judged_grasps_are_exported_with_what_could_not_be_tried(planned, tmp_path):
+    good = planned[0]
+    off = good.positions + 1.0
+    path = contacts_file(
+        tmp_path / "g.json", [("a", good.positions, good.normals), ("b", off, good.normals)]
+    )
+    judged(tmp_path / "ds", path)
+    for to, files in (("npz", 4), ("csv", 4), ("mjcf", 1), ("isaac", 1)):
+        done = export(tmp_path / "ds", to, tmp_path / to, None, silent)
+        assert done.files == files
+    with np.load(tmp_path / "npz" / "grasps.npz", allow_pickle=False) as arrays:
+        given = arrays["label"] == "given"
+        assert list(arrays["held"][given]) == list(arrays["force_closed"][given]) == [1, -1]
+        again = judged(
+            tmp_path / "again",
+            write_arrays(
+                tmp_path / "again.npz",
+                {name: arrays[name][given] for name in ("contact_points_m", "contact_normals")},
+            ),
+        )
+    assert list(again["held"]) == [True, None]

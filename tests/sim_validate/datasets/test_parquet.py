@@ -1,0 +1,169 @@
+import math
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from sim_validate.datasets import parquet as tables
+from sim_validate.datasets.building.make_unit import made_of
+from sim_validate.datasets.columns import KEYS, TABLES, Column
+from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.parquet import parquet_bytes, read_rows
+from sim_validate.datasets.rows import split_of
+from sim_validate.datasets.units import body_of, units_of
+
+pytest.importorskip("pyarrow")
+
+
+@pytest.fixture(scope="module")
+def unit():
+    (unit,) = units_of(DatasetConfig(objects=("tetrahedron",), limit=2))
+    return unit
+
+
+@pytest.fixture(scope="module")
+def rows(unit):
+    return made_of(unit, body_of(unit)).rows
+
+
+@pytest.fixture
+def written(rows, tmp_path):
+    found = {}
+    for name in TABLES:
+        path = tmp_path / f"{name}.parquet"
+        path.write_bytes(parquet_bytes(name, rows[name], {"made by": "a test"}))
+        found[name] = path
+    return found
+
+
+def test_a_file_of_another_version_is_refused(written, monkeypatch):
+    table = TABLES["objects"]
+    monkeypatch.setitem(tables.TABLES, "objects", (*table, Column("taste", "text", "new")))
+    for read in (read_rows, lambda path: list(tables.each_row(path))):
+        with pytest.raises(gc.InputError, match="other columns"):
+            read(written["objects"])
+
+
+def test_rows_have_exactly_the_columns_of_their_tables(rows):
+    for name, columns in TABLES.items():
+        known = {column.name for column in columns}
+        seen = set().union(*(set(row) for row in rows[name]))
+        assert seen <= known
+        assert known - {"moved_m"} <= seen  # which only given grasps have
+
+
+def test_a_unit_holds_grasps_their_controls_and_the_trials_of_both(unit, rows):
+    (object_row,) = rows["objects"]
+    body = body_of(unit)
+    assert object_row["object_id"] == body.content_sha256
+    grasps = [row for row in rows["grasps"] if row["label"] == "grasp"]
+    controls = [row for row in rows["grasps"] if row["label"] != "grasp"]
+    assert len(grasps) >= 4
+    assert len(controls) >= len(grasps)
+    assert all(row["held"] and row["force_closed"] for row in grasps)
+    assert not any(row["held"] or row["force_closed"] for row in controls)
+    assert {row["control_of"] for row in controls} <= {row["grasp_id"] for row in grasps}
+    for row in rows["grasps"]:
+        tried = [trial for trial in rows["trials"] if trial["grasp_id"] == row["grasp_id"]]
+        assert [trial["trial"] for trial in tried] == list(range(row["trials"]))
+        assert row["held"] == all(trial["outcome"] == "held" for trial in tried)
+    for row in grasps:
+        certificate = gc.force_closure(
+            row["contact_points_m"], row["contact_normals"], row["friction"]
+        )
+        assert certificate.closed
+        assert certificate.margin == pytest.approx(row["closure_margin"], rel=1e-6)
+
+
+def test_tables_are_read_as_they_were_written(rows, written):
+    for name, path in written.items():
+        back = read_rows(path)
+        given = sorted(rows[name], key=lambda row: [row[key] for key in KEYS[name]])
+        assert len(back) == len(given) >= 1
+        for row, original in zip(back, given, strict=True):
+            for column in TABLES[name]:
+                expected = original.get(column.name)
+                if isinstance(expected, float) and not math.isfinite(expected):
+                    expected = None
+                assert row[column.name] == expected
+                if column.shape and expected is not None:
+                    assert np.shape(row[column.name]) == column.shape
+
+
+def test_files_do_not_depend_on_the_order_of_rows_nor_on_when_they_are_made(unit, rows):
+    for name in TABLES:
+        once = parquet_bytes(name, rows[name], {"a": "1", "b": "2"})
+        assert parquet_bytes(name, rows[name][::-1], {"b": "2", "a": "1"}) == once
+        assert (
+            parquet_bytes(name, made_of(unit, body_of(unit)).rows[name], {"a": "1", "b": "2"})
+            == once
+        )
+
+
+def test_columns_say_their_units(written):
+    from pyarrow import parquet
+
+    schema = parquet.read_schema(written["grasps"])
+    assert schema.metadata == {b"made by": b"a test"}
+    for column in TABLES["grasps"]:
+        said = schema.field(column.name).metadata
+        assert said[b"meaning"].decode() == column.meaning
+        assert said.get(b"unit", b"").decode() == column.unit
+
+
+def test_no_flipped_bit_in_a_page_changes_rows_in_silence(written):
+    path = written["trials"]
+    whole, rows = path.read_bytes(), read_rows(path)
+    footer = len(whole) - 8 - int.from_bytes(whole[-8:-4], "little")
+    noticed = 0
+    for place in range(4, footer, footer // 80):
+        spoiled = bytearray(whole)
+        spoiled[place] ^= 0x10
+        path.write_bytes(bytes(spoiled))
+        try:
+            assert read_rows(path) == rows
+        except gc.InputError:
+            noticed += 1
+    assert noticed >= 1
+
+
+def test_a_cut_file_is_noticed(written):
+    path = written["trials"]
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(gc.InputError, match="damaged"):
+        read_rows(path)
+
+
+def test_two_rows_with_one_name_are_refused(rows):
+    with pytest.raises(gc.InputError, match="two rows"):
+        parquet_bytes("grasps", [*rows["grasps"], rows["grasps"][0]], {})
+
+
+def test_objects_are_split_by_their_hash_in_stated_shares():
+    splits = [split_of(f"object {number}", 0) for number in range(4000)]
+    assert splits.count("train") == pytest.approx(3200, abs=120)
+    assert splits.count("validation") == pytest.approx(400, abs=80)
+    assert [split_of(f"object {number}", 1) for number in range(4000)] != splits
+
+
+def test_columns_of_other_types_and_another_table_are_refused(written, tmp_path):
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    table = parquet.read_table(written["objects"])
+    place = table.schema.get_field_index("vertices")
+    other = table.set_column(place, "vertices", table["vertices"].cast(arrow.float64()))
+    parquet.write_table(other, tmp_path / "t.parquet")
+    with pytest.raises(gc.InputError, match="columns of other types than objects"):
+        read_rows(tmp_path / "t.parquet", "objects")
+    turned = table.select(list(reversed(table.column_names)))
+    parquet.write_table(turned, tmp_path / "t.parquet")
+    with pytest.raises(gc.InputError, match="other columns than objects"):
+        read_rows(tmp_path / "t.parquet", "objects")
+    with pytest.raises(gc.InputError, match="other columns than objects"):
+        read_rows(written["grasps"], "objects")
+
+
+def test_files_that_claim_too_much_are_refused_before_they_are_read(written, monkeypatch):
+    monkeypatch.setattr(tables, "MOST_ROWS", 1)
+    with pytest.raises(gc.InputError, match=r"claims [0-9]+ rows, .* limits are 1 and"):
+        read_rows(written["trials"])

@@ -1,0 +1,44 @@
+import pytest
+
+from grasp_core.errors import InputError
+from sim_validate.files.reading import read_text, write_text
+from sim_validate.parallel.processes import each
+
+
+def test_a_file_is_replaced_as_a_whole(tmp_path):
+    path = tmp_path / "deep" / "a.json"
+    assert write_text(path, "one") == path
+    write_text(path, "two")
+    assert read_text(path) == "two"
+    assert [p.name for p in path.parent.iterdir()] == ["a.json"]
+
+
+def test_a_failed_write_leaves_the_old_file_and_no_rest(tmp_path):
+    path = write_text(tmp_path / "a.json", "one")
+    with pytest.raises(UnicodeEncodeError):
+        write_text(path, "\ud800")
+    assert read_text(path) == "one"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.json"]
+
+
+def test_unreadable_files_are_refused(tmp_path):
+    with pytest.raises(InputError, match="cannot be read"):
+        read_text(tmp_path / "none")
+    for data, words in (
+        (b"a\xff", "not UTF-8 text .* at byte 1"),
+        (b"\xff\xfea\0", "byte order mark"),
+        (b"\xef\xbb\xbf{}", "save it as UTF-8 without one"),
+    ):
+        (tmp_path / "binary").write_bytes(data)
+        with pytest.raises(InputError, match=words):
+            read_text(tmp_path / "binary")
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_results_come_in_the_order_of_the_units(jobs):
+    assert list(each(abs, range(-20, 0), jobs=jobs)) == list(range(20, 0, -1))
+
+
+def test_an_error_in_a_unit_reaches_the_caller():
+    with pytest.raises(TypeError):
+        list(each(abs, [None] * 20, jobs=2))

@@ -1,0 +1,71 @@
+import numpy as np
+import pytest
+
+from sim_validate.simulation import schedules
+from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
+from sim_validate.simulation.schedules import Clock, Load
+from sim_validate.simulation.wrench_limits import OVERLOAD, part
+from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
+
+CLOCK = Clock(0.01)
+IDLE = Load(np.zeros(6), np.full((4, 3), 2.0))
+LOAD = Load(np.arange(1.0, 7.0), np.full((4, 3), 5.0))
+
+
+def test_smooth_shares_rise_from_almost_nothing_to_one():
+    shares = schedules.smooth(20)
+    steps = np.diff(np.concatenate([[0.0], shares]))
+    assert shares[-1] == 1.0
+    assert (steps > 0).all()
+    assert steps[0] < 0.2 * steps.max() > steps[-1]
+
+
+def test_a_hold_loads_at_high_friction_and_watches_at_the_one_under_test():
+    schedule = schedules.hold(IDLE, LOAD, (1.5, 0.5), CLOCK, HoldProtocol())
+    watched = schedule.watched
+    assert watched == 16 + 10
+    assert len(schedule.friction) == watched + 40
+    assert set(schedule.friction[:watched]) == {1.5}
+    assert set(schedule.friction[watched:]) == {0.5}
+    np.testing.assert_array_equal(schedule.wrenches[watched - 10 :], np.tile(LOAD.wrench, (50, 1)))
+    np.testing.assert_array_equal(schedule.forces[-1], LOAD.forces)
+
+
+def test_a_squeeze_applies_no_wrench_and_ends_with_the_planned_forces():
+    schedule = schedules.squeeze(LOAD.forces, 1.5, CLOCK, HoldProtocol())
+    assert not schedule.wrenches.any()
+    np.testing.assert_array_equal(schedule.forces[-1], LOAD.forces)
+    assert schedule.watched == len(schedule.friction) == 16
+
+
+def test_a_release_changes_nothing_but_the_friction():
+    schedule = schedules.release(LOAD.forces, 2.0, 0.3, CLOCK, FrictionProtocol())
+    assert not schedule.wrenches.any()
+    assert (schedule.forces == LOAD.forces).all()
+    assert schedule.friction[schedule.watched - 1] == 2.0
+    assert schedule.friction[schedule.watched] == 0.3
+
+
+def test_a_ramp_watches_while_the_load_rises_between_the_shares():
+    protocols = HoldProtocol(), LimitProtocol()
+    schedule, shares = schedules.ramp(IDLE, LOAD, (0.9, 1.1), 0.5, CLOCK, protocols)
+    assert len(shares) == len(schedule.friction) - schedule.watched == 50
+    assert shares[-1] == pytest.approx(1.1)
+    applied = schedule.wrenches[schedule.watched :] / LOAD.wrench
+    np.testing.assert_allclose(applied, np.tile(shares[:, None], 6))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0, 1.3, OVERLOAD])
+def test_planned_forces_balance_every_share_of_a_limit(share):
+    """Below the limit, at it, and above it, where the fingers cannot apply them."""
+    tested = 0
+    for name in ("wedge", "random-12-1"):
+        body, found = grasps(name, 0.5, 2)
+        for grasp in found:
+            idle = rig_of(body, grasp, 0.5).idle
+            for limit in limiting_loads(body, grasp, 0.5, 4):
+                load = part(idle, limit, share)
+                assert imbalance(load, body, grasp) < 1e-6
+                np.testing.assert_allclose(load.wrench, share * limit.wrench)
+                tested += 1
+    assert tested >= 12

@@ -1,0 +1,375 @@
+import json
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import scenes
+from grasp_core.planning.request import FAMILIES
+from sim_validate import main as commands
+from sim_validate.cli.examples import EXAMPLES
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.main import main
+from tests.grasp_core.curved import bumpy_ellipsoid
+from tests.patience import HANGING_S
+
+ROOT = Path(__file__).parent.parent.parent
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_run_writes_grasps_verdicts_and_scenes_and_tells(here, capsys):
+    assert main(["run", "tetrahedron", "--family", "concurrent", "--out", "results"]) == Exit.GOOD
+    assert sorted(p.name for p in here.iterdir()) == ["results"]
+    names = sorted(p.name for p in (here / "results").iterdir())
+    assert names == ["grasps.json", "report", "scenes", "verdicts.json"]
+    assert [p.name for p in (here / "results" / "scenes").iterdir()] == ["c-0-1-2-3.xml"]
+    assert (here / "results" / "report" / "grasps" / "c-0-1-2-3.html").is_file()
+    shown = capsys.readouterr().out
+    for word in ("concurrent", "in sim", "mu*", "held", "um moved", "results/report/index.html"):
+        assert word in shown
+    verdicts = json.loads((here / "results" / "verdicts.json").read_text())
+    assert verdicts["complete"] is True
+    assert verdicts["summary"]["grasps_held"] == verdicts["summary"]["grasps"] == 1
+    assert verdicts["summary"]["controls"] > 0
+    assert verdicts["summary"]["controls_held"] == 0
+
+
+def test_a_second_run_leaves_nothing_of_the_first_behind(here):
+    assert main(["run", "box", "--limit", "2", "--out", "results", "-q"]) == Exit.GOOD
+    kept = here / "results" / "scenes" / "mine.xml"
+    kept.write_text("<mujoco/>")
+    nothing = ["--cones", "normal", "--family", "concurrent", "--out", "results", "-q"]
+    assert main(["run", "box", *nothing]) == Exit.NONE
+    names = sorted(p.name for p in (here / "results").rglob("*") if p.is_file())
+    assert names == ["grasps.json", "mine.xml"]
+    assert not (here / "results" / "report").exists()
+
+
+@pytest.mark.usefixtures("here")
+def test_a_report_that_fails_leaves_the_run_as_it_is(monkeypatch, capsys):
+    def broken(*_, **__):
+        raise OSError(28, "No space left on device", "a.webp")
+
+    monkeypatch.setattr("sim_validate.commands.report.write_report", broken)
+    assert main(["run", "tetrahedron", "--limit", "1", "-q"]) == Exit.GOOD
+    assert "no report: a.webp: No space left on device" in capsys.readouterr().err
+
+
+def test_a_verdict_has_the_fields_that_users_rely_on(here, capsys):
+    assert main(["run", "wedge", "--limit", "1", "--no-report", "--json"]) == Exit.GOOD
+    document = json.loads(capsys.readouterr().out)
+    (verdict,) = document["verdicts"]
+    assert {
+        "id", "contacts_sha256", "outcome", "held", "mismatches", "critical_friction", "wrenches",
+        "controls", "bounds", "robustness", "accepted_by", "settings", "versions",
+    } == set(verdict)  # fmt: skip
+    assert verdict["mismatches"] == []
+    friction = verdict["critical_friction"]
+    assert friction["bracket"][0] < friction["simulated"] < friction["bracket"][1]
+    assert friction["simulated"] == pytest.approx(friction["predicted"], rel=0.01)
+    assert document["gate"]["passed"] is True
+    assert all(c["least"] <= c["value"] <= c["largest"] for c in document["gate"]["checks"])
+    assert {"wrench", "predicted_limit", "simulated_limit", "outcome"} <= set(
+        verdict["wrenches"][0]
+    )
+    assert len(verdict["wrenches"]) == 13
+    settings = verdict["settings"]
+    assert settings["physics"]["cone"] == "elliptic"
+    assert settings["flags"]["autoreset"] == "disable"
+    for control in verdict["controls"].values():
+        assert control["held"] is False
+        assert control["separating_wrench"] is not None
+    assert (here / "graspproof-out" / "wedge" / "verdicts.json").exists()
+
+
+def test_plan_validate_and_scene_work_on_the_same_file(here, capsys):
+    assert main(["plan", "wedge", "--limit", "3", "--out", "p"]) == Exit.GOOD
+    assert main(["validate", "p/grasps.json", "--limit", "2", "--out", "v"]) == Exit.GOOD
+    assert main(["scene", "p/grasps.json", "--out", "s"]) == Exit.GOOD
+    assert len(list((here / "s").iterdir())) == 3
+    capsys.readouterr()
+    name = json.loads((here / "p" / "grasps.json").read_text())["grasps"][0]["id"]
+    assert main(["scene", "p/grasps.json", "--grasp", name]) == Exit.GOOD
+    assert capsys.readouterr().out == (here / "s" / f"{name}.xml").read_text()
+
+
+def test_one_and_two_processes_give_the_same_verdicts(here):
+    """To the last digit: whatever is simulated was planned with digits that solvers agree on."""
+    assert main(["plan", "icosahedron", "--limit", "16", "--out", "p", "-q"]) == Exit.GOOD
+    for jobs in ("1", "2"):
+        command = ["validate", "p/grasps.json", "--jobs", jobs, "--out", jobs, "-q"]
+        assert main(command) == Exit.GOOD
+    one, two = ((here / jobs / "verdicts.json").read_text() for jobs in ("1", "2"))
+    assert one == two
+
+
+@pytest.mark.usefixtures("here")
+def test_json_output_is_one_document_and_the_rest_goes_elsewhere(capsys):
+    commands = {
+        "plan wedge --out p": 0, "inspect box": 0, "objects": 0, "run tetrahedron --no-report": 0,
+        "doctor": 0, "report graspproof-out/tetrahedron": 0,
+        "run box --family pencil --cones normal": 5,
+        "plan box --family pencil --cones normal --out b": 5, "validate b/grasps.json": 5,
+        "scene p/grasps.json --out s": 0,
+        "scene p/grasps.json --grasp c-0-1-2-7": 0,
+    }  # fmt: skip
+    for command, code in commands.items():
+        assert main([*command.split(), "--json"]) == code
+        json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("name", ["box", "prism"])
+@pytest.mark.parametrize("command", ["run", "plan"])
+@pytest.mark.usefixtures("here")
+def test_an_object_without_grasps_says_so_in_one_sentence(capsys, command, name):
+    paper = [part for family in FAMILIES for part in ("--family", family)]
+    assert main([command, name, "--cones", "normal", *paper]) == Exit.NONE
+    sentences = [
+        line for line in capsys.readouterr().out.splitlines() if "positively spanning" in line
+    ]
+    assert len(sentences) == 1
+
+
+def test_a_mesh_file_and_its_unit(here, capsys):
+    import trimesh
+
+    body = scenes.example_object("wedge")
+    trimesh.Trimesh(1e3 * body.vertices, body.triangles).export(here / "part.stl")
+    assert main(["inspect", "part.stl"]) == Exit.INPUT
+    assert "--unit mm" in capsys.readouterr().err
+    assert main(["plan", "part.stl", "--unit", "mm", "--out", "p"]) == Exit.GOOD
+    assert json.loads((here / "p" / "grasps.json").read_text())["object"]["name"] == "part"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["plan", "tetrahedon"], Exit.INPUT, "did you mean tetrahedron"),
+        (["plan", "none.stl"], Exit.INPUT, "none.stl"),
+        (["plan", "part.xyz"], Exit.INPUT, "part.xyz"),
+        (["validate", "none.json"], Exit.INPUT, "none.json"),
+        (["plan", "wedge", "--theta-deg", "40"], Exit.INPUT, "theta_deg must be a number from"),
+        (["plan", "wedge", "--friction", "0"], Exit.USAGE, "friction"),
+        (["plan", "wedge", "--friction", "nan"], Exit.USAGE, "friction"),
+        (["plan", "wedge", "--limit", "0"], Exit.USAGE, "limit"),
+        (["run", "wedge", "--jobs", "0"], Exit.USAGE, "jobs"),
+        (["plan", "wedge", "--family", "spiral"], Exit.USAGE, "concurrent"),
+        (["plan", "wedge", "--fricton", "0.3"], Exit.USAGE, "--friction"),
+        (["plan"], Exit.USAGE, "Required options"),
+        (["bake"], Exit.USAGE, "inspect"),
+        (["plan", "wedge", "--config"], Exit.USAGE, "--config"),
+        (["plan", "wedge", "--config", "none.toml"], Exit.INPUT, "none.toml"),
+    ],
+)  # fmt: skip
+def test_errors_have_their_exit_code_and_name_the_cause(here, capsys, arguments, code, words):
+    assert main(arguments) == code
+    complaint = capsys.readouterr()
+    assert words in complaint.err + complaint.out
+    assert "Traceback" not in complaint.err
+    assert not list(here.iterdir())
+
+
+def test_a_config_file_sets_flags_and_flags_override_it(here, capsys):
+    (here / "c.toml").write_text(
+        'friction = 0.3\nlimit = 2\nfamily = ["concurrent"]\njson = true\n'
+    )
+    assert main(["plan", "wedge", "--config", "c.toml"]) == Exit.GOOD
+    plan = json.loads(capsys.readouterr().out)
+    assert (plan["friction"], len(plan["grasps"])) == (0.3, 2)
+    assert main(["plan", "wedge", "--config=c.toml", "--limit", "1"]) == Exit.GOOD
+    assert len(json.loads(capsys.readouterr().out)["grasps"]) == 1
+    (here / "bad.toml").write_text("frction = 0.3\n")
+    assert main(["plan", "wedge", "--config", "bad.toml"]) == Exit.USAGE
+
+
+@pytest.mark.usefixtures("here")
+def test_a_control_that_holds_makes_the_run_fail(monkeypatch, capsys):
+    monkeypatch.setattr("sim_validate.validation.control_trials.judge", _always_held)
+    assert main(["run", "wedge", "--limit", "1", "--jobs", "1", "--no-report"]) == Exit.NEGATIVE
+    assert "negative controls were let go (all should)" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("here")
+def test_a_run_without_controls_says_so(monkeypatch, capsys):
+    monkeypatch.setattr("sim_validate.validation.validation.negative_controls", lambda *_: ())
+    assert main(["run", "tetrahedron", "--jobs", "1", "--no-report"]) == Exit.GOOD
+    assert "no negative controls" in capsys.readouterr().err
+
+
+def test_a_folder_named_like_an_object_does_not_hide_it(here, capsys):
+    (here / "wedge").mkdir()
+    assert main(["plan", "wedge", "-q"]) == Exit.GOOD
+    assert "error" not in capsys.readouterr().err
+
+
+def test_an_unexpected_error_is_internal_and_shows_its_place_when_asked(monkeypatch, capsys):
+    def broken(*_, **__):
+        raise RuntimeError("boom")
+
+    monkeypatch.setattr("sim_validate.commands.plan.plan", broken)
+    assert main(["plan", "wedge"]) == Exit.INTERNAL
+    assert "internal error" in capsys.readouterr().err
+    assert main(["plan", "wedge", "-v"]) == Exit.INTERNAL
+    assert "boom" in capsys.readouterr().err
+
+
+def test_control_characters_in_a_name_do_not_reach_the_terminal(here, capsys):
+    import trimesh
+
+    body = scenes.example_object("box")
+    trimesh.Trimesh(body.vertices, body.triangles).export(here / "a\x1b[31mb.stl")
+    assert main(["inspect", "a\x1b[31mb.stl"]) == Exit.GOOD
+    shown = capsys.readouterr()
+    assert "\x1b[31m" not in shown.out + shown.err
+
+
+@pytest.mark.parametrize("graphics", ["nonsense", "osmesa"])
+def test_graphics_that_are_not_here_are_named(graphics):
+    """Where OSMesa is, the second one is not wrong."""
+    code = "from sim_validate.main import run_and_exit; run_and_exit()"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "doctor"], env=os.environ | {"MUJOCO_GL": graphics}, cwd=ROOT,
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == Exit.INPUT or (graphics, done.returncode) == ("osmesa", Exit.GOOD)
+    assert done.returncode == Exit.GOOD or "MUJOCO_GL" in done.stderr
+    assert "internal error" not in done.stderr
+
+
+def test_objects_whose_names_look_alike_have_folders_of_their_own(here):
+    import trimesh
+
+    for name, shape in (("a b", "box"), ("a'b", "prism")):
+        body = scenes.example_object(shape)
+        trimesh.Trimesh(body.vertices, body.triangles).export(here / f"{name}.stl")
+        assert main(["run", f"{name}.stl", "--limit", "1", "--no-report", "-q"]) == Exit.GOOD
+    folders = sorted(path.name for path in (here / "graspproof-out").iterdir())
+    assert len(folders) == 2
+    assert all(re.fullmatch(r"a_b-[0-9a-f]{8}", folder) for folder in folders)
+
+
+def test_an_interrupted_run_keeps_what_is_done(here):
+    """SIGINT while simulating: exit code 130, a whole grasps.json, verdicts marked incomplete."""
+    code = "from sim_validate.main import run_and_exit; run_and_exit()"
+    command = [sys.executable, "-c", code, "run", "icosahedron", "--limit", "None"]
+    command += ["--cones", "normal"]
+    command += ["--family", "concurrent", "--jobs", "1"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+    folder = here / "graspproof-out" / "icosahedron"
+    said = []
+    for line in process.stderr:  # the first line of progress says that some are simulated
+        said.append(line)
+        if re.match(r"simulating [1-9]\d*/420", line):
+            break
+    process.send_signal(signal.SIGINT)
+    _, complaint = process.communicate(timeout=HANGING_S)
+    assert process.returncode == Exit.INTERRUPTED, [*said, complaint]
+    assert len(json.loads((folder / "grasps.json").read_text())["grasps"]) == 420
+    verdicts = json.loads((folder / "verdicts.json").read_text())
+    assert verdicts["complete"] is False
+    assert 0 < len(verdicts["verdicts"]) < 420
+
+
+def _always_held(trace, *_):
+    from sim_validate.simulation.hold_verdict import HoldVerdict, Outcome
+
+    return HoldVerdict(Outcome.HELD, "", 0.0, 0.0, 0.0, trace.slips_m.max(axis=0), None)
+
+
+def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface(here, capsys):
+    import trimesh
+
+    vertices, triangles = bumpy_ellipsoid(noise=0.001)
+    trimesh.Trimesh(1e3 * vertices, triangles[5:], process=False).export(here / "scan.ply")
+    flags = ["--unit", "mm", "--patches", "10", "--limit", "4", "--out", "r"]
+    fingers = ["--finger-radius-m", "0.004", "--approach-m", "0.03"]
+    assert main(["run", "scan.ply", *flags, *fingers]) == Exit.GOOD
+    shown = capsys.readouterr()
+    assert "not a closed surface" in shown.err
+    assert "4 of 4 grasps held" in shown.out
+    verdict = json.loads((here / "r" / "verdicts.json").read_text())["verdicts"][0]
+    assert verdict["settings"]["drive"]["radius_m"] == 0.004
+    saved = json.loads((here / "r" / "grasps.json").read_text())
+    assert saved["object"]["patches"] == {"spread_deg": 10.0, "depth": 0.01, "most": 10}
+    assert saved["finger"] == {"radius_m": 0.004, "approach_m": 0.03}
+    assert main(["validate", "r/grasps.json", "--limit", "1", "--out", "again"]) == Exit.GOOD
+    again = json.loads((here / "again" / "verdicts.json").read_text())["verdicts"][0]
+    assert again["settings"]["drive"]["radius_m"] == 0.004
+    capsys.readouterr()
+    assert main(["inspect", "scan.ply", "--unit", "mm", "--json"]) == Exit.GOOD
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["patches"]["most"] == 20
+    assert 0.0 < facts["largest_spread_deg"] <= 10.0
+    assert main(["inspect", "scan.ply", "--unit", "mm"]) == Exit.GOOD
+    said = capsys.readouterr().out
+    assert "20 nearly flat patches of a curved surface" in said
+    assert "deg at most, 10 deg allowed" in said
+
+
+def test_a_mesh_is_described_in_words(capsys):
+    """Not by the repr of anything."""
+    assert main(["inspect", "wedge"]) == Exit.GOOD
+    said = capsys.readouterr().out
+    assert said.splitlines()[:3] == [
+        "wedge",
+        "  mesh                 6 vertices, 8 triangles",
+        "  faces                8 planar, 0 not convex, 0 with holes",
+    ]
+    assert re.search(r"volume +0\.000199083 m\^3\n", said)
+    assert not re.search(r"[{}\[\]']|None|_", said)
+
+
+@pytest.mark.usefixtures("here")
+def test_planning_flags_reach_the_planner(capsys):
+    flags = ["--friction", "0.3", "--complete", "--rank-by", "diverse", "--limit", "5"]
+    assert main(["plan", "double-wedge-bar", *flags]) == Exit.GOOD
+    assert "0 undecided, 0 left open" in capsys.readouterr().out
+    reach = ["--finger-radius-m", "0.006", "--approach-m", "0.05", "--edge-clearance-m", "0.001"]
+    assert main(["plan", "l-bracket", *reach, "--share-faces-m", "0.01", "--limit", "150"]) == 0
+    assert "out of reach" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"),
+    [
+        (["--approach-m", "0.1"], "--approach-m also needs --finger-radius-m"),
+        (["--finger-radius-m", "0.01"], "--finger-radius-m also needs --approach-m"),
+        (["--edge-clearance-m", "5"], "clearance must be a number from 0"),
+        (["--complete", "--family", "pencil"], "takes the free method"),
+        (["--optimize", "--share-faces-m", "0.01"], "leave it out, or them"),
+        (["--unit", "mm"], "box is built in"),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_flags_that_do_not_fit_are_refused(capsys, flags, said):
+    assert main(["plan", "box", *flags]) == Exit.INPUT
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", EXAMPLES)
+def test_help_on_a_command_shows_examples_that_can_be_typed(monkeypatch, capsys, words):
+    assert main([*words.split(), "--help"]) == Exit.GOOD
+    shown = capsys.readouterr().out.partition("\nexamples:\n")[2].splitlines()
+    assert [line.strip() for line in shown] == [f"graspproof {each}" for each in EXAMPLES[words]]
+    asked = []
+    monkeypatch.setattr(commands, "execute", lambda command: asked.append(command) or Exit.GOOD)
+    for line in shown:
+        assert main(shlex.split(line)[1:]) == Exit.GOOD
+    assert len(asked) == len(shown) > 0
+
+
+def test_every_command_has_examples(capsys):
+    assert len(EXAMPLES) == len(commands.ACTIONS)
+    assert main(["--help"]) == Exit.GOOD
+    assert "examples:" not in capsys.readouterr().out
