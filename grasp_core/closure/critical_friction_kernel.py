@@ -51,14 +51,13 @@ def search(
     """Bracket the critical friction of each of many sets of contacts.
 
     Args:
-            arms: Contacts at unit size, (g, k, 3).
-            normals: Inward unit normals, (g, k, 3).
-            width: Wanted widths of the brackets, relative to their lower ends.
-            forces: Filled with forces that balance, (g, k, 3).
-            twists: Filled with twists that separate, (g, 6).
-            bounds: Filled with frictions, lower and upper, that twists and forces are meant for,
-            (g, 2).
-                A pair that is no bracket, or not narrow, was given up.
+        arms: Contacts at unit size, (g, k, 3).
+        normals: Inward unit normals, (g, k, 3).
+        width: Wanted widths of the brackets, relative to their lower ends.
+        forces: Filled with forces that balance, (g, k, 3).
+        twists: Filled with twists that separate, (g, 6).
+        bounds: Filled with a lower and an upper friction, proved by twist and forces, (g, 2).
+            A pair that is no bracket, or not narrow, was given up.
     """
     k = arms.shape[1]
     axes, rows, columns = np.empty((k, 3, 3)), np.empty((k, 3, WRENCH)), np.empty((k, 3, WRENCH))
@@ -99,11 +98,11 @@ def deepest(
     """Balance each of many sets of contacts as deep inside its cones as can be.
 
     Args:
-            contacts: Arms at unit size, (g, k, 3), normals, (g, k, 3), and frictions, (g,).
-            share: Gap that may be left (see `least_cone_sum`).
-            forces: Filled with the forces, (g, k, 3).
-            twists: Filled with the twists of the dual programs, (g, 6).
-            values: Filled with the values of the primal and the dual programs, (g, 2).
+        contacts: Arms at unit size, (g, k, 3), normals, (g, k, 3), and frictions, (g,).
+        share: Gap that may be left (see `least_cone_sum`).
+        forces: Filled with the forces, (g, k, 3).
+        twists: Filled with the twists of the dual programs, (g, 6).
+        values: Filled with the values of the primal and the dual programs, (g, 2).
     """
     arms, normals, frictions = contacts
     k = arms.shape[1]
