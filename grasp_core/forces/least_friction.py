@@ -80,7 +80,7 @@ def _without_friction(balance: Balance, weights: Array) -> ConicProgram:
     bounded = [(-normal, np.full(count, -balance.least[0]))]
     if np.isfinite(balance.largest[0]):
         bounded.append((normal, np.full(count, balance.largest[0])))
-    # (1), (2), (3)
+    # rows: the balance (1), the limits (2), the cones (3)
     A = np.vstack([balanced, *(rows for rows, _ in bounded), cones])
     b = np.concatenate([-balance.W[0], *(limit for _, limit in bounded), np.zeros(n)])
     return ConicProgram(excess, A, b, 6, count * len(bounded), (3,) * count)

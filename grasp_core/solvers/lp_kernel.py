@@ -122,7 +122,7 @@ def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex) -> tuple[int, int
 
 @njit(cache=True, error_model="numpy")
 def proved_bound(c: Array, rows: Rows, vertex: Vertex, accuracy: float) -> float:
-    """Return y.b, a bound of all feasible values, if y >= 0 gives c to an accuracy; else infinity."""
+    """Return y.b, a bound of feasible values, if y >= 0 gives c to an accuracy; else infinity."""
     bound, left = 0.0, c.copy()
     for j in range(len(c)):
         share = vertex.y[j]
