@@ -213,5 +213,5 @@ def four(items: Iterable[Item]) -> tuple[Item, Item, Item, Item]:
     """
     listed = tuple(items)
     if len(listed) != FINGERS:
-        raise InputError(f"expected {FINGERS}, one per finger, got {len(listed)}")
+        raise InputError(f"expected {FINGERS} items, one per finger, got {len(listed)}")
     return listed

@@ -122,6 +122,7 @@ class ClosureCertificate:
             The bound; minus infinity if closed, or infinity if not, where the fields prove none.
         """
         arms, center, size = unit_size(self.positions)
+        # `verify` asks only for unit length to nine digits, so the directions are taken exactly
         normals = self.normals / np.linalg.norm(self.normals, axis=1, keepdims=True)
         if self.closed:
             forces = self.forces
@@ -200,6 +201,7 @@ def unit_size(points: Array) -> tuple[Array, Array, float]:
     """Return arms from the mean contact over the longest, (k, 3), that centre and that length."""
     center = points.mean(axis=0)
     arms = points - center
+    # contacts in one place have no size of their own
     size = float(np.linalg.norm(arms, axis=1).max())
     size = size if size > 0.0 else 1.0
     return arms / size, center, size

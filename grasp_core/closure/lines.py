@@ -52,8 +52,8 @@ def classify_lines(points: ArrayLike, directions: ArrayLike) -> LineClass:
     `concurrent`. The spread of the points sets the length against which tolerances count.
 
     Args:
-            points: One point on each line, (4, 3) [m].
-            directions: Non-zero vectors along the lines, of any length, (4, 3).
+        points: One point on each line, (4, 3) [m].
+        directions: Non-zero vectors along the lines, of any length, (4, 3).
 
     Raises:
         InputError: A shape is wrong, or a direction is zero.

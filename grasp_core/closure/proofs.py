@@ -69,7 +69,7 @@ RANK = 1e-9
 
 
 def supports(twist: Array, arms: Array, normals: Array, friction: Array) -> Array:
-    """Support s_i(y) of each friction cone, cut at unit normal force, in direction y, (k,)."""
+    """Compute the support s_i(y) of each friction cone, cut at unit normal force, (k,)."""
     velocities = twist[:3] + np.cross(twist[3:], arms)
     along, across = normal_and_tangential(velocities, normals)
     return along + friction * across

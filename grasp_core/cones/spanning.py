@@ -85,6 +85,7 @@ def span_sines(units: Array) -> Array:
     quadruples make this ten times as fast as a formula for each.
     """
     one, two, three, four = np.ascontiguousarray(np.moveaxis(units, 0, -1))
+    # weights of a vanishing combination: all of one sign where the four positively span
     front, back = _crossed(one, two), _crossed(three, four)
     minors = (_dotted(two, back), _dotted(one, back), _dotted(four, front), _dotted(three, front))
     signed: Array = np.stack([minors[0], -minors[1], minors[2], -minors[3]])
@@ -103,6 +104,7 @@ def span_sines(units: Array) -> Array:
     for minor, rest in zip(minors, OTHERS, strict=True):
         g, h, k = (cosines[frozenset(pair)] for pair in combinations(rest, 2))
         a, b, c = h * k - g, g * k - h, g * h - k
+        # the largest square over the signs of (2)
         most = np.maximum(np.maximum(a + b + c, a - b - c), np.maximum(b - a - c, c - a - b))
         squared = 3.0 - g * g - h * h - k * k + 2.0 * most
         size = np.abs(minor)
@@ -140,6 +142,7 @@ def cones_positively_span(axes: ArrayLike, half_angles: ArrayLike) -> bool:
         raise InputError(f"half_angles must be in [0, pi/2), got {angles.tolist()}")
     sines = np.sin(angles)
     if not positively_span(units):
+        # positive spanning is what continuity in the derivation starts from
         return False
     for triple in combinations(range(4), 3):
         # the corners of the box (1), whose sides now differ: none may reach the unit sphere
@@ -255,6 +258,7 @@ class SpanningTable:
             self.size = end
 
     def _ending_in(self, newest: int) -> Indices:
+        # rather than counting first, a guess at the room: counting costs as much as listing
         found = np.empty((GUESS * newest * newest, 4), dtype=np.int64)
         count = self.kernel.quadruples(self.bits, newest, found)
         if count > len(found):

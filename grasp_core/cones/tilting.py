@@ -119,6 +119,7 @@ def _lowest_heights(normals: Array) -> Array:
     units = np.moveaxis(normals, 1, 0)
     middles = [one + other for one, other in combinations(units, 2)]
     for one, two, three in combinations(units, 3):
+        # both directions square to the plane of the three tips are equally far from all three
         across = np.cross(two - one, three - one)
         middles += [across, -across]
     for middle in middles:
@@ -232,6 +233,7 @@ def _into_cap(vectors: Array, centers: Array, angles: Array) -> Array:
     along = np.einsum("qi,qi->q", vectors, centers)
     across = vectors - along[:, None] * centers
     sideways = np.linalg.norm(across, axis=1)
+    # no further than the cap's angle, and not at all without a direction
     turn = np.where(sideways > SLIGHT, np.minimum(np.arctan2(sideways, along), angles), 0.0)[
         :, None
     ]
@@ -249,6 +251,7 @@ def _improved(axes: Array, normals: Array, thetas: Array) -> tuple[Array, Array]
         kernel.improve((axes, reached), *given, moves, np.array(PACE))
         return axes, reached
     reached = half_angle(axes, normals, thetas)
+    # steps are in units of each quadruple's own narrowest friction cone
     steps = FIRST_MOVE * thetas.min(axis=1)
     for move in moves:
         sideways = move[:, :1] * first + move[:, 1:] * second

@@ -149,7 +149,7 @@ def check_schema(found: Mapping[str, Any], schema: int) -> None:
         )
     if came < schema:
         raise InputError(
-            f"schema: expected {schema}, got {came}: written by an older graspproof; make it anew"
+            f"schema: expected {schema}, got {came}: written by an older graspproof; write it again"
         )
 
 
@@ -189,7 +189,7 @@ def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(found) < len(pairs):
         counts = Counter(key for key, _ in pairs)
         twin = next(key for key, _ in pairs if counts[key] > 1)
-        raise InputError(f"{_key(twin)}: the key is there twice in one object; leave one out")
+        raise InputError(f"{_key(twin)}: the key occurs twice in one object; remove one")
     return found
 
 

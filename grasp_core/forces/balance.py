@@ -77,6 +77,7 @@ class Balance:
         least, largest = normal_force
         size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
         scales = np.full(len(wrenches), largest)
+        # the unit of force, the load or the limit, keeps all numbers of order one
         if by_load or not math.isfinite(largest):
             loads = np.linalg.norm(wrenches / np.repeat([1.0, size], 3), axis=1)
             scales = np.minimum(np.maximum(loads, least), largest)
@@ -106,6 +107,7 @@ class Balance:
         Args:
             friction: Coulomb coefficient of each contact, (k,).
         """
+        # force and torque separately, in units of the longest arm
         sizes = np.linalg.norm(self.W.reshape(-1, 2, 3), axis=2).max(axis=1)
         most = CLEARLY * np.sqrt(1.0 + friction**2).sum()
         return sizes > most * self.largest
@@ -146,6 +148,7 @@ class Balance:
 
     def into_cones(self, F: Array, friction: float) -> Array:
         """Move forces (n, 3k) a little so that they meet limits and friction cones exactly."""
+        # normal parts are brought into the limits first, since they say how far slides may reach
         along = np.clip(F[:, 0::3], self.least[:, None], self.largest[:, None])
         across = np.hypot(F[:, 1::3], F[:, 2::3])
         shrink = np.minimum(1.0, friction * along / np.maximum(across, NO_FORCE))

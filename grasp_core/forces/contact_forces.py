@@ -123,6 +123,7 @@ def least_friction_forces(
     """
     load = frozen(wrench, (6,), "wrench")[None]
     balance = _balance(positions, normals, load, normal_force, center)
+    # one coefficient for all contacts: weights of one
     alike = np.ones(len(balance.frames))
     f = _least_friction(balance, friction, alike)
     if f is None:
@@ -137,6 +138,7 @@ def closest_forces(
     """Find forces in the friction cones that leave the least imbalance, (k, 3) [N]."""
     load = frozen(wrench, (6,), "wrench")[None]
     balance = _balance(positions, normals, load, normal_force, center)
+    # the cones (3) and limits (2) hold, while (1) is only approached: its square is the objective
     rows = balance.pyramids(np.full(len(balance.frames), friction))
     P = balance.G.T @ balance.G + LEAST_CHARGE * np.eye(balance.G.shape[1])
     q = balance.G.T @ balance.W[0]
@@ -176,6 +178,7 @@ def _least_norm(balance: Balance, friction: Array) -> Array:
     Z = least_distance(*balance.polyhedra(rows))
     F = balance.checked(balance.F0 + Z @ balance.null.T)
     P, hopeless = np.eye(F.shape[1]), balance.beyond(friction)
+    # where the nearest point is not proved, ProxQP is asked, then the exact cones
     for i in np.flatnonzero(np.isnan(F[:, 0])):
         one = balance.one(int(i))
         if hopeless[i]:
@@ -275,6 +278,7 @@ def _check_limits(normal_force: tuple[float, float]) -> None:
     limits = several(normal_force, each, "normal_force", "limits")
     if len(limits) != len(("least", "largest")) or not limits[0] < limits[1]:
         raise InputError(f"normal_force must be (least, largest), got {shown(normal_force)}")
+    # infinity stands for no upper limit; any other limit must be a force of a plausible size
     if not (SMALLEST <= limits[1] <= LARGEST or (limits[1] == math.inf and limits[0] <= LARGEST)):
         raise InputError(
             f"normal_force: largest must be from {SMALLEST:g} to {LARGEST:g} N, or infinite, got "

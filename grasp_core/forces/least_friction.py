@@ -56,6 +56,7 @@ def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:
         needed = _needed_friction(better, weights)
         if not needed < friction:
             break
+        # an improvement is kept, but a small one ends the search
         improved = needed < friction * (1.0 - IMPROVEMENT)
         best, friction = better, needed
         if not improved:

@@ -101,7 +101,10 @@ def optimize_contacts(
         number(finger_radius, "finger_radius", least=SMALLEST, most=body.radius, where=where)
     before = _quality(body, grasp, friction)
     if before.lower <= 0.0:
-        raise InputError(f"grasp {grasp.id} is not in force closure at friction {friction}")
+        raise InputError(
+            f"grasp {grasp.id} is not in force closure at friction {friction}; "
+            "raise the friction or give another grasp"
+        )
     pieces = pieces_under(body, grasp)
     insets = _insets(body, grasp, pieces, finger_radius)
     clearances = tuple(float(body.radius * inset) for inset in insets)

@@ -197,7 +197,9 @@ def _choices(
     pieces = unit_pieces(body)
     by_face = [[piece for piece in pieces if piece.face == face] for face in faces]
     if not all(by_face):
-        raise InputError(f"one of the faces {tuple(faces)} is too narrow for a contact")
+        raise InputError(
+            f"one of the faces {tuple(faces)} is too narrow for a contact; choose other faces"
+        )
     # edges between the pieces of a face are no borders: contacts may lie on them
     rooms = [
         [inset_piece(one[0], inset)] if len(one) == 1 else one

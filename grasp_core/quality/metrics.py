@@ -195,18 +195,18 @@ def hull_volume(
     torque_scale: float,
     edges: int = 8,
 ) -> float:
-    """Volume of the hull of the pyramids' edges in wrench space [N^6].
+    """Compute the volume of the hull of the pyramids' edges in wrench space [N^6].
 
     Args:
         positions: Contact points, (k, 3) [m]; or a Grasp.
         normals: Unit vectors into the object, (k, 3).
         friction: Coulomb coefficient, one for all contacts or one each, (k,).
-        center: About which torques are taken, (3,) [m].
+        center: Point about which torques are taken, (3,) [m].
         torque_scale: Length that makes a torque comparable with a force [m].
-        edges: Of each pyramid.
+        edges: How many edges each pyramid has.
 
     Returns:
-        Zero if the wrenches lie in a plane.
+        The volume; zero if the wrenches lie in a plane.
 
     Raises:
         InputError: Shapes, lengths or signs are wrong.
@@ -226,13 +226,13 @@ def hull_volume(
 def smallest_singular_value(
     positions: ArrayLike | Grasp, *, center: ArrayLike = (0.0, 0.0, 0.0), torque_scale: float
 ) -> float:
-    """Smallest singular value of the map from contact forces to wrenches.
+    """Compute the smallest singular value of the map from contact forces to wrenches.
 
-    Zero for contacts on one line, and for two: they turn nothing about their line.
+    It is zero for contacts on one line, and for two: they turn nothing about their line.
 
     Args:
         positions: Contact points, (k, 3) [m]; or a Grasp.
-        center: About which torques are taken, (3,) [m].
+        center: Point about which torques are taken, (3,) [m].
         torque_scale: Length that makes a torque comparable with a force [m].
 
     Raises:

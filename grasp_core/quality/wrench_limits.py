@@ -203,6 +203,7 @@ class WrenchBody:
         """
         self.max_normal_force = positive(max_normal_force, "max_normal_force")
         self.count = k = len(arms)
+        # at the contacts' own middle and at unit size all numbers are of order one
         self.middle = arms.mean(axis=0)  # a far centre would swamp the levers
         arms = arms - self.middle
         self.size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
@@ -224,6 +225,7 @@ class WrenchBody:
         unit = self._about_middle(wrench)
         length = float(np.linalg.norm(unit))
         A = self.A.copy()
+        # a wrench of unit length keeps lambda of order one; it is scaled back below
         A[:6, -1] = unit / length
         q = np.zeros(A.shape[1])
         q[-1] = -1.0
@@ -245,6 +247,7 @@ class WrenchBody:
     def attains(self, found: WrenchLimit) -> bool:
         """Return whether the forces are allowed, and balance the limit's multiple of the wrench."""
         shares = np.einsum("kij,ki->kj", self.frames, found.forces) / self.max_normal_force
+        # what is left of (1) after adding the limit's multiple of the wrench
         left = self.G @ shares.ravel()
         left += found.limit / self.max_normal_force * self._about_middle(found.wrench)
         balanced = float(np.linalg.norm(left)) <= HELD * self.bounded.size

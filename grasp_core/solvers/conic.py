@@ -66,7 +66,7 @@ def minimize(program: ConicProgram) -> ConicSolution:
     Raises:
         SolverError: Every answer failed our check; an infeasible program also ends so.
     """
-    failure = SolverError("no way of solving was tried")
+    failure = SolverError("no settings were tried")
     for change in WAYS:
         try:
             return _solved(program, change)

@@ -94,7 +94,7 @@ def maximize(program: LinearProgram) -> Optimum | Infeasible:
     """
     found = maximize_above(program, -math.inf)
     if isinstance(found, Below):
-        raise SolverError("called below minus infinity")
+        raise SolverError("the simplex method called the optimum smaller than minus infinity")
     return found
 
 
@@ -117,7 +117,7 @@ def maximize_above(program: LinearProgram, cutoff: float) -> Optimum | Infeasibl
 
 
 def _by_highs(program: LinearProgram) -> Optimum | Infeasible:
-    failure = SolverError("no way of solving was tried")
+    failure = SolverError("no strategy was tried")
     for strategy in STRATEGIES:
         try:
             return _solved(program, strategy)
@@ -171,7 +171,7 @@ def _by_simplex(program: LinearProgram, cutoff: float) -> Optimum | Infeasible |
     if status == kernel.BELOW:
         return _checked_bound(program, multipliers[:count], cutoff)
     if basis[-1] >= count:
-        raise SolverError("the simplex method ended at its box")
+        raise SolverError("the simplex method ended at its box; the program may be unbounded")
     x = np.asarray(np.linalg.solve(vertex, h[basis]), dtype=np.float64)
     return _checked_optimum(program, x, multipliers[:count])
 
@@ -182,7 +182,7 @@ def _checked_bound(program: LinearProgram, multipliers: Array, cutoff: float) ->
     off = float(np.abs(program.c - G.T @ multipliers).max())
     bound = float(h @ multipliers)
     if not (off <= RESIDUAL and bound <= cutoff):  # nor if one is not a number
-        raise SolverError(f"called below {cutoff:.3g}, but the bound is {bound:.3g}")
+        raise SolverError(f"the optimum was called below {cutoff:.3g}, its bound is {bound:.3g}")
     return Below(bound, multipliers)
 
 
@@ -228,7 +228,7 @@ def _checked_ray(program: LinearProgram, ray: Array) -> Infeasible:
         combined = np.abs(G.T @ multipliers).max(initial=0.0)
         if -float(h @ multipliers) > FARTHEST * combined + RESIDUAL:
             return Infeasible(multipliers)
-    raise SolverError("called infeasible, but the proof does not check")
+    raise SolverError("the program was called infeasible, but the proof fails our check")
 
 
 def _run(program: LinearProgram, strategy: int) -> tuple[Any, Any]:
