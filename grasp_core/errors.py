@@ -28,7 +28,7 @@ class UnfaithfulError(GraspError):
 
 
 class MeshRefusal(StrEnum):
-    """Why a mesh is not accepted; the value is the stable code shown to users."""
+    """The reasons why a mesh is not accepted; each value is the stable code shown to users."""
 
     UNREADABLE = "GP-MESH-UNREADABLE"
     FORMAT = "GP-MESH-FORMAT"

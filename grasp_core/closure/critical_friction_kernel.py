@@ -56,7 +56,7 @@ def search(
         width: Wanted widths of the brackets, relative to their lower ends.
         forces: Filled with forces that balance, (g, k, 3).
         twists: Filled with twists that separate, (g, 6).
-        bounds: Filled with a lower and an upper friction, proved by twist and forces, (g, 2).
+        bounds: Filled with the frictions that twists separate at and forces close at, (g, 2).
             A pair that is no bracket, or not narrow, was given up.
     """
     k = arms.shape[1]

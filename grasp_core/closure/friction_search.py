@@ -151,7 +151,7 @@ class Ends:
     arms: Array
     """Arms of the contacts at unit size, (k, 3)."""
     strict: bool = True
-    """Whether each step is proved in rational arithmetic, not in floats that the end may refute."""
+    """Whether each step is proved in rational arithmetic, or in floats, which rounding may undo."""
     lower: float = 0.0
     upper: float = math.inf
     forces: Array | None = None

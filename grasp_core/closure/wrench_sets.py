@@ -83,7 +83,8 @@ class WrenchSet:
     friction: Array
     """Coulomb coefficients, (k,)."""
     norm: Norm
-    """How the normal forces are bounded, each to a sum or a size of one newton."""
+    """How normal forces are bounded: their sum is one newton (`l1`) or each is at most that
+    (`linf`)."""
 
     @classmethod
     def of(

@@ -71,7 +71,7 @@ def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:
 
 
 def holds_disc(polygon: FlatPolygon, border: FlatPolygon, center: Array, radius: float) -> bool:
-    """Return whether a polygon holds a disc's part inside a border, but for `LEFT_OUT` of it."""
+    """Return whether a polygon covers a disc within a border, up to `LEFT_OUT` of its own area."""
     turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
     rows = np.column_stack([np.cos(turns), np.sin(turns)])
     disc = clip(border.corners, rows, rows @ center + radius)

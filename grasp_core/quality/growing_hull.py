@@ -50,7 +50,7 @@ class GrowingHull:
 
     @property
     def size(self) -> int:
-        """How many simplices are kept, live or dead."""
+        """Number of simplices that are kept, live or removed."""
         return self._used
 
     def lowest(self) -> tuple[Array, float]:

@@ -87,7 +87,7 @@ class WrenchLimit:
             center: Point about which torques are taken, (3,) [m].
 
         Returns:
-            Whether the fields prove each other; False if they are no certificate.
+            Whether every field is true; False if they are no certificate.
 
         Raises:
             InputError: The arguments do not describe contacts.
