@@ -69,7 +69,7 @@ class FrictionInterval:
         return 0.0 if self.upper <= REPORTED_AS_ZERO else self.upper
 
     def verify(self) -> bool:
-        """Check both ends, (1) and (2), again in rational arithmetic and without any solver."""
+        """Check both ends again, in rational arithmetic and without any solver."""
         return self._fits() and self._open_below() and self._closed_above()
 
     def _fits(self) -> bool:

@@ -3,9 +3,9 @@
 Contacts are given at unit size: arms from their mean point, the longest of length one. The program
 and the supports s_i are those of `force_closure`. Let d_i be the depth mu_i n_i.f_i - |tangential
 part of f_i| of force i in its cone, or n_i.f_i without friction, w the wrench of all forces, and
-sigma the sixth singular value of the grasp map. A correction of the forces of length
-c = (|w| + rounding) / sigma balances them, and takes no more than sqrt(1 + mu_i^2) c from d_i. So
-forces prove closure, and bound the margin, if
+sigma the sixth singular value of the matrix of wrenches that contacts can apply. A correction of
+length c = (|w| + rounding) / sigma balances the forces, and takes no more than sqrt(1 + mu_i^2) c
+from d_i. So forces prove closure, and the left side bounds the margin from below, if
 
     min_i (d_i - sqrt(1 + mu_i^2) c) / (sum n_i.f_i + sqrt(k) c)  >  0,                       (1)
 
@@ -211,8 +211,8 @@ def margin_ceiling(
         caution: Factor on the rounding that is allowed for.
 
     Returns:
-        An upper bound; zero, which bounds nothing but says that there is no closure, where M is
-        zero to within rounding; infinity where M is more.
+        An upper bound; zero, which bounds nothing but says that there is no closure, where the
+        largest support M is zero to within rounding; infinity where M is more.
     """
     if not refutes_closure(twist, arms, normals, friction):
         return math.inf
