@@ -1,4 +1,4 @@
-"""Arrays checked once on the way in, and read-only ever after."""
+"""Arrays are checked once on the way in, and are read-only from then on."""
 
 import math
 from typing import Any, TypeAlias
@@ -10,26 +10,27 @@ from grasp_core.checked import MOST_COUNT, shown
 from grasp_core.errors import InputError
 
 Array: TypeAlias = NDArray[np.float64]
-"""Any float array; its shape is said in words where it is used."""
+"""Float array of any shape; the docstring of each value or argument gives its shape."""
 Indices: TypeAlias = NDArray[np.int64]
-"""Any integer array of indices."""
+"""Integer array of indices, of any shape."""
 
 DIGITS = 9
 """Digits kept by `to_digits`: a thousand times more than any result needs, a million times fewer
 than solvers' noise reaches."""
 SHIFT = 0.5 * (math.sqrt(5.0) - 1.0)
-"""Where a grid lies on which numbers are rounded or compared, in cells: the golden section is worst
-approximated by fractions, so the numbers of regular objects are far from borders."""
+"""Offset of the grids on which numbers are rounded or compared, in cells: the golden section is the
+number worst approximated by fractions, so the numbers of regular objects are far from borders."""
 ASIDE = 0.05
-"""Keeps round numbers, such as the 1.0 of a unit vector, away from where digits begin to count."""
+"""Shift of the decimal logarithm that keeps round numbers, such as the 1.0 of a unit vector, away
+from the sizes at which one digit more counts."""
 LARGEST_ENTRY = 1e50
-"""The product of three such numbers has a finite square."""
+"""Largest size of an array entry: the product of three such numbers has a finite square."""
 SMALLEST_SIZE = 1e-50
-"""What is smaller and not zero has a square that is lost beside others, or is zero."""
+"""Smallest length above zero: the square of a smaller one vanishes beside others, or is zero."""
 REAL = "iuf"
-"""Kinds of numpy's numbers that are real ones."""
+"""Numpy's kind letters of integers and floats, the only entries accepted."""
 UNIT_SLACK = 1e-9
-"""How far the length of a unit vector may be from 1: rounding of a file with ten digits."""
+"""How far the length of a unit vector may be from 1: the rounding of a file with ten digits."""
 
 
 def frozen(
@@ -65,10 +66,10 @@ def frozen(
 
 
 def real_array(value: ArrayLike, name: str) -> Array:
-    """A new array of real numbers: what numpy would turn into some is none.
+    """Copy a value into a new float array; strings and truth values are refused, not converted.
 
     Raises:
-        InputError: It is not of real numbers.
+        InputError: The value is not an array of real numbers.
     """
     try:
         given: NDArray[Any] = np.asarray(value)
@@ -77,15 +78,15 @@ def real_array(value: ArrayLike, name: str) -> Array:
     if given.dtype.kind not in REAL:
         got = shown(value) if given.ndim == 0 else f"entries of type {given.dtype}"
         raise InputError(f"{name} must be an array of numbers, got {got}")
-    with np.errstate(over="ignore"):  # of extended precision
+    with np.errstate(over="ignore"):  # extended precision may exceed doubles; `frozen` refuses that
         return np.array(given, dtype=np.float64)
 
 
 def frozen_units(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
-    """Like `frozen`, for unit vectors along the last axis.
+    """Copy `value` into a read-only array of unit vectors along the last axis (see `frozen`).
 
     Raises:
-        InputError: As `frozen`, or a vector's length is not 1.
+        InputError: `frozen` refuses the array, or a vector's length is not 1.
     """
     array = frozen(value, shape, name)
     lengths = np.linalg.norm(array, axis=-1)
@@ -96,13 +97,13 @@ def frozen_units(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> 
 
 
 def frozen_each(value: ArrayLike, count: int, name: str) -> Array:
-    """Like `frozen`, for one number for all of `count` things, or one each, (count,)."""
+    """Copy one number for all of `count` things, or one each, into a read-only array, (count,)."""
     given = real_array(value, name)
     return frozen(np.full(count, given) if given.ndim == 0 else given, (count,), name)
 
 
 def frozen_indices(value: Any, shape: tuple[int | None, ...], name: str) -> Indices:
-    """Like `frozen`, for non-negative whole numbers."""
+    """Copy `value` into a read-only array of non-negative whole numbers (see `frozen`)."""
     numbers = frozen(value, shape, name)
     if ((numbers != np.floor(numbers)) | (numbers < 0) | (numbers > MOST_COUNT)).any():
         raise InputError(f"{name} must hold whole numbers from 0 to {MOST_COUNT}")
@@ -112,14 +113,14 @@ def frozen_indices(value: Any, shape: tuple[int | None, ...], name: str) -> Indi
 
 
 def to_digits(values: Array, size: float = 0.0) -> Array:
-    """Values rounded to `DIGITS` digits of the largest of them, on a shifted grid.
+    """Round values to `DIGITS` digits of the largest of them, on a shifted grid.
 
     The last bits of solvers' and factorisations' answers depend on where their numbers lie in
     memory; what is simulated or written must not.
 
     Args:
-        values: Of any shape.
-        size: Counts as one of them, where values may be zero but for rounding.
+        values: Numbers in an array of any shape.
+        size: Smallest size that the digits refer to, for values that are zero but for rounding.
     """
     largest = max(float(np.abs(values).max(initial=0.0)), size)
     if largest == 0.0:

@@ -1,6 +1,7 @@
-"""Single values checked on the way in: numbers, counts, words, switches, paths and our own values.
+"""Checks for single values on the way in: numbers, counts, words, switches, paths, our own values.
 
-Arrays have `arrays`. Nothing heavy is imported here, so that flags can have the same bounds.
+Arrays are checked in `arrays`. Nothing heavy is imported here, so that command-line flags can
+use the same bounds.
 """
 
 import math
@@ -14,19 +15,20 @@ from grasp_core.errors import InputError
 Value = TypeVar("Value")
 
 SMALLEST, LARGEST = 1e-9, 1e9
-"""Lengths, forces and the like outside are mistakes, in SI units."""
+"""Lengths, forces and similar quantities outside this range are mistakes, in SI units."""
 LARGEST_FRICTION = 1e3
-"""Coefficients above this are reported as infinite, and refused; no material comes near it."""
+"""Largest Coulomb coefficient: a larger critical one is reported as infinite, a larger input is
+refused; no material comes near it."""
 MOST_COUNT = 10**9
-"""What is to be counted takes longer than anybody waits."""
+"""Largest count accepted: anything larger would take longer than anybody waits."""
 MOST_SEED = 2**64 - 1
 MOST_EDGES = 10_000
-"""Of a pyramid in place of a friction cone: it is a circle to seven digits."""
+"""Most edges of a pyramid that replaces a friction cone: it equals the cone to seven digits."""
 MOST_RANDOM_WRENCHES, MOST_TRIALS = 10_000, 100_000
 HUGE = 10**100
-"""Whole numbers above are told by their size: Python does not write the largest."""
+"""Whole numbers above this are shown by their size: Python does not write the largest ones."""
 SHOWN = 60
-"""Letters of a refused value in a message."""
+"""Most characters of a refused value that a message shows."""
 
 
 def number(  # noqa: PLR0913 - the ways in which a range can end
@@ -39,19 +41,19 @@ def number(  # noqa: PLR0913 - the ways in which a range can end
     most: float | None = None,
     where: str = "",
 ) -> float:
-    """A number in a range; it is finite unless `most` is infinite.
+    """Check that a value is a number in a range; it is finite unless `most` is infinite.
 
     Args:
-        value: Anything.
-        name: What to call it in a message.
+        value: The value to check, of any type.
+        name: What to call the value in an error message.
         above: Largest number that is too small.
-        least: Smallest number that is taken.
+        least: Smallest number that is accepted.
         below: Smallest number that is too large.
-        most: Largest number that is taken.
-        where: What the range comes from, for the message.
+        most: Largest number that is accepted.
+        where: Where the range comes from, appended to it in the message.
 
     Raises:
-        InputError: It is no real number, or outside.
+        InputError: The value is not a real number, or outside the range.
     """
     real = not isinstance(value, bool) and isinstance(value, Real)
     size = _as_float(value) if real else math.nan
@@ -64,28 +66,28 @@ def number(  # noqa: PLR0913 - the ways in which a range can end
 
 
 def positive(value: Any, name: str) -> float:
-    """A length, force or the like of a size that occurs.
+    """Check that a value is a length, force or similar quantity of a plausible size.
 
     Raises:
-        InputError: It is not.
+        InputError: The value is not a number from `SMALLEST` to `LARGEST`.
     """
     return number(value, name, least=SMALLEST, most=LARGEST)
 
 
 def coefficient(value: Any, name: str = "friction") -> float:
-    """A Coulomb coefficient above zero.
+    """Check that a value is a Coulomb coefficient above zero.
 
     Raises:
-        InputError: It is not.
+        InputError: The value is not a number from `SMALLEST` to `LARGEST_FRICTION`.
     """
     return number(value, name, least=SMALLEST, most=LARGEST_FRICTION)
 
 
 def whole(value: Any, name: str, *, least: int = 0, most: int = MOST_COUNT) -> int:
-    """A whole number from `least` to `most`.
+    """Check that a value is a whole number from `least` to `most`.
 
     Raises:
-        InputError: It is none.
+        InputError: The value is not a whole number, or outside the range.
     """
     integral = not isinstance(value, bool) and isinstance(value, Integral)
     count = int(value) if integral else None
@@ -97,19 +99,19 @@ def whole(value: Any, name: str, *, least: int = 0, most: int = MOST_COUNT) -> i
 
 
 def seed_of(value: Any, name: str = "seed") -> int:
-    """A seed of random numbers.
+    """Check that a value is a seed of random numbers.
 
     Raises:
-        InputError: It is none.
+        InputError: The value is not a whole number from 0 to `MOST_SEED`.
     """
     return whole(value, name, most=MOST_SEED)
 
 
 def one_of(value: Any, choices: Iterable[str], name: str) -> None:
-    """Refuse what is not among some words.
+    """Refuse a value that is not one of the given words.
 
     Raises:
-        InputError: It is not.
+        InputError: The value is not among `choices`.
     """
     known = tuple(choices)
     if not isinstance(value, str) or value not in known:
@@ -117,20 +119,20 @@ def one_of(value: Any, choices: Iterable[str], name: str) -> None:
 
 
 def switch(value: Any, name: str) -> None:
-    """Refuse what is neither true nor false.
+    """Refuse a value that is neither True nor False.
 
     Raises:
-        InputError: It is neither.
+        InputError: The value is not a bool.
     """
     if not isinstance(value, bool):
         raise InputError(f"{name} must be True or False, got {shown(value)}")
 
 
 def text(value: Any, name: str) -> str:
-    """Text.
+    """Check that a value is text.
 
     Raises:
-        InputError: It is not.
+        InputError: The value is not a string.
     """
     if not isinstance(value, str):
         raise InputError(f"{name} must be text, got {shown(value)}")
@@ -138,16 +140,16 @@ def text(value: Any, name: str) -> str:
 
 
 def instance(value: Any, kind: type[Value], name: str, remedy: str = "") -> Value:
-    """A value of a class.
+    """Check that a value is an instance of a class.
 
     Args:
-        value: Anything.
+        value: The value to check, of any type.
         kind: The class.
-        name: What to call the value in a message.
-        remedy: Where such values come from.
+        name: What to call the value in an error message.
+        remedy: Where values of the class come from, for the message.
 
     Raises:
-        InputError: It is of another class.
+        InputError: The value is of another class.
     """
     if not isinstance(value, kind):
         hint = f"; {remedy}" if remedy else ""
@@ -156,20 +158,20 @@ def instance(value: Any, kind: type[Value], name: str, remedy: str = "") -> Valu
 
 
 def function(value: Any, name: str) -> None:
-    """Refuse what cannot be called.
+    """Refuse a value that cannot be called.
 
     Raises:
-        InputError: It cannot.
+        InputError: The value is not callable.
     """
     if not callable(value):
         raise InputError(f"{name} must be a function, got {shown(value)}")
 
 
 def path_of(value: Any, name: str) -> Path:
-    """The name of a file or folder.
+    """Check that a value names a file or folder.
 
     Raises:
-        InputError: It is no text or path, is empty, or holds a zero byte.
+        InputError: The value is not text or a path, is empty, or holds a zero byte.
     """
     if not isinstance(value, str | Path):
         raise InputError(f"{name} must be a path, as text or pathlib.Path, got {shown(value)}")
@@ -179,16 +181,16 @@ def path_of(value: Any, name: str) -> Path:
 
 
 def several(value: Any, each: Callable[[Any], Value], name: str, kind: str) -> tuple[Value, ...]:
-    """Things in order, each of them checked; text is not taken for its letters.
+    """Check every item of a sequence; a string is refused, not split into letters.
 
     Args:
-        value: Anything.
-        each: Makes such a thing of a value, or refuses it.
-        name: What to call the value in a message.
-        kind: What the things are.
+        value: The value to check, of any type.
+        each: Function that returns a checked item, or refuses it.
+        name: What to call the value in an error message.
+        kind: What the items are, in the plural, for the message.
 
     Raises:
-        InputError: It is no sequence, or `each` refuses one of them.
+        InputError: The value is not a sequence, or `each` refuses an item.
     """
     if isinstance(value, str | bytes) or not isinstance(value, Iterable):
         raise InputError(f"{name} must be several {kind}, as a tuple, got {shown(value)}")
@@ -196,7 +198,7 @@ def several(value: Any, each: Callable[[Any], Value], name: str, kind: str) -> t
 
 
 def shown(value: Any) -> str:
-    """A value in a message: short, on one line, and for what is long its kind."""
+    """Write a value for a message: short and on one line; a long value is shown by its kind."""
     if isinstance(value, int) and abs(value) > HUGE:
         return f"a whole number of {value.bit_length()} bits"
     listed = cast("Iterable[Any]", value) if type(value) in {tuple, list} else None

@@ -1,4 +1,4 @@
-"""Everything the three packages raise on purpose, one class per cause."""
+"""The errors that the three packages raise on purpose, one class per cause."""
 
 from enum import StrEnum
 
@@ -8,7 +8,7 @@ class GraspError(Exception):
 
 
 class InputError(GraspError):
-    """A value handed in breaks the contract; the message says which and how to mend it."""
+    """A value passed in breaks the contract; the message says which, and how to correct it."""
 
 
 class UndecidedError(GraspError):
@@ -28,7 +28,7 @@ class UnfaithfulError(GraspError):
 
 
 class MeshRefusal(StrEnum):
-    """Why a mesh is not accepted; the value is the stable code shown to users."""
+    """The reasons why a mesh is not accepted; each value is the stable code shown to users."""
 
     UNREADABLE = "GP-MESH-UNREADABLE"
     FORMAT = "GP-MESH-FORMAT"
@@ -63,5 +63,5 @@ class MeshError(InputError):
         self.reason, self.message = reason, message
 
     def __str__(self) -> str:
-        """The code, and what it is about."""
+        """Return the refusal's code and its message, on one line."""
         return f"{self.reason.value}: {self.message}"

@@ -1,6 +1,6 @@
-"""Whether the fields of a certificate are what they should be: `checked` and `arrays` as questions.
+"""Checks of a certificate's fields that answer True or False, where `checked` and `arrays` raise.
 
-Certificates may come from anywhere. What `verify` asks here it answers with False, never an error.
+A certificate may come from anywhere, so its `verify` answers False to a bad field, never an error.
 """
 
 from numbers import Real
@@ -14,12 +14,12 @@ from grasp_core.checked import LARGEST_FRICTION
 
 
 def is_a(value: Any, kind: type) -> bool:
-    """Whether a value is of a class, whatever is declared."""
+    """Return whether a value is an instance of a class, whatever type is declared for it."""
     return isinstance(value, kind)
 
 
 def is_tuple_of(value: Any, kind: type, count: int | None = None) -> bool:
-    """Whether a value is a tuple of things of a class, of so many if that is given."""
+    """Return whether a value is a tuple of instances of a class, `count` of them if given."""
     if not isinstance(value, tuple):
         return False
     things = cast("tuple[Any, ...]", value)
@@ -28,13 +28,13 @@ def is_tuple_of(value: Any, kind: type, count: int | None = None) -> bool:
 
 
 def is_number(value: Any, *, least: float = -LARGEST_ENTRY, most: float = LARGEST_ENTRY) -> bool:
-    """Whether a value is one real number in a range, and not NaN."""
+    """Return whether a value is a single real number in a range, and not NaN."""
     real = isinstance(value, Real) and not is_a(value, bool)
     return real and least <= cast("float", value) <= most
 
 
 def is_array(value: Any, *shape: int | None) -> TypeGuard[Array]:
-    """Whether a value is an array of finite real numbers of a shape; None leaves an axis free."""
+    """Return whether a value is an array of finite reals of a shape; None leaves an axis free."""
     if not isinstance(value, np.ndarray):
         return False
     array = cast("NDArray[Any]", value)
@@ -46,17 +46,17 @@ def is_array(value: Any, *shape: int | None) -> TypeGuard[Array]:
 
 
 def is_indices(value: Any, *shape: int | None) -> bool:
-    """Whether a value is an array of whole numbers of a shape."""
+    """Return whether a value is an array of whole numbers of a shape."""
     return is_array(value, *shape) and value.dtype.kind in "iu"
 
 
 def are_units(value: Any, *shape: int | None, slack: float = UNIT_SLACK) -> bool:
-    """Whether a value is an array of unit vectors along its last axis."""
+    """Return whether a value is an array of unit vectors along its last axis."""
     return is_array(value, *shape) and bool(
         (np.abs(np.linalg.norm(value, axis=-1) - 1.0) <= slack).all()
     )
 
 
 def are_frictions(value: Any, count: int) -> bool:
-    """Whether a value holds one Coulomb coefficient per contact, (count,)."""
+    """Return whether a value holds one Coulomb coefficient per contact, (count,)."""
     return is_array(value, count) and bool(((value >= 0.0) & (value <= LARGEST_FRICTION)).all())

@@ -1,4 +1,4 @@
-"""Names of a package that are imported when they are first used: what is not used costs nothing.
+"""A package's names are imported on their first use, so that unused ones cost nothing.
 
 The stub beside a package's `__init__.py` lists the names, for type checkers and for this module.
 """
@@ -10,15 +10,15 @@ from pathlib import Path
 from typing import Any
 
 Surface = tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]
-"""`__getattr__`, `__dir__` and `__all__` of a package."""
+"""The functions `__getattr__` and `__dir__` and the list `__all__` of a package."""
 
 
 def names_in_stub(package: str, file: str) -> Surface:
-    """What a package needs in order to offer the names that its stub imports.
+    """Return what a package needs in order to offer the names that its stub imports.
 
     Args:
-        package: Its `__name__`.
-        file: Its `__file__`.
+        package: The package's `__name__`.
+        file: The package's `__file__`.
     """
     stub = ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8"))
     imports = [part for part in stub.body if isinstance(part, ast.ImportFrom)]

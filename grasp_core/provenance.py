@@ -1,6 +1,6 @@
-"""What produced a result: versions of everything, and how this processor rounds.
+"""What produced a result: versions of every package, and how this processor rounds.
 
-Kinds of processors and kinds of code differ in the last digits.
+Results of different processors, or of compiled and plain code, differ in the last digits.
 """
 
 import hashlib
@@ -19,11 +19,11 @@ PACKAGES = (
 )  # fmt: skip
 
 SIZES = (3, 6, 12, 24, 64)
-"""Of the matrices that are tried."""
+"""Numbers of rows of the square matrices that `arithmetic` tries."""
 
 
 def versions() -> dict[str, str]:
-    """Versions of everything that can change a number, without importing any of it."""
+    """Look up the version of everything that can change a number, without importing any of it."""
     found = {"python": platform.python_version(), "machine": platform.machine()}
     for package in PACKAGES:
         try:
@@ -35,9 +35,9 @@ def versions() -> dict[str, str]:
 
 @cache
 def arithmetic() -> str:
-    """A hash of what linear algebra gives here, and of whether inner loops are compiled.
+    """Return a hash of what linear algebra gives here and of whether inner loops are compiled.
 
-    The same where results are the same bit for bit, with the same versions of everything.
+    Two machines with equal hashes and equal versions give results that agree bit for bit.
     """
     rng = np.random.default_rng(0)
     digest = hashlib.sha256(

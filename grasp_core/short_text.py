@@ -1,4 +1,4 @@
-"""How values of many numbers are shown in a line: a name, and what tells them apart."""
+"""Values of many numbers are shown in one line: a name, and the figures that tell them apart."""
 
 from typing import cast
 
@@ -9,23 +9,23 @@ from grasp_core.arrays import Array
 from grasp_core.checked import shown
 
 NOTHING = 1e-12
-"""Share of a vector's largest number that counts as zero where people read it."""
+"""Share of a vector's largest number below which a number is shown as zero."""
 
 
 def summary(kind: str, *said: str, **figures: object) -> str:
-    """`Kind(words, name=figure, ..)`, in the style of constructors but not one.
+    """Write `Kind(words, name=figure, ..)`, like a constructor call but not meant as code.
 
     Args:
         kind: Name of the class.
-        said: Words, as they are.
-        figures: Numbers and vectors to six digits, anything else as in messages.
+        said: Words that are shown as they are.
+        figures: Numbers and vectors to six digits; anything else as in error messages.
     """
     parts = [*said, *(f"{name}={_figure(value)}" for name, value in figures.items())]
     return f"{kind}({', '.join(parts)})"
 
 
 def counted(number: int, thing: str) -> str:
-    """`1 hole`, `2 holes`."""
+    """Write a number with its noun, such as `1 hole` or `2 holes`."""
     return f"{number} {thing}" if number == 1 else f"{number} {_plural(thing)}"
 
 
@@ -41,7 +41,7 @@ def _figure(value: object) -> str:
 
 
 def vector(value: ArrayLike) -> str:
-    """The numbers of a vector to six digits; what is rounding beside the largest is zero."""
+    """Write a vector to six digits; a number that is rounding beside the largest is zero."""
     numbers = np.array(value, dtype=np.float64)
     numbers[np.abs(numbers) < NOTHING * np.abs(numbers).max(initial=0.0)] = 0.0
     return f"({', '.join(f'{x:.6g}' for x in numbers.tolist())})"

@@ -1,4 +1,4 @@
-"""The nouns of a grasp: contacts, force cones, regions, witnesses, grasps; all frozen.
+"""The nouns of a grasp, all of them frozen: contacts, force cones, regions, witnesses and grasps.
 
 Every vector is in the object's frame and in SI units. Normals are unit vectors that
 point into the object. Arrays are copied, checked and made read-only on construction.
@@ -28,7 +28,7 @@ from grasp_core.short_text import counted, summary, vector
 Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
 """The class of a grasp's witness lines."""
 Method: TypeAlias = Literal["concurrent", "pencil", "regulus", "free"]
-"""How grasps are looked for: by one of the paper's constructions, or free of any type."""
+"""How grasps are searched: by one of the paper's three constructions, or free of any family."""
 RegionKind: TypeAlias = Literal["cone", "disc", "point", "certified"]
 FaceQuadruple: TypeAlias = tuple[int, int, int, int]
 """Indices of four faces, in finger order."""
@@ -43,13 +43,13 @@ RIGHT_ANGLE = np.pi / 2
 class ForceCone:
     """A circular cone of force directions inside a friction cone.
 
-    The paper's case has the normal as axis and the friction angle as half-angle.
+    In the paper the normal is the axis and the friction angle the half-angle.
     """
 
     axis: Array
-    """Unit vector, (3,)."""
+    """Unit vector along the middle of the cone, (3,)."""
     half_angle: float
-    """[rad]"""
+    """Angle between the axis and the cone's surface, from 0 to below pi / 2 [rad]."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", frozen_units(self.axis, (3,), "axis"))
@@ -61,7 +61,7 @@ class ForceCone:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Contact:
-    """Where one fingertip touches, and which way it can push."""
+    """A point where one fingertip touches the object, with the direction in which it can push."""
 
     position: Array
     """Point on the surface, (3,) [m]."""
@@ -78,14 +78,14 @@ class Contact:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ContactRegion:
-    """Where one finger may stand while the others stay anywhere in their own regions."""
+    """A region where one finger may stand while the others stay anywhere in their own regions."""
 
     kind: RegionKind
-    """What certifies it: `cone` is the inverted force cone of a focus point cut with the face,
-    `disc` a disc around the contact of a pencil; `certified` a proof of its own (see
-    `certified_regions`); `point` claims nothing but the contact."""
+    """Which proof certifies the region: `cone` is the inverted force cone of a focus point cut with
+    the face, `disc` a disc around the contact of a pencil, `certified` a region with a proof of its
+    own (see `certify_regions`); `point` claims nothing but the contact."""
     polygon: Array
-    """Convex polygon on the face, (k, 3) [m]; of a disc, points of its border."""
+    """Convex polygon on the face, (k, 3) [m]; for a disc, points of its border."""
     inscribed_radius: float
     """Radius of the largest disc inside the region [m]."""
 
@@ -101,12 +101,12 @@ class ContactRegion:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Witness:
-    """Balanced forces, whose four lines show what family a grasp belongs to."""
+    """Balanced forces, whose four lines show to which family a grasp belongs."""
 
     points: Array
-    """A point on each line, the contact, (4, 3) [m]."""
+    """One point on each line, namely the contact, (4, 3) [m]."""
     forces: Array
-    """Forces along the lines, into the object, normal parts summing to one, (4, 3)."""
+    """Forces along the lines, into the object, whose normal parts sum to one, (4, 3)."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen(self.points, (FINGERS, 3), "points"))
@@ -123,17 +123,17 @@ class Witness:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Grasp:
-    """Four contacts in finger order, with the witness of why they hold."""
+    """Four contacts in finger order, with a witness that shows why they hold the object."""
 
     id: str
     family: Family
     faces: FaceQuadruple
     contacts: tuple[Contact, Contact, Contact, Contact]
     focus_points: Array
-    """Where witness lines of force meet, (k, 3) [m]: one point for a concurrent grasp, one for
-    each pair of a pencil. For a regulus, the points between the two lines of each pair, or none."""
+    """Points where witness lines meet, (k, 3) [m]: one for a concurrent grasp, one for each
+    pair of a pencil. For a regulus, the points between the two lines of each pair, or none."""
     force_cones: tuple[ForceCone, ForceCone, ForceCone, ForceCone]
-    """The cones the construction used; each lies inside its contact's friction cone."""
+    """Force cones that the construction used; each lies inside its contact's friction cone."""
     regions: tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
     radius: float
     """Radius of the smallest of the four independent discs [m]; 0.0 where none is claimed."""
@@ -144,13 +144,13 @@ class Grasp:
     closure_margin: float
     """Margin of the exact closure test at the planned friction (see `force_closure`)."""
     ferrari_canny: tuple[float, float]
-    """Proved bounds of the `l1` quality at the planned friction, torques about the centre of mass
-    and over the object's radius [N]."""
+    """Lower and upper bound, both proved, of the `l1` quality at the planned friction, with torques
+    about the centre of mass and over the object's radius [N]."""
     witness: Witness
-    """Balanced forces whose lines are of the grasp's family."""
+    """Balanced forces whose four lines belong to the grasp's family."""
     approach_directions: Array | None = None
-    """Which way each finger moves in to its contact, on the free line that was found for it, unit
-    vectors, (4, 3); None if none was asked for (`plan(finger=...)`)."""
+    """Direction in which each finger moves in to its contact, on the free line that was found for
+    it, unit vectors, (4, 3); None if no line was asked for (`plan(finger=...)`)."""
 
     def __post_init__(self) -> None:
         text(self.id, "id")
@@ -196,7 +196,7 @@ class Grasp:
 
 
 PER_FINGER = {"contacts": Contact, "force_cones": ForceCone, "regions": ContactRegion}
-"""What a grasp has one of per finger."""
+"""Class of the values that a grasp has one of per finger, by field name."""
 
 
 def _one_per_finger(value: Any, each: Callable[[Any], object], name: str, kind: str) -> None:
@@ -206,12 +206,12 @@ def _one_per_finger(value: Any, each: Callable[[Any], object], name: str, kind: 
 
 
 def four(items: Iterable[Item]) -> tuple[Item, Item, Item, Item]:
-    """Exactly four things, one per finger.
+    """Return exactly four things, one per finger.
 
     Raises:
-        InputError: There are more or fewer.
+        InputError: There are more or fewer than four.
     """
     listed = tuple(items)
     if len(listed) != FINGERS:
-        raise InputError(f"expected {FINGERS}, one per finger, got {len(listed)}")
+        raise InputError(f"expected {FINGERS} items, one per finger, got {len(listed)}")
     return listed

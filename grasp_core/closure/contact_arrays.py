@@ -1,4 +1,4 @@
-"""Contacts as checked arrays: one set, many sets of the same number, and a hash of a set."""
+"""Contacts are made into checked arrays, one set or many sets of equal size, and into a hash."""
 
 import hashlib
 from collections.abc import Iterable
@@ -15,17 +15,18 @@ from grasp_core.values import FINGERS, Contact, Grasp
 
 
 def stacked(contacts: Iterable[Contact]) -> tuple[Array, Array]:
-    """Positions and inward normals of contacts, each (k, 3)."""
+    """Return the positions [m] and inward normals of contacts, each (k, 3)."""
     listed = tuple(contacts)
     positions = np.array([contact.position for contact in listed])
     return positions, np.array([contact.normal for contact in listed])
 
 
 def contact_arrays(positions: ArrayLike | Grasp, normals: ArrayLike | None) -> tuple[Array, Array]:
-    """Positions and inward normals, each (k, 3), from a grasp or from two arrays.
+    """Return checked positions and inward normals, each (k, 3), of a grasp or of two arrays.
 
     Raises:
-        InputError: Shapes differ, a normal is not a unit vector, or fewer than two contacts.
+        InputError: Shapes differ, a normal is not a unit vector, or there are fewer than two
+            contacts.
     """
     if isinstance(positions, Grasp):
         if normals is not None:
@@ -44,11 +45,12 @@ def check_spread(extents: Array, name: str = "positions") -> None:
     """Refuse contacts so close together, but not in one place, that squares of lengths vanish.
 
     Args:
-        extents: Of each set along each axis, (..., 3) [m].
-        name: What to call the contacts in a message.
+        extents: Extent of each set of contacts along each axis, (..., 3) [m].
+        name: What to call the contacts in an error message.
 
     Raises:
-        InputError: They are.
+        InputError: The contacts of a set are in different places, yet less than `SMALLEST_SIZE`
+            apart.
     """
     sizes: Array = extents.max(axis=-1)
     tiny = (sizes > 0.0) & (sizes < SMALLEST_SIZE)
@@ -60,7 +62,7 @@ def check_spread(extents: Array, name: str = "positions") -> None:
 
 
 def contact_frictions(friction: ArrayLike, count: int) -> Array:
-    """One checked Coulomb coefficient per contact, (count,), from one for all or one each."""
+    """Return one checked Coulomb coefficient per contact, (count,), of one for all or one each."""
     mu = frozen_each(friction, count, "friction")
     if (mu < 0.0).any():
         raise InputError(f"friction must not be negative, got {float(mu.min()):.6g}")
@@ -78,10 +80,11 @@ NO_NORMALS = "or give normals"
 def many_contact_arrays(
     positions: ArrayLike | Iterable[Grasp], normals: ArrayLike | None
 ) -> tuple[Array, Array]:
-    """Positions and inward normals, each (g, k, 3), from grasps or from two arrays.
+    """Return checked positions and inward normals, each (g, k, 3), of grasps or of two arrays.
 
     Raises:
-        InputError: Shapes differ, a normal is not a unit vector, or fewer than two contacts.
+        InputError: Shapes differ, a normal is not a unit vector, or there are fewer than two
+            contacts in a set.
     """
     given: Any = positions
     if normals is None:
@@ -100,11 +103,11 @@ def many_contact_arrays(
 
 
 def many_frictions(friction: ArrayLike, shape: tuple[int, int]) -> Array:
-    """One checked Coulomb coefficient for each of (g, k) contacts.
+    """Return one checked Coulomb coefficient for each of (g, k) contacts.
 
     Args:
-        friction: One for all contacts, or one each, (k,) or (g, k).
-        shape: (g, k)
+        friction: One coefficient for all contacts, or one each, (k,) or (g, k).
+        shape: Number of sets and of contacts in each, (g, k).
 
     Raises:
         InputError: The shape differs, or a coefficient is negative or too large.
@@ -116,8 +119,9 @@ def many_frictions(friction: ArrayLike, shape: tuple[int, int]) -> Array:
 
 
 def many_frames(normals: Array) -> Array:
-    """As `contact_frames`, of many sets (g, k, 3): columns (normal, tangent, tangent)."""
+    """Orthonormal frames of many sets of normals (g, k, 3), each as by `contact_frames`."""
     x, y, z = np.moveaxis(normals, -1, 0)
+    # the axis nearest to square to the normal gives the longest cross product; x wins ties, then y
     nothing, least = np.zeros_like(x), np.abs(normals).min(axis=-1)
     crossed = np.stack([-y, x, nothing], axis=-1)
     crossed[np.abs(y) == least] = np.stack([z, nothing, -x], axis=-1)[np.abs(y) == least]
@@ -129,7 +133,7 @@ def many_frames(normals: Array) -> Array:
 
 
 def unit_sizes(points: Array) -> tuple[Array, Array, Array]:
-    """As `unit_size`, of many sets (g, k, 3): arms, centres (g, 3) and lengths (g,)."""
+    """Arms, centres (g, 3) and lengths (g,) of many sets of points (g, k, 3), as by `unit_size`."""
     centers = points.mean(axis=1)
     arms = points - centers[:, None]
     sizes = np.linalg.norm(arms, axis=2).max(axis=1)
@@ -138,6 +142,7 @@ def unit_sizes(points: Array) -> tuple[Array, Array, Array]:
 
 
 def contacts_sha256(contacts: Iterable[Contact]) -> str:
-    """Of positions and normals in finger order; 0.0 and -0.0 are the same."""
+    """Hash positions and normals in finger order with SHA-256; 0.0 and -0.0 count as equal."""
+    # adding zero turns -0.0 into 0.0
     numbers = np.concatenate([part.ravel() for part in stacked(contacts)]) + 0.0
     return hashlib.sha256(numbers.astype("<f8").tobytes()).hexdigest()

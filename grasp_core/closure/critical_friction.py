@@ -3,19 +3,23 @@
 Solved: where the margin of the closure program changes sign as the common friction grows.
 
 Force closure at one friction is force closure at every larger one, so the threshold is unique.
-It is bracketed by certificates: balancing forces in all cones bound it from above by their own
-steepest angle, a separating twist from below by the friction up to which it separates. On either
-side of its zero the margin is nearly linear in the friction. Its slope follows from the program's
-answer: with tau the margin over mu, and the tangential forces in units of mu, friction enters the
-program only through the balance, whose multiplier is the twist, so that
+It is bracketed by certificates: balancing forces f_i bound it from above by their own steepest
+angle, a separating twist with velocities v_i from below by the friction up to which it separates,
 
-    d tau / d mu = sum v_i . (tangential part of f_i) / mu,
+    mu  <=  max_i |tangential part of f_i| / n_i.f_i,                                         (1)
+    mu  >=  min_i -n_i.v_i / |tangential part of v_i|.                                        (2)
+
+On either side of its zero the margin is nearly linear in the friction. Its slope follows from the
+program's answer: with tau the margin over mu, and the tangential forces in units of mu, friction
+enters the program only through the balance, whose multiplier is the twist, so that
+
+    d tau / d mu  =  sum v_i . (tangential part of f_i) / mu,                                 (3)
 
 v_i being the velocity of contact i under the twist. Newton's method says where to try next.
 
-A compiled search of the same kind comes first (see `kernels.critical`). The forces and the twist
-that it finds are checked like all others; where there are none, or their interval is not narrow,
-the search is made program by program (see `friction_search`), with proofs in rational arithmetic.
+A compiled search of the same kind comes first (see `critical_friction_kernel`). The forces and the
+twist that it finds are checked like all others; where there are none, or their interval is not
+narrow, `friction_search` goes program by program, with proofs in rational arithmetic.
 """
 
 import math
@@ -38,16 +42,16 @@ from grasp_core.values import Grasp
 
 KERNEL = "grasp_core.closure.critical_friction_kernel"
 NO_FORCE = 1e-100
-"""Stands in where a contact does not push: no friction is enough there."""
+"""Least normal part that is divided by: a contact that does not push needs infinite friction."""
 SEARCHED = 0.95
-"""The compiled search is asked for this share of the accuracy; the rest is for rounding."""
+"""Share of the accuracy that the compiled search is asked for; the rest is left for rounding."""
 
 
 def critical_friction(
     positions: ArrayLike | Grasp,
     normals: ArrayLike | None = None,
 ) -> float:
-    """Smallest common Coulomb coefficient that is proved enough for force closure.
+    """Find the smallest common Coulomb coefficient that is proved enough for force closure.
 
     It is the upper end of an interval whose lower end is proved to be too little (see
     `critical_friction_interval`). In tests on 20,000 sets of contacts, half of them on grids, the
@@ -58,8 +62,8 @@ def critical_friction(
         normals: Unit vectors into the object, (k, 3).
 
     Returns:
-        The upper end: every larger coefficient suffices, by balanced forces inside the cones. 0.0
-        where closure is proved at `REPORTED_AS_ZERO`; `math.inf` where it is
+        The upper end: every larger coefficient suffices, by balanced forces inside the cones. It is
+        0.0 where closure is proved at `REPORTED_AS_ZERO`, and `math.inf` where closure is
         proved at no friction up to `LARGEST_FRICTION`.
 
     Raises:
@@ -73,7 +77,7 @@ def critical_frictions(
     positions: ArrayLike | Iterable[Grasp],
     normals: ArrayLike | None = None,
 ) -> Array:
-    """Critical friction of each of many sets of contacts, as `critical_friction` finds it.
+    """Find the critical friction of each of many sets of contacts (see `critical_friction`).
 
     Args:
         positions: Contact points, (g, k, 3) [m], k >= 2; or grasps.
@@ -92,7 +96,7 @@ def critical_friction_interval(
     positions: ArrayLike | Grasp,
     normals: ArrayLike | None = None,
 ) -> FrictionInterval:
-    """Proved bounds of the critical friction, each with what proves it.
+    """Find proved bounds of the critical friction, with the forces and the twist that prove them.
 
     Args:
         positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
@@ -106,6 +110,7 @@ def critical_friction_interval(
     """
     points, units = contact_arrays(positions, normals)
     quick, ends = _at_once(points[None], units[None]), Ends.of(points, units)
+    # the quick answer is proved again in rational arithmetic before it is kept
     if quick.found[0]:
         ends.close(quick.forces[0], float(quick.upper[0]), exactly=True)
         ends.open(quick.twists[0])
@@ -129,35 +134,38 @@ def _upper_ends(points: Array, units: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Quick:
-    """Narrow intervals of many sets of contacts, where they are found."""
+    """Quick intervals for many sets of contacts, where the compiled search found narrow ones."""
 
     found: NDArray[np.bool_]
-    """(g,)"""
+    """Whether an interval was found and proved, (g,)."""
     upper: Array
-    """(g,)"""
+    """Upper ends of the intervals, (g,)."""
     forces: Array
-    """They prove closure at `upper`, (g, k, 3)."""
+    """Forces that prove closure at `upper`, (g, k, 3)."""
     twists: Array
-    """They separate just below, about the mean contact and at unit size, (g, 6)."""
+    """Twists that separate just below `upper`, about the mean contact and at unit size, (g, 6)."""
 
 
 def _at_once(points: Array, normals: Array) -> _Quick:
-    """Narrow intervals that the compiled search finds, both of their ends proved here."""
+    """Search in compiled code for narrow intervals, and prove both of their ends."""
     arms, _, _ = unit_sizes(points)
     units = np.array(normals)  # writable, like all that the search is compiled for
     forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))
     bounds, found = np.zeros((len(arms), 2)), np.zeros(len(arms), dtype=bool)
     if kernel := compiled(KERNEL):
         kernel.search(arms, units, SEARCHED * FRICTION_ACCURACY, forces, twists, bounds)
+    # (2): the friction for which the search says that its twists separate
     lower = bounds[:, 0]
     bounded = (lower > FRICTIONLESS) & (lower < 0.5 * LARGEST_FRICTION)
     bounded &= _separate(twists, arms, units, lower)
     highest = lower * (1.0 + FRICTION_ACCURACY - 2.0 * SHAVED)
     with np.errstate(over="ignore", invalid="ignore"):  # degenerate contacts, proved nothing below
         along, across = normal_and_tangential(forces, units)
+    # (1): the friction that the forces need, raised by a tenth of the width so that they lie inside
     upper = (across / np.maximum(along, NO_FORCE)).max(axis=1) * (1.0 + 0.1 * FRICTION_ACCURACY)
     near = np.flatnonzero(bounded & (upper <= highest))
     found[near] = many_prove_closure(forces[near], arms[near], units[near], upper[near])
+    # where these forces do not prove closure, the deepest ones at the highest allowed end may
     left = np.flatnonzero(bounded & ~found)
     upper[left] = highest[left]
     forces[left], _, _ = deepest_forces(arms[left], units[left], highest[left])
@@ -166,10 +174,11 @@ def _at_once(points: Array, normals: Array) -> _Quick:
 
 
 def _separate(twists: Array, arms: Array, normals: Array, friction: Array) -> NDArray[np.bool_]:
-    """Whether each contact is at rest or departs steeply enough, but for rounding of its own speed.
+    """Return which twists leave each contact at rest or departing as steeply as (2) asks.
 
-    A bound on the rounding of the whole twist would not do: where the margin grows with the square
-    of the friction, it lets pass twists that do not separate.
+    A contact is allowed the rounding of its own speed only. A bound on the rounding of the whole
+    twist would not do: where the margin grows with the square of the friction, it lets pass twists
+    that do not separate.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         sizes = np.linalg.norm(twists, axis=1)[:, None]
@@ -181,9 +190,10 @@ def _separate(twists: Array, arms: Array, normals: Array, friction: Array) -> ND
 
 
 def _close_without_friction(arms: Array, normals: Array) -> bool:
-    """Whether pushes along the normals balance: of those that do, the most even ones are tried."""
+    """Return whether pushes along the normals balance; only the most even ones are tried."""
     along_normals = np.hstack([normals, np.cross(arms, normals)])
     left, values, _ = np.linalg.svd(along_normals)
+    # the projection of equal pushes onto those that balance
     free = left[:, int((values > RANK).sum()) :]
     pushes = free @ free.sum(axis=0)
     if pushes.min(initial=math.inf) <= 0.0:

@@ -1,7 +1,7 @@
-"""The search for critical frictions, one margin program after the other (see `critical`).
+"""The compiled search for critical frictions solves one margin program after the other.
 
 Solved: for each set of contacts, balanced forces that need little more than the critical friction,
-and a twist that separates at little less.
+and a twist that separates at little less (see `critical_friction`).
 
 Method. Every program, at whatever friction, gives both: the most friction that any of its forces
 needs is enough, and up to the least friction at which its twist meets a cone there is no closure. A
@@ -21,19 +21,19 @@ from grasp_core.closure.margin_kernel import SHARE, WRENCH, least_cone_sum
 
 FIRST_TRIAL = 0.5
 MOST_TRIALS = 30
-"""Seven are usual."""
+"""Most programs per set of contacts; seven are usual."""
 SMALLEST, LARGEST = 1e-6, 1e3
-"""Frictions that are tried."""
+"""Smallest and largest friction that is tried."""
 AT_REST = 1e-4
-"""Contacts whose z_i is that much smaller than the largest one are put to rest."""
+"""A contact is put to rest if its z_i is at most this share of the largest one."""
 SPANNED = 1e-6
-"""Sine of the angle to the others below which a row adds nothing."""
+"""A row adds nothing to a basis if the sine of its angle to that span is below this."""
 ABOVE, BELOW = 0.75, 0.15
 """Trials pass the root by these shares of the width asked for, to close in from both sides: above
 it by more, as the proof of closure is the harder one; and by the error of Newton's method, the
 square of its step over the friction."""
 EVEN = 1e-10
-"""Optima this close to one tell nothing: ten times the gap that is left, for rounding."""
+"""An optimum this close to one shows nothing: ten times the gap that is left, for rounding."""
 
 
 def try_out() -> None:
@@ -52,12 +52,12 @@ def search(
 
     Args:
         arms: Contacts at unit size, (g, k, 3).
-        normals: (g, k, 3)
-        width: Of the brackets, relative to their lower ends.
+        normals: Inward unit normals, (g, k, 3).
+        width: Wanted widths of the brackets, relative to their lower ends.
         forces: Filled with forces that balance, (g, k, 3).
         twists: Filled with twists that separate, (g, 6).
-        bounds: Filled with the frictions, above and below, for which they are meant, (g, 2). What
-            is no bracket, or not narrow, was given up.
+        bounds: Filled with the frictions that twists separate at and forces close at, (g, 2).
+            A pair that is no bracket, or not narrow, was given up.
     """
     k = arms.shape[1]
     axes, rows, columns = np.empty((k, 3, 3)), np.empty((k, 3, WRENCH)), np.empty((k, 3, WRENCH))
@@ -72,11 +72,13 @@ def search(
             needed = _needed(pair, primal, friction)
             if primal < 1.0 - EVEN and needed < upper:
                 upper = needed
+                # V below one: the forces close, at the friction that they need
                 _in_space(pair, primal, friction, axes, forces[g])
             if dual > 1.0 + EVEN and friction > lower:
                 lower = friction
                 _copy(y, twists[g])
             _copy(y, twist)
+            # the twist of any program separates up to some friction once contacts are put to rest
             separates = _separates(rows, pair[1], span, twist)
             if separates > lower:
                 lower = separates
@@ -96,11 +98,11 @@ def deepest(
     """Balance each of many sets of contacts as deep inside its cones as can be.
 
     Args:
-        contacts: Their arms at unit size, (g, k, 3), normals, (g, k, 3), and frictions, (g,).
-        share: As `least_cone_sum`.
+        contacts: Arms at unit size, (g, k, 3), normals, (g, k, 3), and frictions, (g,).
+        share: Gap that may be left (see `least_cone_sum`).
         forces: Filled with the forces, (g, k, 3).
-        twists: Filled with those of the dual program, (g, 6).
-        values: Filled with those of the primal and the dual program, (g, 2).
+        twists: Filled with the twists of the dual programs, (g, 6).
+        values: Filled with the values of the primal and the dual programs, (g, 2).
     """
     arms, normals, frictions = contacts
     k = arms.shape[1]
@@ -117,7 +119,7 @@ def deepest(
 
 @njit(cache=True, error_model="numpy")
 def _set_up(arms: Array, normals: Array, axes: Array, rows: Array, mean: Array) -> None:
-    """Axes of the contacts, their wrenches, (k, 3, 6), and the mean of those of the normals."""
+    """Fill in the contacts' axes, their wrenches, (k, 3, 6), and the normals' mean wrench."""
     for w in range(WRENCH):
         mean[w] = 0.0
     for i in range(len(arms)):
@@ -133,7 +135,7 @@ def _set_up(arms: Array, normals: Array, axes: Array, rows: Array, mean: Array) 
 
 @njit(cache=True, error_model="numpy")
 def _orthonormal(normal: Array, axes: Array) -> None:
-    """A normal and two tangents, (3, 3)."""
+    """Fill in a unit normal and two tangents, (3, 3)."""
     far = 0
     for j in range(3):
         axes[0, j] = normal[j]
@@ -156,7 +158,7 @@ def _at_friction(rows: Array, mean: Array, friction: float, columns: Array) -> N
 
 @njit(cache=True, error_model="numpy")
 def _needed(pair: Array, primal: float, friction: float) -> float:
-    """The most friction that any of the forces needs; infinite if one of them pulls."""
+    """Return the most friction that any of the forces needs; infinite if one of them pulls."""
     share, needed = (1.0 - primal) / pair.shape[1], 0.0
     for i in range(pair.shape[1]):
         along = pair[0, i, 0] + share
@@ -178,7 +180,7 @@ def _in_space(pair: Array, primal: float, friction: float, axes: Array, forces: 
 
 @njit(cache=True, error_model="numpy")
 def _separates(rows: Array, z: Array, span: Array, twist: Array) -> float:
-    """Up to which friction the twist separates, once contacts nearly at rest are at rest."""
+    """Return up to which friction a twist separates, once contacts nearly at rest are at rest."""
     still = 0.0
     for i in range(len(rows)):
         still = max(still, AT_REST * z[i, 0])
@@ -194,7 +196,7 @@ def _separates(rows: Array, z: Array, span: Array, twist: Array) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _least_ratio(rows: Array, z: Array, still: float, twist: Array) -> float:
-    """Of leaving to sliding, over the contacts that are not at rest."""
+    """Return the least ratio of leaving to sliding over the contacts that are not at rest."""
     least = LARGEST
     for i in range(len(rows)):
         if z[i, 0] > still:
@@ -209,7 +211,7 @@ def _least_ratio(rows: Array, z: Array, still: float, twist: Array) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _add(row: Array, span: Array, spanned: int) -> int:
-    """Add a row to an orthonormal basis, unless it is in its span already; their new number."""
+    """Add a row to an orthonormal basis, unless it is in its span already; return the new size."""
     if spanned == WRENCH:
         return spanned
     fresh, before = span[spanned], math.sqrt(_dot(row, row))
@@ -251,7 +253,7 @@ def _dot(a: Array, b: Array) -> float:
 def _next(
     pair: Array, value: float, friction: float, lower: float, upper: float, width: float
 ) -> float:
-    """Where 1 / V becomes one if it goes on like this, a little to the wider side.
+    """Return where 1 / V becomes one by Newton's method, passed a little to the wider side.
 
     Friction enters the program through the tangential columns of A_i only, and y is their
     multiplier: the slope of V over the logarithm of the friction is the sum of s_i1 z_i1 and
@@ -261,6 +263,7 @@ def _next(
     for i in range(pair.shape[1]):
         slope += pair[0, i, 1] * pair[1, i, 1] + pair[0, i, 2] * pair[1, i, 2]
     if abs(value - 1.0) <= EVEN:
+        # 1 / V is linear: d(1/V) = -dV / V^2, over the logarithm of the friction
         return lower * (1.0 + ABOVE * width) if lower > friction else 0.0
     root = friction * (1.0 - value * (value - 1.0) / slope) if slope < 0.0 else np.nan
     if lower < root < upper:

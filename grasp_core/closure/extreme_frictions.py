@@ -1,4 +1,4 @@
-"""Contacts at the ends of the scale of friction: closed by any positive one, or closed by none.
+"""Contacts at either end of the scale of friction: closed by any positive one, or closed by none.
 
 Solved: whether contacts are in force closure at every positive friction, and whether they are at
 no friction whatever. Both are questions of linear programs.
@@ -8,11 +8,13 @@ that balance with any forces at all at the contacts in S,
 
     sum over S of wrench(f_i) + sum over the others of l_i wrench(n_i) = 0,                 (1)
 
-with as many l_i > 0 as can be. Add those contacts to S, and go on until nothing is added. If S is
-everybody and the wrenches span six dimensions, every friction mu > 0 is enough: forces of each
-round, times mu or less those of the round before, are inside all cones, since what a later round
-does to a contact is small beside the push that the contact has already. Two rounds make a margin
-that grows with the square of mu, three one with its cube. Otherwise, by Stiemke's lemma, a twist
+with as many l_i > 0 as can be. Add those contacts to S, and go on until nothing is added. If S
+holds all contacts and the wrenches span six dimensions, every friction mu > 0 is enough: forces of
+each round, times mu or less those of the round before, are inside all cones, since what a later
+round does to a contact is small beside the push that the contact has already. Two rounds make a
+margin that grows with the square of mu, three one with its cube. Otherwise, by Stiemke's lemma, a
+twist leaves S at rest while all others depart along their normals; it separates up to the least
+ratio of departing to sliding, which is a positive friction.
 leaves S at rest while all others depart along their normals; it separates up to the least ratio of
 departing to sliding, which is a positive friction.
 
@@ -33,29 +35,30 @@ from grasp_core.errors import SolverError
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 
 DEPENDENT = 1e-9
-"""Singular values of unit-size wrenches below this are zero."""
+"""Singular values of unit-size wrenches below this count as zero."""
 SUPPORTED = 0.5
-"""Pushes that can be positive can be one, and others are zero; this tells them apart."""
+"""Border between pushes of zero and of one: pushes that can be positive can be one."""
 LARGEST = 1e4
-"""Bounds the variables of the programs, whose answers are of order one."""
+"""Largest size of a variable of the programs, whose answers are of order one."""
 POSITIVE = 1e-6
-"""Optima below this are zero: a hundred times the residual of a linear program."""
+"""Optima below this count as zero: a hundred times the residual of a linear program."""
 SHARE = 0.5
-"""Of what is left of a cone, that the forces of the next round may take."""
+"""Share of what is left of a cone that the forces of the next round may take."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rounds:
-    """Balanced forces of each round, or the twist that ends them."""
+    """The balanced forces of each round, or the twist that ends the rounds."""
 
     forces: tuple[Array, ...]
-    """(k, 3) each; empty unless every positive friction is enough."""
+    """Balanced forces of each round, (k, 3) each; empty unless every positive friction is
+    enough."""
     twist: Array | None
-    """(6,): contacts depart along their normals or are at rest. None where forces are given, or
-    nothing was found."""
+    """Twist under which contacts depart along their normals or are at rest, (6,). None where forces
+    are given, or nothing was found."""
 
     def at(self, friction: float, normals: Array) -> Array:
-        """Balanced forces inside the cones of a friction, (k, 3), the largest push of order one."""
+        """Return balanced forces inside the cones of a friction, (k, 3), of pushes of order one."""
         total = self.forces[0]
         for forces in self.forces[1:]:
             along, across = normal_and_tangential(total, normals)
@@ -67,11 +70,11 @@ class Rounds:
 
 
 def rounds(arms: Array, normals: Array) -> Rounds:
-    """Whether every positive friction is enough.
+    """Find out whether every positive friction is enough.
 
     Args:
         arms: Contacts at unit size, (k, 3).
-        normals: Inward, (k, 3).
+        normals: Inward unit normals, (k, 3).
     """
     maps = grasp_map(arms).reshape(WRENCH, -1, 3)
     pushes = np.einsum("wki,ki->wk", maps, normals)
@@ -79,6 +82,7 @@ def rounds(arms: Array, normals: Array) -> Rounds:
     while not settled.all():
         free = np.flatnonzero(~settled)
         held = maps[:, settled].reshape(WRENCH, -1)
+        # (1), seen only in the directions of wrenches that the contacts of S cannot apply
         outside = _complement(held)
         weights = _most_pushes(outside.T @ pushes[:, free])
         if weights is None:
@@ -95,16 +99,17 @@ def rounds(arms: Array, normals: Array) -> Rounds:
 
 
 def hopeless_twist(arms: Array, normals: Array) -> Array | None:
-    """The twist (6,) of (2), if there is one: it separates at every friction.
+    """Find the twist (6,) of (2), if there is one: it separates at every friction.
 
     Args:
         arms: Contacts at unit size, (k, 3).
-        normals: Inward, (k, 3).
+        normals: Inward unit normals, (k, 3).
     """
     at_rest = _complement(grasp_map(arms))
     if at_rest.shape[1]:
         return at_rest[:, 0]
     k = len(arms)
+    # (2) as a null space: the variables are the twist and the speeds c_i, whose sum is maximised
     departing = np.zeros((k, 3, k))
     departing[np.arange(k), :, np.arange(k)] = normals
     basis = _null_space(np.hstack([grasp_map(arms).T, departing.reshape(3 * k, k)]))
@@ -116,11 +121,11 @@ def hopeless_twist(arms: Array, normals: Array) -> Array | None:
 
 
 def pushing_forces(arms: Array, normals: Array) -> Array | None:
-    """Balanced forces (k, 3) that push at every contact: those that some friction allows.
+    """Find balanced forces (k, 3) that push at every contact; some friction then allows them.
 
     Args:
         arms: Contacts at unit size, (k, 3).
-        normals: Inward, (k, 3).
+        normals: Inward unit normals, (k, 3).
     """
     basis = _null_space(grasp_map(arms))
     n = basis.shape[1]
@@ -133,9 +138,10 @@ def pushing_forces(arms: Array, normals: Array) -> Array | None:
 
 
 def _most_pushes(rows: Array) -> Array | None:
-    """Weights (n,) >= 0 with rows @ weights = 0, as many positive as can be; None if none can."""
+    """Find weights (n,) >= 0 with rows @ weights = 0, as many above zero as can be, or None."""
     basis = _null_space(rows)
     k, n = basis.shape
+    # shares from 0 to 1, each at most its weight: their sum counts the weights that can be positive
     shares = np.eye(k)
     nothing = np.zeros((k, n))
     limits = np.repeat([0.0, 0.0, 1.0, LARGEST], k)
@@ -150,7 +156,7 @@ def _most_pushes(rows: Array) -> Array | None:
 
 
 def _departing(outside: Array, pushes: Array) -> Array | None:
-    """The twist, a combination of the columns of `outside`, that departs most evenly."""
+    """Find the twist, a combination of the columns of `outside`, that departs most evenly."""
     m, n = outside.shape[1], pushes.shape[1]
     steep = np.hstack([pushes.T @ outside, np.ones((n, 1))])
     box = np.hstack([np.vstack([np.eye(m), -np.eye(m)]), np.zeros((2 * m, 1))])
@@ -159,7 +165,7 @@ def _departing(outside: Array, pushes: Array) -> Array | None:
 
 
 def _best(c: Array, A: Array, b: Array) -> Array | None:
-    """Where c.x is largest with A x <= b, if it is positive there, and not by rounding."""
+    """Return where c.x is largest with A x <= b, if it is positive there, and not by rounding."""
     if not A.shape[1]:
         return None
     try:
@@ -170,7 +176,7 @@ def _best(c: Array, A: Array, b: Array) -> Array | None:
 
 
 def _null_space(rows: Array) -> Array:
-    """Orthonormal columns that `rows` maps to zero."""
+    """Return orthonormal columns that `rows` maps to zero."""
     if not rows.size:
         return np.eye(rows.shape[1])
     _, values, right = np.linalg.svd(rows)
@@ -178,5 +184,5 @@ def _null_space(rows: Array) -> Array:
 
 
 def _complement(wrenches: Array) -> Array:
-    """Orthonormal columns that are orthogonal to all of (6, n)."""
+    """Return orthonormal columns that are orthogonal to all of the wrenches (6, n)."""
     return _null_space(wrenches.T) if wrenches.size else np.eye(WRENCH)

@@ -6,17 +6,20 @@ Contacts are in force closure iff the contact wrenches have rank 6 and some forc
 interior of the cones balance each other: a neighbourhood of such forces maps onto a
 neighbourhood of the zero wrench, and scaling does the rest. The margin program
 
-    maximise t  subject to  sum f_i = 0,  sum x_i x f_i = 0,  sum n_i.f_i = 1,
-                            |f_i - (n_i.f_i) n_i| + t <= mu_i n_i.f_i
+    maximise t  subject to  sum f_i = 0,  sum x_i x f_i = 0,                            (1)
+                            sum n_i.f_i = 1,                                            (2)
+                            |f_i - (n_i.f_i) n_i| + t <= mu_i n_i.f_i                   (3)
 
 is therefore positive for force closure. Its dual is a twist y = (a, b): with the contact
 velocities v_i = a + b x x_i, the support of cone i in direction y is
-s_i(y) = n_i.v_i + mu_i |tangential part of v_i|, and t = max_i s_i(y) for the best y. If no
-s_i(y) is positive, then no contact wrench has a positive product with y, and no external
-wrench w with y.w < 0 can be resisted.
+
+    s_i(y) = n_i.v_i + mu_i |tangential part of v_i|,                                   (4)
+
+and t = max_i s_i(y) for the best y. If no s_i(y) is positive, then no contact wrench has a
+positive product with y, and no external wrench w with y.w < 0 can be resisted.
 
 Both answers are certificates: `verify` uses sums, norms and one singular value. Both also bound
-the optimum, forces from below and twists from above.
+the optimum, forces from below and twists from above (see `proofs`).
 
 Source: Sudsang & Ponce 1995, Definition 1 and Proposition 1, with the condition on the rank
 made explicit; the cone program is standard.
@@ -37,41 +40,42 @@ from grasp_core.fields import are_frictions, are_units, is_array, is_number
 from grasp_core.values import Grasp
 
 UNSAFE = 1e-6
-"""A margin larger than this is not itself why nothing can be proved."""
+"""A margin larger than this does not itself explain why nothing can be proved."""
 CAUTION = 1.01
-"""A margin is shown with this multiple of the rounding that `verify` allows for, since sums and
+"""Factor on the rounding that `verify` allows for, in the margin that is reported: sums and
 singular values differ in their last digits from processor to processor."""
 SUMMED = 1e-9
 """How far the normal parts of closing forces may be from summing to 1, and their wrench at unit
 size from zero."""
 FAR_BELOW = -1e6
-"""Margins proved to be below are told as minus infinity: no forces balance at all, or hardly."""
+"""A margin proved to be below this is reported as minus infinity: hardly any forces balance."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClosureCertificate:
-    """A verdict on force closure with what proves it."""
+    """A verdict on force closure, with the forces or the wrench that prove it."""
 
     closed: bool
+    """Whether the contacts are in force closure."""
     margin: float
     """Proved bound of the optimum t of the margin program, dimensionless, unchanged by moving and
     scaling. If closed, the optimum is no less. If not, it is no more than a negative margin, while
     zero says only that there is no closure: contacts may balance deep inside their cones, and yet
     leave the object free. `force_closure` gives the optimum to some 1e-9 where contacts and
-    friction are not nearly degenerate; minus infinity for what is below -1e6."""
+    friction are not nearly degenerate; a margin below -1e6 is reported as minus infinity."""
     positions: Array
-    """(k, 3) [m]"""
+    """Contact points, (k, 3) [m]."""
     normals: Array
-    """(k, 3), of length 1 to nine digits; their directions count."""
+    """Inward normals, (k, 3), of length 1 to nine digits; only their directions count."""
     friction: Array
     """Coulomb coefficient of each contact, (k,)."""
     forces: Array | None
-    """If closed: balancing forces strictly inside the cones, (k, 3), normal parts summing to 1,
-    both to within 1e-9. Torques are about the mean contact, at unit size."""
+    """If closed: balancing forces strictly inside the cones, (k, 3), with normal parts that sum to
+    1, both to within 1e-9; torques are about the mean contact, at unit size. None otherwise."""
     separating_wrench: Array | None
-    """If not: y = (a, b), (6,), about the frame's origin, with y.w <= 0 for every wrench w that
-    the contacts can apply, to within 1e-12 of lengths at unit size; an external wrench w with
-    y.w < 0 is not resisted."""
+    """If not closed: y = (a, b), (6,), about the frame's origin, with y.w <= 0 for every wrench w
+    that the contacts can apply, to within 1e-12 of lengths at unit size; an external wrench w with
+    y.w < 0 is not resisted. None otherwise."""
 
     def __post_init__(self) -> None:
         for name in ("positions", "normals", "friction", "forces", "separating_wrench"):
@@ -85,7 +89,7 @@ class ClosureCertificate:
         """Re-check every field in plain arithmetic, without any solver.
 
         Returns:
-            Whether the fields prove the verdict and the margin; False for what is no certificate.
+            Whether the fields prove the verdict and the margin; False if they are no certificate.
         """
         with np.errstate(all="ignore"):
             if not (self._are_contacts() and is_number(self.margin, least=-math.inf)):
@@ -97,7 +101,7 @@ class ClosureCertificate:
             )
 
     def separates(self) -> bool:
-        """Whether the wrench separates, whatever the margin; fields are taken as sound."""
+        """Return whether the wrench separates, whatever the margin; fields are taken as sound."""
         return self.forces is None and self.proved() <= 0.0
 
     def _are_contacts(self) -> bool:
@@ -109,26 +113,29 @@ class ClosureCertificate:
         return (spread == 0.0 or spread >= SMALLEST_SIZE) and are_frictions(self.friction, count)
 
     def proved(self, caution: float = 1.0) -> float:
-        """What the fields prove of the margin: a lower bound if closed, an upper one if not.
+        """Compute the margin that the fields prove: a lower bound if closed, an upper one if not.
 
         Args:
-            caution: Multiplies what is allowed for rounding.
+            caution: Factor on the rounding that is allowed for.
 
         Returns:
-            Minus infinity or infinity where they prove none.
+            The bound; minus infinity if closed, or infinity if not, where the fields prove none.
         """
         arms, center, size = unit_size(self.positions)
+        # `verify` asks only for unit length to nine digits, so the directions are taken exactly
         normals = self.normals / np.linalg.norm(self.normals, axis=1, keepdims=True)
         if self.closed:
             forces = self.forces
             if not (is_array(forces, *arms.shape) and _balance(forces, arms, normals)):
                 return -math.inf
+            # without friction `proved_margin` sees only normal parts, so slides are checked here
             if (normal_and_tangential(forces, normals)[1][self.friction == 0.0] > SUMMED).any():
                 return -math.inf
             return proved_margin(forces, arms, normals, self.friction, caution)
         wrench = self.separating_wrench
         if not is_array(wrench, 6):
             return math.inf
+        # the twist of (4), moved from the frame's origin to the mean contact, at unit size
         turned = np.asarray(np.cross(wrench[3:], center), dtype=np.float64)
         twist = np.concatenate([wrench[:3] + turned, wrench[3:] * size])
         ceiling = margin_ceiling(twist, arms, normals, self.friction, caution)
@@ -136,7 +143,7 @@ class ClosureCertificate:
 
 
 def _balance(forces: Array, arms: Array, normals: Array) -> bool:
-    """Whether forces at unit size sum to nothing, and their normal parts to 1."""
+    """Return whether forces balance at unit size, (1), and their normal parts sum to 1, (2)."""
     wrench = np.concatenate([forces.sum(axis=0), np.cross(arms, forces).sum(axis=0)])
     pushes = float(np.einsum("ki,ki->", forces, normals))
     return float(np.abs(wrench).max()) <= SUMMED and abs(pushes - 1.0) <= SUMMED
@@ -166,10 +173,12 @@ def force_closure(
     if answer.closed is not None:
         forces, wrench = None, None
         if answer.closed:
+            # (2) exactly: scaling forces leaves (1) and the sign of (3) alone
             forces = answer.forces / float(np.einsum("ki,ki->", answer.forces, units))
         else:
             wrench = _about_origin(answer.twist, center, size)
         found = ClosureCertificate(answer.closed, answer.margin, points, units, mu, forces, wrench)
+        # a caution above one leaves room for `verify` to round otherwise on another processor
         found = replace(found, margin=found.proved(CAUTION))
         if found.verify():
             return found
@@ -189,9 +198,10 @@ def _why_undecided(margin: float) -> str:
 
 
 def unit_size(points: Array) -> tuple[Array, Array, float]:
-    """Arms from the mean contact over the longest one, with that centre and length."""
+    """Return arms from the mean contact over the longest, (k, 3), that centre and that length."""
     center = points.mean(axis=0)
     arms = points - center
+    # contacts in one place have no size of their own
     size = float(np.linalg.norm(arms, axis=1).max())
     size = size if size > 0.0 else 1.0
     return arms / size, center, size

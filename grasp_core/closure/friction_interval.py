@@ -1,4 +1,13 @@
-"""The interval that the critical friction of contacts is proved to lie in."""
+"""The interval that the critical friction of contacts is proved to lie in.
+
+Its upper end is proved by forces f_i that balance exactly and lie inside the cones there, its lower
+end by a twist whose velocities v_i leave each contact at rest or depart steeply enough:
+
+    0 < n_i.f_i,     |tangential part of f_i|  <  upper n_i.f_i,                              (1)
+    n_i.v_i <= 0,    lower |tangential part of v_i|  <=  -n_i.v_i.                            (2)
+
+`rational_proofs` checks both in rational arithmetic.
+"""
 
 import math
 from dataclasses import dataclass
@@ -13,21 +22,22 @@ from grasp_core.closure.wrenches import WRENCH
 from grasp_core.fields import are_units, is_array, is_number
 
 FEWEST = 2
-"""Contacts that can balance anything."""
+"""Fewest contacts that can balance anything."""
 FRICTIONLESS = 1e-6
-"""Smallest friction at which closure is sought: a contact in a file with six digits is not placed
-better."""
+"""Smallest friction at which closure is sought: the contacts of a file with six digits are not
+placed better than that."""
 REPORTED_AS_ZERO = 2.0 * FRICTIONLESS
-"""Up to here a critical friction is reported as zero: where it is zero in truth, a proof may need a
+"""Largest critical friction that is reported as zero: where it is zero in truth, a proof may need a
 trifle more than `FRICTIONLESS` on one machine and not on another."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrictionInterval:
-    """Contacts are open at every common friction up to `lower`, closed at all from `upper` on.
+    """An interval of friction: contacts are open up to `lower`, and closed from `upper` on.
 
-    The proof that they are open holds for contacts moved by at most 1e-12 of their size, where
-    their wrenches are dependent but for rounding; the proof that they are closed, as they are.
+    The proof that the contacts are open holds for contacts moved by at most 1e-12 of their size,
+    where their wrenches are dependent but for rounding; the proof that they are closed holds for
+    the contacts as they are.
     """
 
     lower: float
@@ -35,12 +45,12 @@ class FrictionInterval:
     upper: float
     """Coulomb coefficient, at most `LARGEST_FRICTION`, or infinite where nothing is claimed."""
     positions: Array
-    """(k, 3) [m]"""
+    """Contact points, (k, 3) [m]."""
     normals: Array
-    """Inward, (k, 3)."""
+    """Inward unit normals, (k, 3)."""
     forces: Array | None
-    """Balanced strictly inside cones of friction `upper`, once their imbalance, which is rounding,
-    is removed; (k, 3), in any unit of force. None where `upper` is infinite."""
+    """Forces that are balanced strictly inside cones of friction `upper`, once their imbalance,
+    which is rounding, is removed; (k, 3), in any unit of force. None where `upper` is infinite."""
     twist: Array | None
     """Velocity of the object at the first contact, and angular velocity, (6,) [m/s, rad/s], along
     which no force inside cones of friction `lower` has positive power. None where `lower` is 0."""
@@ -77,11 +87,13 @@ class FrictionInterval:
     def _open_below(self) -> bool:
         if not 0.0 <= self.lower <= self.upper:  # nor if one is not a number
             return False
+        # without a twist nothing is claimed from below
         if self.twist is None:
             return self.lower == 0.0
         return self.lower > 0.0 and separates(self.twist, self.positions, self.normals, self.lower)
 
     def _closed_above(self) -> bool:
+        # without forces nothing is claimed from above
         if self.forces is None:
             return self.upper == math.inf
         return self.upper <= LARGEST_FRICTION and closes(
@@ -90,11 +102,11 @@ class FrictionInterval:
 
 
 def at_the_first(twist: Array, positions: Array) -> Array:
-    """A twist about the mean contact and at unit size, about the first contact instead, (6,).
+    """Move a twist at unit size from the mean contact to the first contact, (6,) [m/s, rad/s].
 
     Args:
-        twist: Velocity there and angular velocity, with arms from `unit_size`, (6,).
-        positions: (k, 3) [m]
+        twist: Velocity at the mean contact and angular velocity, with arms from `unit_size`, (6,).
+        positions: Contact points, (k, 3) [m].
     """
     arms, _, size = unit_size(positions)
     velocity = twist[:3] + np.asarray(np.cross(twist[3:], arms[0]), dtype=np.float64)

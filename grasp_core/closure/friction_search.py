@@ -1,11 +1,11 @@
-"""Search for the critical friction of one set of contacts, program by program.
+"""The critical friction of one set of contacts is searched program by program.
 
 Solved: a narrow interval with proofs of both of its ends (see `friction_interval`).
 
 The two ends of the scale come first: contacts that no friction closes, and contacts that any
-friction closes (see `extreme_frictions`). Otherwise Newton's method, as `critical` describes it,
-says at which friction to solve the margin program next. What its answers prove is decided in
-rational arithmetic, whatever the program says about itself.
+friction closes (see `extreme_frictions`). Otherwise Newton's method, as `critical_friction`
+describes it, says at which friction to solve the margin program next. What its answers prove is
+decided in rational arithmetic, whatever the program says about itself.
 """
 
 import math
@@ -28,40 +28,41 @@ FRICTION_ACCURACY = 5e-8
 """Relative width of the final interval of a critical friction."""
 FIRST_TRIAL = 0.5
 PROOF_SHARES = (0.0, 1e-3, 0.03)
-"""Where closure is proved between the friction that forces need and that of the trial."""
+"""Frictions at which closure is tried, as shares of the way from what forces need to the trial."""
 GROWTH = ((0.1 * FRICTIONLESS, 3.0), (1e-3, 2.0), (math.inf, 10.0))
-"""How much farther from an undecided friction the next trial is, up to which distance: fast where
-proofs are expected, and where they are not."""
+"""Pairs of a distance and a factor: up to that distance from an undecided friction, the next trial
+is that many times farther; fast where proofs are expected, and again where they are not."""
 NUDGE = 0.4
 OVERSHOOT = 1.0
-"""Trials pass the expected threshold, to close in from both sides: by this share of the accuracy,
-and by this multiple of the error of Newton's method, the step's square over the friction."""
+"""Trials pass the expected threshold, to close in from both sides: by `NUDGE` times the accuracy,
+and by `OVERSHOOT` times the error of Newton's method, the step's square over the friction."""
 HALVING = 6
-"""Every so many trials the interval is halved, whatever Newton's method says."""
+"""After this many trials the interval is halved once, whatever Newton's method says."""
 MOST_TRIALS = 80
-"""Nine are usual, and some fifty where contacts are nearly degenerate."""
+"""Most trials of one search: nine are usual, and some fifty where contacts are nearly
+degenerate."""
 LITTLE = 1e-3
-"""Frictions up to this are tried where any friction seems enough."""
+"""Largest friction that is tried first where any friction seems enough."""
 RESTING = (NEARLY_AT_REST, 1e-7, 1e-5, 1e-3)
 """Speeds below which contacts are put to rest under a unit twist, tried in turn: a solver leaves
 the square root of its accuracy where two contacts carry nearly everything."""
 EVENED = 3
-"""How often a program is solved again in units of the pushes that it found."""
+"""How often a program is solved again in units of the pushes that it found before."""
 FAINTEST = 1e-10
-"""Smallest push that has units of its own, in those of the largest."""
+"""Smallest push that gets a unit of its own, as a share of the largest."""
 ADDED, SHAVED = 5e-9, 1e-10
-"""Added to the friction that forces need, and taken off the one up to which a twist separates, for
-rounding; relative."""
+"""Allowance for rounding, relative: `ADDED` raises the friction that forces need, `SHAVED` lowers
+the one up to which a twist separates."""
 STALLED = 1e-3
-"""Unit twists that are this small once contacts are at rest are rounding."""
+"""A unit twist that is shorter than this once contacts are at rest is only rounding."""
 
 
 def search_interval(points: Array, units: Array) -> FrictionInterval:
-    """The interval of the critical friction, as narrow as `FRICTION_ACCURACY` or as proofs allow.
+    """Find the interval of the critical friction, as narrow as its accuracy or proofs allow.
 
     Args:
-        points: (k, 3) [m]
-        units: Inward normals, (k, 3).
+        points: Contact points, (k, 3) [m].
+        units: Inward unit normals, (k, 3).
     """
     for strict in (False, True):
         found = _searched(Ends.of(points, units, strict=strict)).interval()
@@ -95,7 +96,7 @@ def _searched(ends: "Ends") -> "Ends":
 
 
 def _try_little(ends: "Ends") -> None:
-    """Closure at little friction, or a first lower end."""
+    """Look for closure at little friction, or else for a first lower end."""
     little, friction = rounds(ends.arms, ends.units), FRICTIONLESS
     if little.twist is not None:
         ends.open(little.twist)
@@ -109,9 +110,9 @@ def _try_little(ends: "Ends") -> None:
 def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:
     """Solve the margin program again in units of the pushes of its own answer.
 
-    At a threshold where some contacts can push but little, as much as others can press or slide
-    beside what they carry, the depth of their forces is below what a solver tells from zero. In
-    units of their own they are as deep as others.
+    At a threshold, some contacts can push only as little as others can press or slide beside what
+    they carry. The depth of their forces is then below what a solver tells from zero. In units of
+    their own they are as deep as others.
     """
     G, alike = grasp_map(ends.arms), np.full(len(ends.arms), friction)
     for _ in range(EVENED):
@@ -132,7 +133,7 @@ def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:
 
 
 def _asked(arms: Array, units: Array, friction: float) -> Answer:
-    """The margin program's answer; zeros, which prove nothing, where there is none."""
+    """Ask for the margin program's answer; where it fails, zeros, which prove nothing."""
     try:
         return decide(arms, units, np.full(len(arms), friction))
     except SolverError:
@@ -141,31 +142,32 @@ def _asked(arms: Array, units: Array, friction: float) -> Answer:
 
 @dataclass(slots=True)
 class Ends:
-    """Proved ends of an interval of friction, and where to try next."""
+    """The proved ends of an interval of friction, and where to try next."""
 
     points: Array
-    """(k, 3) [m]"""
+    """Contact points, (k, 3) [m]."""
     units: Array
-    """Inward normals, (k, 3)."""
+    """Inward unit normals, (k, 3)."""
     arms: Array
-    """The same points at unit size."""
+    """Arms of the contacts at unit size, (k, 3)."""
     strict: bool = True
-    """Whether each step is proved in rational arithmetic, or only what rounding may undo."""
+    """Whether each step is proved in rational arithmetic, or in floats, which rounding may undo."""
     lower: float = 0.0
     upper: float = math.inf
     forces: Array | None = None
     twist: Array | None = None
     share: float = 0.5
-    """Of the upper end to try next while nothing is known from below."""
+    """Share of the upper end to try next while nothing is known from below."""
     trials: int = 0
     center: float = math.nan
-    """A friction at which neither side could be proved: the threshold, to all appearance."""
+    """Friction at which neither side could be proved, apparently the threshold; NaN if there is
+    none."""
     spread: float = 0.0
-    """How far from there proofs are looked for."""
+    """Distance from `center` at which proofs are tried."""
 
     @classmethod
     def of(cls, points: Array, units: Array, *, strict: bool = True) -> "Ends":
-        """Nothing is proved yet."""
+        """Begin with contacts about which nothing is proved yet."""
         return cls(points, units, unit_size(points)[0], strict)
 
     @property
@@ -177,7 +179,7 @@ class Ends:
         return self.upper <= FRICTIONLESS or narrow or around or beyond
 
     def interval(self) -> FrictionInterval:
-        """What has been proved, by forces that balance as well as floats can."""
+        """Return what has been proved, with forces that balance as well as floats can."""
         forces, contacts = self.forces, (self.points, self.units)
         if forces is not None:
             exact = closing_forces(forces, *contacts, self.upper)
@@ -186,12 +188,12 @@ class Ends:
         return FrictionInterval(self.lower, self.upper, *contacts, forces, self.twist)
 
     def learn(self, friction: float, answer: Answer) -> None:
-        """Take what the answer at a friction proves."""
+        """Move both ends to what the program's answer at a friction proves."""
         self.close(answer.forces, friction)
         self.open(answer.twist)
 
     def decided(self, friction: float) -> None:
-        """Look farther from a friction at which nothing was proved, or look there no longer."""
+        """Look farther from a friction at which nothing was proved, or stop looking there."""
         undecided = self.lower < friction < self.upper
         if undecided and math.isnan(self.center):
             self.center, self.spread = friction, NUDGE * FRICTION_ACCURACY * friction
@@ -232,7 +234,7 @@ class Ends:
                 self._opened(still, friction)
 
     def open_at_all(self, twist: Array) -> bool:
-        """Whether a twist separates at every friction; then nothing is left to ask."""
+        """Return whether a twist separates at every friction; then the search is over."""
         self._opened(twist, math.inf)
         return self.lower == math.inf
 
@@ -243,7 +245,7 @@ class Ends:
             self.lower, self.twist = friction, twist
 
     def next_trial(self, friction: float, margin: float, slope: float) -> float:
-        """Where the margin vanishes if it goes on like this, a little to the wider side."""
+        """Return the margin's root by Newton's method, passed a little to the wider side."""
         if not math.isnan(self.center):
             above = self.center + self.spread
             return above if self.upper > above else self.center - self.spread
@@ -261,7 +263,7 @@ class Ends:
 
 
 def _put_to_rest(twist: Array, arms: Array, normals: Array, slow: float) -> tuple[Array, float]:
-    """A unit twist that leaves slow contacts at rest, and up to which friction it may separate."""
+    """Put slow contacts to rest under a unit twist; also return up to where it may separate."""
     rows = grasp_map(arms).T.reshape(-1, 3, WRENCH)
     slowest = np.linalg.norm(rows @ twist, axis=1) <= slow
     resting = rows[slowest].reshape(-1, WRENCH)
@@ -277,12 +279,12 @@ def _put_to_rest(twist: Array, arms: Array, normals: Array, slow: float) -> tupl
 
 
 def _between(lower: float, upper: float) -> float:
-    """Halve the interval of cone angles: it treats small and large friction alike."""
+    """Return the friction halfway between in cone angle, which treats small and large alike."""
     return math.tan(0.5 * (math.atan(lower) + math.atan(min(upper, 4.0 * LARGEST_FRICTION))))
 
 
 def _slope(answer: Answer, arms: Array, normals: Array) -> float:
-    """By how much the margin over mu grows with the logarithm of mu."""
+    """Return by how much the margin over mu grows with the logarithm of mu."""
     velocities = answer.twist[:3] + np.cross(answer.twist[3:], arms)
     along = np.einsum("ki,ki->k", answer.forces, normals)
     slides = answer.forces - along[:, None] * normals

@@ -3,9 +3,14 @@
 Solved: the Grassmann class of four lines, from the two numbers that decide it.
 
 A line through x with unit direction d has the Pluecker vector (d, x x d). Forces along four
-lines can only balance if the four vectors are dependent, rank at most 3. The lines of their
-span are where the span meets the Klein quadric, the vectors with d.m = 0, so the class is the
-rank of the form <(d, m), (d', m')> = d.m' + d'.m on that span:
+lines can only balance if the four vectors are dependent, of rank 3 at most:
+
+    rank of the vectors (d_i, x_i x d_i)  <=  3.                                        (1)
+
+The lines of their span are where the span meets the Klein quadric, the vectors with d.m = 0, so
+the class is the rank, on that span, of the form
+
+    <(d, m), (d', m')>  =  d.m' + d'.m:                                                 (2)
 
     3  regulus: a conic of pairwise skew lines, one family of a hyperboloid or paraboloid
     2  pencil: two flat pencils that share a line and lie in different planes
@@ -36,7 +41,7 @@ REGULUS = 3
 
 
 def plucker_vectors(points: Array, directions: Array) -> Array:
-    """Pluecker vectors (d, x x d) of lines, (k, 6)."""
+    """Return the Pluecker vectors (d, x x d) of lines, (k, 6)."""
     return np.hstack([directions, np.cross(points, directions)])
 
 
@@ -48,7 +53,7 @@ def classify_lines(points: ArrayLike, directions: ArrayLike) -> LineClass:
 
     Args:
         points: One point on each line, (4, 3) [m].
-        directions: Any non-zero vectors along the lines, (4, 3).
+        directions: Non-zero vectors along the lines, of any length, (4, 3).
 
     Raises:
         InputError: A shape is wrong, or a direction is zero.
@@ -63,20 +68,24 @@ def classify_lines(points: ArrayLike, directions: ArrayLike) -> LineClass:
         )
     check_spread(np.ptp(x, axis=0), "points")
     d = d / lengths
+    # lengths count relative to the spread, unless the points are one point but for rounding
     arms = x - x.mean(axis=0)
     spread = float(np.linalg.norm(arms, axis=1).max())
     if spread > ROUNDING * float(np.abs(x).max()):
         arms = arms / spread
     _, sizes, basis = np.linalg.svd(plucker_vectors(arms, d))
+    # dependent vectors are those of (1)
     rank = int((sizes > ON_CLASS).sum())
     if rank == len(d):
         return "independent"
     span = basis[:rank]
+    # (2), on an orthonormal basis of the span
     form = span[:, :3] @ span[:, 3:].T
     meeting = int((np.abs(np.linalg.eigvalsh(form + form.T)) > ON_CLASS).sum())
     if meeting >= REGULUS:
         return "regulus"
     if meeting > 0:
         return "pencil"
+    # both have form zero: planar lines and their points span two dimensions
     flatness = np.linalg.svd(np.vstack([d, arms]), compute_uv=False)[2]
     return "planar" if flatness <= ON_CLASS else "concurrent"

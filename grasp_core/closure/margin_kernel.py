@@ -1,16 +1,16 @@
-"""The margin program of force closure at one friction, by an interior-point method.
+"""The margin program of force closure at one friction is solved by an interior-point method.
 
-Solved (see `closure`): how deep inside their friction cones k contacts can balance each other. In
-coordinates (normal, tangent, tangent) with tangential forces in units of the friction, each cone is
-K = {s : s_0 >= |(s_1, s_2)|}. Write the forces as s_i + t e with e = (1, 0, 0) and t their common
-depth. As their normal parts sum to one, t = (1 - sum s_i0) / k, and what is left is
+Solved (see `force_closure`): how deep inside their friction cones k contacts can balance each
+other. In coordinates (normal, tangent, tangent) with tangential forces in units of the friction,
+each cone is K = {s : s_0 >= |(s_1, s_2)|}. Write the forces as s_i + t e with e = (1, 0, 0) and t
+their common depth. As their normal parts sum to one, t = (1 - sum s_i0) / k, and what is left is
 
-    minimise  sum s_i0  subject to  sum A_i s_i = -m,  s_i in K,
+    minimise  sum s_i0  subject to  sum A_i s_i = -m,  s_i in K,                            (1)
 
 the columns of A_i being the wrenches of contact i's three axes, with the mean m of the wrenches of
 all normals taken off the first. Its dual
 
-    maximise  -m.y      subject to  z_i = e - A_i'y in K
+    maximise  -m.y      subject to  z_i = e - A_i'y in K                                    (2)
 
 is over twists y. The optimum V is below one for force closure and above one if some y separates:
 z_i in K means that the support of cone i in direction y is at most (1 + m.y) / k.
@@ -20,7 +20,7 @@ dual one is exact. From there Newton's method follows the points where the produ
 in the algebra of K are equal multiples of e, with Mehrotra's predictor and corrector, in the
 coordinates of Nesterov and Todd in which s_i and z_i are the same vector. Each step is found by
 reflections: the squares of a Cholesky factorisation would leave an imbalance where two contacts
-carry nearly everything. Divisions by zero give what is no number, with which the search ends.
+carry nearly everything. A division by zero gives infinity or NaN, with which the search ends.
 
 Source: Vandenberghe, "The CVXOPT linear and quadratic cone program solvers" (2010), sections 4-7.
 """
@@ -34,13 +34,13 @@ from grasp_core.arrays import Array
 
 WRENCH = 6
 MOST_STEPS = 40
-"""Ten are usual."""
+"""Most Newton steps; ten are usual."""
 SHARE = 0.1
-"""Of the distance of V from one."""
+"""Gap, as a share of the distance of V from one, that leaves no doubt on which side of one V is."""
 SMALLEST_GAP = 1e-11
-"""Smaller ones are rounding, in programs of order one."""
+"""Gaps below this are rounding, in programs of order one."""
 BALANCED = 1e-10
-"""Largest imbalance of the last point; usual is 1e-15."""
+"""Largest imbalance of the last point; 1e-15 is usual."""
 SHORTER = 0.99
 """Share of the way to the border of the cones that a step may take."""
 
@@ -49,11 +49,11 @@ SHORTER = 0.99
 def least_cone_sum(
     columns: Array, mean: Array, share: float, pair: Array, y: Array
 ) -> tuple[float, float]:
-    """Solve the program, as far as it is wanted.
+    """Solve (1) and (2), up to a gap.
 
     Args:
-        columns: Those of A_i, as rows, (k, 3, 6).
-        mean: m, (6,).
+        columns: Columns of each A_i, as rows, (k, 3, 6).
+        mean: The mean m of the normals' wrenches, (6,).
         share: The gap between primal and dual that may be left, relative to the distance of V from
             one: with `SHARE` it is clear on which side of one V is.
         pair: Filled with s and z, (2, k, 3).
@@ -76,6 +76,7 @@ def least_cone_sum(
             break
         if not (_scale(pair, W, middle) and _factor(columns, W, V, R)):
             break
+        # Mehrotra's predictor aims at the border; how far it gets says how far to aim at the middle
         _towards_the_border(middle, wanted)
         _direct(V, R, missing, wanted, step, turn)
         reach = min(1.0, _longest(middle, step))
@@ -99,7 +100,7 @@ def _start(pair: Array, y: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _values(mean: Array, pair: Array, y: Array) -> tuple[float, float, float]:
-    """Values of the primal and the dual program, and the sum of s_i.z_i."""
+    """Return the values of (1) and (2), and the sum of s_i.z_i."""
     primal = dual = gap = 0.0
     for i in range(pair.shape[1]):
         primal += pair[0, i, 0]
@@ -112,7 +113,7 @@ def _values(mean: Array, pair: Array, y: Array) -> tuple[float, float, float]:
 
 @njit(cache=True, error_model="numpy")
 def _missing(columns: Array, mean: Array, pair: Array, missing: Array) -> float:
-    """What the forces lack to balance, and its largest part."""
+    """Fill in what the forces lack to balance; return its largest part."""
     for w in range(WRENCH):
         missing[w] = -mean[w]
     for i in range(len(columns)):
@@ -127,16 +128,17 @@ def _missing(columns: Array, mean: Array, pair: Array, missing: Array) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _depth(v: Array, i: int) -> float:
-    """v_0^2 - |(v_1, v_2)|^2 of the i-th vector; not positive outside the cone."""
+    """Return v_0^2 - |(v_1, v_2)|^2 of the i-th vector; it is not positive outside the cone."""
     across = math.sqrt(v[i, 1] ** 2 + v[i, 2] ** 2)
     return (v[i, 0] - across) * (v[i, 0] + across) if v[i, 0] > 0.0 else -1.0
 
 
 @njit(cache=True, error_model="numpy")
 def _scale(pair: Array, W: Array, middle: Array) -> bool:
-    """The symmetric maps W_i of K, and their inverses, with W_i z_i = inverse(W_i) s_i = middle_i.
+    """Fill in symmetric maps W_i of K and their inverses: W_i z_i = inverse(W_i) s_i = middle_i.
 
-    False if rounding has put the point outside the cones.
+    Returns:
+        False if rounding has put the point outside the cones.
     """
     s, z = pair[0], pair[1]
     for i in range(len(s)):
@@ -167,9 +169,10 @@ def _scale(pair: Array, W: Array, middle: Array) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def _factor(columns: Array, W: Array, V: Array, R: Array) -> bool:
-    """Reflections 1 - v v' that bring all A_i W_i, side by side, to the triangle R.
+    """Find reflections 1 - v v' that bring all A_i W_i, side by side, to the triangle R.
 
-    False if the wrenches do not span all six dimensions.
+    Returns:
+        False if the wrenches do not span all six dimensions.
     """
     for w in range(WRENCH):
         for i in range(len(columns)):
@@ -215,9 +218,9 @@ def _dot(V: Array, v: int, X: Array, x: int) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _direct(V: Array, R: Array, missing: Array, wanted: Array, step: Array, turn: Array) -> None:
-    """The step whose parts for s and z, scaled, sum to what is wanted, and its part for y.
+    """Find the step whose scaled parts for s and z sum to `wanted`, and its part `turn` for y.
 
-    It supplies what is missing.
+    The step also supplies what the forces lack to balance.
     """
     for i in range(len(wanted)):
         for j in range(3):
@@ -264,7 +267,7 @@ def _towards_the_border(middle: Array, wanted: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _towards_the_middle(middle: Array, ahead: Array, product: float, wanted: Array) -> None:
-    """Where the products become `product` e, with those of the step ahead taken into account."""
+    """Aim where the products become `product` e, given those of the step ahead."""
     s, z = ahead[0], ahead[1]
     for i in range(len(wanted)):
         m0, m1, m2 = middle[i, 0], middle[i, 1], middle[i, 2]
@@ -278,7 +281,7 @@ def _towards_the_middle(middle: Array, ahead: Array, product: float, wanted: Arr
 
 @njit(cache=True, error_model="numpy")
 def _longest(middle: Array, step: Array) -> float:
-    """How many times a step can be taken before s or z leaves the cones."""
+    """Return how many times a step can be taken before s or z leaves the cones."""
     longest = np.inf
     for side in range(2):
         p, d = middle, step[side]

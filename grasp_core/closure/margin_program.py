@@ -1,7 +1,7 @@
-"""The margin program of force closure, solved in compiled code or by the conic solver.
+"""The margin program of force closure is solved here, in compiled code or by the conic solver.
 
-See `closure` for what it says and `kernels.margin` for the compiled method. What a solution claims
-is proved by `closure_margin`.
+`force_closure` derives the program, (1) to (3) there, and `margin_kernel` the compiled method. What
+a solution claims is proved by `proofs`.
 """
 
 import math
@@ -15,31 +15,31 @@ from grasp_core.compiled import compiled
 from grasp_core.solvers.conic import ConicProgram, minimize
 
 KERNEL = "grasp_core.closure.critical_friction_kernel"
-"""The search for critical friction solves the same programs at many frictions."""
+"""Kernel of the search for critical friction, which solves the same program at many frictions."""
 ROUNDING = 1e-12
 """Slack of the plain-arithmetic checks, for data scaled to unit size: some thousand
 rounding errors."""
 TINY = float(np.finfo(np.float64).tiny)
 COARSE = 0.1
-"""As in `kernels.margin`: the gap that is left by who only asks for the sign of a margin."""
+"""Gap, as in `margin_kernel`, that may be left where only the sign of a margin is asked for."""
 
 
 def deepest_forces(
     arms: Array, normals: Array, friction: Array, share: float = COARSE
 ) -> tuple[Array, Array, Array]:
-    """Balanced forces of many sets of contacts as deep in the cones as can be, in compiled code.
+    """Find balanced forces of many sets of contacts, as deep in the cones as can be, by the kernel.
 
     Args:
         arms: Contacts at unit size, (g, k, 3).
-        normals: (g, k, 3)
-        friction: Of each set, positive, (g,).
-        share: The gap that may be left (see `kernels.margin`).
+        normals: Inward unit normals, (g, k, 3).
+        friction: Coulomb coefficient of each set, positive, (g,).
+        share: The gap that may be left (see `margin_kernel`).
 
     Returns:
-        Forces, (g, k, 3), twists (g, 6) on which the supports are at most the margin over the
-        friction, and lower and upper bounds of the margin, (g, 2), where the forces balance. Bounds
-        that have crossed, or are no numbers, are those of a search that broke down, as it does on
-        degenerate contacts. All zeros without kernels.
+        Forces, (g, k, 3); twists, (g, 6), on which the supports are at most the margin over the
+        friction; and lower and upper bounds of the margin, (g, 2), where the forces balance. A
+        search that broke down, as it does on degenerate contacts, ends with bounds that have
+        crossed or are not numbers. Without kernels all of these are zero.
     """
     forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))
     values = np.ones((len(arms), 2))
@@ -51,15 +51,15 @@ def deepest_forces(
 
 
 def margin_program(balance: Array, normals: Array, friction: Array) -> tuple[float, Array, Array]:
-    """Margin t, balancing forces (k, 3), and the dual twist in the rows of `balance`.
+    """Solve for the margin t, balancing forces (k, 3), and the dual twist in the rows of `balance`.
 
     The unknowns of a contact are its normal force and its tangential force over mu, so that
     small coefficients are solved as well as large ones; without friction only the former.
 
     Args:
-        balance: What must vanish as a matrix on the stacked forces, (m, 3k).
-        normals: (k, 3)
-        friction: (k,)
+        balance: Matrix on the stacked forces whose product must vanish, (m, 3k).
+        normals: Inward unit normals, (k, 3).
+        friction: Coulomb coefficients, (k,).
     """
     k, m = len(normals), len(balance)
     frames = contact_frames(normals) * np.array([np.ones(k), friction, friction]).T[:, None]
@@ -72,9 +72,11 @@ def margin_program(balance: Array, normals: Array, friction: Array) -> tuple[flo
     largest = float(friction.max()) or 1.0
     flat = friction == 0.0
     A = np.zeros((m + 1 + n, n + 1))
+    # (1) and (2) of `force_closure` as equations
     A[:m, :n], A[m, :n] = rows, pushing
     order = np.argsort(~np.repeat(flat, 3)[free], kind="stable")  # frictionless rows first
     A[m + 1 + np.arange(n), order] = -1.0
+    # (3), over mu: the normal part less t / mu bounds the tangential part over mu
     depths = largest / np.where(flat, 1.0, np.maximum(friction, TINY))
     A[m + 1 :, n] = np.where(pushing, np.repeat(depths, 3)[free], 0.0)[order]
     b, q = np.zeros(len(A)), np.zeros(n + 1)
@@ -83,19 +85,20 @@ def margin_program(balance: Array, normals: Array, friction: Array) -> tuple[flo
     solution = minimize(ConicProgram(q, A, b, m + 1, flats, (3,) * (k - flats)))
     local = np.zeros(3 * k)
     x = solution.x[:-1]
+    # what the solver leaves of the imbalance is taken off by least squares
     local[free] = x - np.asarray(np.linalg.lstsq(rows, rows @ x, rcond=None)[0], dtype=np.float64)
     forces = np.einsum("kij,kj->ki", frames, local.reshape(k, 3))
     return largest * float(solution.x[-1]), forces, -solution.z[:m]
 
 
 def allowed(friction: Array) -> NDArray[np.bool_]:
-    """Which of the local forces (normal, tangent, tangent) of each contact may be non-zero."""
+    """Return which local forces (normal, tangent, tangent) may be non-zero, (3k,)."""
     sliding = friction > 0.0
     return np.column_stack([np.ones_like(sliding), sliding, sliding]).ravel()
 
 
 def _departing_twist(rows: Array, share: Array) -> Array | None:
-    """A twist with which every contact leaves along its normal: then no forces balance."""
+    """Find a twist with which every contact leaves along its normal: then no forces balance."""
     sizes = np.maximum(np.linalg.norm(rows, axis=0), TINY)
     scaled: Array = (rows / sizes).T
     twist = -np.asarray(np.linalg.lstsq(scaled, share / sizes, rcond=None)[0], dtype=np.float64)

@@ -35,19 +35,19 @@ INDEPENDENT = (1e-6, 1e-9)
 """Distances of a unit-size wrench from the span of others at which it counts as independent of
 them, tried in turn; the last one is the rank that force closure asks for."""
 NEARLY_AT_REST = 1e-9
-"""Speeds that are meant to be none, for twists of unit size."""
+"""Speeds below this are meant to be zero, for twists of unit size."""
 SAME = Fraction(1, 10**12)
 """Speed of a contact that cannot be put to rest exactly and yet counts as at rest, for twists of
 unit size: it would be at rest if it were moved by this share of the contacts' size."""
 
 
 def closes(forces: Array, positions: Array, normals: Array, friction: float) -> bool:
-    """Whether forces next to these balance exactly, strictly inside cones that span all wrenches.
+    """Return whether forces next to these balance exactly, strictly inside cones of full rank.
 
     Args:
-        forces: (k, 3)
-        positions: (k, 3) [m]
-        normals: Inward, of unit length, (k, 3).
+        forces: Contact forces that balance but for rounding, (k, 3).
+        positions: Contact points, (k, 3) [m].
+        normals: Inward unit normals, (k, 3).
         friction: Coulomb coefficient of all contacts.
     """
     return closing_forces(forces, positions, normals, friction) is not None
@@ -56,18 +56,19 @@ def closes(forces: Array, positions: Array, normals: Array, friction: float) -> 
 def closing_forces(
     forces: Array, positions: Array, normals: Array, friction: float
 ) -> Array | None:
-    """The forces that `closes` finds next to the given ones, but for rounding; None without.
+    """Return the balanced forces that `closes` finds, rounded to floats; None if there are none.
 
     Args:
-        forces: (k, 3)
-        positions: (k, 3) [m]
-        normals: Inward, of unit length, (k, 3).
+        forces: Contact forces that balance but for rounding, (k, 3).
+        positions: Contact points, (k, 3) [m].
+        normals: Inward unit normals, (k, 3).
         friction: Coulomb coefficient of all contacts.
     """
     if not (np.isfinite(forces).all() and 0.0 < friction < math.inf):
         return None
     arms, size = _arms(positions)
     along, across = normal_and_tangential(forces, normals)
+    # the depth of each force in its cone says how much of the imbalance it may take
     depths = np.maximum(friction * along - across, 0.0)
     columns = _columns(arms, np.argsort(-depths, kind="stable"))
     if columns is None:
@@ -83,12 +84,12 @@ def closing_forces(
 
 
 def separates(twist: Array, positions: Array, normals: Array, friction: float) -> bool:
-    """Whether no force in the friction cones works along a twist next to this one.
+    """Return whether no force in the friction cones works along a twist next to this one.
 
     Args:
         twist: Velocity of the object at the first contact, and angular velocity, (6,) [m/s, rad/s].
-        positions: (k, 3) [m]
-        normals: Inward, of unit length, (k, 3).
+        positions: Contact points, (k, 3) [m].
+        normals: Inward unit normals, (k, 3).
         friction: Coulomb coefficient of all contacts; infinite to ask for every coefficient.
     """
     arms, size = _arms(positions)
@@ -101,6 +102,7 @@ def separates(twist: Array, positions: Array, normals: Array, friction: float) -
     still = np.flatnonzero(np.linalg.norm((rows @ unit).reshape(-1, 3), axis=1) <= NEARLY_AT_REST)
     wanted = (3 * still[:, None] + np.arange(3)).ravel()
     exact_arms = _exact_arms(positions, size)
+    # an independent choice of the velocities to be made zero: the others vanish with them
     resting = [divmod(int(wanted[each]), 3) for each in _independent(rows[wanted], INDEPENDENT[-1])]
     exact = _at_rest([Fraction(x) for x in unit.tolist()], exact_arms, resting)
     if exact is None or not any(exact):
@@ -113,7 +115,7 @@ def separates(twist: Array, positions: Array, normals: Array, friction: float) -
 
 
 def _arms(positions: Array) -> tuple[Array, float]:
-    """Arms from the first contact in units of the longest one, (k, 3), and its length."""
+    """Return arms from the first contact in units of the longest one, (k, 3), and its length."""
     arms = positions - positions[0]
     size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
     return arms / size, size
@@ -129,7 +131,7 @@ def _exact_arms(positions: Array, size: float) -> list[Exact]:
 
 
 def _columns(arms: Array, order: Indices) -> list[tuple[int, int]] | None:
-    """Six independent columns of the grasp map, as (contact, axis), from contacts in an order."""
+    """Choose six independent columns of the grasp map, as (contact, axis), in order of contacts."""
     wrenches = grasp_map(arms).T.reshape(-1, 3, WRENCH)[order].reshape(-1, WRENCH)
     for least in INDEPENDENT:
         found = _independent(wrenches, least)
@@ -139,14 +141,14 @@ def _columns(arms: Array, order: Indices) -> list[tuple[int, int]] | None:
 
 
 def _nearly_balanced(forces: Array, arms: Array, depths: Array) -> Array:
-    """Forces changed so that they balance but for rounding, the deeper the more."""
+    """Change forces so that they balance but for rounding, the deeper ones by more."""
     G, room = grasp_map(arms), np.repeat(depths, 3)
     change = np.linalg.lstsq(G * room, G @ forces.ravel(), rcond=INDEPENDENT[-1])[0]
     return forces - (room * np.asarray(change, dtype=np.float64)).reshape(forces.shape)
 
 
 def _independent(rows: Array, least: float) -> list[int]:
-    """Rows, (n, 6), none of which is nearer than that to the span of those before it."""
+    """Choose rows of (n, 6), none of them nearer than `least` to the span of those before it."""
     left, found = rows.copy(), list[int]()
     for row in range(len(left)):
         length = float(np.linalg.norm(left[row]))
@@ -161,7 +163,7 @@ def _independent(rows: Array, least: float) -> list[int]:
 def _balanced(
     forces: list[Exact], arms: list[Exact], columns: list[tuple[int, int]]
 ) -> list[Exact] | None:
-    """Forces with components, as (contact, axis), changed so that they balance."""
+    """Change components of forces, given as (contact, axis), so that the forces balance exactly."""
     total = [Fraction(0)] * WRENCH
     for force, arm in zip(forces, arms, strict=True):
         wrench = [*force, *_cross(arm, force)]
@@ -177,7 +179,7 @@ def _balanced(
 
 
 def _at_rest(twist: Exact, arms: list[Exact], resting: list[tuple[int, int]]) -> Exact | None:
-    """A twist changed so that velocities of contacts along axes, (contact, axis), are zero."""
+    """Change a twist so that velocities of contacts along axes, (contact, axis), are zero."""
     rows = [_wrench(axis, arms[contact]) for contact, axis in resting]
     speeds = [sum((a * b for a, b in zip(row, twist, strict=True)), Fraction(0)) for row in rows]
     changes = _solution(rows, speeds)
@@ -185,7 +187,7 @@ def _at_rest(twist: Exact, arms: list[Exact], resting: list[tuple[int, int]]) ->
 
 
 def _wrench(axis: int, arm: Exact) -> Exact:
-    """Of a unit force along an axis; also what gives the speed there along it, times a twist."""
+    """Return the wrench of a unit force; its product with a twist is the contact's speed there."""
     force = [Fraction(int(axis == each)) for each in range(3)]
     return [*force, *_cross(arm, force)]
 
@@ -195,7 +197,7 @@ def _velocity(twist: Exact, arm: Exact) -> Exact:
 
 
 def _solution(rows: list[Exact], right: Exact) -> Exact | None:
-    """One x with rows @ x = right, six numbers, those it leaves free zero; by elimination."""
+    """Solve rows @ x = right for six numbers by elimination; those it leaves free are zero."""
     table = [[*row, value] for row, value in zip(rows, right, strict=True)]
     pivots = list[int]()
     for i, row in enumerate(table):
@@ -215,13 +217,13 @@ def _solution(rows: list[Exact], right: Exact) -> Exact | None:
 
 
 def _inside(force: Exact, normal: Exact, slope: Fraction) -> bool:
-    """Inequality (1), `slope` being the square of the friction."""
+    """Return whether inequality (1) holds, `slope` being the square of the friction."""
     along, across = _squares(force, normal)
     return _dot(force, normal) > 0 and across < slope * along
 
 
 def _departs(velocity: Exact, normal: Exact, slope: Fraction | None) -> bool:
-    """Inequality (2), for every friction where `slope` is None; or no speed but `SAME`."""
+    """Return whether (2) holds, for every friction if `slope` is None, or the speed is `SAME`."""
     if _dot(velocity, velocity) <= SAME**2:
         return True
     along, across = _squares(velocity, normal)
@@ -230,7 +232,7 @@ def _departs(velocity: Exact, normal: Exact, slope: Fraction | None) -> bool:
 
 
 def _squares(vector: Exact, normal: Exact) -> tuple[Fraction, Fraction]:
-    """Squares of the parts along and across a normal, times the square of its length."""
+    """Return squares of the parts along and across a normal, times the square of its length."""
     along = _dot(vector, normal) ** 2
     return along, _dot(vector, vector) * _dot(normal, normal) - along
 

@@ -6,10 +6,13 @@ Ferrari & Canny bound the contact forces in two ways:
            cut at unit normal force;
     linf:  each normal force is at most one; the set is the sum of such hulls with zero.
 
-With s_i(y) the support of cone i cut at unit normal force (see `closure`), the support of the
-set in the direction y is max_i s_i(y), or the sum of the positive s_i(y). The force of contact
-i that attains s_i(y) is n_i + mu_i t, with t along the tangential part of its velocity; so the
-circular cones need no pyramid.
+With s_i(y) the support of cone i cut at unit normal force, (4) of `force_closure`, the support of
+the set in the direction y is
+
+    h(y) = max_i s_i(y) for l1,  the sum of the positive s_i(y) for linf.               (1)
+
+The force of contact i that attains s_i(y) is n_i + mu_i t, with t along the tangential part of its
+velocity; so the circular cones need no pyramid.
 
 Source: Ferrari & Canny, "Planning optimal grasps" (ICRA 1992), with circular cones.
 """
@@ -30,23 +33,24 @@ from grasp_core.solvers.ties import on_grid
 from grasp_core.values import Grasp
 
 Norm: TypeAlias = Literal["l1", "linf"]
-"""How contact forces are bounded."""
+"""How contact forces are bounded: by their sum (`l1`) or one by one (`linf`)."""
 
 NO_SLIDE = 1e-290
-"""Less than this along the surface has no direction."""
+"""A velocity along the surface that is smaller than this has no direction."""
 SAME_FRAME = 1e-9
-"""How far frames may be from orthonormal: normals are unit to nine digits."""
+"""How far frames may be from orthonormal: normals are unit vectors to nine digits."""
 SAME_DIGITS = 10
-"""Digits after the point that searches are told: frames stay within `SAME_FRAME`."""
+"""Digits after the point that searches are given: frames stay within `SAME_FRAME`."""
 LARGEST_RATIO = 1e6
-"""Between the torque scale and the contacts' extent: beyond it, rounding decides."""
+"""Largest ratio of torque scale and contacts' extent, either way: beyond it, rounding decides."""
 
 
 def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
-    """Levers of contacts (k, 3) about a centre, over the torque scale.
+    """Compute levers of contacts (k, 3) about a centre, over the torque scale.
 
     Raises:
-        InputError: The scale or the centre is so far from the contacts' own that rounding decides.
+        InputError: The scale or the centre is so far from those of the contacts that rounding
+            would decide.
     """
     scale = positive(torque_scale, "torque_scale")
     spread = np.ptp(points, axis=0)
@@ -69,16 +73,18 @@ def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WrenchSet:
-    """The wrenches of contacts with bounded normal forces.
+    """The set of wrenches that contacts can apply with bounded normal forces.
 
     Contact forces are local here: (normal, tangent, tangent) of each contact in turn.
     """
 
     G: Array
-    """Local contact forces to their wrench, torques over the torque scale, (6, 3k)."""
+    """Matrix from local contact forces to their wrench, torques over the torque scale, (6, 3k)."""
     friction: Array
-    """(k,)"""
+    """Coulomb coefficients, (k,)."""
     norm: Norm
+    """How normal forces are bounded: their sum is one newton (`l1`) or each is at most that
+    (`linf`)."""
 
     @classmethod
     def of(
@@ -91,7 +97,7 @@ class WrenchSet:
         torque_scale: float,
         norm: Norm = "l1",
     ) -> Self:
-        """From contacts, (k, 3) each; torques are about `center`, divided by `torque_scale` [m].
+        """Make the set of contacts, (k, 3) each; torques are about `center`, over `torque_scale`.
 
         Raises:
             InputError: Shapes, lengths or signs are wrong.
@@ -103,16 +109,16 @@ class WrenchSet:
         return cls(G, contact_frictions(friction, len(points)), norm)
 
     def on_grid(self) -> "WrenchSet":
-        """Nearly the same for a search, which is to see no last digits."""
+        """Return nearly the same set, on a grid, for searches that must not see last digits."""
         return replace(
             self, G=on_grid(self.G, SAME_DIGITS), friction=on_grid(self.friction, SAME_DIGITS)
         )
 
     def sound(self) -> bool:
-        """Whether this is the wrench set of some contacts, to within `SAME_FRAME`.
+        """Return whether this is the wrench set of some contacts, to within `SAME_FRAME`.
 
-        In the columns of `G` each contact has an orthonormal frame, and torques that are those of
-        the frame's vectors at one point: then torque columns times the frame's are skew.
+        The force rows of `G` must be an orthonormal frame for each contact, and the torque rows
+        those of the frame's vectors at one point: then torque rows times the frame's are skew.
         """
         k = len(self.friction) if is_array(self.friction, None) else 0
         known = is_a(self.norm, str) and self.norm in get_args(Norm)
@@ -124,6 +130,7 @@ class WrenchSet:
         square = frames @ frames.transpose(0, 2, 1)
         levers = turns @ frames.transpose(0, 2, 1)
         slack = SAME_FRAME * np.maximum(np.abs(levers).max(axis=(1, 2), keepdims=True), 1.0)
+        # G = (F; [x] F) for a frame F at the point x, so that F F' = 1 and G_torque F' = [x]
         return (
             bool((np.abs(square - np.eye(3)) <= SAME_FRAME).all())
             and bool((np.abs(levers + levers.transpose(0, 2, 1)) <= slack).all())
@@ -137,13 +144,13 @@ class WrenchSet:
         return float(longest * np.sqrt(1.0 + self.friction.max() ** 2))
 
     def supports(self, directions: Array) -> Array:
-        """Support of the set in each of several directions, (n, 6), without forces, (n,)."""
+        """Compute the support (1) in several directions, (n, 6), without forces, (n,)."""
         slopes = (directions @ self.G).reshape(len(directions), -1, 3)
         each = slopes[:, :, 0] + self.friction * np.hypot(slopes[:, :, 1], slopes[:, :, 2])
         return each.max(axis=1) if self.norm == "l1" else np.maximum(each, 0.0).sum(axis=1)
 
     def support(self, direction: Array) -> tuple[float, Array]:
-        """Support of the set in a direction, with the local forces that attain it, (3k,)."""
+        """Compute the support (1) in a direction, with the local forces that attain it, (3k,)."""
         slopes = (direction @ self.G).reshape(-1, 3)
         across = np.hypot(slopes[:, 1], slopes[:, 2])
         each = slopes[:, 0] + self.friction * across
@@ -163,17 +170,18 @@ class WrenchSet:
         return float(each[pushing].sum()), forces.ravel()
 
     def edges(self) -> Array:
-        """Local forces whose wrenches span what the set spans, (n, 3k)."""
+        """Return local forces whose wrenches span what the set spans, (n, 3k)."""
         k = len(self.friction)
         frame = np.array([[1.0, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1]])
         forces = np.zeros((4 * k + 1, k, 3))
         for i, mu in enumerate(self.friction):
             forces[4 * i : 4 * i + 4, i] = frame * [1.0, mu, mu]
+        # the last row, no force at all, belongs to linf only
         rows = forces.reshape(-1, 3 * k)
         return rows if self.norm == "linf" else rows[:-1]
 
     def holds(self, forces: Array, slack: float) -> bool:
-        """Whether local forces, (n, 3k), lie within cones and bounds, up to a slack."""
+        """Return whether local forces, (n, 3k), lie within cones and bounds, up to a slack."""
         each = forces.reshape(len(forces), -1, 3)
         pushes, slides = each[:, :, 0], np.hypot(each[:, :, 1], each[:, :, 2])
         if self.norm == "l1":

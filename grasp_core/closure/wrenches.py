@@ -1,4 +1,4 @@
-"""Contact forces to wrenches, as matrices.
+"""Matrices from contact forces to wrenches, and the frames of contacts.
 
 A wrench is (force, torque), (6,), with the torque about a stated centre. A contact force is
 what the finger applies to the object, in the object's frame.
@@ -14,11 +14,11 @@ WRENCH = 6
 
 
 def grasp_map(positions: Array, center: Array | None = None) -> Array:
-    """Matrix from stacked contact forces (3k,) to their wrench about `center`, (..., 6, 3k).
+    """Build the matrix (..., 6, 3k) from stacked contact forces (3k,) to their wrench.
 
     Args:
         positions: Contact points, (..., k, 3) [m].
-        center: (3,) [m]; the origin when None.
+        center: Point about which torques are taken, (3,) [m]; the origin when None.
     """
     arms = positions if center is None else positions - center
     x, y, z = np.moveaxis(arms, -1, 0)
@@ -31,25 +31,25 @@ def grasp_map(positions: Array, center: Array | None = None) -> Array:
 
 
 def in_frames(G: Array, frames: Array) -> Array:
-    """A matrix on stacked forces (m, 3k), as one on their coordinates in (k, 3, 3) frames."""
+    """Turn a matrix on stacked forces (m, 3k) into one on their coordinates in (k, 3, 3) frames."""
     m, k = len(G), len(frames)
     return np.einsum("mki,kij->mkj", G.reshape(m, k, 3), frames).reshape(m, 3 * k)
 
 
 def cross_matrix(vector: Array) -> Array:
-    """Matrix C of a cross product: C @ b is vector x b."""
+    """Build the matrix C of a cross product: C @ b is vector x b."""
     x, y, z = vector
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def contact_frames(normals: Array) -> Array:
-    """Orthonormal frames with the columns (normal, tangent, tangent), (k, 3, 3)."""
+    """Build orthonormal frames with the columns (normal, tangent, tangent), (k, 3, 3)."""
     columns = [((x, y, z), *plane_tangents(x, y, z)) for x, y, z in normals.tolist()]
     return np.array(columns).transpose(0, 2, 1)
 
 
 def normal_and_tangential(forces: Array, normals: Array) -> tuple[Array, Array]:
-    """Normal components (..., k) and lengths of the tangential parts (..., k) of (..., k, 3)."""
+    """Split (..., k, 3): normal components and lengths of the tangential parts, (..., k) each."""
     along = np.einsum("...i,...i->...", forces, normals)
     across = forces - along[..., None] * normals
     return along, np.sqrt(np.einsum("...i,...i->...", across, across))

@@ -6,11 +6,14 @@ Four vectors theta-positively span R^3 when every choice of one vector from each
 half-angle theta around them positively spans R^3. Let A have the unit axes of three of the
 four cones as rows. If the axes themselves positively span, then by continuity the property
 first fails when some triple of cones admits linearly dependent picks, that is, when a plane
-through the origin with unit normal g meets all three: |A g| <= sin(psi) row by row. With
-y = A g such a g exists iff some y in that box has |A^-1 y| >= 1, and a convex function is
+through the origin with unit normal g meets all three,
+
+    |A g| <= sin(psi)  row by row.                                                      (1)
+
+With y = A g such a g exists iff some y in that box has |A^-1 y| >= 1, and a convex function is
 largest at a corner of the box. So, for equal half-angles,
 
-    sin(theta*) = min over the 4 triples, over signs s in {+-1}^3, of 1 / |A^-1 s|,
+    sin(theta*) = min over the 4 triples, over signs s in {+-1}^3, of 1 / |A^-1 s|,     (2)
 
 and the property holds exactly for theta < theta*. The columns of A^-1 are cross products of
 the axes over det A, which is how the code evaluates it. theta* never exceeds asin(1/3): the
@@ -33,20 +36,20 @@ from grasp_core.errors import InputError
 
 SIGNS = np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=np.float64)
 LARGEST_SPAN_ANGLE = math.asin(1.0 / 3.0)
-"""Reached by the regular tetrahedron only [rad]."""
+"""Largest span angle, which only the regular tetrahedron reaches [rad]."""
 KERNEL = "grasp_core.cones.spanning_kernel"
 FEW = 30
-"""So many directions are enumerated in less time than it takes to load compiled code."""
+"""Number of directions up to which enumerating is faster than loading compiled code."""
 GUESS = 2
-"""Room for so many quadruples per pair of directions, before they are counted."""
+"""Quadruples per pair of directions that there is room for before they are counted."""
 OTHERS = ([1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2])
-"""The other three, for each of four."""
+"""Indices of the other three, for each of four."""
 DEPENDENT = 1e-12
 """Triples of unit vectors with a smaller determinant are coplanar: a few rounding errors."""
 
 
 def span_angle(normals: ArrayLike) -> float:
-    """Largest half-angle below which four cones around unit vectors always positively span.
+    """Find the largest half-angle below which four cones around unit vectors positively span.
 
     Args:
         normals: Unit vectors, (4, 3).
@@ -58,11 +61,12 @@ def span_angle(normals: ArrayLike) -> float:
     if not positively_span(units):
         return 0.0
     triples = [units[list(triple)] for triple in combinations(range(4), 3)]
+    # (2), the minimum over signs being taken in `triple_sine`
     return math.asin(min(abs(triple_sine(*triple)) for triple in triples))
 
 
 def count_spanning(normals: ArrayLike, least: float) -> int:
-    """How many quadruples of unit vectors (n, 3) span at an angle [rad], without listing them."""
+    """Count the quadruples of unit vectors (n, 3) that span at an angle [rad], without a list."""
     units = frozen_units(normals, (None, 3), "normals")
     kernel = compiled(KERNEL) if len(units) > FEW else None
     if kernel is None:
@@ -72,15 +76,16 @@ def count_spanning(normals: ArrayLike, least: float) -> int:
 
 
 def span_sines(units: Array) -> Array:
-    """Sine of theta* of many quadruples of unit vectors (q, 4, 3); negative where they do not span.
+    """Compute sines of theta* of many quadruples (q, 4, 3), (q,); negative where they do not span.
 
     The negative value is how far the worst weight of a vanishing combination is from positive.
 
-    As `triple_sine`, from the cosines between the vectors: with (v x w).(w x u) = (v.w)(w.u) - u.v,
-    the largest |+-(v x w) +-(w x u) +-(u x v)| needs no cross products. A few arrays along all
+    It is (2), from the cosines between the vectors: with (v x w).(w x u) = (v.w)(w.u) - u.v, the
+    largest |+-(v x w) +-(w x u) +-(u x v)| needs no cross products. A few arrays along all
     quadruples make this ten times as fast as a formula for each.
     """
     one, two, three, four = np.ascontiguousarray(np.moveaxis(units, 0, -1))
+    # weights of a vanishing combination: all of one sign where the four positively span
     front, back = _crossed(one, two), _crossed(three, four)
     minors = (_dotted(two, back), _dotted(one, back), _dotted(four, front), _dotted(three, front))
     signed: Array = np.stack([minors[0], -minors[1], minors[2], -minors[3]])
@@ -95,9 +100,11 @@ def span_sines(units: Array) -> Array:
         for pair in combinations(range(4), 2)
     }
     least = np.full(len(units), np.inf)
+    # each triple's term of (2): its determinant over the longest signed sum of cross products
     for minor, rest in zip(minors, OTHERS, strict=True):
         g, h, k = (cosines[frozenset(pair)] for pair in combinations(rest, 2))
         a, b, c = h * k - g, g * k - h, g * h - k
+        # the largest square over the signs of (2)
         most = np.maximum(np.maximum(a + b + c, a - b - c), np.maximum(b - a - c, c - a - b))
         squared = 3.0 - g * g - h * h - k * k + 2.0 * most
         size = np.abs(minor)
@@ -107,24 +114,24 @@ def span_sines(units: Array) -> Array:
 
 
 def _dotted(one: Sequence[Array], two: Sequence[Array]) -> Array:
-    """Dot products of columns, (q,)."""
+    """Return dot products of columns, (q,)."""
     return one[0] * two[0] + one[1] * two[1] + one[2] * two[2]
 
 
 def _crossed(one: Sequence[Array], two: Sequence[Array]) -> tuple[Array, Array, Array]:
-    """Cross products of columns, three of (q,)."""
+    """Return cross products of columns, three of (q,)."""
     (x, y, z), (u, v, w) = one, two
     return y * w - z * v, z * u - x * w, x * v - y * u
 
 
 def cones_positively_span(axes: ArrayLike, half_angles: ArrayLike) -> bool:
-    """Whether four circular cones positively span R^3 whatever vector each contributes.
+    """Return whether four circular cones positively span R^3 whatever vector each contributes.
 
-    The generalised P3: cones of different half-angles around any axes.
+    The cones may have different half-angles and any axes: this is the generalised P3.
 
     Args:
         axes: Unit vectors, (4, 3).
-        half_angles: (4,) [rad].
+        half_angles: Half-angles of the cones, (4,) [rad].
 
     Raises:
         InputError: Shapes, lengths or angles are wrong.
@@ -135,8 +142,10 @@ def cones_positively_span(axes: ArrayLike, half_angles: ArrayLike) -> bool:
         raise InputError(f"half_angles must be in [0, pi/2), got {angles.tolist()}")
     sines = np.sin(angles)
     if not positively_span(units):
+        # positive spanning is what continuity in the derivation starts from
         return False
     for triple in combinations(range(4), 3):
+        # the corners of the box (1), whose sides now differ: none may reach the unit sphere
         corners = np.linalg.solve(units[list(triple)], (SIGNS * sines[list(triple)]).T)
         if np.linalg.norm(corners, axis=0).max() >= 1.0:
             return False
@@ -144,9 +153,9 @@ def cones_positively_span(axes: ArrayLike, half_angles: ArrayLike) -> bool:
 
 
 def angles_between(one: Array, other: Array) -> Array:
-    """Angles between vectors (..., 3), as exact for nearly equal ones as for others, (...) [rad].
+    """Compute angles between vectors (..., 3), (...) [rad], as exact for small ones as for others.
 
-    The inverse cosine would give up half of the digits there.
+    The inverse cosine would give up half of the digits of a small angle.
     """
     along = np.sum(one * other, axis=-1)
     across: Array = np.arctan2(np.linalg.norm(np.cross(one, other), axis=-1), along)
@@ -154,13 +163,13 @@ def angles_between(one: Array, other: Array) -> Array:
 
 
 def positively_span(vectors: Array) -> bool:
-    """Whether some positive combination of four vectors, (4, 3), vanishes and they span R^3."""
+    """Return whether four vectors, (4, 3), span R^3 and some positive combination vanishes."""
     signed = _signed_determinants(vectors)
     return bool(signed.min() > DEPENDENT or signed.max() < -DEPENDENT)
 
 
 def balancing_weights(vectors: Array) -> Array:
-    """The weights of sum w_i v_i = 0, summing to one in absolute value, (..., 4).
+    """Return weights with sum w_i v_i = 0 that sum to one in absolute value, (..., 4).
 
     All are positive where the four vectors, (..., 4, 3), positively span R^3.
     """
@@ -170,22 +179,22 @@ def balancing_weights(vectors: Array) -> Array:
 
 
 def _signed_determinants(vectors: Array) -> Array:
-    """Weights of a vanishing combination, by Cramer's rule, (..., 4)."""
+    """Return weights of a vanishing combination, by Cramer's rule, (..., 4)."""
     minors = np.stack([vectors[..., rest, :] for rest in OTHERS], axis=-3)
     determinants: Array = np.asarray(np.linalg.det(minors), dtype=np.float64)
     return determinants * (1.0, -1.0, 1.0, -1.0)
 
 
 def triple_sine(one: Array, two: Array, three: Array) -> Array:
-    """Sine of the half-angle at which three cones first touch one plane, signed by det.
+    """Compute the sine of the half-angle at which three cones first touch one plane, signed by det.
 
     Args:
         one: Unit vectors, (..., 3).
-        two: Likewise.
-        three: Likewise.
+        two: Unit vectors, (..., 3).
+        three: Unit vectors, (..., 3).
 
     Returns:
-        (...): zero where the three are coplanar.
+        The term of one triple in (2), (...): zero where the three are coplanar.
     """
     one, two, three = np.broadcast_arrays(one, two, three)
     crosses = np.stack([np.cross(two, three), np.cross(three, one), np.cross(one, two)], axis=-2)
@@ -200,17 +209,17 @@ class SpanningQuadruples:
     """Face quadruples whose normals positively span at some least angle."""
 
     indices: Indices
-    """(q, 4), ascending in each row, rows in lexicographic order."""
+    """Indices of the faces, (q, 4), ascending in each row, rows in lexicographic order."""
     span_angles: Array
-    """theta* of each, (q,) [rad]."""
+    """theta* of each quadruple, (q,) [rad]."""
 
 
 def spanning_quadruples(normals: Array, least_angle: float) -> SpanningQuadruples:
-    """All quadruples of directions whose span angle exceeds `least_angle`.
+    """List all quadruples of directions whose span angle exceeds `least_angle`.
 
     Args:
         normals: Unit vectors, (n, 3).
-        least_angle: [rad]
+        least_angle: Angle that theta* must exceed [rad].
     """
     if len(normals) <= FEW:
         return _spanning_by_pairs(normals, math.sin(least_angle))
@@ -218,7 +227,7 @@ def spanning_quadruples(normals: Array, least_angle: float) -> SpanningQuadruple
 
 
 class SpanningTable:
-    """Quadruples of directions that span, by the last of their directions."""
+    """The quadruples of directions that span, listed by the last of their directions."""
 
     def __init__(self, normals: Array, least_angle: float) -> None:
         self.units, self.least = np.ascontiguousarray(normals), math.sin(least_angle)
@@ -227,7 +236,7 @@ class SpanningTable:
         self.bits = None if self.kernel is None else self.kernel.empty_table(len(normals))
 
     def quadruples(self, start: int, end: int) -> SpanningQuadruples:
-        """Those whose last direction is one of start .. end - 1."""
+        """List the quadruples whose last direction is one of start .. end - 1."""
         if self.kernel is None:
             every = _spanning_by_pairs(self.units[:end], self.least)
             last = every.indices[:, 3] >= start
@@ -239,7 +248,7 @@ class SpanningTable:
         return SpanningQuadruples(indices, np.arcsin(sines))
 
     def count(self, newest: int) -> int:
-        """How many have this direction for their last one; only with compiled code."""
+        """Count the quadruples that end in a direction; compiled code is needed for this."""
         self._extend(newest + 1)
         return int(self.kernel.quadruples(self.bits, newest, np.empty((0, 4), dtype=np.int64)))
 
@@ -249,6 +258,7 @@ class SpanningTable:
             self.size = end
 
     def _ending_in(self, newest: int) -> Indices:
+        # rather than counting first, a guess at the room: counting costs as much as listing
         found = np.empty((GUESS * newest * newest, 4), dtype=np.int64)
         count = self.kernel.quadruples(self.bits, newest, found)
         if count > len(found):
@@ -258,14 +268,14 @@ class SpanningTable:
 
 
 def _sorted(parts: Sequence[Indices], count: int) -> Indices:
-    """Quadruples of `count` directions in lexicographic order, (q, 4)."""
+    """Sort quadruples of `count` directions in lexicographic order, (q, 4)."""
     places = count ** np.arange(3, -1, -1)
     keys = np.sort(np.concatenate(parts) @ places)
     return keys[:, None] // places % count
 
 
 def _spanning_by_pairs(normals: Array, least: float) -> SpanningQuadruples:
-    """All of them, from the least sine, without compiled code.
+    """List all quadruples that span above a least sine, without compiled code.
 
     A table of signed triple sines decides each quadruple. With i < j fixed, the faces fall
     into those to the left of the plane (i, j) and those to its right; a positively spanning

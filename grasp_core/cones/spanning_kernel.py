@@ -1,11 +1,11 @@
-"""All quadruples of directions that positively span at some least angle, by bit sets of triples.
+"""Quadruples of directions that positively span at some least angle, by bit sets of triples.
 
 With s(i, j, k) the signed sine of the angle at which three cones first touch one plane (see
 `spanning`), four directions i, j, k < l span at an angle if the three others go around
 -l in a circle, s(i, j, l), s(j, k, l) and s(k, i, l) of one sign, s(i, j, k) of the other, and all
 larger in size than the sine of that angle. The table keeps for each ordered pair the set of third
-directions with a positive s, one bit each; what completes a pair is common to three of its rows,
-and is found 64 directions at a time.
+directions with a positive s, one bit each; the directions that complete a pair are common to three
+of its rows, and are found 64 at a time.
 """
 
 import numpy as np
@@ -29,7 +29,7 @@ def try_out() -> None:
 
 
 def empty_table(count: int) -> NDArray[np.uint64]:
-    """A table for so many directions, none of which is in it yet."""
+    """Make a table with room for `count` directions, none of which is in it yet."""
     return np.zeros((count, count, (count + WORD - 1) // WORD), dtype=np.uint64)
 
 
@@ -38,10 +38,10 @@ def extend(table: NDArray[np.uint64], units: Array, start: int, end: int, least:
     """Put the directions start .. end - 1 into the table.
 
     Args:
-        table: Holds those before them.
-        units: (n, 3)
-        start: The first new one.
-        end: One after the last one.
+        table: Table that holds the directions before these; changed in place.
+        units: Unit vectors, (n, 3).
+        start: The first new direction.
+        end: One after the last new direction.
         least: Smallest sine that counts.
     """
     for k in range(start, end):
@@ -65,12 +65,12 @@ def quadruples(table: NDArray[np.uint64], newest: int, found: Indices) -> int:
     """List the quadruples of one direction and three before it.
 
     Args:
-        table: Holds all of them.
-        newest: The last one of each quadruple.
+        table: Table that holds all of these directions.
+        newest: The last direction of each quadruple.
         found: Filled with quadruples, ascending in each row, as far as there is room.
 
     Returns:
-        How many there are.
+        How many quadruples there are.
     """
     count = 0
     word, bit = newest // WORD, np.uint64(1) << np.uint64(newest % WORD)
@@ -85,7 +85,7 @@ def quadruples(table: NDArray[np.uint64], newest: int, found: Indices) -> int:
 
 @njit(cache=True)
 def least_sines(units: Array, found: Indices, sines: Array) -> None:
-    """Sines of the angles below which quadruples of directions span, (q,)."""
+    """Fill in sines of the angles below which quadruples of directions span, (q,)."""
     for row in range(len(found)):
         a, b = units[found[row, 0]], units[found[row, 1]]
         c, d = units[found[row, 2]], units[found[row, 3]]
@@ -101,7 +101,7 @@ def _completed(
     found: Indices,
     count: int,
 ) -> int:
-    """Add what completes a pair: with the newest like the pair, and with the pair the other way."""
+    """List quadruples of a pair, the newest direction and one between; return the new count."""
     tail, head = pair
     larger = max(tail, head)
     for word in range(larger // WORD, (newest + WORD - 1) // WORD):
@@ -125,7 +125,7 @@ def _completed(
 
 @njit(cache=True)
 def _place(bit: np.uint64) -> int:
-    """Which bit of a word is set."""
+    """Return which bit of a word is set."""
     place, size = 0, 32
     while size:
         if bit >> np.uint64(size):
@@ -137,7 +137,7 @@ def _place(bit: np.uint64) -> int:
 
 @njit(cache=True)
 def _mark(table: NDArray[np.uint64], i: int, j: int, k: int) -> None:
-    """Triple (i, j, k) turns this way, and so do (j, k, i) and (k, i, j)."""
+    """Mark that (i, j, k) turns this way, and with it (j, k, i) and (k, i, j)."""
     one = np.uint64(1)
     table[i, j, k // WORD] |= one << np.uint64(k % WORD)
     table[j, k, i // WORD] |= one << np.uint64(i % WORD)
@@ -146,7 +146,7 @@ def _mark(table: NDArray[np.uint64], i: int, j: int, k: int) -> None:
 
 @njit(cache=True)
 def _sine(u: Array, v: Array, w: Array) -> float:
-    """Size of `triple_sine` of `spanning`."""
+    """Return the size of `triple_sine` of `spanning`."""
     x, y, z = _crossed(v, w)
     determinant = abs(x * u[0] + y * u[1] + z * u[2])
     if determinant <= DEPENDENT:
@@ -156,7 +156,7 @@ def _sine(u: Array, v: Array, w: Array) -> float:
 
 @njit(cache=True)
 def _longest_squared(g: float, h: float, k: float) -> float:
-    """Of +-(v x w) +-(w x u) +-(u x v), from the cosines u.v, v.w and w.u of unit vectors."""
+    """Return the longest |+-(v x w) +-(w x u) +-(u x v)|^2 from the cosines u.v, v.w and w.u."""
     a, b, c = h * k - g, g * k - h, g * h - k
     most = max(max(a + b + c, a - b - c), max(b - a - c, c - a - b))
     return 3.0 - g * g - h * h - k * k + 2.0 * most

@@ -4,7 +4,7 @@ Solved: for four normals n_i with friction cones of half-angles theta_i, axes a_
 psi, as large as a search finds, such that the cones around a_i lie inside the friction cones and
 positively span whatever direction each contributes (P3):
 
-    angle(a_i, n_i) + psi <= theta_i,      psi < theta*(a_1, .., a_4).
+    angle(a_i, n_i) + psi <= theta_i,      psi < theta*(a_1, .., a_4).                        (1)
 
 Solutions exist exactly where four forces, each strictly inside its friction cone, can sum to zero
 without lying in a plane: then their directions positively span, and by continuity so do narrow
@@ -14,13 +14,17 @@ normals, and so have all faces at frictions above 0.354, where P3 around the nor
 With a_i = n_i and psi = theta this is Definition 3 of the paper; its constructions hold word for
 word, since nothing in them uses that an axis is a normal.
 
+An upper bound of psi. For every unit vector m some axis has a_i.m < -sin(psi), and it is within
+theta_i - psi of its normal, so that
+
+    2 psi  <  max_i angle(n_i, m) - 90 deg + theta_i.                                         (2)
+
 Search. The height of the pyramid (theta, theta*) over the axes has one ridge after another, so
 nothing is claimed to be the largest. Axes that balance well are found first: each in turn is
 pointed against the sum of the others, as far as a cap around its normal lets it, for caps of
 several sizes; normals that lie nearly in a plane, as those of a box's sides, are bent out of it.
-Then all four are moved at random, in steps that grow with success and shrink
-without. The moves are the same for any quadruple, in frames that turn with it, so that turned
-objects get turned cones.
+Then all four are moved at random, in steps that grow with success and shrink without. The moves are
+the same for any quadruple, in frames that turn with it, so that turned objects get turned cones.
 
 Source: this project's; P3 with its closed form is explained in `spanning`.
 """
@@ -40,40 +44,40 @@ KERNEL = "grasp_core.cones.tilting_kernel"
 CAPS = (0.3, 0.5, 0.7, 0.9)
 """How far axes may lean while they are balanced, in friction angles."""
 TOWARD = (0.5, 0.9)
-"""How far axes may lean to meet in a point."""
+"""How far axes may lean to meet in a point, in friction angles."""
 SWEEPS = 8
 MOVES = 60
 FIRST_MOVE = 0.2
-"""Of the friction angle."""
+"""Length of the first random move, in friction angles."""
 GROWTH, DECAY = 1.3, 0.9
-"""Of the moves, after a success and after a failure."""
+"""Factors on the length of the moves after a success and after a failure."""
 SLIGHT = 1e-6
-"""Improvements and directions below this must not decide anything: vertices that are off by 1e-9
-of an object turn the normals of its small faces by a hundred times that."""
+"""Improvements and directions below this decide nothing: vertices that are off by 1e-9 of an
+object turn the normals of its small faces by a hundred times that."""
 PACE = (FIRST_MOVE, GROWTH, DECAY, SLIGHT)
 BESIDE = 0.1
-"""Sine of the angle from which on another axis is beside one."""
+"""Sine of the angle from which on one axis counts as beside another."""
 FLAT = 0.5
 """Normals lie nearly in a plane if their spread across it is below this share of the next one."""
 SIDES = [tuple(s * np.array(p)) for s in (1, -1)
          for p in ((1, 1, -1, -1), (1, -1, 1, -1), (1, -1, -1, 1))]  # fmt: skip
-"""Two fingers to either side of a plane."""
+"""Signs that put two fingers on either side of a plane."""
 CHUNK = 20_000
 """Quadruples that are searched at once: some tens of megabytes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TiltedCones:
-    """Four force cones for each of q quadruples."""
+    """The four force cones of each of q quadruples."""
 
     axes: Array
-    """Unit vectors, (q, 4, 3)."""
+    """Unit vectors along the cones' middles, (q, 4, 3)."""
     half_angles: Array
-    """psi, the same for all four, (q,) [rad]; not positive where none was found."""
+    """Half-angle psi, the same for all four, (q,) [rad]; not positive where none was found."""
 
 
 def tilted_cones(normals: Array, thetas: Array) -> TiltedCones:
-    """Force cones with wide half-angles for many quadruples.
+    """Search force cones with wide half-angles for many quadruples.
 
     Args:
         normals: Unit vectors, (q, 4, 3).
@@ -88,17 +92,15 @@ def tilted_cones(normals: Array, thetas: Array) -> TiltedCones:
 
 
 def widest_half_angles(normals: Array, thetas: Array, sines: Array) -> Array:
-    """Half-angles psi that no force cones exceed, however they are tilted, (q,) [rad].
+    """Bound the half-angles psi of all force cones by (2), however these are tilted, (q,) [rad].
 
-    For every unit vector m some axis has a_i.m < -sin(psi), and it is within theta_i - psi of its
-    normal: the largest angle(n_i, m) - 90 deg + theta_i is above 2 psi. Where the normals span, the
-    smallest over m of max angle(n_i, m) - 90 deg is theta*. Else it is negative, and taken where m
-    is in the middle of two normals, or as far from three.
+    Where the normals span, the smallest over m of max angle(n_i, m) - 90 deg is theta*. Else it is
+    negative, and taken where m is in the middle of two normals, or as far from three.
 
     Args:
         normals: Unit vectors, (q, 4, 3).
         thetas: Half-angles of the friction cones, (q, 4) [rad].
-        sines: Those of theta*, not positive where the normals do not span, (q,).
+        sines: Sines of theta*, not positive where the normals do not span, (q,).
     """
     if kernel := compiled(KERNEL):
         lowest = np.empty(len(normals))
@@ -106,16 +108,18 @@ def widest_half_angles(normals: Array, thetas: Array, sines: Array) -> Array:
     else:
         lowest = _lowest_heights(normals)
     heights = np.where(sines > 0.0, sines, np.minimum(lowest, 0.0))
+    # (2), for the largest theta_i and the best m; psi is no more than any theta_i, by (1)
     widest = 0.5 * (thetas.max(axis=1) + np.arcsin(np.clip(heights, -1.0, 1.0)))
     return np.minimum(widest + SLIGHT, thetas.min(axis=1))
 
 
 def _lowest_heights(normals: Array) -> Array:
-    """The least max_i -n_i.m over the middles m of two normals or three, (q,)."""
+    """Return the least max_i -n_i.m over the middles m of two normals or three, (q,)."""
     lowest = np.full(len(normals), np.inf)
     units = np.moveaxis(normals, 1, 0)
     middles = [one + other for one, other in combinations(units, 2)]
     for one, two, three in combinations(units, 3):
+        # both directions square to the plane of the three tips are equally far from all three
         across = np.cross(two - one, three - one)
         middles += [across, -across]
     for middle in middles:
@@ -126,10 +130,10 @@ def _lowest_heights(normals: Array) -> Array:
 
 
 def widened(directions: Array, normals: Array, thetas: Array) -> TiltedCones:
-    """Force cones whose axes are sought near given directions inside the friction cones.
+    """Search force cones whose axes are near given directions inside the friction cones.
 
     Args:
-        directions: Such as those of balanced forces, (q, 4, 3).
+        directions: Directions to start from, such as those of balanced forces, (q, 4, 3).
         normals: Unit vectors, (q, 4, 3).
         thetas: Half-angles of the friction cones, (q, 4) [rad].
     """
@@ -138,11 +142,11 @@ def widened(directions: Array, normals: Array, thetas: Array) -> TiltedCones:
 
 
 def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> TiltedCones:
-    """Force cones whose axes lean towards common points, as far as spanning lets them.
+    """Search force cones whose axes lean towards common points, as far as spanning lets them.
 
     Args:
-        points: One for each quadruple, (q, 3).
-        positions: Where the axes start, (q, 4, 3).
+        points: One point for each quadruple, (q, 3).
+        positions: Points where the axes start, (q, 4, 3).
         normals: Unit vectors, (q, 4, 3).
         thetas: Half-angles of the friction cones, (q, 4) [rad].
     """
@@ -169,6 +173,7 @@ def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
         reached = half_angle(axes, normals, thetas)
         better = reached > half_angles + SLIGHT
         best[better], half_angles[better] = axes[better], reached[better]
+    # singular values: the third is the normals' spread across the plane they lie in most nearly
     sizes = np.linalg.svd(normals, compute_uv=False)
     flat = np.flatnonzero(sizes[:, 2] < FLAT * sizes[:, 1])
     for axes in _bent(normals[flat], thetas[flat]):
@@ -179,11 +184,12 @@ def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
 
 
 def _bent(normals: Array, thetas: Array) -> Iterator[Array]:
-    """Axes that leave a plane in which the normals nearly lie, two to either side of it."""
+    """Yield axes that leave a plane in which the normals nearly lie, two to either side of it."""
     _, _, directions = np.linalg.svd(normals)
     across = directions[:, 2]
     turns = np.cross(normals[:, :1], normals[:, 1:])
     which = np.argmax(np.linalg.norm(turns, axis=-1) > BESIDE, axis=1)
+    # the side of the plane is tied to the normals, so that a turned object gets turned axes
     handed = np.einsum("qi,qi->q", turns[np.arange(len(turns)), which], across)
     across = across * np.where(handed < 0.0, -1.0, 1.0)[:, None]
     for signs, cap in product(SIDES, CAPS[:-1]):
@@ -195,18 +201,19 @@ def _bent(normals: Array, thetas: Array) -> Iterator[Array]:
 
 
 def half_angle(axes: Array, normals: Array, thetas: Array) -> Array:
-    """The largest psi that axes allow, (q,) [rad]; negative where they do not span."""
+    """Return the largest psi that (1) allows, (q,) [rad]; negative where the axes do not span."""
     if kernel := compiled(KERNEL):
         reached = np.empty(len(axes))
         kernel.half_angles(*map(np.ascontiguousarray, (axes, normals, thetas)), reached)
         return reached
+    # theta* of the axes, then what the lean of each axis leaves of its friction cone
     sines = span_sines(axes)
     spans = np.where(sines > 0.0, np.arcsin(np.clip(sines, 0.0, 1.0)), sines)
     return np.minimum(spans, (thetas - angles_between(axes, normals)).min(axis=1))
 
 
 def _balanced(normals: Array, caps: Array) -> Array:
-    """Unit vectors within caps around the normals, each pointed against the sum of the others."""
+    """Point unit vectors, within caps around the normals, each against the sum of the others."""
     axes = np.array(normals, order="C")
     if kernel := compiled(KERNEL):
         kernel.balance(axes, axes.copy(), np.ascontiguousarray(caps), SWEEPS, SLIGHT)
@@ -219,13 +226,14 @@ def _balanced(normals: Array, caps: Array) -> Array:
 
 
 def _into_cap(vectors: Array, centers: Array, angles: Array) -> Array:
-    """Unit vectors along vectors (q, 3), or the nearest ones within angles (q,) of unit centers.
+    """Return unit vectors along vectors (q, 3), or the nearest within angles (q,) of unit centers.
 
-    Vectors without a direction across the center leave it where it is.
+    A vector without a direction across its center gives the center.
     """
     along = np.einsum("qi,qi->q", vectors, centers)
     across = vectors - along[:, None] * centers
     sideways = np.linalg.norm(across, axis=1)
+    # no further than the cap's angle, and not at all without a direction
     turn = np.where(sideways > SLIGHT, np.minimum(np.arctan2(sideways, along), angles), 0.0)[
         :, None
     ]
@@ -234,6 +242,7 @@ def _into_cap(vectors: Array, centers: Array, angles: Array) -> Array:
 
 
 def _improved(axes: Array, normals: Array, thetas: Array) -> tuple[Array, Array]:
+    # one seed for all quadruples: equal ones get equal moves, wherever they are listed
     moves = np.random.default_rng(0).normal(size=(MOVES, FINGERS, 2))
     first, second = _aside(axes)
     if kernel := compiled(KERNEL):
@@ -242,6 +251,7 @@ def _improved(axes: Array, normals: Array, thetas: Array) -> tuple[Array, Array]
         kernel.improve((axes, reached), *given, moves, np.array(PACE))
         return axes, reached
     reached = half_angle(axes, normals, thetas)
+    # steps are in units of each quadruple's own narrowest friction cone
     steps = FIRST_MOVE * thetas.min(axis=1)
     for move in moves:
         sideways = move[:, :1] * first + move[:, 1:] * second
@@ -256,7 +266,7 @@ def _improved(axes: Array, normals: Array, thetas: Array) -> tuple[Array, Array]
 
 
 def _aside(axes: Array) -> tuple[Array, Array]:
-    """Two directions across each axis, (q, 4, 3), the first also across another one beside it."""
+    """Return two directions across each axis, (q, 4, 3), the first also across one beside it."""
     first = np.zeros_like(axes)
     for ahead in range(FINGERS - 1, 0, -1):
         cross = np.cross(axes, np.roll(axes, -ahead, axis=1))

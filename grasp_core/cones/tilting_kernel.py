@@ -1,4 +1,4 @@
-"""Force cones that are tilted until they span, for many quadruples (see `tilted_cones`)."""
+"""Force cones are tilted until they span, for many quadruples (see `tilting`)."""
 
 import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
@@ -8,9 +8,9 @@ from grasp_core.geometry.vectors_kernel import cross, dotted
 
 FINGERS = 4
 DEPENDENT = 1e-12
-"""As in `grasp_core.cones.spanning`."""
+"""Determinant below which three axes are coplanar, as in `grasp_core.cones.spanning`."""
 SLIGHT = 1e-6
-"""As in `grasp_core.cones.tilting`."""
+"""Size below which nothing is decided, as in `grasp_core.cones.tilting`."""
 
 
 def try_out() -> None:
@@ -51,7 +51,7 @@ def lowest_heights(normals: Array, lowest: Array) -> None:
 
 @njit(cache=True)
 def _height(normals: Array, middle: Array, side: float) -> float:
-    """Largest -n_i.m, for m along a vector or against it; infinite if it has no direction."""
+    """Return the largest -n_i.m, for m along a vector or against it; infinite without direction."""
     length, least = np.sqrt(dotted(middle, middle)), np.inf
     if length <= SLIGHT:
         return np.inf
@@ -65,11 +65,11 @@ def balance(axes: Array, normals: Array, caps: Array, sweeps: int, slight: float
     """Point each axis in turn against the sum of the others, within a cap around its normal.
 
     Args:
-        axes: Changed in place, (q, 4, 3).
-        normals: (q, 4, 3)
-        caps: (q, 4) [rad]
-        sweeps: How often.
-        slight: Shorter vectors across a normal have no direction.
+        axes: Unit vectors, changed in place, (q, 4, 3).
+        normals: Unit vectors, (q, 4, 3).
+        caps: Angles that the axes may lean, (q, 4) [rad].
+        sweeps: How often each axis is pointed.
+        slight: Length below which a vector across a normal has no direction.
     """
     against = np.empty(3)
     for q in range(len(axes)):
@@ -103,10 +103,10 @@ def improve(
 
     Args:
         cones: Axes, changed in place, (q, 4, 3); half-angles, filled in, (q,) [rad].
-        normals: (q, 4, 3)
-        thetas: (q, 4) [rad]
+        normals: Unit vectors, (q, 4, 3).
+        thetas: Half-angles of the friction cones, (q, 4) [rad].
         frames: Two directions across each axis, (2, q, 4, 3).
-        moves: (moves, 4, 2)
+        moves: Random moves in these directions, (moves, 4, 2).
         pace: The first step in friction angles, its growth after a success and its share after
             a failure, and the least improvement that counts, (4,).
     """
@@ -137,7 +137,7 @@ def improve(
 
 @njit(cache=True)
 def _half_angle(axes: Array, normals: Array, thetas: Array, floor: float) -> float:
-    """The largest psi; where that is no larger than a floor, anything up to the floor."""
+    """Return the largest psi; where that is no larger than a floor, anything up to the floor."""
     sine, least = _span_sine(axes), np.inf
     span = np.arcsin(min(sine, 1.0)) if sine > 0.0 else sine
     if span <= floor:
@@ -152,7 +152,7 @@ def _half_angle(axes: Array, normals: Array, thetas: Array, floor: float) -> flo
 
 @njit(cache=True)
 def _span_sine(axes: Array) -> float:
-    """As `span_sines` of `grasp_core.cones.spanning`, for one quadruple."""
+    """Compute `span_sines` of `grasp_core.cones.spanning` for one quadruple."""
     ab, ac, ad = _cosine(axes, 0, 1), _cosine(axes, 0, 2), _cosine(axes, 0, 3)
     bc, bd, cd = _cosine(axes, 1, 2), _cosine(axes, 1, 3), _cosine(axes, 2, 3)
     a, b = _determinant(axes, 1, 2, 3), -_determinant(axes, 0, 2, 3)
@@ -184,7 +184,7 @@ def _determinant(axes: Array, i: int, j: int, k: int) -> float:
 
 @njit(cache=True)
 def _sine(determinant: float, g: float, h: float, k: float) -> float:
-    """Where three cones first touch one plane, from the cosines between their axes."""
+    """Return the sine at which three cones first touch one plane, from cosines between axes."""
     a, b, c = h * k - g, g * k - h, g * h - k
     most = max(max(a + b + c, a - b - c), max(b - a - c, c - a - b))
     return abs(determinant) / np.sqrt(3.0 - g * g - h * h - k * k + 2.0 * most)

@@ -1,4 +1,4 @@
-"""What pydantic finds wrong with a file -> a sentence: the field, what was expected, what came."""
+"""What pydantic finds wrong with a file becomes a sentence: field, expected value, value found."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar, get_args
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 Model = TypeVar("Model", bound="BaseModel")
 BOUNDS = {"too_short": ("at least", "min_length"), "too_long": ("at most", "max_length")}
-"""How errors about the number of items say it."""
+"""Wording and limit of errors about the number of items, by their type."""
 UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 OURS = {
     "float_type": "a number", "int_type": "a whole number", "int_from_float": "a whole number",
@@ -21,23 +21,23 @@ OURS = {
     "greater_than": "more than {gt}", "greater_than_equal": "at least {ge}",
     "less_than": "less than {lt}", "less_than_equal": "at most {le}",
 }  # fmt: skip
-"""Kinds and ranges of values, in the words of people who write JSON or TOML."""
+"""Words for kinds and ranges of values, as people say them who write JSON or TOML."""
 
 
 def record_of(
     kind: type[Model], text: str, wanted: str, *, schema: int | None = None, nulls: bool = True
 ) -> Model:
-    """A checked record from the text of a JSON file.
+    """Read a checked record from the text of a JSON file.
 
     Args:
-        kind: Its fields.
-        text: Of the file.
+        kind: Class of the record, with its fields.
+        text: Text of the file.
         wanted: What the file should be, for messages.
         schema: The version that it must have; None for files that have none.
         nulls: Whether a value may be null.
 
     Raises:
-        InputError: It is no such file; the message names the field.
+        InputError: The text is not such a file; the message names the field.
     """
     from pydantic import ValidationError
 
@@ -49,12 +49,12 @@ def record_of(
 
 
 def complaint(error: "ValidationError", kind: Any, inside: Sequence[str] = ()) -> str:
-    """The first thing that is wrong.
+    """Describe the first thing that is wrong.
 
     Args:
-        error: What pydantic found.
+        error: The error that pydantic raised.
         kind: The fields that were expected: a model, or a dataclass.
-        inside: Where in the file they are.
+        inside: Keys that lead to the record in its file.
     """
     first = error.errors(include_url=False)[0]
     loc, fault, came = first["loc"], first["type"], first["input"]
@@ -74,7 +74,7 @@ def complaint(error: "ValidationError", kind: Any, inside: Sequence[str] = ()) -
 
 
 def _expected(said: str) -> str:
-    """What a message of pydantic says was expected."""
+    """Return what was expected, from a message of pydantic."""
     for beginning, ours in (("Input should be ", ""), ("String should ", "text to ")):
         if said.startswith(beginning):
             return ours + said.removeprefix(beginning)
@@ -82,7 +82,7 @@ def _expected(said: str) -> str:
 
 
 def _fields_at(kind: Any, loc: Sequence[int | str]) -> list[str]:
-    """The keys that a record inside another one may have."""
+    """Return the keys that a record inside another one may have."""
     for part in loc:
         if isinstance(part, str):
             inner = next((f for key, f in _fields(kind).items() if key == part), None)
@@ -96,7 +96,7 @@ def _fields(kind: Any) -> dict[str, Any]:
 
 
 def _record_in(annotation: Any) -> Any:
-    """The record that a type is about: of its items, or where it may be null."""
+    """Return the record that a type holds, as an item or as a value that may be null."""
     if hasattr(annotation, "__pydantic_fields__"):
         return annotation
     inner = (_record_in(part) for part in get_args(annotation))

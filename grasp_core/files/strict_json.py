@@ -1,7 +1,8 @@
-"""The text of a JSON file -> one object of plain values that any of our readers may rely on.
+"""The text of a JSON file becomes one object of plain values that all our readers may rely on.
 
-What JSON leaves open is refused: keys that are there twice, numbers that are none or too large,
-nesting without end, text that no encoding has. So is another kind of our own files, by its name.
+Cases that JSON leaves open are refused: a key twice in an object, numbers that are too large or
+NaN, endless nesting, text that no encoding has. Another kind of our own files is refused by its
+name.
 """
 
 import json
@@ -13,11 +14,12 @@ from typing import Any, cast
 from grasp_core.errors import InputError
 
 DEEPEST = 64
-"""Objects and lists inside each other; ours are less than ten deep."""
+"""Most objects and lists inside each other; ours are less than ten deep."""
 LARGEST_WHOLE = 2**64 - 1
-"""Larger whole numbers are no seeds, counts or indices, and arrays do not hold them."""
+"""Largest whole number: larger ones are no seeds, counts or indices, and arrays cannot hold
+them."""
 LONGEST_ECHO = 40
-"""Characters of a wrong value, or of a key, that a message repeats."""
+"""Most characters of a wrong value, or of a key, that a message repeats."""
 KINDS: Mapping[str, Collection[str]] = {
     "baseline": {"grasps_file"},
     "verdicts.json": {"verdicts"},
@@ -27,24 +29,24 @@ KINDS: Mapping[str, Collection[str]] = {
     "wrench file": {"wrenches"},
     "contacts file": {"contacts"},
 }
-"""Our JSON files, and the keys that tell each from those after it."""
+"""Our JSON files, and for each the keys that tell it from the files listed after it."""
 BESIDE = ("verdicts.json", "regions.json")
-"""Files that lie beside the grasps.json they are about."""
+"""Files that are kept in the folder of the grasps.json that they are about."""
 
 
 def object_of(
     text: str, wanted: str, *, schema: int | None = None, nulls: bool = True
 ) -> dict[str, Any]:
-    """The object that a JSON text holds.
+    """Return the object that a JSON text holds.
 
     Args:
-        text: Of a file.
-        wanted: What it should be, one of `KINDS` or something else.
+        text: Text of a file.
+        wanted: What the file should be, one of `KINDS` or something else.
         schema: The version that it must have; None for files that have none.
         nulls: Whether a value may be null.
 
     Raises:
-        InputError: It is no such object; the message names the field.
+        InputError: The text holds no such object; the message names the field.
     """
     found = value_of(text, nulls=nulls)
     if not isinstance(found, dict):
@@ -57,10 +59,10 @@ def object_of(
 
 
 def value_of(text: str, *, nulls: bool = True) -> Any:
-    """The value that a JSON text holds.
+    """Return the value that a JSON text holds.
 
     Raises:
-        InputError: It is not JSON, or holds what a file of ours must not.
+        InputError: The text is not JSON, or holds a value that no file of ours may hold.
     """
     try:
         found = json.loads(text, object_pairs_hook=_without_twins)
@@ -79,7 +81,7 @@ def value_of(text: str, *, nulls: bool = True) -> Any:
 
 
 def check_values(document: object, *, nulls: bool = True) -> None:
-    """Refuse plain values that no file of ours holds, whatever its format.
+    """Refuse plain values that no file of ours may hold, whatever its format.
 
     Raises:
         InputError: A number is not finite or too large, a text has no encoding, a value is null
@@ -92,12 +94,12 @@ def check_values(document: object, *, nulls: bool = True) -> None:
 
 
 class _FaultError(Exception):
-    """What is wrong with a value; where it is comes together on the way out."""
+    """What is wrong with a value; the keys that lead to it are collected on the way out."""
 
     def __init__(self, fault: str) -> None:
         super().__init__(fault)
         self.trail: list[object] = []
-        """Keys from the value outwards; the last is of the list that holds the document."""
+        """Keys from the value outwards; the last is that of the list around the document."""
 
 
 def _check(holder: Any, nulls: bool, deeper: int) -> None:
@@ -116,10 +118,10 @@ def _check(holder: Any, nulls: bool, deeper: int) -> None:
 
 
 def check_kind(found: Mapping[str, Any], wanted: str) -> None:
-    """Refuse another file of ours.
+    """Refuse another kind of our files than the one that was asked for.
 
     Raises:
-        InputError: It is one; the message says which.
+        InputError: The file is of another kind; the message says which.
     """
     if wanted in KINDS and set(KINDS[wanted]) <= found.keys():
         return
@@ -130,10 +132,10 @@ def check_kind(found: Mapping[str, Any], wanted: str) -> None:
 
 
 def check_schema(found: Mapping[str, Any], schema: int) -> None:
-    """Refuse another version than this package reads.
+    """Refuse a version of the file format that this package does not read.
 
     Raises:
-        InputError: The key `schema` is another number, or none.
+        InputError: The key `schema` is missing, or is another number.
     """
     came = found.get("schema")
     if came is None:
@@ -147,12 +149,12 @@ def check_schema(found: Mapping[str, Any], schema: int) -> None:
         )
     if came < schema:
         raise InputError(
-            f"schema: expected {schema}, got {came}: written by an older graspproof; make it anew"
+            f"schema: expected {schema}, got {came}: written by an older graspproof; write it again"
         )
 
 
 def place(parts: Sequence[object]) -> str:
-    """Where a value is in a document, as messages say it: `grasps[0].contacts[2].normal`."""
+    """Write where a value is in a document, as in messages: `grasps[0].contacts[2].normal`."""
     said = "".join(
         f"[{part}]" if isinstance(part, int) else f".{_key(str(part))}" for part in parts
     )
@@ -160,7 +162,7 @@ def place(parts: Sequence[object]) -> str:
 
 
 def shown(value: object) -> str:
-    """A value that came, as messages say it: short, and in letters that can be printed."""
+    """Write a value that was found for a message: short, and in characters that can be printed."""
     if isinstance(value, dict):
         return "an object"
     if isinstance(value, list | tuple):
@@ -187,12 +189,12 @@ def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(found) < len(pairs):
         counts = Counter(key for key, _ in pairs)
         twin = next(key for key, _ in pairs if counts[key] > 1)
-        raise InputError(f"{_key(twin)}: the key is there twice in one object; leave one out")
+        raise InputError(f"{_key(twin)}: the key occurs twice in one object; remove one")
     return found
 
 
 def _all_plain(holder: Any) -> bool:
-    """Whether a list is one of finite floats: most are."""
+    """Return whether a list holds finite floats only, as most lists do."""
     if not isinstance(holder, list):
         return False
     values = cast("list[Any]", holder)
@@ -210,7 +212,7 @@ def _items(holder: Any) -> Iterable[tuple[Any, Any]]:
 
 
 def _fault(value: object, *, nulls: bool) -> str | None:
-    """What is wrong with a value that holds no others."""
+    """Return what is wrong with a value that holds no others; None if nothing is."""
     if isinstance(value, float):
         return None if math.isfinite(value) else f"expected a finite number, got {value}"
     if isinstance(value, int):

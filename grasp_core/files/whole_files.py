@@ -1,6 +1,6 @@
-"""Regular files, read up to a bound, and files that are written whole or not at all.
+"""Regular files are read up to a bound, and files are written whole or not at all.
 
-A file is complete before it is renamed into place.
+A new file is complete before it is renamed into place.
 """
 
 import os
@@ -11,16 +11,16 @@ from contextlib import contextmanager
 from pathlib import Path
 
 UNFINISHED = ".unfinished-"
-"""In the names of files that are being written, or were when their writer was killed."""
+"""Part of the name of files that are being written, or were when their writer was killed."""
 SHOWN = 40
-"""Characters of a file's name in that of its unfinished one, which must not get too long."""
+"""Most characters of a file's name in that of its unfinished one, which must not get too long."""
 
 
 def write_parts(path: Path, parts: Iterable[bytes]) -> Path:
     """Write a file; folders are made as needed.
 
     Raises:
-        OSError: It cannot be written; the error names the file.
+        OSError: The file cannot be written; the error names the file.
     """
     with replacing(path) as temporary, temporary.open("wb") as stream:
         stream.writelines(parts)
@@ -31,10 +31,10 @@ def write_parts(path: Path, parts: Iterable[bytes]) -> Path:
 
 @contextmanager
 def replacing(path: Path) -> Generator[Path]:
-    """Another path of the same ending to write to, which is put in the place of the file.
+    """Yield another path with the same suffix to write to; afterwards it replaces the file.
 
     Raises:
-        OSError: It cannot be written; the error names the file, not the other path.
+        OSError: The file cannot be written; the error names the file, not the other path.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -48,7 +48,7 @@ def replacing(path: Path) -> Generator[Path]:
 
 @contextmanager
 def _beside(path: Path) -> Generator[Path]:
-    """An empty file in the same folder, which is not there afterwards."""
+    """Yield an empty file in the same folder, which is removed afterwards."""
     prefix = f".{path.name[:SHOWN]}{UNFINISHED}"
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=path.suffix)
     try:
@@ -59,16 +59,16 @@ def _beside(path: Path) -> Generator[Path]:
 
 
 def remove_unfinished(folder: Path) -> None:
-    """Remove what killed writers have left in a folder that nobody writes to."""
+    """Remove the files that killed writers left in a folder where nobody is writing."""
     for path in folder.glob(f".*{UNFINISHED}*"):
         path.unlink(missing_ok=True)
 
 
 def bounded_bytes(path: Path, most: int) -> bytes:
-    """The bytes of a file, or its first `most + 1` where there are more; pipes never block.
+    """Read the bytes of a file, or its first `most + 1` if it has more; pipes never block.
 
     Raises:
-        OSError: It cannot be read, or is a folder, a pipe or a device.
+        OSError: The file cannot be read, or is a folder, a pipe or a device.
     """
     try:
         handle = os.open(

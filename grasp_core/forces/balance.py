@@ -1,5 +1,14 @@
 """All contact forces that balance external wrenches: the smallest ones plus a null space.
 
+With the map G from forces to their wrench and the external wrenches w_i, the forces
+
+    f = F0_i + N z   with   F0_i = -inv(G) w_i,  G N = 0                                      (1)
+
+balance w_i for every z, inv(G) being the pseudo-inverse; none that balance are smaller than F0_i.
+Limits and friction pyramids are inequalities on z:
+
+    R f <= 0,   l <= f_n <= u.                                                                (2)
+
 Forces are local, (normal, tangent, tangent) for each contact, in units of the largest normal
 force; lengths are in units of the longest arm. What does not depend on the wrench is computed
 once for all wrenches.
@@ -15,15 +24,16 @@ from grasp_core.arrays import Array
 from grasp_core.closure.wrenches import contact_frames, grasp_map, in_frames
 
 PYRAMID_SIDES = 16
-"""An inscribed 16-sided pyramid gives away 1.9 % of the friction coefficient."""
+"""Sides of the inscribed pyramids: sixteen give away 1.9 % of the friction coefficient."""
 RESIDUAL = 1e-6
 """Largest imbalance and cone violation accepted, in units of the largest normal force: a
 hundred times the accuracy asked of ProxQP."""
 
 CLEARLY = 1.01
-"""By how much a wrench is beyond all forces, so that rounding and `RESIDUAL` do not matter."""
+"""Factor by which a wrench must exceed all forces, so that rounding and `RESIDUAL` do not
+matter."""
 NO_FORCE = 1e-100
-"""Stands in where a contact without force would lead to a division by zero."""
+"""Least normal force that is divided by, where a contact may have no force."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +43,7 @@ class Balance:
     frames: Array
     """Columns (normal, tangent, tangent) of each contact, (k, 3, 3)."""
     G: Array
-    """Map from forces to their wrench, (6, 3k)."""
+    """Matrix from forces to their wrench, (6, 3k)."""
     inverse: Array
     """Pseudo-inverse of G, (3k, 6)."""
     null: Array
@@ -41,13 +51,13 @@ class Balance:
     scales: Array
     """Unit of force for each wrench, (n,) [N]."""
     W: Array
-    """External wrenches, (n, 6)."""
+    """External wrenches, (n, 6), in these units and in units of the longest arm."""
     F0: Array
-    """Balancing forces of least norm, out of limits and cones where they are, (n, 3k)."""
+    """Balancing forces of least norm, which may break limits and leave cones, (n, 3k)."""
     least: Array
-    """Least normal force of any contact, (n,)."""
+    """Least normal force allowed at any contact, (n,)."""
     largest: Array
-    """Largest normal force of any contact, (n,)."""
+    """Largest normal force allowed at any contact, (n,)."""
 
     @classmethod
     def of(
@@ -57,9 +67,9 @@ class Balance:
         """Scale contacts and wrenches, (n, 6) [N, N m], whose torques are about the arms' origin.
 
         Args:
-            arms: (k, 3) [m]
-            normals: (k, 3)
-            wrenches: (n, 6) [N, N m]
+            arms: Contact points from the centre of torques, (k, 3) [m].
+            normals: Inward unit normals, (k, 3).
+            wrenches: External (force, torque), (n, 6) [N, N m].
             normal_force: Least and largest normal force of each contact [N].
             by_load: Whether the unit of force is the load, so that a small one counts, or the
                 largest normal force.
@@ -67,6 +77,7 @@ class Balance:
         least, largest = normal_force
         size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
         scales = np.full(len(wrenches), largest)
+        # the unit of force, the load or the limit, keeps all numbers of order one
         if by_load or not math.isfinite(largest):
             loads = np.linalg.norm(wrenches / np.repeat([1.0, size], 3), axis=1)
             scales = np.minimum(np.maximum(loads, least), largest)
@@ -80,7 +91,7 @@ class Balance:
         return cls(frames, G, inverse, null, scales, W, -W @ inverse.T, *limits)
 
     def one(self, i: int) -> "Balance":
-        """The same with the i-th wrench alone, to the last bit what `of` makes of that wrench."""
+        """Return the balance of the i-th wrench alone, to the last bit what `of` makes of it."""
         W = self.W[[i]]
         return replace(
             self, scales=self.scales[[i]], W=W, F0=-W @ self.inverse.T,
@@ -88,33 +99,36 @@ class Balance:
         )  # fmt: skip
 
     def beyond(self, friction: Array) -> NDArray[np.bool_]:
-        """Which wrenches are larger than all forces within limits and cones together, (n,).
+        """Return which wrenches exceed all forces within limits and cones together, (n,).
 
-        No arm is longer than one, so this bounds forces and torques alike. What is far beyond
+        No arm is longer than one, so this bounds forces and torques alike. Wrenches far beyond that
         would keep solvers busy for seconds.
 
         Args:
-            friction: Of each contact, (k,).
+            friction: Coulomb coefficient of each contact, (k,).
         """
+        # force and torque separately, in units of the longest arm
         sizes = np.linalg.norm(self.W.reshape(-1, 2, 3), axis=2).max(axis=1)
         most = CLEARLY * np.sqrt(1.0 + friction**2).sum()
         return sizes > most * self.largest
 
     def pyramids(self, friction: Array) -> Array:
-        """Rows R with R @ f <= 0 inside pyramids inscribed in the friction cones, (16 k, 3 k).
+        """Return rows R with R @ f <= 0 inside pyramids in the friction cones, (16 k, 3 k).
 
         Args:
-            friction: Of each contact, (k,).
+            friction: Coulomb coefficient of each contact, (k,).
         """
         count, turns = len(friction), 2.0 * np.pi * (np.arange(PYRAMID_SIDES) + 0.5) / PYRAMID_SIDES
         rows, each = np.zeros((count, PYRAMID_SIDES, count, 3)), np.arange(count)
+        # sides touch the cone between the corners of the pyramid, hence the cosine of half a side
         rows[each, :, each, 0] = -friction[:, None] * math.cos(np.pi / PYRAMID_SIDES)
         rows[each, :, each, 1], rows[each, :, each, 2] = np.cos(turns), np.sin(turns)
         return rows.reshape(count * PYRAMID_SIDES, 3 * count)
 
     def polyhedra(self, rows: Array) -> tuple[Array, Array]:
-        """C, D: F0[i] + null @ z keeps the limits and has rows @ f <= 0 where C @ z <= D[i]."""
+        """Return C and D with (2) for f = F0[i] + null @ z exactly where C @ z <= D[i]."""
         along, normal_parts = self.null[0::3], self.F0[:, 0::3]
+        # (2) with the forces (1) put in: what multiplies z goes left, the rest right
         C, D = [rows @ self.null, -along], [-self.F0 @ rows.T, normal_parts - self.least[:, None]]
         if np.isfinite(self.largest).all():
             C.append(along)
@@ -122,7 +136,8 @@ class Balance:
         return np.vstack(C), np.hstack(D)
 
     def checked(self, F: Array, residual: float = RESIDUAL) -> Array:
-        """Forces (n, 3k) made to balance to rounding; NaN where they then break a limit."""
+        """Make forces (n, 3k) balance to rounding; NaN where they then break a limit."""
+        # the least change that balances f is the pseudo-inverse of what is left
         exact = F - (F @ self.G.T + self.W) @ self.inverse.T
         along = exact[:, 0::3]
         wrong = np.abs(exact @ self.G.T + self.W).max(axis=1)
@@ -132,7 +147,8 @@ class Balance:
         return exact
 
     def into_cones(self, F: Array, friction: float) -> Array:
-        """Forces near these, (n, 3k), that meet the limits and the friction cones exactly."""
+        """Move forces (n, 3k) a little so that they meet limits and friction cones exactly."""
+        # normal parts are brought into the limits first, since they say how far slides may reach
         along = np.clip(F[:, 0::3], self.least[:, None], self.largest[:, None])
         across = np.hypot(F[:, 1::3], F[:, 2::3])
         shrink = np.minimum(1.0, friction * along / np.maximum(across, NO_FORCE))
@@ -140,18 +156,18 @@ class Balance:
         return np.stack(parts, axis=2).reshape(F.shape)
 
     def in_space(self, F: Array) -> Array:
-        """Forces in the object's frame, (n, k, 3) [N]."""
+        """Turn local forces into forces in the object's frame, (n, k, 3) [N]."""
         local = F.reshape(len(F), len(self.frames), 3)
         forces = np.einsum("kij,nkj->nki", self.frames, local)
         return self.scales[:, None, None] * np.asarray(forces, dtype=np.float64)
 
 
 def needed_friction(F: Array, friction: Array) -> Array:
-    """The largest share of its friction that any contact with a tangential force needs, (n,).
+    """Return the largest share of its friction that a contact with a tangential force needs, (n,).
 
     Args:
         F: Local forces, (n, 3k).
-        friction: Of each contact, (k,).
+        friction: Coulomb coefficient of each contact, (k,).
     """
     along, across = F[:, 0::3], np.hypot(F[:, 1::3], F[:, 2::3])
     shares = across / np.maximum(friction * along, NO_FORCE)

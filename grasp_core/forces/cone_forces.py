@@ -1,12 +1,14 @@
 """Balanced contact forces of least norm in the exact circular friction cones.
 
-Solved: for one wrench,
+Solved: for one wrench w, with the map G from forces to their wrench,
 
-    minimise |f|  subject to  G f = -w,  l <= f_n <= u,  |f_t| <= mu f_n   for all contacts.
+    minimise |f|  subject to  G f = -w,                                                       (1)
+                              l <= f_n <= u  for all contacts,                                (2)
+                              |f_t| <= mu f_n  for all contacts.                              (3)
 
 Pyramids inside the cones give away 2 % of the friction; just above the critical friction they hold
-no forces where the cones do. There forces are many times the load, so they are sought in units of
-their own size: the program is solved once to find that, and again for the digits.
+no forces where the cones do. Forces there are many times the load, so they are sought in units of
+their own size: the program is solved once to find that size, and again for the digits.
 """
 
 import numpy as np
@@ -17,15 +19,15 @@ from grasp_core.forces.balance import RESIDUAL, Balance, needed_friction
 from grasp_core.solvers.conic import ConicProgram, minimize
 
 KEPT_BACK = 1e-7
-"""Share of the friction that is not used, for what the solver leaves."""
+"""Share of the friction that is not used, to cover what the solver leaves."""
 
 
 def least_norm_in_cones(balance: Balance, friction: Array) -> Array | None:
-    """Local forces (3k,) that balance the first wrench in the cones; None where none are found.
+    """Find local forces (3k,) that balance the first wrench in the cones; None if none are found.
 
     Args:
         balance: The wrench and the limits.
-        friction: Of each contact, (k,).
+        friction: Coulomb coefficient of each contact, (k,).
     """
     unit = 1.0
     for _ in range(2):
@@ -41,10 +43,11 @@ def least_norm_in_cones(balance: Balance, friction: Array) -> Array | None:
 
 
 def _program(balance: Balance, friction: Array, unit: float) -> ConicProgram:
-    """The program of the module's text, with a bound on |f| as the last variable."""
+    """Build the program (1) to (3), with a bound on |f| as the last variable."""
     n, flat = balance.G.shape[1], friction == 0.0
     normal, rows = np.eye(n, n + 1)[0::3], -np.eye(n, n + 1)
     rows[0::3] *= friction[:, None]
+    # a cone of friction zero is a ray: its tangential parts are equations instead
     cones, slides = rows[np.repeat(~flat, 3)], np.eye(n, n + 1)[np.repeat(flat, 3)]
     slides = np.delete(slides, np.s_[::3], axis=0)
     bounded = [(-normal, -balance.least[0])]
@@ -52,6 +55,7 @@ def _program(balance: Balance, friction: Array, unit: float) -> ConicProgram:
         bounded.append((normal, balance.largest[0]))
     norm = -np.vstack([np.eye(n + 1)[n], np.eye(n, n + 1)])
     equations = np.vstack([np.hstack([balance.G, np.zeros((6, 1))]), slides])
+    # rows: (1) and the rays, (2), the cones (3), then |f| <= the last variable
     A = np.vstack([equations, *(side for side, _ in bounded), cones, norm])
     b = np.zeros(len(A))
     b[:6] = -balance.W[0] / unit

@@ -1,18 +1,27 @@
-"""Contact forces that balance wrenches, by strictly convex programs; the door to ProxQP.
+"""Contact forces that balance wrenches are found by strictly convex programs; the door to ProxQP.
 
-Forces are sought in pyramids inscribed in the friction cones, so that every answer lies in
-the true cones. Two objectives for balanced forces: the least norm, and the least friction,
-that is, the smallest coefficient max_i |tangential part| / normal part. The latter is found
-by Dinkelbach's iteration: with r the current coefficient, forces that minimise the largest
-tangential part minus r times the normal part have a smaller one, until they do not; the last
-2 % that pyramids give away come from `least_friction`. Where pyramids hold no forces that balance,
-as just above the critical friction, exact cones may (`cone_forces`). Where nothing balances,
-`closest_forces` leaves the least imbalance.
+Forces f are sought in pyramids inscribed in the friction cones, so that every answer lies in the
+true cones. With the map G from forces to their wrench, the external wrench w, the least and largest
+normal force l and u, and the rows R of the pyramids they satisfy
 
-Both objectives ask for the nearest point of a polyhedron (`least_distance`), once the balance
-is solved (`balance`). Where that point is not found, ProxQP decides. It calls some of these
-feasible programs infeasible, so it is asked for the closest feasible point, and its status is
-not read: an answer counts when its own residuals are small.
+    G f = -w,                                                                                 (1)
+    l <= f_n <= u,                                                                            (2)
+    R f <= 0.                                                                                 (3)
+
+There are two objectives: the least norm |f|, and the least friction, that is, the smallest
+coefficient r = max_i |f_t| / f_n. The latter is found by Dinkelbach's iteration: forces with
+
+    the least excess max_i |f_t| - r f_n over the current r                                   (4)
+
+have a smaller coefficient, until they do not; the last 2 % that pyramids give away come from
+`least_friction`. Where pyramids hold no forces that balance, as just above the critical friction,
+exact cones may (`cone_forces`). Where nothing balances, `closest_forces` leaves the least
+imbalance.
+
+Both objectives ask for the nearest point of a polyhedron (`nearest_point`), once (1) is solved
+(`balance`). Where that point is not found, ProxQP decides. It calls some of these feasible programs
+infeasible, so it is asked for the closest feasible point, and its status is not read: an answer
+counts when its own residuals are small.
 """
 
 import importlib
@@ -36,11 +45,12 @@ from grasp_core.values import Grasp
 
 REQUESTED = 1e-8
 MAX_ITERATIONS = 300
-"""Feasible programs of this size take about twenty; infeasible ones would go on for minutes."""
+"""Most iterations of ProxQP: feasible programs of this size take about twenty; infeasible ones
+would go on for minutes."""
 REGULAR = 1e-3
 """Weight of the forces' own size that keeps the least-friction programs strictly convex."""
 IMPROVEMENT = 1e-2
-"""Iteration ends when the coefficient falls by less than this share."""
+"""The iteration ends when the coefficient falls by less than this share."""
 MAX_ROUNDS = 20
 ACTIVE = (1e-6, 1e-5, 1e-7, 1e-8)
 """Slacks below which a constraint may count as active, tried in turn."""
@@ -58,7 +68,7 @@ def contact_forces(  # noqa: PLR0913 - the contract's arguments
     normal_force: tuple[float, float] = (0.0, math.inf),
     center: ArrayLike = (0.0, 0.0, 0.0),
 ) -> Array:
-    """Forces at the contacts that balance an external wrench, or each of many.
+    """Find forces at the contacts that balance an external wrench, or each of many.
 
     Args:
         positions: Contact points, (k, 3) [m]; or a Grasp, with `normals` None.
@@ -72,16 +82,16 @@ def contact_forces(  # noqa: PLR0913 - the contract's arguments
             needs of its friction. The latter is found by iteration: where limits on the forces are
             far above the load it may stop early.
         normal_force: Least and largest normal force of each contact [N].
-        center: (3,) [m]
+        center: Point about which torques are taken, (3,) [m].
 
     Returns:
-        Forces on the object, (k, 3), or (n, k, 3) [N], in the frame of `positions`. Those for one
-        of many wrenches are the same as for that wrench alone, but for rounding.
+        Forces on the object, (k, 3), or (n, k, 3) [N], in the frame of `positions`. The forces for
+        one of many wrenches are the same as for that wrench alone, but for rounding.
 
     Raises:
         InputError: Shapes, limits or coefficients are wrong.
-        NoForcesError: No forces found that meet the limits and the friction; the text gives the
-            index of the first of many wrenches for which there are none.
+        NoForcesError: No forces were found that meet the limits and the friction; the text gives
+            the index of the first of many wrenches for which there are none.
     """
     _objective(objective)
     loads, single = _rows(wrench)
@@ -103,14 +113,17 @@ def least_friction_forces(
     positions: Array, normals: Array, friction: float, wrench: Array, *,
     normal_force: tuple[float, float], center: Array,
 ) -> tuple[Array, float] | None:  # fmt: skip
-    """Balancing forces (k, 3) of least friction, with that coefficient, whatever it is.
+    """Find balancing forces (k, 3) of least friction, with that coefficient, whatever it is.
 
     `friction` is where the search starts; forces are found above it if they must be.
 
-    None when the limits on the normal forces leave no balance.
+    Returns:
+        The forces [N] and the coefficient; None when the limits on the normal forces leave no
+        balance.
     """
     load = frozen(wrench, (6,), "wrench")[None]
     balance = _balance(positions, normals, load, normal_force, center)
+    # one coefficient for all contacts: weights of one
     alike = np.ones(len(balance.frames))
     f = _least_friction(balance, friction, alike)
     if f is None:
@@ -122,9 +135,10 @@ def closest_forces(
     positions: Array, normals: Array, friction: float, wrench: Array, *,
     normal_force: tuple[float, float], center: Array,
 ) -> Array:  # fmt: skip
-    """Forces in the friction cones that leave the least imbalance, (k, 3)."""
+    """Find forces in the friction cones that leave the least imbalance, (k, 3) [N]."""
     load = frozen(wrench, (6,), "wrench")[None]
     balance = _balance(positions, normals, load, normal_force, center)
+    # the cones (3) and limits (2) hold, while (1) is only approached: its square is the objective
     rows = balance.pyramids(np.full(len(balance.frames), friction))
     P = balance.G.T @ balance.G + LEAST_CHARGE * np.eye(balance.G.shape[1])
     q = balance.G.T @ balance.W[0]
@@ -140,6 +154,7 @@ def _least_imbalance(P: Array, q: Array, rows: Array, balance: Balance) -> Array
     """Minimise f'Pf/2 + q'f in the cones and limits: with P = L L', the least |L'f + inv(L) q|."""
     L = np.linalg.cholesky(P)
     back, shift = np.linalg.inv(L).T, np.linalg.solve(L, q)
+    # (3), then (2), as rows; the balance (1) is in the objective
     along = np.eye(len(q))[0::3]
     C, d = [rows, -along], [np.zeros(len(rows)), -np.broadcast_to(balance.least, len(along))]
     if np.isfinite(balance.largest).all():
@@ -157,11 +172,13 @@ def _objective(name: str) -> Callable[[Balance, Array], Array]:
 
 
 def _least_norm(balance: Balance, friction: Array) -> Array:
-    """Balanced forces of least norm, (n, 3k); NaN from the first wrench on that has none."""
+    """Find balanced forces of least norm, (n, 3k); NaN from the first wrench on that has none."""
     rows = balance.pyramids(friction)
+    # |F0 + null z| is least where |z| is, F0 being orthogonal to the null space of (1)
     Z = least_distance(*balance.polyhedra(rows))
     F = balance.checked(balance.F0 + Z @ balance.null.T)
     P, hopeless = np.eye(F.shape[1]), balance.beyond(friction)
+    # where the nearest point is not proved, ProxQP is asked, then the exact cones
     for i in np.flatnonzero(np.isnan(F[:, 0])):
         one = balance.one(int(i))
         if hopeless[i]:
@@ -178,7 +195,7 @@ def _least_norm(balance: Balance, friction: Array) -> Array:
 
 
 def _least_friction_each(balance: Balance, friction: Array) -> Array:
-    """Balanced forces of least friction, (n, 3k); NaN from the first wrench on that has none."""
+    """Find balanced forces of least friction, (n, 3k); NaN from the first wrench without any."""
     largest = float(friction.max())
     weights = friction / largest if largest > 0.0 else np.ones(len(friction))
     F = np.full(balance.F0.shape, np.nan)
@@ -188,6 +205,7 @@ def _least_friction_each(balance: Balance, friction: Array) -> Array:
             break
         one = balance.one(i)
         f = _least_friction(one, largest, weights)
+        # pyramids may hold no forces that the cones hold, so the iteration starts in the cones then
         if f is None or not _in_cones(f, friction):
             start = least_norm_in_cones(one, friction)
             f = f if start is None else lower_friction(one, weights, start)
@@ -198,14 +216,14 @@ def _least_friction_each(balance: Balance, friction: Array) -> Array:
 
 
 def _in_cones(f: Array, friction: Array) -> bool:
-    """Whether local forces (3k,) are there and need no more than the friction."""
+    """Return whether local forces (3k,) are numbers and need no more than the friction."""
     return bool(needed_friction(f[None], friction)[0] <= 1.0 + RESIDUAL)
 
 
 def _least_friction(balance: Balance, start: float, weights: Array) -> Array | None:
-    """Forces (3k,) that need the least r, where the friction of each contact is r times its weight.
+    """Find forces (3k,) that need the least r, each contact having the friction r times its weight.
 
-    The iteration starts from a coefficient on the way there.
+    The iteration starts from a coefficient on the way to it.
     """
     best, friction = None, start
     for _ in range(MAX_ROUNDS):
@@ -222,12 +240,13 @@ def _least_friction(balance: Balance, start: float, weights: Array) -> Array | N
 
 
 def _toward_less_friction(balance: Balance, friction: float, weights: Array) -> Array:
-    """Balanced forces whose largest excess over `friction`, a further variable, is least.
+    """Find balanced forces with the least excess (4) over `friction`, which is a further variable.
 
     With the forces F0 + null @ z and the excess t, what is minimised is, but for a constant,
     half the square of (sqrt(REGULAR) z, t + 1).
     """
     rows = balance.pyramids(friction * weights)
+    # the pyramids (3) widened by t: R f <= weight t
     allowance = np.repeat(weights, len(rows) // len(weights))
     C, D = balance.polyhedra(rows)
     excess = np.zeros((len(C), 1))
@@ -259,6 +278,7 @@ def _check_limits(normal_force: tuple[float, float]) -> None:
     limits = several(normal_force, each, "normal_force", "limits")
     if len(limits) != len(("least", "largest")) or not limits[0] < limits[1]:
         raise InputError(f"normal_force must be (least, largest), got {shown(normal_force)}")
+    # infinity stands for no upper limit; any other limit must be a force of a plausible size
     if not (SMALLEST <= limits[1] <= LARGEST or (limits[1] == math.inf and limits[0] <= LARGEST)):
         raise InputError(
             f"normal_force: largest must be from {SMALLEST:g} to {LARGEST:g} N, or infinite, got "
@@ -267,7 +287,7 @@ def _check_limits(normal_force: tuple[float, float]) -> None:
 
 
 def _rows(wrench: ArrayLike) -> tuple[Array, bool]:
-    """Wrenches as rows, and whether there is but one that is no row."""
+    """Return wrenches as rows, and whether a single one was given that was not a row."""
     try:
         single = np.ndim(wrench) != 2  # noqa: PLR2004 - rows and columns
     except ValueError:  # ragged, which `frozen` explains
@@ -283,7 +303,7 @@ def _rows(wrench: ArrayLike) -> tuple[Array, bool]:
 
 
 def _remedy(normal_force: tuple[float, float]) -> str:
-    """What may help: without limits, forces for one load are forces for it at any size."""
+    """Return what may help: without limits, a load that has forces has them at any size."""
     if math.isfinite(normal_force[1]):
         return "lower the load or raise the limits"
     return "use more friction or place the contacts otherwise"
@@ -301,6 +321,7 @@ def _solve(P: Array, q: Array, rows: Array, balance: Balance, *, balanced: bool)
     solver = _qpsolvers()
     forces = balance.G.shape[1]
     lower, upper = np.full(len(q), -np.inf), np.full(len(q), np.inf)
+    # (2) as bounds on every third variable, (1) as equations unless its residual is the objective
     lower[0:forces:3], upper[0:forces:3] = balance.least, balance.largest
     map_of_all = np.hstack([balance.G, np.zeros((6, len(q) - forces))])
     equations = (map_of_all, -balance.W[0]) if balanced else (None, None)
@@ -326,7 +347,7 @@ def _qpsolvers() -> Any:
 
 
 def _polished(program: Any, x: Array) -> Array:
-    """The exact optimum on the constraints that are active at x, if it is feasible and as good.
+    """Return the exact optimum on the constraints active at x, if it is feasible and as good as x.
 
     The solver stops anywhere within its tolerance, at a point that depends on where its numbers
     lie in memory. The conditions of optimality on the active constraints are linear equations
@@ -349,7 +370,7 @@ def _polished(program: Any, x: Array) -> Array:
 
 
 def _as_rows(program: Any) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """P, q, then C x <= d with the bounds among the rows, then A x = b."""
+    """Return P, q, then C x <= d with the bounds among the rows, then A x = b."""
     n = len(program.q)
     above, below = np.isfinite(program.ub), np.isfinite(program.lb)
     C = np.vstack([program.G, np.eye(n)[above], -np.eye(n)[below]])

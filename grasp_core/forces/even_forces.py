@@ -2,8 +2,9 @@
 
 Solved, with the pushes f_n = n.f and the tangential parts f_t of the contact forces f:
 
-    maximise t  subject to  sum f_i = 0,  sum x_i x f_i = 0,
-                            t <= f_n <= 1,  |f_t| <= mu f_n   for all contacts
+    maximise t  subject to  sum f_i = 0,  sum x_i x f_i = 0,                            (1)
+                            t <= f_n <= 1  for all contacts,                            (2)
+                            |f_t| <= mu f_n  for all contacts.                          (3)
 
 Zero forces are always allowed, so t is never negative. It is positive iff balanced forces in the
 cones exist with which every finger pushes. The largest push is 1 then: scaling would raise t.
@@ -20,13 +21,13 @@ from grasp_core.errors import NoForcesError, SolverError
 from grasp_core.solvers.conic import ConicProgram, minimize
 
 NO_PUSH = 1e-9
-"""A least push below this is none, in largest pushes: a hundred times what the solver leaves."""
+"""A least push below this share of the largest is none: a hundred times what the solver leaves."""
 IMBALANCE = 1e-9
 """Largest imbalance of the answer, in largest pushes, for contacts of unit size."""
 
 
 def even_forces(positions: ArrayLike, normals: ArrayLike, friction: ArrayLike) -> Array:
-    """Balanced forces whose least push is as large as it can be, the largest push being 1 N.
+    """Find balanced forces whose least push is as large as it can be, the largest push being 1 N.
 
     Args:
         positions: Contact points, (k, 3) [m].
@@ -49,6 +50,7 @@ def even_forces(positions: ArrayLike, normals: ArrayLike, friction: ArrayLike) -
     frames = contact_frames(units) * np.column_stack([np.ones(k), mu, mu])[:, None]
     pushes, least = np.eye(3 * k, 3 * k + 1)[0::3], np.eye(3 * k + 1)[-1]
     balance = np.hstack([in_frames(grasp_map(arms), frames), np.zeros((WRENCH, 1))])
+    # rows: (1), the upper and the lower bounds of (2), the cones (3)
     A = np.vstack([balance, pushes, least - pushes, -np.eye(3 * k, 3 * k + 1)])
     b = np.concatenate([np.zeros(WRENCH), np.ones(k), np.zeros(4 * k)])
     x = minimize(ConicProgram(-least, A, b, WRENCH, 2 * k, (3,) * k)).x[:-1]

@@ -1,9 +1,11 @@
 """Balanced contact forces that need the least friction, with exact circular cones.
 
 Solved: the least mu such that forces with |tangential part| <= mu normal part balance a wrench
-within limits on the normal parts. With mu the coefficient that the forces at hand need,
+within limits on the normal parts. With mu the coefficient that the current forces need,
 
-    minimise t  subject to  G f = -w,  l <= f_n <= u,  |f_t| <= mu f_n + t   for all contacts
+    minimise t  subject to  G f = -w,                                                   (1)
+                            l <= f_n <= u  for all contacts,                            (2)
+                            |f_t| <= mu f_n + t  for all contacts                       (3)
 
 gives forces that need less, unless t = 0 (Dinkelbach). Contacts whose frictions differ have
 weights a, and |f_t| <= a (mu f_n + t). Forces planned with pyramids, where the
@@ -20,9 +22,10 @@ from grasp_core.forces.balance import NO_FORCE, Balance
 from grasp_core.solvers.conic import ConicProgram, minimize
 
 IMPROVEMENT = 1e-4
-"""Iteration ends when the coefficient falls by less than this share: some 1e-4 from the least."""
+"""The iteration ends when the coefficient falls by less than this share: some 1e-4 from the
+least."""
 MAX_ROUNDS = 12
-"""Each costs a program; the excess falls by half or more a round, faster unless a finger idles."""
+"""Most programs: the excess falls by half or more in each, and faster unless a finger idles."""
 ROUNDING = 1e-9
 """Largest imbalance, and distance outside the limits, in units of the largest force."""
 FRICTIONLESS = 1e-6
@@ -30,15 +33,15 @@ FRICTIONLESS = 1e-6
 
 
 def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:
-    """Forces that balance the first wrench as the given ones do and need the least friction.
+    """Find forces that balance the first wrench as the given ones do and need the least friction.
 
     Args:
         balance: The wrench and the limits.
-        weights: What the friction of each contact is in units of the coefficient, (k,).
+        weights: Friction of each contact in units of the common coefficient, (k,).
         forces: Balanced local forces to start from, (3k,).
 
     Returns:
-        (3k,); the given forces where the solver finds none that need less.
+        Local forces, (3k,); the given ones where the solver finds none that need less.
     """
     best, friction = forces, _needed_friction(forces, weights)
     program = _without_friction(balance, weights)
@@ -53,6 +56,7 @@ def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:
         needed = _needed_friction(better, weights)
         if not needed < friction:
             break
+        # an improvement is kept, but a small one ends the search
         improved = needed < friction * (1.0 - IMPROVEMENT)
         best, friction = better, needed
         if not improved:
@@ -61,21 +65,23 @@ def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:
 
 
 def _needed_friction(forces: Array, weights: Array) -> float:
-    """The largest ratio of tangential to weighted normal part, where there are weights."""
+    """Return the largest ratio of tangential to weighted normal part, over positive weights."""
     along, across = forces[0::3], np.hypot(forces[1::3], forces[2::3])
     ratios = across / np.maximum(weights * along, NO_FORCE)
     return float(ratios[weights > 0.0].max())
 
 
 def _without_friction(balance: Balance, weights: Array) -> ConicProgram:
-    """The program of the module's text with mu = 0; its last 3k rows are the cones."""
+    """Build the module's program with mu = 0; its last 3k rows are the cones (3)."""
     n, count = balance.G.shape[1], len(weights)
     normal, excess = np.eye(n, n + 1)[0::3], np.eye(n + 1)[n]
+    # the first row of each cone, a (mu f_n + t), gets its mu in `_with_least_excess`
     balanced, cones = np.hstack([balance.G, np.zeros((6, 1))]), -np.eye(n, n + 1)
     cones[0::3] = -weights[:, None] * excess
     bounded = [(-normal, np.full(count, -balance.least[0]))]
     if np.isfinite(balance.largest[0]):
         bounded.append((normal, np.full(count, balance.largest[0])))
+    # rows: the balance (1), the limits (2), the cones (3)
     A = np.vstack([balanced, *(rows for rows, _ in bounded), cones])
     b = np.concatenate([-balance.W[0], *(limit for _, limit in bounded), np.zeros(n)])
     return ConicProgram(excess, A, b, 6, count * len(bounded), (3,) * count)

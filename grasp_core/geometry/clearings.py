@@ -1,8 +1,9 @@
-"""Large convex polygons that no segment of a plane enters, as clearings between obstacles.
+"""Large convex polygons that no segment of a plane enters: clearings between obstacles.
 
-Each segment is kept out by a half-plane through its point nearest to the middle, across the way
-there: as a segment is convex, all of it is beyond. What "nearest" means is measured by an ellipse
-around the clearing, so that long clearings grow long; the largest of a few rounds is kept.
+Each segment is kept out by a half-plane through its point nearest to the middle of the polygon,
+square to the line between the two: as a segment is convex, all of it is beyond. Nearness is
+measured by an ellipse around the clearing, so that long clearings grow long; the largest polygon of
+a few rounds is kept.
 
 The idea is that of IRIS (Deits & Tedrake, "Computing large convex regions of obstacle-free space
 through semidefinite programming", 2015), with the ellipse of the polygon's second moments.
@@ -16,15 +17,15 @@ from grasp_core.solvers.ties import first_best, surpassing
 
 ROUNDS = 5
 CANDIDATES = 400
-"""Points that are tried as the middle."""
+"""Most points that are tried as the middle."""
 
 
 def clearest_point(points: Array, segments: Array) -> tuple[Array, float]:
-    """The point farthest from all segments, and how far that is.
+    """Find the point farthest from all segments, (2,), and how far that is.
 
     Args:
-        points: Candidates, (n, 2); of many only some are tried.
-        segments: (m, 2, 2)
+        points: Candidates, (n, 2); if there are many, only some are tried.
+        segments: End points of segments, (m, 2, 2).
     """
     tried = points[:: 1 + len(points) // CANDIDATES]
     room = np.array([_nearest(point, segments)[1].min() for point in tried])
@@ -33,12 +34,12 @@ def clearest_point(points: Array, segments: Array) -> tuple[Array, float]:
 
 
 def clearing(start: Array, segments: Array, gap: float) -> Array | None:
-    """A convex polygon around a point that no segment enters, (k, 2), counter-clockwise.
+    """Find a convex polygon around a point that no segment enters, (k, 2), counter-clockwise.
 
     Args:
-        start: Inside, (2,).
-        segments: Obstacles all around, (m, 2, 2).
-        gap: How far to stay from them.
+        start: Point inside the polygon, (2,).
+        segments: End points of obstacles all around, (m, 2, 2).
+        gap: How far the polygon stays from them.
     """
     low, high = segments.min(axis=(0, 1)), segments.max(axis=(0, 1))
     box = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
@@ -54,7 +55,7 @@ def clearing(start: Array, segments: Array, gap: float) -> Array | None:
 
 
 def _cut(box: Array, middle: Array, segments: Array, stretch: Array, gap: float) -> Array:
-    """The box without what half-planes cut off for the segments, nearest first."""
+    """Cut off half-planes from the box for the segments, nearest first."""
     left = (segments - middle) @ stretch.T
     polygon = box
     while len(left):
@@ -74,7 +75,7 @@ def _cut(box: Array, middle: Array, segments: Array, stretch: Array, gap: float)
 
 
 def _nearest(point: Array, segments: Array) -> tuple[Array, Array]:
-    """Points of segments nearest to a point, (m, 2), and their distances, (m,)."""
+    """Return the points of segments nearest to a point, (m, 2), and their distances, (m,)."""
     tails, along = segments[:, 0], segments[:, 1] - segments[:, 0]
     squared = np.einsum("mi,mi->m", along, along)
     share = np.einsum("mi,mi->m", point - tails, along) / np.where(squared > 0.0, squared, 1.0)
@@ -83,7 +84,7 @@ def _nearest(point: Array, segments: Array) -> tuple[Array, Array]:
 
 
 def _ellipse(polygon: Array) -> tuple[Array, Array]:
-    """Centre of a polygon, and the map that makes its second moments those of a disc."""
+    """Return a polygon's centre and the map that makes its second moments those of a disc."""
     _, centre = area_and_centroid([polygon])
     after = np.roll(polygon, -1, axis=0)
     corners = np.concatenate([polygon, 0.5 * (polygon + after)]) - centre

@@ -1,7 +1,7 @@
-"""Points that are close to each other, and what hangs together through links.
+"""Points that are close to each other, and the sets that links join into one piece.
 
-With numpy alone: a library for graphs takes longer to import than a small object to plan on. It is
-asked where points crowd.
+Numpy alone does this: a library for graphs takes longer to import than a small object to plan on.
+Scipy's tree is used only where points crowd.
 """
 
 import importlib
@@ -13,23 +13,23 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
 
 GENERAL = np.array([0.41421, 0.56714, 0.69315])
-"""A direction square to no face that anyone builds, where shadows would crowd; shorter than one, so
-that shadows are closer than points."""
+"""Direction of the line of shadows, square to no face that anyone builds, where shadows would
+crowd; shorter than one, so that shadows are closer than points."""
 CROWDED = 64
-"""Neighbours of a shadow with which it is compared one by one."""
+"""Most neighbours of a shadow that are compared with it one by one."""
 MOST_LINKS = 100
-"""For each point."""
+"""Most links per point."""
 
 
 def close_pairs(points: Array, reach: float) -> Indices:
-    """Links between points within a distance of each other, (k, 2).
+    """List links between points within a distance of each other, as pairs of indices, (k, 2).
 
     Close points have close shadows on a line, so only neighbours there are compared. Equal points
     are linked in a row, and compared with others only once.
 
     Args:
-        points: (n, 3)
-        reach: In the same unit.
+        points: Points, (n, 3), in any unit of length.
+        reach: Largest distance of a link, in the same unit.
 
     Raises:
         InputError: So many points are close to each other that their links cannot be listed.
@@ -64,13 +64,13 @@ def _pairs_of_tree(points: Array, reach: float) -> Indices:
 
 
 def components(count: int, links: Indices) -> Indices:
-    """Of each of so many things the least one that it hangs together with, (count,).
+    """Return for each thing the least index among those it is connected with, (count,).
 
-    Labels only fall: along links, then to the label of a label, until all links are between equals.
+    Labels only fall: along links, then to the label of a label, until all links join equal labels.
 
     Args:
-        count: Of things.
-        links: Pairs of them, (k, 2).
+        count: Number of things.
+        links: Pairs of indices of linked things, (k, 2).
     """
     label = np.arange(count)
     while (label[links[:, 0]] != label[links[:, 1]]).any():

@@ -14,30 +14,30 @@ FEWEST_CORNERS, MOST_CORNERS = 3, 5000
 WIDTH, FINE = 1e-6, 1e-9
 """How far a radius may be from that of the largest disc: relative to it, and in unit size."""
 LEFT_OUT = 2e-3
-"""Share of a polygon's area that it may lack of a disc: half of it is what corners are saved for,
+"""Share of a polygon's area that it may lack of a disc: half of it is given up to save corners,
 the rest is for `SIDES`."""
 SIDES = 64
-"""Of the polygon around a disc, whose area is larger by 8e-4 of it."""
+"""Sides of the polygon around a disc, whose area is larger by 8e-4 of it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FlatPolygon:
-    """A convex polygon in its plane."""
+    """A convex polygon in its plane, by its corners and by its half-planes."""
 
     corners: Array
-    """Counter-clockwise, (k, 2)."""
+    """Corners, counter-clockwise, (k, 2)."""
     E: Array
     """Unit outward edge normals, (k, 2)."""
     b: Array
-    """Inside is E y <= b, (k,)."""
+    """Offsets of the edges, (k,): a point y is inside where E y <= b."""
 
     def holds(self, points: Array, slack: float) -> bool:
-        """Whether points (n, 2) are inside, or outside by a slack at most."""
+        """Return whether points (n, 2) are inside, or outside by a slack at most."""
         return bool((points @ self.E.T <= self.b + slack).all())
 
 
 def flat_polygon(arms: Array, normal: Array, slack: float) -> FlatPolygon | None:
-    """Points (k, 3) of the plane through zero as a convex polygon, wound about its normal.
+    """Make a convex polygon, wound about its normal, of points (k, 3) in the plane through zero.
 
     Returns:
         None if the points are off the plane, or not corners of a convex polygon in order.
@@ -48,7 +48,7 @@ def flat_polygon(arms: Array, normal: Array, slack: float) -> FlatPolygon | None
 
 
 def convex_polygon(corners: Array, slack: float) -> FlatPolygon | None:
-    """Corners (k, 2) as a convex polygon; None if they are not its corners in order.
+    """Make a convex polygon of corners (k, 2); None if they are not its corners in order.
 
     Corners that coincide with the one before, as cutting leaves them, count once.
     """
@@ -62,7 +62,7 @@ def convex_polygon(corners: Array, slack: float) -> FlatPolygon | None:
 
 
 def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:
-    """Whether a polygon whose edges move inwards just vanishes when they have moved by a radius."""
+    """Return whether moving all edges inwards by the radius makes the polygon just vanish."""
     inner, outer = (
         clip(polygon.corners, polygon.E, polygon.b - radius - sign * (WIDTH * radius + FINE))
         for sign in (-1.0, 1.0)
@@ -71,7 +71,7 @@ def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:
 
 
 def holds_disc(polygon: FlatPolygon, border: FlatPolygon, center: Array, radius: float) -> bool:
-    """Whether a polygon holds what a border has of a disc, but for `LEFT_OUT` of its area."""
+    """Return whether a polygon covers a disc within a border, up to `LEFT_OUT` of its own area."""
     turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
     rows = np.column_stack([np.cos(turns), np.sin(turns)])
     disc = clip(border.corners, rows, rows @ center + radius)

@@ -1,4 +1,4 @@
-"""The door to trimesh: its reading of mesh files."""
+"""The door to trimesh, which reads mesh files."""
 
 import importlib
 import io
@@ -10,9 +10,9 @@ from grasp_core.arrays import Array, Indices
 
 
 def parsed_by_trimesh(kind: str, data: bytes) -> tuple[Array, Indices]:
-    """Vertices (n, 3) and triangles (t, 3) as trimesh finds them; none where it finds none.
+    """Read vertices (n, 3) and triangles (t, 3) with trimesh; both empty where it finds none.
 
-    It guesses and skips where a file is broken, and raises whatever the bytes lead it to.
+    Trimesh guesses and skips where a file is broken, and raises whatever the bytes lead it to.
     """
     scene = _trimesh("exchange.load").load_scene(
         io.BytesIO(data), file_type=kind, process=False, skip_materials=True

@@ -1,4 +1,4 @@
-"""Nearest points of triangles, with no tolerance: what is tiny or thin is measured like the rest.
+"""Nearest points of triangles, with no tolerance: tiny and thin ones are measured like the rest.
 
 Solved: for a point p and a triangle a, b, c, its point q nearest to p.
 
@@ -20,12 +20,12 @@ from grasp_core.solvers.ties import first_best
 
 
 def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Array:
-    """The surface point nearest to each of several points, (n, 3) [m].
+    """Find the surface point nearest to each of several points, (n, 3) [m].
 
     Args:
-        vertices: (v, 3) [m]
-        triangles: (t, 3)
-        points: (n, 3) [m]
+        vertices: Vertices of the surface, (v, 3) [m].
+        triangles: Indices of the vertices of each triangle, (t, 3).
+        points: Points to start from, (n, 3) [m].
     """
     corners = vertices[triangles]
     nearest = np.empty((len(points), 3))
@@ -36,11 +36,11 @@ def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Ar
 
 
 def nearest_on_triangles(corners: Array, point: Array) -> Array:
-    """The point of each of several triangles nearest to a point, (t, 3) [m].
+    """Find the point of each of several triangles nearest to a point, (t, 3) [m].
 
     Args:
-        corners: (t, 3, 3) [m]
-        point: (3,) [m]
+        corners: Corners of the triangles, (t, 3, 3) [m].
+        point: Point to start from, (3,) [m].
     """
     candidates = np.stack([*_on_edges(corners, point), _foot(corners, point)])
     nearest = np.linalg.norm(candidates - point, axis=2).argmin(axis=0)
@@ -48,7 +48,7 @@ def nearest_on_triangles(corners: Array, point: Array) -> Array:
 
 
 def _on_edges(corners: Array, point: Array) -> list[Array]:
-    """The point of each edge nearest to a point, three times (t, 3)."""
+    """Return the point of each edge nearest to a point, three times (t, 3)."""
     found: list[Array] = []
     for start, end in ((0, 1), (1, 2), (2, 0)):
         tails = corners[:, start]
@@ -59,7 +59,7 @@ def _on_edges(corners: Array, point: Array) -> list[Array]:
 
 
 def _foot(corners: Array, point: Array) -> Array:
-    """The foot of a point on each triangle if it is inside, else a corner, (t, 3)."""
+    """Return the foot of a point on each triangle if it is inside, else a corner, (t, 3)."""
     tails = corners[:, 0]
     one, other, away = corners[:, 1] - tails, corners[:, 2] - tails, point - tails
     normals = np.cross(one, other)
@@ -77,5 +77,5 @@ def _dots(a: Array, b: Array) -> Array:
 
 
 def _divided(a: Array, b: Array) -> Array:
-    """Quotients; zero where a triangle or an edge has no size, and its corners are candidates."""
+    """Divide; zero where a triangle or edge has no size, as its corners are candidates anyway."""
     return np.divide(a, b, out=np.zeros_like(a), where=b > 0.0)

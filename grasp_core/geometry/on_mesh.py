@@ -1,4 +1,4 @@
-"""Is a point on a triangle mesh, with the mesh's normal there?"""
+"""The surface of a triangle mesh, and whether a point with a normal lies on it."""
 
 import math
 from typing import Any
@@ -9,12 +9,12 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.geometry.nearest_points import nearest_on_triangles
 
 LEAN = math.cos(3e-3)
-"""Of the angle between a normal and a triangle's that count as one: planar faces are as flat as
-`FlatnessLimits` say, and six digits round."""
+"""Cosine of the largest angle between a normal and a triangle's that still agree: planar faces are
+as flat as `FlatnessLimits` say, and six digits round."""
 
 
 class Surface:
-    """A closed triangle mesh, wound outwards."""
+    """The surface of a closed triangle mesh, wound outwards."""
 
     def __init__(self, vertices: Array, triangles: Indices) -> None:
         self._corners: Any = vertices[triangles]
@@ -25,11 +25,11 @@ class Surface:
         self._inward = -outward / np.where(lengths > 0.0, lengths, 1.0)
 
     def holds(self, point: Array, normal: Array | None, slack: float) -> bool:
-        """Whether a point is on the surface, and a triangle there has the normal if one is given.
+        """Return whether a point is on the surface, on a triangle with the normal if one is given.
 
         Args:
-            point: (3,) [m]
-            normal: Into the solid, (3,).
+            point: The point, (3,) [m].
+            normal: Unit vector into the solid, (3,); None if any will do.
             slack: How far the point may be from a triangle [m].
         """
         near = np.linalg.norm(nearest_on_triangles(self._corners, point) - point, axis=1) <= slack

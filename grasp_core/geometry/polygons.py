@@ -1,6 +1,6 @@
-"""Figures in a plane: frames, edges, clipping, and convex pieces of a polygon with holes.
+"""Polygons in a plane: frames, edges, clipping, and convex pieces of a polygon with holes.
 
-A polygon is an (k, 2) array of corners, counter-clockwise unless it is a hole. A convex
+A polygon is a (k, 2) array of corners, counter-clockwise unless it is a hole. A convex
 polygon is also the set {y : E y <= b}, with the rows of E unit outward edge normals.
 """
 
@@ -19,20 +19,20 @@ CONVEX_SLACK = 1e-9
 lengths' product: well above the rounding of coordinates, well below a visible notch."""
 
 SAME_PART = 1e-3
-"""Of the slack within which corners are straight: heights closer than this are equal."""
+"""Share of the slack of straight corners within which heights are equal."""
 SAME_CORNER = 1e-9
-"""Corners closer than this are one, at unit size."""
+"""Distance below which two corners are one, at unit size."""
 ON_LINE = 1e-12
-"""Corners closer than this to a line, relative to their coordinates, are on it: a thousand rounding
+"""Distance from a line, relative to coordinates, below which a corner is on it: a thousand rounding
 errors. Else a cut through a corner leaves a second corner beside it on some machines."""
 TRIMMED = 1e-3
-"""Share of a polygon's area that fewer corners may cost."""
+"""Share of a polygon's area that may be given up to have fewer corners."""
 
 Row: TypeAlias = tuple[float, float, float]
 
 
 def plane_frame(normal: Array) -> Array:
-    """Two orthonormal columns spanning the plane with this normal, (3, 2).
+    """Return two orthonormal columns spanning the plane with this normal, (3, 2).
 
     (column 0, column 1, normal) is right-handed. The choice is deterministic and
     depends on the normal only, so that all figures on one face share it.
@@ -41,7 +41,7 @@ def plane_frame(normal: Array) -> Array:
 
 
 def plane_tangents(x: float, y: float, z: float) -> tuple[Row, Row]:
-    """The columns of `plane_frame`, of the normal (x, y, z)."""
+    """Return the columns of `plane_frame` for the normal (x, y, z)."""
     smallest = min(abs(x), abs(y), abs(z))
     if abs(x) == smallest:
         u, v, w = 0.0, -z, y
@@ -55,13 +55,13 @@ def plane_tangents(x: float, y: float, z: float) -> tuple[Row, Row]:
 
 
 def signed_area(polygon: Array) -> float:
-    """Area of a polygon, positive when counter-clockwise."""
+    """Return the area of a polygon, positive when counter-clockwise."""
     x, y = polygon.T
     return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def area_and_centroid(loops: list[Array]) -> tuple[float, Array]:
-    """Area and centre of area (2,) of an outer border with holes (holes clockwise)."""
+    """Return the area and its centre (2,) of an outer border with holes (holes clockwise)."""
     area, moment = 0.0, np.zeros(2)
     for loop in loops:
         following = np.roll(loop, -1, axis=0)
@@ -72,7 +72,7 @@ def area_and_centroid(loops: list[Array]) -> tuple[float, Array]:
 
 
 def edge_rows(polygon: Array) -> tuple[Array, Array]:
-    """Half-planes (E, b) of a convex counter-clockwise polygon: inside is E y <= b."""
+    """Return the half-planes (E, b) of a convex counter-clockwise polygon: inside is E y <= b."""
     along = np.roll(polygon, -1, axis=0) - polygon
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     E = np.column_stack([along[:, 1], -along[:, 0]])
@@ -80,7 +80,7 @@ def edge_rows(polygon: Array) -> tuple[Array, Array]:
 
 
 def clip(polygon: Array, rows: Array, limits: Array) -> Array:
-    """The part of a convex polygon where rows @ y <= limits; (0, 2) when nothing is left."""
+    """Cut a convex polygon down to where rows @ y <= limits; (0, 2) when nothing is left."""
     for row, limit in zip(rows, limits, strict=True):
         height = polygon @ row - limit
         height[np.abs(height) <= ON_LINE * np.abs(polygon).max(initial=0.0)] = 0.0
@@ -97,12 +97,12 @@ def clip(polygon: Array, rows: Array, limits: Array) -> Array:
 
 
 def tidy(polygon: Array) -> Array:
-    """A polygon (k, 2) at unit size without corners that coincide with the one before."""
+    """Remove corners that coincide with the one before from a polygon (k, 2) at unit size."""
     return polygon[np.linalg.norm(polygon - np.roll(polygon, 1, axis=0), axis=1) > SAME_CORNER]
 
 
 def with_fewer_corners(polygon: Array) -> Array:
-    """A convex polygon inside of a convex one (k, 2), without corners that cut hardly any area."""
+    """Drop corners of a convex polygon (k, 2) that hold hardly any area; the rest is inside it."""
     left = TRIMMED * signed_area(polygon)
     while len(polygon) > 3:  # noqa: PLR2004 - a triangle has no corner to spare
         before, after = (
@@ -119,7 +119,7 @@ def with_fewer_corners(polygon: Array) -> Array:
 
 
 def nearest_point(polygon: Array, point: Array) -> Array:
-    """The point of a convex counter-clockwise polygon (k, 2) that is nearest to a point (2,)."""
+    """Return the point of a convex counter-clockwise polygon (k, 2) nearest to a point (2,)."""
     E, b = edge_rows(polygon)
     if (E @ point <= b).all():
         return point
@@ -130,9 +130,9 @@ def nearest_point(polygon: Array, point: Array) -> Array:
 
 
 def convex_hull(points: Array) -> Array:
-    """Corners of the convex hull of points (n, 2), counter-clockwise, (k, 2).
+    """Return the corners of the convex hull of points (n, 2), counter-clockwise, (k, 2).
 
-    They begin with the one that comes first among the points, however the figure is turned.
+    They begin with the corner that comes first among the points, however the figure is turned.
     """
     ordered = points[np.lexsort(points.T[::-1])]
 
@@ -151,7 +151,7 @@ def convex_hull(points: Array) -> Array:
 
 
 def _turn(one: Array, two: Array, three: Array) -> float:
-    """Twice the area of a triangle, positive if it turns left."""
+    """Return twice the area of a triangle, positive if it turns left."""
     (x, y), (u, v) = two - one, three - one
     return float(x * v - y * u)
 
@@ -172,7 +172,7 @@ def without_straight_corners(polygon: Array, slack: float) -> Array:
 
 
 def is_convex(polygon: Array) -> bool:
-    """Whether a counter-clockwise polygon turns left (or goes straight) at every corner."""
+    """Return whether a counter-clockwise polygon turns left (or goes straight) at every corner."""
     edge = np.roll(polygon, -1, axis=0) - polygon
     following = np.roll(edge, -1, axis=0)
     turn = edge[:, 0] * following[:, 1] - edge[:, 1] * following[:, 0]

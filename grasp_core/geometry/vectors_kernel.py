@@ -1,4 +1,4 @@
-"""Products of vectors in space, for other kernels."""
+"""Products of vectors in space, compiled for other kernels."""
 
 import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
@@ -8,7 +8,7 @@ from grasp_core.arrays import Array
 
 @njit(cache=True)
 def dotted(u: Array, v: Array) -> float:
-    """Dot product of two vectors."""
+    """Return the dot product of two vectors."""
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
@@ -22,7 +22,7 @@ def cross(u: Array, v: Array, crossed: Array) -> None:
 
 @njit(cache=True)
 def angle_between(u: Array, v: Array) -> float:
-    """Angle between two vectors [rad], as exact for nearly equal ones as for others."""
+    """Return the angle between two vectors [rad], as exact for nearly equal ones as for others."""
     crossed = np.empty(3)
     cross(u, v, crossed)
     return np.arctan2(np.sqrt(dotted(crossed, crossed)), dotted(u, v))
@@ -30,7 +30,7 @@ def angle_between(u: Array, v: Array) -> float:
 
 @njit(cache=True)
 def balancing_weights(axes: Array, weights: Array) -> None:
-    """Fill in weights of sum w_i a_i = 0, (4,), as those of `grasp_core.cones.spanning`."""
+    """Fill in weights of sum w_i a_i = 0, (4,), like those of `grasp_core.cones.spanning`."""
     front, back, total = np.empty(3), np.empty(3), 0.0
     cross(axes[2], axes[3], back)
     cross(axes[0], axes[1], front)
@@ -46,7 +46,7 @@ def balancing_weights(axes: Array, weights: Array) -> None:
 
 @njit(cache=True)
 def focus_direction(axes: Array) -> Array:
-    """As `focus_direction` of `grasp_core.families.placements`."""
+    """Compute the same as `focus_direction` of `grasp_core.families.placements`."""
     weights, u = np.empty(4), np.empty(3)
     balancing_weights(axes, weights)
     for j in range(3):
@@ -59,7 +59,7 @@ def focus_direction(axes: Array) -> Array:
 
 @njit(cache=True)
 def across(axis: Array, T: Array) -> tuple[Array, Array]:
-    """Two unit vectors across an axis, the first leaning as the first of a face's frame."""
+    """Return two unit vectors across an axis, the first leaning as the first of a face's frame."""
     first, second, along = np.empty(3), np.empty(3), 0.0
     for j in range(3):
         along += T[j, 0] * axis[j]

@@ -1,15 +1,15 @@
-"""Climbing towards contacts of larger Ferrari-Canny quality on four convex faces.
+"""Contacts climb towards larger Ferrari-Canny quality on four convex faces.
 
 Solved, locally: maximise over positions x_i on the faces the radius of the largest ball of wrenches
-that contact forces of total normal part one resist.
+that contact forces with normal parts of sum one resist.
 
 Derivation. The quality is bounded from below by the plane of an inner polytope that is nearest to
-zero (see `quality`). A simplex of it has corners w_c, made by contact forces F_ci at contacts i,
-a unit normal (a, alpha) and the distance b; the foot of the perpendicular on its plane is
+zero (see `ferrari_canny`). A simplex of it has corners w_c, made by contact forces F_ci at contacts
+i, a unit normal (a, alpha) and the distance b; the foot of the perpendicular on its plane is
 sum_c l_c w_c. When contacts move by d_i and take their forces along, w_c moves by
 (0, sum_i d_i x F_ci), and
 
-    b changes by  sum_i d_i . (Phi_i x alpha),   Phi_i = sum_c l_c F_ci.
+    b changes by  sum_i d_i . (Phi_i x alpha),   Phi_i = sum_c l_c F_ci.                      (1)
 
 Each step is a linear program: raise the least of these linearised distances, with positions inside
 the faces and no coordinate moved farther than a trust region allows. A step counts when
@@ -34,34 +34,35 @@ from grasp_core.solvers.ties import graded, nearest_optimum, on_grid, surpassing
 SEARCH_GAP = 1e-3
 """Gap of the quality's bounds during the climb."""
 BAND = 0.2
-"""Simplices up to this share farther than the nearest take part in a step."""
+"""Simplices up to this share farther than the nearest one take part in a step."""
 MOST_ROWS = 100
 STEEPEST = 20.0
-"""Simplices whose foot weighs a corner more than this are too flat to say where it moves."""
+"""Largest weight of a corner in the foot on a simplex: flatter ones do not say where it moves."""
 FLAT = 1e-9
-"""Singular values of simplices below this share of the largest are zero, but for rounding."""
+"""Singular values of simplices below this share of the largest count as zero."""
 STEP_DIGITS = 6
-"""Digits after the point of a step."""
+"""Digits after the point that a step is rounded to."""
 LAST_DIGIT = 10.0**-STEP_DIGITS
-"""A step ends so far inside of the limits, in object radii, as rounding moves it."""
+"""How far inside the limits a step ends, in object radii, which is how far rounding may move it."""
 FIRST_REACH, LEAST_REACH = 0.1, 1e-3
 """Trust region at first and at the end, in object radii."""
 MOST_STEPS = 40
 GOOD, GROWTH = 0.5, 1.5
-"""A step that gains this share of what was predicted lets the trust region grow."""
+"""Share of the predicted gain above which the trust region grows, and by which factor."""
 POOR, SHRINKAGE = 0.2, 0.4
-"""One that gains less than this lets it shrink."""
+"""Share of the predicted gain below which the trust region shrinks, and to which share."""
 WORTHWHILE = 1e-6
 """Predicted relative gain at which the climb ends."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactFaces:
-    """Four convex pieces with the limits that contacts keep on each."""
+    """Four convex pieces of faces, with the limits that contacts keep on each."""
 
     pieces: tuple[FacePiece, ...]
     limits: tuple[Array, ...]
-    """Contact i lies where E_i y <= limits[i], in the plane of its piece."""
+    """Offsets of the edges, for each piece: contact i lies where E_i y <= limits[i] in its
+    plane."""
     friction: float
 
     @property
@@ -70,11 +71,11 @@ class ContactFaces:
         return contact_frames(np.array([piece.normal for piece in self.pieces]))
 
     def positions(self, y: Array) -> Array:
-        """Contacts in space, (k, 3), of plane coordinates, (k, 2)."""
+        """Turn plane coordinates of contacts, (k, 2), into points in space, (k, 3)."""
         return np.array([piece.point(at) for piece, at in zip(self.pieces, y, strict=True)])
 
     def quality(self, y: Array, gap: float = SEARCH_GAP) -> FerrariCanny:
-        """The `l1` quality of contacts, torques in units of the object's size.
+        """Compute the `l1` quality of contacts, torques in units of the object's size.
 
         Its wrenches are on a grid: a polytope that grows where it is weakest has many equal planes
         to choose from.
@@ -84,7 +85,7 @@ class ContactFaces:
         return wrench_set_quality(wrenches.on_grid(), gap)
 
     def climbed(self, y: Array) -> tuple[Array, FerrariCanny]:
-        """Contacts (k, 2) of a local optimum, starting from given ones, and their quality."""
+        """Climb from given contacts to those of a local optimum, (k, 2), and their quality."""
         found, reach = self.quality(y), FIRST_REACH
         for _ in range(MOST_STEPS):
             if found.polytope is None or reach < LEAST_REACH:
@@ -102,7 +103,7 @@ class ContactFaces:
     def _step(
         self, y: Array, found: FerrariCanny, polytope: InnerPolytope, reach: float
     ) -> tuple[Array, float]:
-        """The best move within the trust region, and what it should gain."""
+        """Find the best move within the trust region, and what it should gain."""
         distances, slopes = self.nearest_planes(found, polytope)
         n = y.size
         rows = [np.hstack([-slopes, np.ones((len(slopes), 1))])]
@@ -122,7 +123,7 @@ class ContactFaces:
         return on_grid(x[:n].reshape(y.shape), STEP_DIGITS), float(x[n])
 
     def nearest_planes(self, found: FerrariCanny, polytope: InnerPolytope) -> tuple[Array, Array]:
-        """Distances (m,) and slopes (m, 2k) of the planes nearest to zero."""
+        """Return distances (m,) and slopes (m, 2k), by (1), of the planes nearest to zero."""
         points = polytope.forces @ found.wrenches.G.T
         height = np.einsum("mcj,mj->mc", points[polytope.corners], polytope.normals)
         heights: Array = height.min(axis=1)

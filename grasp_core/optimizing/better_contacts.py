@@ -1,8 +1,8 @@
-"""A grasp moved on its four faces to where its Ferrari-Canny quality is larger.
+"""A grasp is moved on its four faces to where its Ferrari-Canny quality is larger.
 
-Contacts stay on the convex pieces of the faces that they are on.
+Each contact stays on the convex piece of a face that it is on.
 
-The climb of `quality_ascent` has many local optima, so it starts from the grasp's own contacts and
+The climb of `ascent` has many local optima, so it starts from the grasp's own contacts and
 from random ones. The best end is certified like any grasp, and replaces the given one only if it is
 proved to be better: if its lower bound is above the given one's upper bound.
 
@@ -36,30 +36,30 @@ from grasp_core.solvers.ties import coarse, first_best, largest_first, on_grid, 
 from grasp_core.values import FINGERS, ForceCone, Grasp
 
 FINGER_RADIUS = 0.05
-"""In object radii, where none is given: half the radius of a fingertip in the scenes."""
+"""Default radius, in object radii: half the radius of a fingertip in the scenes."""
 RANDOM_STARTS = 3
-"""Followed besides the grasp itself: the best of `RANDOM_TRIALS`."""
+"""Random contacts that are followed besides the grasp itself: the best of `RANDOM_TRIALS`."""
 RANDOM_TRIALS = 24
 START_DIGITS = 8
-"""Digits after the point of where the climb from the grasp itself begins, at unit size."""
+"""Digits after the point of the contacts where the climb of the grasp begins, at unit size."""
 ROUGH = 2e-2
 """Gap of the quality's bounds while starting points are compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Improvement:
-    """A grasp moved on its faces, with the proved bounds before and after."""
+    """A grasp moved on its faces, with the proved bounds of its quality before and after."""
 
     grasp: Grasp
     """The moved grasp; the given one where no better one was found."""
     before: FerrariCanny
     after: FerrariCanny
     clearances: tuple[float, ...]
-    """How far the contacts, if moved, had to stay from the edges of their faces [m]."""
+    """Distance that each contact had to keep from the edges of its face, if moved, (4,) [m]."""
 
     @property
     def gain(self) -> float:
-        """How many times larger the quality has become: the ratio of lower bounds."""
+        """Factor by which the quality has grown: the ratio of lower bounds."""
         return self.after.lower / self.before.lower
 
 
@@ -77,12 +77,12 @@ def optimize_contacts(
 
     Args:
         body: The object.
-        grasp: A grasp of it in force closure at this friction.
+        grasp: A grasp of the object, in force closure at this friction.
         friction: Coulomb coefficient at every contact.
         finger_radius: How far moved contacts stay from edges [m], or half the radius of the
             largest disc in a face if that is less. If None a twentieth of the object's radius or,
             where that is less, as far as the given contact on that face.
-        seed: For the random starting points.
+        seed: Seed of the random starting points.
 
     Returns:
         A certified grasp of quality no lower than the given one's. If moved, its witness is of the
@@ -101,7 +101,10 @@ def optimize_contacts(
         number(finger_radius, "finger_radius", least=SMALLEST, most=body.radius, where=where)
     before = _quality(body, grasp, friction)
     if before.lower <= 0.0:
-        raise InputError(f"grasp {grasp.id} is not in force closure at friction {friction}")
+        raise InputError(
+            f"grasp {grasp.id} is not in force closure at friction {friction}; "
+            "raise the friction or give another grasp"
+        )
     pieces = pieces_under(body, grasp)
     insets = _insets(body, grasp, pieces, finger_radius)
     clearances = tuple(float(body.radius * inset) for inset in insets)
@@ -124,7 +127,7 @@ def optimize_contacts(
 def _insets(
     body: Polyhedron, grasp: Grasp, pieces: Sequence[FacePiece], finger_radius: float | None
 ) -> list[float]:
-    """How far contacts stay from the edges of each piece, at unit size."""
+    """Return how far contacts stay from the edges of each piece, at unit size."""
     if finger_radius is not None:
         return [finger_radius / body.radius] * FINGERS
     depths = [
@@ -141,7 +144,7 @@ def _quality(body: Polyhedron, grasp: Grasp, friction: float) -> FerrariCanny:
 
 
 def pieces_under(body: Polyhedron, grasp: Grasp) -> tuple[FacePiece, ...]:
-    """The convex piece that each contact lies on."""
+    """Return the convex piece of a face that each contact lies on."""
     pieces = unit_pieces(body)
     return tuple(
         _deepest([piece for piece in pieces if piece.face == face], point)
@@ -150,7 +153,7 @@ def pieces_under(body: Polyhedron, grasp: Grasp) -> tuple[FacePiece, ...]:
 
 
 def _deepest(pieces: Sequence[FacePiece], point: Array) -> FacePiece:
-    """The piece that a point is deepest in, the first one of those on whose common edge it is."""
+    """Return the piece that a point is deepest in, or the first if it is on a common edge."""
     depths = [float((piece.b - piece.E @ _in_plane(piece, point)).min()) for piece in pieces]
     return pieces[first_best(depths, SAME_CORNER)]
 
@@ -164,7 +167,7 @@ def _in_plane(piece: FacePiece, point: Array) -> Array:
 
 
 def _clear_of_edges(room: FacePiece, point: Array) -> Array:
-    """A point in the plane of a face, moved towards the middle of its room until inside, (2,)."""
+    """Move a point in the plane of a face towards the middle of its room until inside, (2,)."""
     y, middle = on_grid(_in_plane(room, point), START_DIGITS), room.corners.mean(axis=0)
     beyond = room.E @ y - room.b
     inward = room.E @ (y - middle)
@@ -175,7 +178,7 @@ def _clear_of_edges(room: FacePiece, point: Array) -> Array:
 def _random_starts(
     faces: ContactFaces, rooms: Sequence[FacePiece], rng: np.random.Generator
 ) -> Iterator[Array]:
-    """The best of some random contacts that are in closure, (4, 2) each."""
+    """Return the best of some random contacts that are in closure, (4, 2) each."""
     trials = [
         np.array([rng.dirichlet(np.ones(len(room.corners))) @ room.corners for room in rooms])
         for _ in range(RANDOM_TRIALS)
@@ -188,7 +191,7 @@ def _random_starts(
 def _certified(
     body: Polyhedron, grasp: Grasp, faces: ContactFaces, y: Array, rng: np.random.Generator
 ) -> Grasp | None:
-    """The grasp at these contacts, if closure and a witness of the general type confirm it."""
+    """Return the grasp at these contacts if closure and a general witness confirm it, else None."""
     positions = faces.positions(y)
     normals = np.array([piece.normal for piece in faces.pieces])
     try:

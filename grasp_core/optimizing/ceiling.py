@@ -2,18 +2,22 @@
 
 Solved: how much better than a known grasp any other on the same faces can be.
 
-Derivation. In any direction y the support of a contact's cone, n.v + mu |tangential part of v| with
-v the velocity of the contact under y, is convex in the contact's position. On a product of convex
-parts of the faces it is therefore largest at corners, and contacts at all corners together have a
-quality no smaller than any four contacts in the parts. The support of all corners in a single
-direction, any one, is an upper bound already.
+Derivation. In any direction y the support of a contact's cone,
+
+    n.v + mu |tangential part of v|,  with v the velocity of the contact under y,             (1)
+
+is convex in the contact's position. On a product of convex parts of the faces it is therefore
+largest at corners, and contacts at all corners together have a quality no smaller than any four
+contacts in the parts. The support of all corners in a single direction, any one, is an upper bound
+already.
 
 Branch and bound: the part with the highest bound is cut through its longest face, until all are
 near the target. Directions that bound one part well often bound its neighbours, so all found so far
 are tried before another is searched.
 
-Contacts count that keep clear of the edges as `best_contacts` keeps them; a grasp nearer to an edge
-may have a larger quality. Faces that are not convex count as a whole, up to their borders.
+The bound is for contacts that keep clear of the edges as `better_contacts` keeps them; a grasp
+nearer to an edge may have a larger quality. Faces that are not convex count as a whole, up to their
+borders.
 
 Every part left carries its direction, so the bound can be checked again in plain arithmetic.
 """
@@ -46,37 +50,39 @@ PART_GAP = 0.02
 """Gap of the quality of corner contacts: finer bounds do not help while parts are large."""
 MOST_PARTS = 1_000_000
 ENOUGH = 0.01
-"""Parts whose bound is within this share of what is known are not cut any more."""
+"""Parts whose bound is within this share of the known quality are not cut any more."""
 ROUNDING = 1e-9
-"""By which a part's bound may exceed the ceiling, relative to it or to one newton."""
+"""How far a part's bound may exceed the ceiling, relative to it or to one newton."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leaf:
-    """A part of the faces with a direction in which nothing on it is strong."""
+    """A part of the faces, with a direction in which no contacts on it are strong."""
 
     choice: int
-    """Which combination of convex pieces, one per face."""
+    """Index of a combination of convex pieces, one per face."""
     path: Path
+    """Cuts that lead from the whole pieces to this part."""
     direction: Array
-    """Unit twist, (6,)."""
+    """Unit twist in which the corners' support bounds the quality, (6,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class QualityCeiling:
-    """No contacts on the faces, clear of the edges, have a larger quality than `upper`."""
+    """A bound `upper` that no contacts on the faces, clear of the edges, exceed in quality."""
 
     upper: float
     choices: tuple[tuple[FacePiece, ...], ...]
-    """Convex pieces without their margins, at unit size."""
+    """Convex pieces without their margins, at unit size, one per face in each combination."""
     friction: float
     leaves: tuple[Leaf, ...]
 
     def verify(self) -> bool:
         """Re-check every field in plain arithmetic.
 
-        That the pieces are convex polygons, that the parts cover them, and that all are bounded, to
-        within `ROUNDING`. That the pieces are those of an object's faces is for who has the object.
+        The check is that the pieces are convex polygons, that the parts cover them, and that all
+        are bounded, to within `ROUNDING`. Whether the pieces are those of an object's faces can
+        only be checked with the object.
         """
         with np.errstate(all="ignore"):
             return (
@@ -136,7 +142,7 @@ def quality_ceiling(
         body: The object.
         faces: Indices of four faces.
         friction: Coulomb coefficient at every contact.
-        known: A quality that is attained, where bounding may stop.
+        known: A quality that is attained [N], where bounding may stop.
         finger_radius: How far contacts stay from the edges of their faces [m], one for all faces
             or one each, such as an improvement's `clearances`; contacts nearer to an edge are not
             bounded. A twentieth of the object's radius if None.
@@ -191,7 +197,9 @@ def _choices(
     pieces = unit_pieces(body)
     by_face = [[piece for piece in pieces if piece.face == face] for face in faces]
     if not all(by_face):
-        raise InputError(f"one of the faces {tuple(faces)} is too narrow for a contact")
+        raise InputError(
+            f"one of the faces {tuple(faces)} is too narrow for a contact; choose other faces"
+        )
     # edges between the pieces of a face are no borders: contacts may lie on them
     rooms = [
         [inset_piece(one[0], inset)] if len(one) == 1 else one
@@ -204,11 +212,12 @@ def _bounded(
     choice: Sequence[FacePiece], path: Path, friction: float, directions: list[Array],
     target: float,
 ) -> tuple[float, Array]:  # fmt: skip
-    """An upper bound on a part with its direction; a new one joins those to try."""
+    """Bound a part, with the direction of the bound; a new direction joins those to try."""
     corners = _corner_wrenches(choice, path, friction)
     best, bounds = None, np.empty(0)
     if directions:
         bounds = corners.supports(np.array(directions))
+        # a direction that bounded another part costs no search, so all are tried first
         best = first_best(-bounds)
         if bounds[best] <= target:
             return float(bounds[best]), directions[best]
@@ -217,6 +226,7 @@ def _bounded(
     upper = corners.support(direction)[0]
     if best is not None and bounds[best] < upper:
         return float(bounds[best]), directions[best]
+    # (1) at all corners in the new direction; an old one may still be better
     return upper, direction
 
 

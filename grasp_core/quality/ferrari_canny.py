@@ -2,19 +2,25 @@
 
 Solved: Q, the radius of the largest ball around the zero wrench inside the set W of wrenches
 that bounded contact forces can apply (see `wrench_sets`); if zero lies outside W, minus its
-distance from W.
+distance from W. With h the support of W, (1) of `wrench_sets`, over unit directions y,
 
-Q is the least support of W over unit directions y, so any direction bounds it from above. A
-polytope inside W bounds it from below: no plane of its boundary is nearer to zero. The polytope is
-grown where it is weakest: the point of W farthest along the normal of the nearest plane is added,
-until that plane and its support agree. If zero is outside, the nearest point of W is found by
-a cone program; its forces bound the distance from above, its direction from below.
+    Q  =  min h(y)  <=  h(y) for any y.                                                       (1)
+
+A polytope inside W bounds Q from below, with n.x <= b the planes of its simplices:
+
+    Q  >=  min b, if the simplices enclose zero.                                              (2)
+
+The polytope is grown where it is weakest: the point of W farthest along the normal of the nearest
+plane is added, until that plane and its support agree. If zero is outside, the nearest point of W
+is found by a cone program; its forces bound the distance from above, its direction from below:
+
+    -|w|  <=  Q  for any w in W.                                                              (3)
 
 Without closure, Q of `l1` is negative; that of `linf` is zero, since fingers may then rest.
 
-Both proofs are kept and can be checked again in plain arithmetic; how, `inner_polytope` says for
-the lower bound. Polytopes are grown by a compiled kernel, and those that it leaves, or whose proof
-does not check, by `growing_hull`; so are all where there are no kernels (`GRASPPROOF_KERNELS=off`).
+Both proofs are kept and can be checked again in plain arithmetic; `inner_polytope` explains the one
+of the lower bound. A compiled kernel grows the polytopes. `growing_hull` grows those that the
+kernel gives up or whose proof fails, and all of them without kernels (`GRASPPROOF_KERNELS=off`).
 
 Source: Ferrari & Canny 1992; the growing polytope is the expanding-polytope algorithm of
 collision detection in six dimensions (also Zheng 2013 for this metric).
@@ -40,9 +46,9 @@ from grasp_core.values import Grasp
 GAP = 1e-4
 """Default of the largest (upper - lower) / upper."""
 FINEST_GAP = 1e-7
-"""Below this, simplices become so small that rounding of their planes costs more than they gain."""
+"""Smallest gap: below it, rounding of the planes of tiny simplices costs more than they gain."""
 MOST_SIMPLICES = 60_000
-"""The polytope stops growing here; its bounds hold all the same, a little farther apart."""
+"""Simplices at which the polytope stops growing; its bounds hold all the same, farther apart."""
 ROUNDING = 1e-12
 """Slack of the plain-arithmetic checks, relative to the longest wrench."""
 KERNEL = "grasp_core.quality.ferrari_canny_kernel"
@@ -50,25 +56,27 @@ KERNEL = "grasp_core.quality.ferrari_canny_kernel"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FerrariCanny:
-    """Bounds of a quality with what proves them."""
+    """Bounds of a quality with the direction and the polytope, or forces, that prove them."""
 
     lower: float
-    """No larger than the quality [N]."""
+    """Lower bound of the quality [N]."""
     upper: float
-    """No smaller than the quality [N]."""
+    """Upper bound of the quality [N]."""
     wrenches: WrenchSet
+    """Set of wrenches that the quality is about."""
     direction: Array
     """Unit twist, (6,), torque scale applied, in which the support is at most `upper`."""
     polytope: InnerPolytope | None
-    """If zero is inside: what proves `lower`. None otherwise."""
+    """Polytope that proves `lower` if zero is inside the set; None otherwise."""
     forces: Array | None
-    """If not: local forces, (3k,), whose wrench is no longer than -`lower`. None otherwise."""
+    """Local forces, (3k,), whose wrench is no longer than -`lower`, if zero is not inside; else
+    None."""
 
     def verify(self) -> bool:
         """Re-check every field in plain arithmetic, without any solver.
 
-        Bounds hold for the set of `wrenches`, which is that of some contacts, to within 1e-12 of
-        its longest wrench.
+        The bounds hold for the set `wrenches`, which is checked to be that of some contacts, to
+        within 1e-12 of its longest wrench.
         """
         with np.errstate(all="ignore"):
             sound = is_a(self.wrenches, WrenchSet) and self.wrenches.sound()
@@ -76,11 +84,13 @@ class FerrariCanny:
             if not (sound and ordered and are_units(self.direction, WRENCH, slack=ROUNDING)):
                 return False
             slack = ROUNDING * self.wrenches.size
+            # (1) for the direction
             support, _ = self.wrenches.support(self.direction)
             return support <= self.upper + slack and self._proves_lower(slack)
 
     def _proves_lower(self, slack: float) -> bool:
         width = self.wrenches.G.shape[1]
+        # (2), the points being wrenches of allowed forces
         if self.polytope is not None:
             return (
                 self.forces is None
@@ -89,6 +99,7 @@ class FerrariCanny:
                 and self.wrenches.holds(self.polytope.forces, ROUNDING)
                 and self.polytope.proved_radius(self.wrenches) >= self.lower - slack
             )
+        # (3), by the wrench of allowed forces
         return (
             is_array(self.forces, width)
             and self.wrenches.holds(self.forces[None], ROUNDING)
@@ -106,13 +117,13 @@ def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
     norm: Norm = "l1",
     gap: float = GAP,
 ) -> FerrariCanny:
-    """Largest wrench resisted in every direction with bounded contact forces.
+    """Bound the largest wrench that bounded contact forces resist in every direction.
 
     Args:
         positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
         normals: Unit vectors into the object, (k, 3).
         friction: Coulomb coefficient, one for all contacts or one each, (k,).
-        center: About which torques are taken, (3,) [m].
+        center: Point about which torques are taken, (3,) [m].
         torque_scale: Length that makes a torque comparable with a force [m], such as the
             object's radius. Values with different scales cannot be compared.
         norm: `l1`, normal forces sum to 1 N, or `linf`, each is at most 1 N.
@@ -135,7 +146,7 @@ def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
 
 
 def wrench_set_quality(wrenches: WrenchSet, gap: float = GAP) -> FerrariCanny:
-    """Signed distance of zero from the boundary of a wrench set, with its proof."""
+    """Bound the signed distance of zero from the boundary of a wrench set, with its proof."""
     found = _by_kernel(wrenches, gap) if compiled(KERNEL) is not None else None
     if found is not None:
         return found
@@ -156,7 +167,7 @@ def _inside(
 
 
 def _by_kernel(wrenches: WrenchSet, gap: float) -> FerrariCanny | None:
-    """Bounds by the compiled polytope; None where they are not proved."""
+    """Find bounds with the compiled polytope; None where they are not proved."""
     kernel = compiled(KERNEL)
     linf = wrenches.norm == "linf"
     cones = kernel.Cones(np.array(wrenches.G, order="C"), np.array(wrenches.friction), linf)
@@ -168,6 +179,7 @@ def _by_kernel(wrenches: WrenchSet, gap: float) -> FerrariCanny | None:
         radius = polytope.proved_radius(wrenches)
         if radius > slack:
             return _inside(wrenches, weakest, polytope, radius)
+    # no polytope encloses zero: that is an answer only if the nearest wrench proves it
     try:
         outside = _outside(wrenches, weakest if weakest.any() else None)
     except SolverError:
@@ -176,7 +188,7 @@ def _by_kernel(wrenches: WrenchSet, gap: float) -> FerrariCanny | None:
 
 
 def _grown(wrenches: WrenchSet, gap: float) -> tuple[Array | None, InnerPolytope | None]:
-    """The weakest direction found, and a polytope that shows there is no much weaker one."""
+    """Find the weakest direction, and a polytope that shows there is no much weaker one."""
     edges = wrenches.edges()
     points = edges @ wrenches.G.T
     start = spread_simplex(points)
@@ -187,6 +199,7 @@ def _grown(wrenches: WrenchSet, gap: float) -> tuple[Array | None, InnerPolytope
     while True:
         normal, offset = hull.lowest()
         support, force = wrenches.support(normal)
+        # (1) in the direction of the nearest plane, whose farthest point is the next corner
         if support < upper:
             upper, weakest = support, normal.copy()
         full = len(forces) == MOST_POINTS or hull.size > MOST_SIMPLICES
@@ -202,16 +215,18 @@ def _grown(wrenches: WrenchSet, gap: float) -> tuple[Array | None, InnerPolytope
 
 
 def _outside(wrenches: WrenchSet, direction: Array | None) -> FerrariCanny:
-    """Bounds where zero is not inside the set, or that cannot be told."""
+    """Find bounds where zero is not inside the set, or no polytope could show that it is."""
     unit = replace(wrenches, norm="l1")
     forces, facing = nearest_wrench(unit)
     wrench = unit.G @ forces
     length = float(np.linalg.norm(wrench))
+    # a degenerate set has support zero across its span; each direction bounds Q by (1)
     trials = [] if direction is None else [direction]
     _, _, right = np.linalg.svd(wrenches.edges() @ wrenches.G.T, full_matrices=False)
     trials += [_unit(y) for y in (-wrench, facing, right[-1], -right[-1]) if y.any()]
     weakest = min(trials, key=lambda y: wrenches.support(y)[0])
     upper = wrenches.support(weakest)[0]
+    # resting fingers apply no wrench, which is allowed by linf
     if wrenches.norm == "linf":
         forces, length = np.zeros_like(forces), 0.0
     return FerrariCanny(-length, max(upper, -length), wrenches, weakest, None, forces)

@@ -1,7 +1,7 @@
-"""A polytope that grows inside a set of wrenches until its nearest plane touches the set.
+"""A polytope grows inside a set of wrenches until its nearest plane touches the set.
 
-Solved: the method of `quality`, from the first simplex to the last, for one set. The answer says
-which forces give the points, which points bound each simplex, and with which normals; `quality`
+Solved: the method of `ferrari_canny`, from the first simplex to the last, for one set. The answer
+gives the forces at the points, the points that bound each simplex, and the normals; `ferrari_canny`
 checks that these simplices enclose zero and takes its bounds from them.
 """
 
@@ -23,33 +23,34 @@ from grasp_core.solvers.hull_kernel import (
 )
 
 ROOM = 2048
-"""Simplices at first; at least twice as many whenever these do not suffice."""
+"""Simplices that fit at first; the room at least doubles whenever it does not suffice."""
 GROWN, OUTSIDE, FLAT, LOST = 0, 1, 2, 3
-"""A polytope around zero; zero is outside; all points lie in a plane; the hull fell apart."""
+"""How growing ends: with a polytope around zero, with zero outside, with all points in a plane, or
+with a hull that fell apart."""
 
 
 class Cones(NamedTuple):
-    """What wrenches there are."""
+    """The cones of contact forces, whose wrenches make up the set."""
 
     G: Array
-    """Local contact forces to their wrench, (6, 3k), contiguous."""
+    """Matrix from local contact forces to their wrench, (6, 3k), contiguous."""
     friction: Array
-    """(k,)"""
+    """Coulomb coefficients, (k,)."""
     linf: bool
     """Whether each normal force is bounded, not their sum."""
 
 
 class Limits(NamedTuple):
-    """When to stop."""
+    """The limits at which a polytope stops growing."""
 
     gap: float
-    """(upper - lower) / upper that is enough."""
+    """Largest (upper - lower) / upper that is enough."""
     simplices: int
     points: int
     flat: float
     """Points closer than this to a common plane, relative to their extent, span nothing more."""
     above: float
-    """A point sees a simplex from this height on, relative to the extent."""
+    """Height from which on a point sees a simplex, relative to the extent."""
 
 
 def try_out() -> None:
@@ -60,10 +61,10 @@ def try_out() -> None:
 
 @njit(cache=True)
 def grow(cones: Cones, edges: Array, limits: Limits) -> tuple[int, Array, Indices, Array, Array]:
-    """Grow the polytope.
+    """Grow a polytope inside the set of wrenches, around zero if that is inside.
 
     Args:
-        cones: Of the set.
+        cones: Cones of the contact forces.
         edges: Local forces whose wrenches span what the set spans, (n, 3k), contiguous.
         limits: When to stop.
 
@@ -102,7 +103,7 @@ def grow(cones: Cones, edges: Array, limits: Limits) -> tuple[int, Array, Indice
 
 @njit(cache=True)
 def _support(cones: Cones, y: Array, force: Array) -> float:
-    """Support of the set in the direction y; fills in the local forces that attain it."""
+    """Return the support of the set in the direction y; fill in local forces that attain it."""
     total, best, at = 0.0, -np.inf, np.empty(3)
     force.fill(0.0)
     for i in range(len(cones.friction)):
@@ -137,9 +138,10 @@ def _wrench(G: Array, force: Array, point: Array) -> None:
 
 @njit(cache=True)
 def _begin(G: Array, edges: Array, limits: Limits, forces: Array, points: Array) -> float:
-    """Fill in seven widely spread points; the height at which points see, -1 if all are flat.
+    """Fill in seven widely spread points, each farthest from the affine hull of those before it.
 
-    Each is the farthest from the affine hull of those before it.
+    Returns:
+        The height from which on points see a simplex; -1 if all points are flat.
     """
     wrenches, rest, mean = np.empty((len(edges), D)), np.empty((len(edges), D)), np.zeros(D)
     for i in range(len(edges)):
@@ -165,7 +167,7 @@ def _begin(G: Array, edges: Array, limits: Limits, forces: Array, points: Array)
 
 @njit(cache=True)
 def _shift(wrenches: Array, origin: Array, rest: Array) -> float:
-    """Fill in the wrenches as seen from an origin; the largest of their components."""
+    """Fill in the wrenches as seen from an origin; return the largest of their components."""
     largest = 0.0
     for i in range(len(wrenches)):
         for j in range(D):
@@ -188,7 +190,7 @@ def _farthest(rest: Array) -> tuple[int, float]:
 
 @njit(cache=True)
 def _flatten(rest: Array, chosen: int, length: float) -> None:
-    """Take away from each row what it has along a chosen one."""
+    """Take away from each row its component along a chosen one."""
     unit = np.empty(D)
     for j in range(D):
         unit[j] = rest[chosen, j] / length
@@ -202,7 +204,7 @@ def _flatten(rest: Array, chosen: int, length: float) -> None:
 
 @njit(cache=True)
 def _extent(points: Array) -> float:
-    """Of the first seven points, along the axis of the largest."""
+    """Return the extent of the first seven points, along the axis where it is largest."""
     extent = 0.0
     for j in range(D):
         least = largest = points[0, j]

@@ -19,16 +19,16 @@ from grasp_core.arrays import Array, Indices
 FLAT = 1e-9
 """Points closer than this to a common plane, relative to their extent, span nothing more."""
 ABOVE = 1e-12
-"""A point sees a simplex from this height on, relative to the extent: some thousand roundings."""
+"""Height from which on a point sees a simplex, relative to the extent: some thousand roundings."""
 DEAD = 1e300
-"""Offset of a simplex that is no longer there: no point sees it, and it is never the lowest."""
+"""Offset of a simplex that was removed: no point sees it, and it is never the lowest."""
 MARKS = np.random.default_rng(1995).integers(1, 2**63, 4096, dtype=np.uint64)
-"""A random number per point; a ridge is recognised by the sum of its points' numbers."""
+"""Random number of each point; a ridge is recognised by the sum of its points' numbers."""
 MOST_POINTS = len(MARKS)
 
 
 class GrowingHull:
-    """Simplices that bound the hull."""
+    """The simplices that bound the convex hull of points which arrive one by one."""
 
     def __init__(self, simplex: Array) -> None:
         """Start from d + 1 points in general position, (d + 1, d)."""
@@ -41,25 +41,25 @@ class GrowingHull:
         """Outward unit normal and offset of each simplex, (n, d + 1)."""
         others = [[i for i in range(count) if i != j] for j in range(count)]
         self.corners: Indices = np.array(others)
-        """Points of each simplex, (n, d)."""
+        """Points at the corners of each simplex, (n, d)."""
         self.neighbors: Indices = np.array(others)
-        """Neighbour across the ridge without each corner, (n, d)."""
+        """Neighbour of each simplex across the ridge without each corner, (n, d)."""
         self._used = count
         self._ridges = np.array([[i for i in range(d) if i != j] for j in range(d)])
         self._dead = np.append(np.zeros(d), DEAD)
 
     @property
     def size(self) -> int:
-        """How many simplices are kept, live or dead."""
+        """Number of simplices that are kept, live or removed."""
         return self._used
 
     def lowest(self) -> tuple[Array, float]:
-        """The plane of least signed distance from the origin: outward normal and distance."""
+        """Return the plane of least signed distance from zero: outward normal and distance."""
         nearest = self.planes[self.planes[: self._used, -1].argmin()]
         return nearest[:-1], float(nearest[-1])
 
     def add(self, point: Array) -> bool:
-        """Extend the hull to a point; False if it sees no simplex, being inside."""
+        """Extend the hull to a point; return False if it sees no simplex, being inside."""
         heights = self.planes[: self._used] @ np.append(point, -1.0)
         hidden = heights <= self.slack
         seen = (~hidden).nonzero()[0]
@@ -69,6 +69,7 @@ class GrowingHull:
         row, corner = hidden[around].nonzero()
         inner, outer = seen[row], around[row, corner]
         fresh = self._places(seen, len(row))
+        # the plane (a, b) of the module's text, for each ridge between a seen and an unseen simplex
         planes = heights[inner, None] * self.planes[outer]
         planes -= heights[outer, None] * self.planes[inner]
         planes /= np.sqrt(np.einsum("ij,ij->i", planes[:, :-1], planes[:, :-1]))[:, None]
@@ -88,12 +89,12 @@ class GrowingHull:
         return True
 
     def simplices(self) -> tuple[Array, Indices]:
-        """Outward normals (n, d) and corners (n, d) of the hull's simplices."""
+        """Return outward normals (n, d) and corners (n, d) of the hull's simplices."""
         alive = np.flatnonzero(self.planes[: self._used, -1] < DEAD)
         return self.planes[alive, :-1], self.corners[alive]
 
     def _places(self, free: Indices, count: int) -> Indices:
-        """Where to keep new simplices: in place of the dead, then at the end."""
+        """Choose where to keep new simplices: in place of removed ones, then at the end."""
         if count <= len(free):
             return free[:count]
         end = self._used + count - len(free)
@@ -108,19 +109,21 @@ class GrowingHull:
         return np.concatenate([free, added])
 
     def _join(self, fresh: Indices, keys: NDArray[np.uint64]) -> None:
-        """Make new simplices neighbours that share the new point and all but one other.
+        """Make new simplices neighbours if they share the new point and all but one of the others.
 
         Args:
-            fresh: (m,)
-            keys: Of the points shared besides the new one, without each corner, (m, d - 1).
+            fresh: Places of the new simplices, (m,).
+            keys: Sums of the marks of the points shared besides the new one, for each corner that
+                is left out, (m, d - 1).
         """
+        # a ridge belongs to two simplices, so that equal keys come in pairs
         pairs = keys.ravel().argsort().reshape(-1, 2)
         owner = fresh[pairs // keys.shape[1]]
         self.neighbors[owner, pairs % keys.shape[1]] = owner[:, ::-1]
 
 
 def spread_simplex(points: Array) -> Indices | None:
-    """Indices of d + 1 widely spread points among (n, d); None if all lie in one plane."""
+    """Find d + 1 widely spread points among (n, d), as indices; None if all lie in one plane."""
     rest = points - points.mean(axis=0)
     chosen = [int(np.einsum("ij,ij->i", rest, rest).argmax())]
     rest = points - points[chosen[0]]

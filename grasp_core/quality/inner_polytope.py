@@ -22,17 +22,17 @@ from grasp_core.closure.wrenches import WRENCH
 from grasp_core.fields import are_units, is_array, is_indices
 
 ON_RIDGE = 1e-9
-"""A ray that passes a ridge at less than this share of the simplex is no proof."""
+"""A ray that passes a ridge at less than this share of the simplex proves nothing."""
 SAME_RAY = 1e-6
-"""A flat simplex, which no generic ray crosses, misses the ray by more than this."""
+"""Distance by which a flat simplex, which no generic ray crosses, misses the ray at least."""
 ROUNDED = 1e-9
-"""How much farther than computed a ray may cross a simplex."""
+"""How much farther than computed a ray may cross a simplex, as a share."""
 BLOCK = 2**15
-"""Heights that are compared at a time: as many as stay in a cache."""
+"""How many heights are compared at a time: as many as stay in a cache."""
 TINY = 1e-300
-"""Stands in where a normal of length zero would lead to a division by zero."""
+"""Least length that is divided by, where a normal may have length zero."""
 LARGEST_KEY = 2**62
-"""Of a ridge, as an integer with one digit per corner."""
+"""Largest integer that names a ridge, with one digit per corner."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,12 +42,12 @@ class InnerPolytope:
     forces: Array
     """Local contact forces whose wrenches are the points, (n, 3k)."""
     corners: Indices
-    """Points of each simplex of the boundary, (m, 6)."""
+    """Indices of the points of each simplex of the boundary, (m, 6)."""
     normals: Array
     """Outward unit normals of the simplices, (m, 6)."""
 
     def sound(self, width: int) -> bool:
-        """Whether the fields fit each other and forces with so many parts; no proof as yet."""
+        """Return whether the fields fit each other and forces of `width` parts, without proof."""
         count = len(self.corners) if is_indices(self.corners, None, WRENCH) else 0
         return (
             count > 0
@@ -57,14 +57,14 @@ class InnerPolytope:
         )
 
     def radius(self, wrenches: WrenchSet) -> float:
-        """Least height of a corner along the normal of its simplex."""
+        """Return the least height of a corner along the normal of its simplex."""
         if len(self.normals) != len(self.corners):
             return -np.inf
         lowest, _ = self._heights(self.forces @ wrenches.G.T)
         return float(lowest.min())
 
     def proved_radius(self, wrenches: WrenchSet) -> float:
-        """The radius, if the simplices enclose zero; otherwise minus infinity."""
+        """Return the radius if the simplices enclose zero, and minus infinity otherwise."""
         if not 0 < len(self.normals) == len(self.corners) or not self._even():
             return -np.inf
         points = self.forces @ wrenches.G.T
@@ -74,7 +74,7 @@ class InnerPolytope:
         return radius if enclosed else -np.inf
 
     def _heights(self, points: Array) -> tuple[Array, Array]:
-        """Along each simplex's unit normal, of its lowest corner and of the highest point, (m,)."""
+        """Return heights of each simplex's lowest corner and of the highest point, (m,) each."""
         count = len(self.corners)
         lowest, highest = np.empty(count), np.empty(count)
         step = max(BLOCK // len(points), 1)
@@ -88,7 +88,7 @@ class InnerPolytope:
         return lowest, highest
 
     def _even(self) -> bool:
-        """Whether every ridge belongs to an even number of simplices."""
+        """Return whether every ridge belongs to an even number of simplices."""
         count, d = len(self.forces), self.corners.shape[1]
         outside = self.corners.min() < 0 or self.corners.max() >= count
         if outside or count ** (d - 1) > LARGEST_KEY:
@@ -101,7 +101,7 @@ class InnerPolytope:
         return keys.size % 2 == 0 and bool((keys[::2] == keys[1::2]).all())
 
     def _crossed_oddly(self, points: Array, lowest: Array, highest: Array) -> bool:
-        """Whether one generic ray from zero crosses an odd number of simplices."""
+        """Return whether one generic ray from zero crosses an odd number of simplices."""
         d = points.shape[1]
         ray = np.cos(np.arange(1, d + 1, dtype=np.float64))
         along = _units(self.normals) @ ray

@@ -1,8 +1,9 @@
-"""Metrics that users of other tools know, by those tools' definitions.
+"""Metrics that users of other tools know, by the definitions of those tools.
 
-Each replaces the friction cones by inscribed pyramids, whose edges are forces of unit normal part
-n + mu t; the first t is the first tangent of the contact's frame (see `wrenches.contact_frames`).
-How the pyramids are turned changes the second digit. For a quality without pyramids see `quality`.
+Each metric replaces the friction cones by inscribed pyramids, whose edges are forces of unit normal
+part n + mu t; the first t is the first tangent of the contact's frame (see
+`wrenches.contact_frames`). How the pyramids are turned changes the second digit. For a quality
+without pyramids see `ferrari_canny`.
 """
 
 import importlib
@@ -39,10 +40,10 @@ UNREACHABLE = 1e-9
 
 
 def pyramid_wrenches(wrenches: WrenchSet, edges: int) -> Array:
-    """Wrenches of the edges of pyramids inscribed in the friction cones, (k edges, 6).
+    """Return wrenches of the edges of pyramids inscribed in the friction cones, (k edges, 6).
 
     Raises:
-        InputError: Fewer than three edges, or more than ten thousand.
+        InputError: There are fewer than three edges, or more than ten thousand.
     """
     circle = _circle(edges)
     slopes = wrenches.friction
@@ -52,10 +53,10 @@ def pyramid_wrenches(wrenches: WrenchSet, edges: int) -> Array:
 
 
 def _circle(edges: int) -> Array:
-    """Edges of a pyramid of friction one, (normal, tangent, tangent), (edges, 3).
+    """Return the edges of a pyramid of friction one, (normal, tangent, tangent), (edges, 3).
 
     Raises:
-        InputError: Fewer than three edges, or more than ten thousand.
+        InputError: There are fewer than three edges, or more than ten thousand.
     """
     whole(edges, "edges", least=FEWEST_EDGES, most=MOST_EDGES)
     turns = 2.0 * np.pi * np.arange(edges) / edges
@@ -69,7 +70,7 @@ def min_weight(
     *,
     edges: int = 8,
 ) -> float:
-    """Largest l such that weights of at least l, summing to one, balance the pyramids' edges.
+    """Find the largest l such that weights of l or more, with sum one, balance the pyramids' edges.
 
     Solved as the dual program: over twists y, with w_j the N wrenches and m their mean,
 
@@ -79,7 +80,7 @@ def min_weight(
         positions: Contact points, (k, 3) [m]; or a Grasp.
         normals: Unit vectors into the object, (k, 3).
         friction: Coulomb coefficient, one for all contacts or one each, (k,).
-        edges: Of each pyramid.
+        edges: How many edges each pyramid has.
 
     Returns:
         At most 1/N; -inf when no weights of whatever sign balance. Positive exactly when the
@@ -106,19 +107,19 @@ def min_weights(
     *,
     edges: int = 8,
 ) -> Array:
-    """The min-weight metric of each of many sets of contacts (see `min_weight`).
+    """Find the min-weight metric of each of many sets of contacts (see `min_weight`).
 
-    A compiled search names the vertex of each program; what does not pass the check of `lp` is
-    solved on its own.
+    A compiled search names the vertex of each program; answers that fail the check of `lp` are
+    solved again one by one.
 
     Args:
         positions: Contact points, (g, k, 3) [m]; or grasps.
         normals: Unit vectors into the object, (g, k, 3).
         friction: Coulomb coefficient, one for all contacts, or one each, (k,) or (g, k).
-        edges: Of each pyramid.
+        edges: How many edges each pyramid has.
 
     Returns:
-        (g,)
+        The metric of each set, (g,).
 
     Raises:
         InputError: Shapes, lengths or signs are wrong.
@@ -133,7 +134,7 @@ def min_weights(
 
 
 def _many_pyramid_wrenches(points: Array, normals: Array, friction: Array, edges: int) -> Array:
-    """Wrenches of the pyramids' edges, (g, k edges, 6), about the centres and at unit size."""
+    """Return wrenches of pyramid edges, (g, k edges, 6), about the centres and at unit size."""
     circle, (arms, _, _) = _circle(edges), unit_sizes(points)
     frames = many_frames(normals)
     forces = np.matmul(circle[:, 1:], frames[..., 1:].swapaxes(-1, -2)) * friction[..., None, None]
@@ -144,7 +145,7 @@ def _many_pyramid_wrenches(points: Array, normals: Array, friction: Array, edges
 
 
 def _at_once(W: Array) -> Array:
-    """Metrics of wrenches (g, N, 6) by the compiled search, (g,); NaN where an answer fails."""
+    """Find metrics of wrenches (g, N, 6) by the kernel, (g,); NaN where an answer fails."""
     found = np.full(len(W), math.nan)
     kernel = compiled(KERNEL)
     if kernel is None:
@@ -169,7 +170,7 @@ def _at_once(W: Array) -> Array:
 
 
 def _min_weight(W: Array) -> float:
-    """Of wrenches (N, 6)."""
+    """Find the min-weight metric of wrenches (N, 6)."""
     N, mean = len(W), W.mean(axis=0)
     if not _balanced_by_any_weights(W):
         return -math.inf
@@ -178,7 +179,7 @@ def _min_weight(W: Array) -> float:
 
 
 def _balanced_by_any_weights(W: Array) -> bool:
-    """Whether weights of whatever sign, summing to one, make the rows vanish."""
+    """Return whether weights of whatever sign, summing to one, make the rows vanish."""
     rows = np.vstack([W.T, np.ones(len(W))])
     wanted = np.append(np.zeros(len(rows) - 1), 1.0)
     weights = np.asarray(np.linalg.lstsq(rows, wanted, rcond=RANK)[0], dtype=np.float64)
@@ -194,18 +195,18 @@ def hull_volume(
     torque_scale: float,
     edges: int = 8,
 ) -> float:
-    """Volume of the hull of the pyramids' edges in wrench space [N^6].
+    """Compute the volume of the hull of the pyramids' edges in wrench space [N^6].
 
     Args:
         positions: Contact points, (k, 3) [m]; or a Grasp.
         normals: Unit vectors into the object, (k, 3).
         friction: Coulomb coefficient, one for all contacts or one each, (k,).
-        center: About which torques are taken, (3,) [m].
+        center: Point about which torques are taken, (3,) [m].
         torque_scale: Length that makes a torque comparable with a force [m].
-        edges: Of each pyramid.
+        edges: How many edges each pyramid has.
 
     Returns:
-        Zero if the wrenches lie in a plane.
+        The volume; zero if the wrenches lie in a plane.
 
     Raises:
         InputError: Shapes, lengths or signs are wrong.
@@ -225,13 +226,13 @@ def hull_volume(
 def smallest_singular_value(
     positions: ArrayLike | Grasp, *, center: ArrayLike = (0.0, 0.0, 0.0), torque_scale: float
 ) -> float:
-    """Smallest singular value of the map from contact forces to wrenches.
+    """Compute the smallest singular value of the map from contact forces to wrenches.
 
-    Zero for contacts on one line, and for two: they turn nothing about their line.
+    It is zero for contacts on one line, and for two: they turn nothing about their line.
 
     Args:
         positions: Contact points, (k, 3) [m]; or a Grasp.
-        center: About which torques are taken, (3,) [m].
+        center: Point about which torques are taken, (3,) [m].
         torque_scale: Length that makes a torque comparable with a force [m].
 
     Raises:

@@ -1,4 +1,4 @@
-"""The min-weight programs of many grasps, one after the other (see `metrics.min_weight`).
+"""The min-weight programs of many grasps are solved one after the other (see `metrics`).
 
 Solved: for each grasp, with its N wrenches w_j and their mean m, a best vertex y of
 
@@ -29,9 +29,9 @@ def vertices(wrenches: Array, twists: Array, multipliers: Array, rows: Indices) 
     """Find a best vertex of each program.
 
     Args:
-        wrenches: (g, N, 6)
+        wrenches: Wrenches of each grasp, (g, N, 6).
         twists: Filled with the vertices, (g, 6); NaN where none is found.
-        multipliers: Filled with those of the rows, (g, 6).
+        multipliers: Filled with the multipliers of the rows, (g, 6).
         rows: Filled with the rows that meet in the vertex, (g, 6).
     """
     count = wrenches.shape[1]
@@ -56,7 +56,7 @@ def vertices(wrenches: Array, twists: Array, multipliers: Array, rows: Indices) 
 
 @njit(cache=True, error_model="numpy")
 def _program(W: Array, c: Array, At: Array, norms: Array) -> None:
-    """Objective, rows and their lengths."""
+    """Fill in the objective, the rows as columns, and their lengths."""
     count = len(W)
     for w in range(WRENCH):
         c[w] = 0.0

@@ -1,13 +1,21 @@
-"""How much contacts resist: the largest multiple of a wrench, and the weakest of several.
+"""How large a wrench contacts resist: the largest multiple of one, and the weakest of several.
 
 With each normal force at most f_max, the wrenches that the contacts can apply form a convex
-body W around the origin. An external wrench w is resisted up to the largest lambda with
--lambda w in W, a conic program. Its dual is a facet of W: a twist y with y.w = -1 and
-lambda = h(y) = f_max sum_i max(0, s_i(y)), the support of W (s_i as in `closure`). The
-wrench -y / |y| meets that facet squarely, so its limit is at most h(y) / |y|: stepping from
-a wrench to the one its limiting facet points at never raises the limit, and stops at a
-wrench that is locally the weakest. No wrench of unit size has a limit below f_max times the `linf`
-quality of the contacts (see `quality`), which is the bound over all directions.
+body W around the origin. An external wrench w is resisted up to
+
+    the largest lambda  with  -lambda w in W,                                           (1)
+
+a conic program. Its dual is a facet of W: a twist y with
+
+    y.w = -1  and  lambda = h(y) = f_max sum_i max(0, s_i(y)),                          (2)
+
+the support of W (s_i as in `force_closure`). The wrench -y / |y| meets that facet squarely, so
+
+    limit of -y / |y|  <=  h(y) / |y|:                                                  (3)
+
+stepping from a wrench to the one its limiting facet points at never raises the limit, and stops
+at a wrench that is locally the weakest. No wrench of unit size has a limit below f_max times the
+`linf` quality of the contacts (see `ferrari_canny`), which is the bound over all directions.
 
 Torques are compared with forces through a stated length.
 """
@@ -33,29 +41,30 @@ SETTLED = 1e-3
 """The search for the weakest wrench ends when a step lowers the limit by less than this share."""
 HELD = 1e-7
 """How far forces at a limit may leave cones and balance, relative to the largest wrench of a unit
-normal force: what conic programs leave."""
+normal force: the accuracy of conic programs."""
 ROUNDING = 1e-9
-"""Of the bound, relative to it, and of the facet's power, relative to the lengths of its parts."""
+"""Slack of the upper bound, relative to it, and of the facet's power, relative to the lengths of
+its factors."""
 LAST_DIGITS = 1e-12
-"""Of a bound near zero, relative to the largest that the facet's length allows."""
+"""Slack of an upper bound near zero, relative to the largest that the facet's length allows."""
 MAX_STEPS = 30
 STARTS = 3
-"""From how many of the weakest axis wrenches the search starts."""
+"""How many of the weakest axis wrenches the search starts from."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WrenchLimit:
-    """How far one external wrench is resisted, with both sides of the proof."""
+    """The largest multiple of an external wrench that is resisted, with both sides of the proof."""
 
     wrench: Array
-    """(6,) [N, N m], torque about the stated centre."""
+    """External wrench (force, torque), (6,) [N, N m], torque about the stated centre."""
     limit: float
-    """Largest multiple of `wrench` that is resisted: `forces` balance it."""
+    """Largest multiple of `wrench` that is resisted, since `forces` balance it; dimensionless."""
     upper: float
-    """No multiple above this is resisted: the support of `facet`, in plain arithmetic."""
+    """Multiple above which nothing is resisted: the support of `facet`, in plain arithmetic."""
     forces: Array
-    """Contact forces that resist it at the limit, (k, 3) [N]: in their cones, of normal parts up to
-    the largest and balanced, to within `HELD`."""
+    """Contact forces that resist the wrench at the limit, (k, 3) [N]: in their cones, with normal
+    parts up to the largest, and balanced, all to within `HELD`."""
     facet: Array
     """Twist y of the limiting facet, (6,), with y.wrench = -1, about the stated centre."""
 
@@ -71,17 +80,17 @@ class WrenchLimit:
         """Re-check both sides in plain arithmetic, for the contacts they are said to be about.
 
         Args:
-            positions: As given to `wrench_limits`, like the others.
-            normals: (k, 3), or None with a Grasp.
-            friction: One for all contacts or one each.
-            max_normal_force: [N]
-            center: (3,) [m]
+            positions: Contact points or Grasp, as given to `wrench_limits`, (k, 3) [m].
+            normals: Unit vectors into the object, (k, 3), or None with a Grasp.
+            friction: Coulomb coefficient, one for all contacts or one each.
+            max_normal_force: Largest normal force of each contact [N].
+            center: Point about which torques are taken, (3,) [m].
 
         Returns:
-            Whether every field is true; False for what is no certificate.
+            Whether every field is true; False if they are no certificate.
 
         Raises:
-            InputError: What is given is no contacts.
+            InputError: The arguments do not describe contacts.
         """
         points, units = contact_arrays(positions, normals)
         about = frozen(center, (3,), "center")
@@ -112,7 +121,7 @@ def max_resisted_wrench(
     max_normal_force: float,
     center: ArrayLike = (0.0, 0.0, 0.0),
 ) -> float:
-    """Largest multiple of an external wrench that the contacts can resist.
+    """Find the largest multiple of an external wrench that the contacts can resist.
 
     Args:
         positions: Contact points, (k, 3) [m]; or a Grasp, with `normals` None.
@@ -120,7 +129,7 @@ def max_resisted_wrench(
         friction: Coulomb coefficient, one for all contacts or one each.
         wrench: External (force, torque), (6,) [N, N m], torque about `center`.
         max_normal_force: Largest normal force of each contact [N].
-        center: (3,) [m]
+        center: Point about which torques are taken, (3,) [m].
 
     Raises:
         InputError: Shapes or limits are wrong, or the wrench is zero.
@@ -141,7 +150,7 @@ def wrench_limits(
     max_normal_force: float,
     center: ArrayLike = (0.0, 0.0, 0.0),
 ) -> tuple[WrenchLimit, ...]:
-    """How far each of several wrenches is resisted, with the forces that do it and a bound.
+    """Find how far each of several wrenches is resisted, with forces that resist it and a bound.
 
     The weakest of them is `min(limits, key=lambda found: found.limit)`.
 
@@ -151,7 +160,7 @@ def wrench_limits(
         friction: Coulomb coefficient, one for all contacts or one each.
         wrenches: External (force, torque), (n, 6) [N, N m], torque about `center`.
         max_normal_force: Largest normal force of each contact [N].
-        center: (3,) [m]
+        center: Point about which torques are taken, (3,) [m].
 
     Raises:
         InputError: Shapes or limits are wrong, or a wrench is zero.
@@ -168,7 +177,7 @@ def wrench_limits(
 
 
 def _check_sizes(loads: Array, name: str) -> None:
-    """Refuse wrenches (n, 6) that are zero, of which every multiple is resisted, or nearly so."""
+    """Refuse wrenches (n, 6) that are zero, or nearly so: every multiple of zero is resisted."""
     sizes = np.abs(loads).max(axis=1)
     if len(loads) and not SMALLEST <= float(sizes.min()) <= float(sizes.max()) <= LARGEST:
         wrong = sizes[(sizes < SMALLEST) | (sizes > LARGEST)][0]
@@ -179,7 +188,7 @@ def _check_sizes(loads: Array, name: str) -> None:
 
 
 class WrenchBody:
-    """The wrenches that contacts can apply with bounded normal forces."""
+    """The body of wrenches that contacts can apply with bounded normal forces."""
 
     def __init__(
         self, arms: Array, normals: Array, friction: Array, max_normal_force: float
@@ -190,10 +199,11 @@ class WrenchBody:
             arms: Contact points from the centre of torques, (k, 3) [m].
             normals: Unit vectors into the object, (k, 3).
             friction: Coulomb coefficients, (k,).
-            max_normal_force: [N]
+            max_normal_force: Largest normal force of each contact [N].
         """
         self.max_normal_force = positive(max_normal_force, "max_normal_force")
         self.count = k = len(arms)
+        # at the contacts' own middle and at unit size all numbers are of order one
         self.middle = arms.mean(axis=0)  # a far centre would swamp the levers
         arms = arms - self.middle
         self.size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
@@ -201,6 +211,7 @@ class WrenchBody:
         self.frames = contact_frames(normals)
         G = in_frames(grasp_map(arms / self.size), self.frames)
         self.G, self.bounded = G, WrenchSet(G, friction, "linf")
+        # (1): G f + lambda w = 0, then 0 <= normal parts <= 1 in units of f_max, then the cones
         self.A = np.zeros((WRENCH + 5 * k, 3 * k + 1))
         self.A[:WRENCH, :-1] = G
         caps, cones = WRENCH + np.arange(2 * k), WRENCH + 2 * k + np.arange(3 * k)
@@ -210,16 +221,18 @@ class WrenchBody:
         self.b = np.concatenate([np.zeros(6), np.ones(k), np.zeros(4 * k)])
 
     def limit(self, wrench: Array) -> WrenchLimit:
-        """Largest multiple of an external wrench that is resisted, with its proof."""
+        """Find the largest multiple of an external wrench that is resisted, with its proof."""
         unit = self._about_middle(wrench)
         length = float(np.linalg.norm(unit))
         A = self.A.copy()
+        # a wrench of unit length keeps lambda of order one; it is scaled back below
         A[:6, -1] = unit / length
         q = np.zeros(A.shape[1])
         q[-1] = -1.0
         k = self.count
         answer = minimize(ConicProgram(q, A, self.b, 6, 2 * k, (3,) * k))
         share = self.max_normal_force / length
+        # the equations' multipliers, scaled to (2)
         facet = answer.z[:6] / -float(answer.z[:6] @ unit)
         limit = max(share * float(answer.x[-1]), 0.0)
         local = answer.x[:-1].reshape(k, 3)
@@ -232,8 +245,9 @@ class WrenchBody:
         )
 
     def attains(self, found: WrenchLimit) -> bool:
-        """Whether the forces are allowed, and balance the limit's multiple of the wrench."""
+        """Return whether the forces are allowed, and balance the limit's multiple of the wrench."""
         shares = np.einsum("kij,ki->kj", self.frames, found.forces) / self.max_normal_force
+        # what is left of (1) after adding the limit's multiple of the wrench
         left = self.G @ shares.ravel()
         left += found.limit / self.max_normal_force * self._about_middle(found.wrench)
         balanced = float(np.linalg.norm(left)) <= HELD * self.bounded.size
@@ -241,12 +255,13 @@ class WrenchBody:
         return balanced and allowed
 
     def bounds(self, found: WrenchLimit) -> bool:
-        """Whether the facet shows that no larger multiple than the upper one is resisted."""
+        """Return whether the facet shows that no larger multiple than the upper one is resisted."""
         load, twist = self._about_middle(found.wrench), found.facet * self.scale
         slides = np.asarray(np.cross(found.facet[3:], self.middle), dtype=np.float64)
         twist[:3] += slides
         power = float(twist @ load)
         lengths = float(np.linalg.norm(twist) * np.linalg.norm(load))
+        # (2): h(y) is at most the upper limit, and y.w = -1, each but for rounding
         bound = self.max_normal_force * self.bounded.support(twist)[0]
         farthest = self.bounded.size * float(np.linalg.norm(twist))
         slack = LAST_DIGITS * self.max_normal_force * farthest
@@ -254,7 +269,7 @@ class WrenchBody:
         return bounded and abs(power + 1.0) <= ROUNDING * lengths
 
     def _about_middle(self, wrench: Array) -> Array:
-        """A wrench about the contacts' middle, at unit size."""
+        """Return a wrench about the contacts' middle, at unit size."""
         moved = np.append(wrench[:3], wrench[3:] - np.cross(self.middle, wrench[:3]))
         return moved / self.scale
 
@@ -263,14 +278,14 @@ class WrenchBody:
         return np.concatenate([facet[:3] - slides, facet[3:]])
 
     def weakest_from(self, limits: Iterable[WrenchLimit], torque_scale: float) -> WrenchLimit:
-        """A wrench of unit size that is locally the hardest to resist.
+        """Search for a wrench of unit size that is locally the hardest to resist.
 
         Args:
-            limits: Of wrenches of unit size; the weakest of them are followed.
+            limits: Limits of wrenches of unit size; the weakest of these are followed.
             torque_scale: Length that makes a torque comparable with a force [m].
 
         Returns:
-            The weakest found: a wrench with |(force, torque / torque_scale)| = 1.
+            The weakest limit found: its wrench has |(force, torque / torque_scale)| = 1.
         """
         scale = np.array([1.0] * 3 + [torque_scale] * 3)
         every = list(limits)
@@ -281,6 +296,7 @@ class WrenchBody:
     def _descend(self, start: WrenchLimit, scale: Array) -> WrenchLimit:
         best = start
         for _ in range(MAX_STEPS):
+            # (3): the wrench that the limiting facet points at, by the scaled product of wrenches
             facing = -best.facet * scale**2
             found = self.limit(_unit(facing, scale))
             if found.limit > best.limit * (1.0 - SETTLED):
@@ -290,7 +306,7 @@ class WrenchBody:
 
 
 def axis_wrenches(torque_scale: float) -> Array:
-    """The twelve wrenches along and against each axis, (12, 6) [N, N m].
+    """Return the twelve wrenches along and against each axis, (12, 6) [N, N m].
 
     Args:
         torque_scale: Torque that goes with a force of one newton [m].

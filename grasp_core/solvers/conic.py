@@ -1,4 +1,4 @@
-"""Conic program -> re-checked primal and dual solution; the door to Clarabel.
+"""A conic program goes in, a re-checked primal and dual solution comes out; the door to Clarabel.
 
     minimise q.x  subject to  b - A x in K,
 
@@ -18,8 +18,8 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import SolverError
 
 RESIDUAL = 1e-7
-"""Largest accepted violation, relative to the solution's size. Callers turn what passes into
-a certificate of their own, so this only catches answers that are wrong outright."""
+"""Largest accepted violation, relative to the solution's size. Callers turn a solution into a
+certificate of their own, so this only catches answers that are wrong outright."""
 REQUESTED = 1e-11
 """Tolerance asked of the solver."""
 
@@ -29,19 +29,19 @@ WAYS: tuple[tuple[str, float] | None, ...] = (
     ("max_step_fraction", 0.9),
 )
 """Changes to the solver's settings, in the order they are tried: at frictions below 1e-3 it stops
-early now and then, and succeeds another way."""
+early now and then, and succeeds with other settings."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConicProgram:
-    """Rows in the order zero, non-negative, then second-order cones (bound first)."""
+    """Data of one program; rows are in the order zero, non-negative, second-order (bound first)."""
 
     q: Array
-    """(n,)"""
+    """Objective, (n,)."""
     A: Array
-    """(rows, n)"""
+    """Matrix of the rows, (rows, n)."""
     b: Array
-    """(rows,)"""
+    """Right-hand sides, (rows,)."""
     zeros: int
     """How many rows must vanish."""
     nonnegatives: int
@@ -52,7 +52,7 @@ class ConicProgram:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConicSolution:
-    """Primal and dual solution, each checked against the data."""
+    """A primal and a dual solution, each checked against the data."""
 
     x: Array
     z: Array
@@ -64,9 +64,9 @@ def minimize(program: ConicProgram) -> ConicSolution:
     """Solve a feasible and bounded conic program.
 
     Raises:
-        SolverError: Every answer failed our check; an infeasible program ends here too.
+        SolverError: Every answer failed our check; an infeasible program also ends so.
     """
-    failure = SolverError("no way of solving was tried")
+    failure = SolverError("no settings were tried")
     for change in WAYS:
         try:
             return _solved(program, change)
@@ -111,7 +111,7 @@ def _check(program: ConicProgram, solution: ConicSolution, status: str) -> None:
 
 
 def _outside(program: ConicProgram, rows: Array, *, dual: bool) -> float:
-    """How far a vector lies outside K (or its dual, where the zero rows are free)."""
+    """Return how far a vector lies outside K (or its dual, where the zero rows are free)."""
     start = program.zeros
     worst = 0.0 if dual else float(np.abs(rows[:start]).max(initial=0.0))
     worst = max(worst, -float(rows[start : start + program.nonnegatives].min(initial=0.0)))
@@ -139,7 +139,7 @@ class _Columns:
 
 
 def _columns(A: Array) -> _Columns:
-    """The matrix without its zeros."""
+    """Compress a matrix to columns without its zeros."""
     columns = A.T
     filled = columns != 0.0
     starts = np.concatenate([[0], filled.sum(axis=1).cumsum()])

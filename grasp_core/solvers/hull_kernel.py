@@ -1,4 +1,4 @@
-"""The growing hull of `growing_hull`, compiled, for points with six coordinates.
+"""The growing hull of `growing_hull` is compiled here, for points with six coordinates.
 
 A point sees simplices, first the lowest one, then neighbours of those it sees. Across each corner
 j of a seen simplex f lies a neighbour: if it is not seen, the point takes the place of corner j.
@@ -13,8 +13,8 @@ That new simplex adjoins
 Turning needs no look-up of ridges, and pairs the right ones where a ridge has more than two
 simplices. A corner is found by the sums of corners, which are exact.
 
-Functions take arrays out of the hull once: in loops that would cost more than the arithmetic. What
-numba keeps of `polytope` does not notice a change here; touch that file as well.
+Functions take arrays out of the hull once: in loops that would cost more than the arithmetic.
+Numba's copy of `ferrari_canny_kernel` does not notice a change here; touch that file as well.
 """
 
 from typing import Any, NamedTuple
@@ -25,44 +25,44 @@ from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissi
 from grasp_core.arrays import Array, Indices
 
 D = 6
-"""Coordinates of a point."""
+"""Number of coordinates of a point."""
 DEAD = 1e300
-"""Offset of a simplex that is no longer there."""
+"""Offset of a simplex that was removed."""
 SINGULAR = 1e-13
-"""Least pivot of the first simplex, whose points are widely spread."""
+"""Smallest pivot accepted for the first simplex, whose points are widely spread."""
 TINY = 1e-300
-"""Stands in where a simplex folded flat would lead to a division by zero."""
+"""Least square that is divided by, where a simplex may be folded flat."""
 
 
 class Hull(NamedTuple):
-    """Simplices, live and dead, and what is known about the latest point."""
+    """The simplices, live and removed, and what is known about the latest point."""
 
     normals: Array
     """Outward unit normals, (room, 6)."""
     offsets: Array
     corners: Indices
-    """Points of each simplex, (room, 6)."""
+    """Indices of the points of each simplex, (room, 6)."""
     neighbors: Indices
-    """Neighbour across the ridge without each corner, (room, 6)."""
+    """Neighbour of each simplex across the ridge without each corner, (room, 6)."""
     sums: Indices
-    """Of the corners."""
+    """Sum of the corners' indices of each simplex, (room,)."""
     heights: Array
-    """Of the latest point that was compared with a simplex, above its plane."""
+    """Height, above each simplex, of the latest point that was compared with it, (room,)."""
     rounds: Indices
-    """Which point that was."""
+    """Index of that latest point, (room,)."""
     made: Indices
-    """New simplex without each corner, (room, 6)."""
+    """New simplex without each corner of a seen one, (room, 6)."""
     seen: Indices
-    """Simplices that the point sees."""
+    """Simplices that the point sees, (room,)."""
     free: Indices
-    """Places of dead simplices."""
+    """Places of removed simplices, (room,)."""
     counts: Indices
-    """How many places were ever used, and how many of them are free."""
+    """How many places were ever used, and how many of them are free, (2,)."""
 
 
 @njit(cache=True)
 def vacant_hull(room: int) -> Hull:
-    """With room for so many simplices."""
+    """Make an empty hull with room for `room` simplices."""
     return Hull(
         np.empty((room, D)), np.empty(room), np.empty((room, D), np.int64),
         np.empty((room, D), np.int64), np.empty(room, np.int64), np.empty(room),
@@ -73,7 +73,7 @@ def vacant_hull(room: int) -> Hull:
 
 @njit(cache=True)
 def larger(hull: Hull) -> Hull:
-    """The same with room for whatever one point can add, and for twice as many simplices."""
+    """Copy a hull with room for all that one point can add, and for twice as many simplices."""
     room = 2 * len(hull.offsets) + D * hull.counts[0]
     return Hull(
         _wider(hull.normals, room), _longer(hull.offsets, room), _wider(hull.corners, room),
@@ -102,7 +102,7 @@ def _longer(column: Any, room: int) -> Any:
 
 @njit(cache=True)
 def enclose(hull: Hull, points: Array) -> bool:
-    """Put the seven simplices around the first points: false if these are nearly flat.
+    """Put the seven simplices around the first points; false if these are nearly flat.
 
     With A the points as columns over ones, row i of inv(A) is the affine function that is one at
     point i and zero at the others.
@@ -128,7 +128,7 @@ def enclose(hull: Hull, points: Array) -> bool:
 
 @njit(cache=True)
 def _eliminate(A: Array) -> bool:
-    """Turn (A, 1) into (1, inv(A)); false if A is nearly singular."""
+    """Turn (A, 1) into (1, inv(A)); return false if A is nearly singular."""
     for i in range(len(A)):
         best = i
         for k in range(i, len(A)):
@@ -156,7 +156,7 @@ def _clear(A: Array, i: int) -> None:
 
 @njit(cache=True)
 def lowest(hull: Hull) -> int:
-    """The simplex with the least offset."""
+    """Return the simplex with the least offset."""
     offsets, found = hull.offsets, 0
     for i in range(hull.counts[0]):
         if offsets[i] < offsets[found]:
@@ -166,7 +166,7 @@ def lowest(hull: Hull) -> int:
 
 @njit(cache=True)
 def look(hull: Hull, point: Array, first: int, slack: float, now: int) -> tuple[int, int]:
-    """Fill in what the point sees: how many simplices, and how many ridges around them."""
+    """Fill in what the point sees; return the number of simplices and of ridges around them."""
     normals, offsets, neighbors = hull.normals, hull.offsets, hull.neighbors
     heights, rounds, seen = hull.heights, hull.rounds, hull.seen
     count, ridges, at = 0, 0, 0
@@ -199,7 +199,7 @@ def _height(normals: Array, offsets: Array, i: int, point: Array) -> float:
 
 @njit(cache=True)
 def extend(hull: Hull, count: int, point: int, slack: float) -> bool:
-    """Replace the seen simplices, the first `count`, by new ones with the point; if it worked."""
+    """Replace the first `count` seen simplices by new ones with the point; false if that fails."""
     seen = hull.seen[:count]
     _raise(hull, seen, point, slack)
     joined = _join(hull, seen, slack)
@@ -234,7 +234,7 @@ def _raise(hull: Hull, seen: Indices, point: int, slack: float) -> None:
 
 @njit(cache=True)
 def _vacant(free: Indices, counts: Indices) -> int:
-    """A place for a new simplex: of a dead one, or at the end."""
+    """Return a place for a new simplex: that of a removed one, or one at the end."""
     if counts[1] > 0:
         counts[1] -= 1
         return int(free[counts[1]])
@@ -255,7 +255,7 @@ def _normalize(normals: Array, offsets: Array, i: int) -> None:
 
 @njit(cache=True)
 def _join(hull: Hull, seen: Indices, slack: float) -> bool:
-    """Make new simplices neighbours: false if one of them has none."""
+    """Make new simplices neighbours; return false if one of them has none."""
     corners, neighbors, made = hull.corners, hull.neighbors, hull.made
     sums, heights = hull.sums, hull.heights
     for f in seen:
@@ -283,7 +283,7 @@ def _join(hull: Hull, seen: Indices, slack: float) -> bool:
 
 @njit(cache=True)
 def _bury(hull: Hull, seen: Indices) -> None:
-    """Free the places of simplices."""
+    """Free the places of simplices that are removed."""
     for f in seen:
         hull.offsets[f] = DEAD
         hull.free[hull.counts[1]] = f
@@ -292,7 +292,7 @@ def _bury(hull: Hull, seen: Indices) -> None:
 
 @njit(cache=True)
 def _place(corners: Indices, i: int, corner: int) -> int:
-    """Where a simplex has a corner; 0 if it has not, which the checks of the answer find out."""
+    """Return where a simplex has a corner; 0 if nowhere, which checks of the answer find out."""
     place = 0
     for j in range(D):  # without a way out, which would be predicted wrongly most of the time
         if corners[i, j] == corner:

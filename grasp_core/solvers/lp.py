@@ -1,4 +1,4 @@
-"""Linear program -> optimum or proof that there is none, re-checked; the door to HiGHS.
+"""A linear program goes in, an optimum or a proof that there is none comes out; the door to HiGHS.
 
     maximise c.x  subject to  A x <= b,  A_eq x = b_eq,  x free.
 
@@ -8,8 +8,8 @@ A'y + A_eq'z = 0 and b.y + b_eq.z < 0, which no feasible x survives. Both are ch
 plain arithmetic before they are returned; the solver's status is not believed.
 
 Programs go to a compiled dual simplex method first; it names the rows of a best vertex, and the
-vertex and its multipliers are solved for afresh. What it leaves or gets wrong goes to HiGHS, and so
-does everything where there are no kernels (`GRASPPROOF_KERNELS=off`).
+vertex and its multipliers are solved for afresh. HiGHS solves the programs that it leaves or gets
+wrong, and all programs where there are no kernels (`GRASPPROOF_KERNELS=off`).
 """
 
 import importlib
@@ -28,7 +28,7 @@ RESIDUAL = 1e-8
 """Largest accepted violation, for programs whose data are of order one (the planner scales
 objects to unit size): ten times the tolerance the solver is asked for."""
 FARTHEST = 1e4
-"""A proof of infeasibility excludes all points with |x|_1 up to this, at unit size."""
+"""Largest |x|_1 that a proof of infeasibility has to exclude, at unit size."""
 
 KERNEL = "grasp_core.solvers.lp_kernel"
 STRATEGIES = (1, 4)
@@ -43,16 +43,16 @@ class LinearProgram:
     c: Array
     """Objective, (n,)."""
     A: Array
-    """(rows, n)"""
+    """Matrix of the inequalities, (rows, n)."""
     b: Array
-    """(rows,)"""
+    """Right-hand sides of the inequalities, (rows,)."""
     A_eq: Array | None = None
-    """(equalities, n)"""
+    """Matrix of the equalities, (equalities, n)."""
     b_eq: Array | None = None
-    """(equalities,)"""
+    """Right-hand sides of the equalities, (equalities,)."""
 
     def stacked(self) -> tuple[Array, Array]:
-        """Inequality rows, then equality rows, with their right-hand sides."""
+        """Return inequality rows, then equality rows, with their right-hand sides."""
         if self.A_eq is None or self.b_eq is None:
             return self.A, self.b
         return np.vstack([self.A, self.A_eq]), np.concatenate([self.b, self.b_eq])
@@ -65,25 +65,25 @@ class Optimum:
     x: Array
     value: float
     multipliers: Array
-    """(rows + equalities,); the first `rows` are non-negative."""
+    """Multipliers y, then z, (rows + equalities,); the first `rows` are non-negative."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Infeasible:
-    """No point with |x|_1 <= `FARTHEST` is feasible, by a combination of the rows (Farkas)."""
+    """A proof, by a combination of the rows (Farkas), that no |x|_1 <= `FARTHEST` is feasible."""
 
     multipliers: Array
-    """(rows + equalities,)"""
+    """Multipliers y, then z, of the combination, (rows + equalities,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Below:
-    """No feasible value reaches the cutoff, by multipliers y >= 0, z as those of an optimum."""
+    """A proof, by multipliers as of an optimum, that no feasible value reaches the cutoff."""
 
     bound: float
-    """b.y + b_eq.z"""
+    """Largest value that the multipliers allow, b.y + b_eq.z."""
     multipliers: Array
-    """(rows + equalities,)"""
+    """Multipliers y, then z, (rows + equalities,); the first `rows` are non-negative."""
 
 
 def maximize(program: LinearProgram) -> Optimum | Infeasible:
@@ -94,19 +94,19 @@ def maximize(program: LinearProgram) -> Optimum | Infeasible:
     """
     found = maximize_above(program, -math.inf)
     if isinstance(found, Below):
-        raise SolverError("called below minus infinity")
+        raise SolverError("the simplex method called the optimum smaller than minus infinity")
     return found
 
 
 def maximize_above(program: LinearProgram, cutoff: float) -> Optimum | Infeasible | Below:
-    """As `maximize`, but a bound below a cutoff may end the search.
+    """Solve a linear program like `maximize`, but stop once a bound below a cutoff is proved.
 
     Args:
-        program: Its data are of order one.
-        cutoff: Smaller values are not worth having.
+        program: Program whose data are of order one.
+        cutoff: Smallest value that is of interest.
 
     Raises:
-        SolverError: As `maximize`.
+        SolverError: The solver's answer failed our check, or the program is unbounded.
     """
     if compiled(KERNEL) is not None:
         try:
@@ -117,7 +117,7 @@ def maximize_above(program: LinearProgram, cutoff: float) -> Optimum | Infeasibl
 
 
 def _by_highs(program: LinearProgram) -> Optimum | Infeasible:
-    failure = SolverError("no way of solving was tried")
+    failure = SolverError("no strategy was tried")
     for strategy in STRATEGIES:
         try:
             return _solved(program, strategy)
@@ -127,7 +127,7 @@ def _by_highs(program: LinearProgram) -> Optimum | Infeasible:
 
 
 def _refuted_by_least_violation(program: LinearProgram, failure: SolverError) -> Infeasible:
-    """Infeasible if every point violates some row: the least violation always exists.
+    """Prove a program infeasible by its least violation of some row, which always exists.
 
     The violation, a further variable, is kept above -1 to bound it.
     """
@@ -171,7 +171,7 @@ def _by_simplex(program: LinearProgram, cutoff: float) -> Optimum | Infeasible |
     if status == kernel.BELOW:
         return _checked_bound(program, multipliers[:count], cutoff)
     if basis[-1] >= count:
-        raise SolverError("the simplex method ended at its box")
+        raise SolverError("the simplex method ended at its box; the program may be unbounded")
     x = np.asarray(np.linalg.solve(vertex, h[basis]), dtype=np.float64)
     return _checked_optimum(program, x, multipliers[:count])
 
@@ -182,7 +182,7 @@ def _checked_bound(program: LinearProgram, multipliers: Array, cutoff: float) ->
     off = float(np.abs(program.c - G.T @ multipliers).max())
     bound = float(h @ multipliers)
     if not (off <= RESIDUAL and bound <= cutoff):  # nor if one is not a number
-        raise SolverError(f"called below {cutoff:.3g}, but the bound is {bound:.3g}")
+        raise SolverError(f"the optimum was called below {cutoff:.3g}, its bound is {bound:.3g}")
     return Below(bound, multipliers)
 
 
@@ -228,7 +228,7 @@ def _checked_ray(program: LinearProgram, ray: Array) -> Infeasible:
         combined = np.abs(G.T @ multipliers).max(initial=0.0)
         if -float(h @ multipliers) > FARTHEST * combined + RESIDUAL:
             return Infeasible(multipliers)
-    raise SolverError("called infeasible, but the proof does not check")
+    raise SolverError("the program was called infeasible, but the proof fails our check")
 
 
 def _run(program: LinearProgram, strategy: int) -> tuple[Any, Any]:

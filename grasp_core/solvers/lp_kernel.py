@@ -1,4 +1,4 @@
-"""The dual simplex method on one small dense program.
+"""The dual simplex method is compiled here, for one small dense program at a time.
 
     maximise c.x  subject to  a_k.x <= b_k (or = b_k).
 
@@ -24,19 +24,20 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 
 BOX = 1e3
-"""Programs are of order one; what ends at the box is left to another solver."""
+"""Half the side of the starting box: programs are of order one, and one that ends at the box is
+left to another solver."""
 VIOLATED = 1e-10
-"""Distance from a row that counts as a violation."""
+"""Distance from a row above which a point violates it."""
 POSITIVE = 1e-9
 """Least alpha_j that may become a pivot."""
 SAME_RATIO = 1e-12
 UNCHANGED = 1e-13
-"""Steps that lower c.x by less do not count as progress."""
+"""Steps that lower c.x by less than this do not count as progress."""
 PATIENCE, MOST = 3, 60
 """Steps without progress until the first row enters, and steps in all, per variable."""
 REFINEMENTS = 3
 NEGLIGIBLE = 1e-12
-"""Multipliers that are zero but for rounding."""
+"""Multipliers of at most this size are zero but for rounding."""
 OPTIMAL, INFEASIBLE, BELOW, LOST = 0, 1, 2, 3
 
 
@@ -48,27 +49,27 @@ def try_out() -> None:
 
 
 class Rows(NamedTuple):
-    """The rows of a program; those of equalities come last, and may be turned around."""
+    """The rows of a program; equalities come last, and may be turned around."""
 
     At: Array
     """A transposed, (n, rows): the loops over all rows then run over neighbours in memory."""
     b: Array
-    """(rows,)"""
+    """Right-hand sides, (rows,)."""
     norms: Array
-    """Their lengths, (rows,)."""
+    """Lengths of the rows, (rows,)."""
     equalities: int
 
 
 class Vertex(NamedTuple):
-    """Where the method stands."""
+    """The basis at which the method stands, its vertex and its multipliers."""
 
     basis: Indices
     """Rows of the basis, (n,); rows + 2 i and rows + 2 i + 1 are the upper and the lower side of
     the box."""
     y: Array
-    """Their multipliers; where a row contradicts them, its combination alpha, (n,)."""
+    """Multipliers of the basis; where a row contradicts it, that row's combination alpha, (n,)."""
     x: Array
-    """Where they meet, (n,)."""
+    """Point where the rows of the basis meet, (n,)."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -76,10 +77,10 @@ def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex) -> tuple[int, int
     """Find a best vertex.
 
     Args:
-        c: (n,)
-        rows: Of the program.
+        c: Objective, (n,).
+        rows: Rows of the program.
         cutoff: Stop as soon as the optimum is known to be smaller.
-        vertex: Filled with the last one.
+        vertex: Filled with the last basis and its vertex.
 
     Returns:
         How it ended, and the row that contradicts the basis, if one does.
@@ -121,7 +122,7 @@ def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex) -> tuple[int, int
 
 @njit(cache=True, error_model="numpy")
 def proved_bound(c: Array, rows: Rows, vertex: Vertex, accuracy: float) -> float:
-    """No feasible value is larger: y.b, if y >= 0 gives c to within an accuracy; else infinity."""
+    """Return y.b, a bound of feasible values, if y >= 0 gives c to an accuracy; else infinity."""
     bound, left = 0.0, c.copy()
     for j in range(len(c)):
         share = vertex.y[j]
@@ -137,7 +138,7 @@ def proved_bound(c: Array, rows: Rows, vertex: Vertex, accuracy: float) -> float
 
 @njit(cache=True, error_model="numpy")
 def proved_empty(rows: Rows, vertex: Vertex, against: int, farthest: float) -> bool:
-    """Whether a row and the basis that it contradicts exclude all points up to |x|_1 = farthest.
+    """Return whether a row and the basis that it contradicts exclude all |x|_1 up to `farthest`.
 
     Where a_r = alpha_1 a_1 + .. with alpha <= 0, its excess over b_r is at least that of
     alpha_1 b_1 + .. .
@@ -156,14 +157,14 @@ def proved_empty(rows: Rows, vertex: Vertex, against: int, farthest: float) -> b
 
 @njit(cache=True, error_model="numpy")
 def _may_weigh(share: float, k: int, rows: Rows) -> bool:
-    """Whether a proof may use a row this much: sides of the box never, equalities always."""
+    """Return whether a proof may use a row this much: never the box, equalities always."""
     count = len(rows.b)
     return k < count and (share > 0.0 or k >= count - rows.equalities)
 
 
 @njit(cache=True, error_model="numpy")
 def _corner(c: Array, count: int, vertex: Vertex) -> tuple[Array, float]:
-    """The corner of the box on the side of c: inverse of its basis, and c.x."""
+    """Return the corner of the box on the side of c: the inverse of its basis, and c.x."""
     n = len(c)
     inverse, value = np.zeros((n, n)), 0.0
     for i in range(n):
@@ -184,7 +185,7 @@ def _leans_on_box(y: Array, basis: Indices, count: int) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def _exceeded(x: Array, rows: Rows, excess: Array) -> None:
-    """How far x is beyond each row."""
+    """Fill in how far x is beyond each row."""
     for k in range(len(excess)):
         excess[k] = -rows.b[k]
     for i in range(len(x)):
@@ -195,7 +196,7 @@ def _exceeded(x: Array, rows: Rows, excess: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _violated(excess: Array, rows: Rows, inside: NDArray[np.bool_], first: bool) -> int:
-    """The row that is violated most, or the first one; -1 if none is."""
+    """Return the row that is violated most, or the first one; -1 if none is."""
     worst, found, inequalities = VIOLATED, -1, len(excess) - rows.equalities
     for k in range(len(excess)):
         beyond = excess[k] if k < inequalities else abs(excess[k])
@@ -208,7 +209,7 @@ def _violated(excess: Array, rows: Rows, inside: NDArray[np.bool_], first: bool)
 
 @njit(cache=True, error_model="numpy")
 def _turn(rows: Rows, k: int) -> None:
-    """Turn an equality, so that what was beneath it is beyond."""
+    """Turn an equality, so that points beneath it are beyond it."""
     rows.b[k] = -rows.b[k]
     for i in range(len(rows.At)):
         rows.At[i, k] = -rows.At[i, k]
@@ -216,7 +217,7 @@ def _turn(rows: Rows, k: int) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _combined(rows: Rows, entering: int, inverse: Array, alpha: Array) -> None:
-    """Write a row as a combination of those of the basis."""
+    """Write a row as a combination of the rows of the basis."""
     alpha[:] = 0.0
     for i in range(len(alpha)):
         share = rows.At[i, entering]
@@ -227,7 +228,7 @@ def _combined(rows: Rows, entering: int, inverse: Array, alpha: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _refine(c: Array, rows: Rows, basis: Indices, inverse: Array, y: Array) -> None:
-    """Multipliers afresh: their rounding errors have added up over the steps."""
+    """Compute the multipliers afresh: rounding errors have added up over the steps."""
     y[:] = 0.0
     for _ in range(REFINEMENTS):
         left = c.copy()
@@ -240,7 +241,7 @@ def _refine(c: Array, rows: Rows, basis: Indices, inverse: Array, y: Array) -> N
 
 @njit(cache=True, error_model="numpy")
 def _subtract(left: Array, share: float, rows: Rows, k: int) -> None:
-    """Take a share of a row away, which may be a side of the box."""
+    """Take a share of a row away from `left`; the row may be a side of the box."""
     side = k - len(rows.b)
     if side >= 0:
         left[side // 2] -= share if side % 2 == 0 else -share
@@ -251,9 +252,9 @@ def _subtract(left: Array, share: float, rows: Rows, k: int) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _leaving(y: Array, alpha: Array, basis: Indices, rows: Rows) -> int:
-    """Of the least ratios y / alpha the one with the largest alpha; -1 if no alpha is positive.
+    """Return the place of least y / alpha, the largest alpha among equals; -1 if none is positive.
 
-    Equalities stay.
+    Equalities stay in the basis.
     """
     count, least, found = len(rows.b), np.inf, -1
     for j in range(len(y)):

@@ -1,17 +1,17 @@
-"""The point of a polyhedron that is nearest to the origin, for many polyhedra with equal normals.
+"""The point of a polyhedron nearest to the origin, for many polyhedra with equal normals.
 
 Solved: minimise |x| subject to C x <= d, for every row d of D.
 
 A point x is nearest iff C x <= d and x = -C'u for some u >= 0 that vanishes off the active rows,
-those with equality. A compiled dual active-set method finds x and u; what it leaves, or what does
-not meet these conditions, is found as it all is where there are no kernels
-(`GRASPPROOF_KERNELS=off`). Least squares give u (Lawson & Hanson): with the residual (y, s) of
+where equality holds. A compiled dual active-set method finds x and u. Where it fails, or its x and
+u miss these conditions, least squares find u (Lawson & Hanson), as they always do where there are
+no kernels (`GRASPPROOF_KERNELS=off`): with the residual (y, s) of
 
     minimise |C'v|^2 + (1 + d.v)^2  over  v >= 0
 
-x = -y / s and u = v / s; where the residual vanishes, v proves that nothing is feasible. Active
-rows a alone give x = C_a^+ d_a, linear in d, so those of one d are tried on others: for loads
-along a path or along few directions, few programs need to be solved.
+x = -y / s and u = v / s; where the residual vanishes, v proves that nothing is feasible. The active
+rows a alone give x = C_a^+ d_a, linear in d, so the active rows of one d are tried on others: for
+loads along a path or along few directions, few programs need to be solved.
 
 Source: Lawson & Hanson, "Solving Least Squares Problems", 1974, chapter 23.
 """
@@ -28,22 +28,22 @@ from grasp_core.compiled import compiled
 
 KERNEL = "grasp_core.solvers.nearest_point_kernel"
 EXACT = 1e-11
-"""Violation of the conditions that is accepted, relative to x: some thousand times the rounding of
-such numbers, a hundred times less than any use can tell apart."""
+"""Accepted violation of the conditions, relative to x: some thousand times the rounding of such
+numbers, a hundred times less than any use can tell apart."""
 TRIED = 200
-"""Active rows are tried on so many others, which takes about twice as long as finding them."""
+"""Right-hand sides on which active rows are tried: it takes about twice as long as finding them."""
 WORTH = 2
-"""They pay if they serve more than so many; while they do not, they are tried half as often."""
+"""Uses above which trying active rows pays; while it does not, they are tried half as often."""
 
 
 def least_distance(C: Array, D: Array, *, accuracy: float = EXACT) -> Array:
-    """The nearest points, (n, v), as rows; NaN where none was found that meets the conditions.
+    """Find the nearest points, (n, v), as rows; NaN where none was found that meets the conditions.
 
     A row of the answer does not depend on the other rows of D, but for rounding.
 
     Args:
-        C: (m, v)
-        D: (n, m)
+        C: Normals of all polyhedra, (m, v).
+        D: Right-hand sides of each polyhedron, (n, m).
         accuracy: Violation of the conditions that is accepted, relative to x; active rows that are
             nearly parallel need more than `EXACT`.
     """
@@ -61,7 +61,7 @@ def least_distance(C: Array, D: Array, *, accuracy: float = EXACT) -> Array:
 
 
 def _by_kernel(C: Array, D: Array, accuracy: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Points of the compiled method, (n, v), and which are proved to be nearest."""
+    """Find points by the compiled method, (n, v), and return which are proved to be nearest."""
     X, U = np.zeros((len(D), C.shape[1])), np.zeros(D.shape)
     compiled(KERNEL).solve(np.array(C, order="C"), np.array(D, order="C"), X, U)
     slack = D - X @ C.T
@@ -73,7 +73,7 @@ def _by_kernel(C: Array, D: Array, accuracy: float) -> tuple[Array, NDArray[np.b
 
 
 def _by_least_squares(C: Array, D: Array) -> Array:
-    """Nearest points, (n, v), where every row of D has a negative entry."""
+    """Find nearest points, (n, v), where every row of D has a negative entry."""
     X, V = np.zeros((len(D), C.shape[1])), np.zeros(D.shape)
     waiting, solved = np.ones(len(D), dtype=bool), np.zeros(len(D), dtype=bool)
     pause, wait = 1, 0
@@ -93,7 +93,7 @@ def _by_least_squares(C: Array, D: Array) -> Array:
 
 
 def _weights(C: Array, d: Array) -> Array:
-    """The v of the module's text; zero if there are too many iterations."""
+    """Find the v of the module's derivation; zero if there are too many iterations."""
     target = np.zeros(C.shape[1] + 1)
     target[-1] = -1.0
     try:
@@ -103,7 +103,7 @@ def _weights(C: Array, d: Array) -> Array:
 
 
 def _from_weights(C: Array, D: Array, V: Array) -> Array:
-    """The nearest points that weights stand for, checked, and corrected where they fail."""
+    """Compute the nearest points of weights v, check them, and correct them where they fail."""
     left = np.maximum(1.0 + (D * V).sum(axis=1, keepdims=True), np.finfo(np.float64).eps)
     X = -(V @ C) / left
     slack = D - X @ C.T
@@ -115,7 +115,7 @@ def _from_weights(C: Array, D: Array, V: Array) -> Array:
 
 
 def _on_rows(C: Array, D: Array, active: Indices) -> tuple[Array, NDArray[np.bool_]]:
-    """Nearest points if these rows are the active ones, (n, v), and which are proved to be."""
+    """Compute nearest points if these rows are active, (n, v), and which are proved to be."""
     inverse = np.linalg.pinv(C[active])
     X = D[:, active] @ inverse.T
     slack, multipliers = D - X @ C.T, -(X @ inverse)

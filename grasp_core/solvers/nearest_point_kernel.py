@@ -1,16 +1,17 @@
-"""The dual active-set method for the nearest points of polyhedra with equal normals.
+"""The dual active-set method finds the nearest points of polyhedra with equal normals.
 
     minimise |x|  subject to  C x <= d,  for every row d of D.
 
-Solved: x and multipliers u >= 0 with x = -C'u, which `least_distance` checks.
+Solved: x and multipliers u >= 0 with x = -C'u, which `nearest_point` checks.
 
 Method. With the rows a_1 .. a_q active, x is the nearest point of where these hold with equality,
 and their multipliers are not negative: x = 0 without any. If x violates a row a, write
 a = r_1 a_1 + .. + r_q a_q + z with z orthogonal to the active rows: a step t along -z lowers
-the multipliers by t r and gives a itself the multiplier t. It ends where a holds with equality,
-and a becomes active, or before, where a multiplier vanishes, whose row then leaves. |x| grows with
-every full step, so no active rows recur. Where z = 0 and no multiplier falls, nothing is feasible.
-The row that is violated most comes first. In the end x is computed afresh from its active rows.
+the multipliers by t r and gives a itself the multiplier t. The step ends where a holds with
+equality, and a becomes active, or before, where a multiplier vanishes, whose row then leaves. |x|
+grows with every full step, so no active rows recur. Where z = 0 and no multiplier falls, nothing is
+feasible. The row that is violated most comes first. In the end x is computed afresh from its active
+rows.
 
 Source: Goldfarb & Idnani, "A numerically stable dual method for solving strictly convex quadratic
 programs", Mathematical Programming 27, 1983.
@@ -25,32 +26,32 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 
 VIOLATED = 1e-13
-"""Distance from a row, relative to x or one, that counts as a violation."""
+"""Distance from a row, relative to x or one, above which a point violates it."""
 DEPENDENT = 1e-9
-"""A row that leaves less of its length orthogonal to the active ones depends on them."""
+"""Share of its length that a row must leave orthogonal to the active ones to be independent."""
 TINY = 1e-300
-"""Stands in for a length of zero, by which would be divided."""
+"""Least length that is divided by."""
 MOST = 20
-"""Steps per variable."""
+"""Most steps per variable."""
 
 
 class Active(NamedTuple):
-    """Active rows A, with A = R'Q."""
+    """The active rows A, with A = R'Q."""
 
     rows: Indices
-    """Which they are, (v + 1,), and after them the one that enters."""
+    """Indices of the active rows, followed by the one that enters, (v + 1,)."""
     inside: NDArray[np.bool_]
     """Whether a row is active, (m,)."""
     Q: Array
-    """Orthonormal rows, (v, v)."""
+    """Orthonormal rows that span the active ones, (v, v)."""
     R: Array
     """Upper triangle, (v, v + 1); the last column is that of the row that enters."""
     u: Array
-    """Multipliers, (v + 1,)."""
+    """Multipliers of these rows, (v + 1,)."""
     z: Array
-    """What the entering row leaves orthogonal to the active ones, (v,)."""
+    """Part of the entering row that is orthogonal to the active ones, (v,)."""
     r: Array
-    """Its shares of the active rows, (v,)."""
+    """Shares of the active rows in the entering row, (v,)."""
 
 
 def try_out() -> None:
@@ -64,10 +65,10 @@ def solve(C: Array, D: Array, X: Array, U: Array) -> None:
     """Find nearest points.
 
     Args:
-        C: (m, v), contiguous like all of these.
-        D: (n, m)
+        C: Normals, (m, v), contiguous like all of these arrays.
+        D: Right-hand sides, (n, m).
         X: Filled with the points, (n, v); with zeros where none was found.
-        U: Zeros, filled with their multipliers, (n, m).
+        U: Zeros, filled with the points' multipliers, (n, m).
     """
     m, v = C.shape
     norms = np.empty(m)
@@ -89,7 +90,7 @@ def solve(C: Array, D: Array, X: Array, U: Array) -> None:
 
 @njit(cache=True)
 def _solve(C: Array, d: Array, norms: Array, active: Active, x: Array) -> int:
-    """How many rows are active at the nearest point; -1 if none was found."""
+    """Find the nearest point; return how many rows are active there, -1 if none was found."""
     count = 0
     x.fill(0.0)
     active.inside.fill(False)
@@ -106,9 +107,9 @@ def _solve(C: Array, d: Array, norms: Array, active: Active, x: Array) -> int:
 
 @njit(cache=True)
 def _enter(C: Array, active: Active, count: int, excess: float, least: float, x: Array) -> int:
-    """Step until the row after the active ones is active: how many then are; -1 if it cannot be.
+    """Step until the row after the active ones is active; return how many then are, -1 if it fails.
 
-    `least` is the length of a rest that does not count.
+    `least` is the length up to which a rest counts as zero.
     """
     entering, z = active.rows[count], active.z
     for _ in range(count + 1):
@@ -135,7 +136,7 @@ def _enter(C: Array, active: Active, count: int, excess: float, least: float, x:
 def _violated(
     C: Array, d: Array, norms: Array, inside: NDArray[np.bool_], x: Array
 ) -> tuple[int, float]:
-    """The row that x violates most, -1 if none, and its excess."""
+    """Return the row that x violates most, -1 if none, and its excess."""
     size = 1.0
     for j in range(len(x)):
         size = max(size, abs(x[j]))
@@ -149,9 +150,9 @@ def _violated(
 
 @njit(cache=True)
 def _split(row: Array, active: Active, count: int) -> float:
-    """Write a row as R[:, count] on Q and a rest z orthogonal to it; the square of the rest.
+    """Write a row as R[:, count] on Q and a rest z orthogonal to it; return the square of the rest.
 
-    Twice, as once leaves rounding of the size of the row.
+    This is done twice, as once leaves rounding of the size of the row.
     """
     Q, R, z = active.Q, active.R, active.z
     for j in range(len(row)):
@@ -176,7 +177,7 @@ def _append(active: Active, count: int, square: float) -> None:
 
 @njit(cache=True)
 def _leaving(active: Active, count: int) -> tuple[int, float]:
-    """The active row whose multiplier vanishes first, and after which step; r is filled in."""
+    """Return the active row whose multiplier vanishes first, and after which step; fill in r."""
     R, r, u, found, least = active.R, active.r, active.u, -1, np.inf
     for i in range(count - 1, -1, -1):
         r[i] = R[i, count]
@@ -199,7 +200,7 @@ def _move(active: Active, count: int, step: float) -> None:
 
 @njit(cache=True)
 def _drop(C: Array, active: Active, count: int, leaving: int) -> int:
-    """Take a row from the active ones; how many are left."""
+    """Remove a row from the active ones; return how many are left."""
     active.inside[active.rows[leaving]] = False
     for j in range(leaving, count):
         active.rows[j], active.u[j] = active.rows[j + 1], active.u[j + 1]
@@ -210,7 +211,7 @@ def _drop(C: Array, active: Active, count: int, leaving: int) -> int:
 
 @njit(cache=True)
 def _recompute(d: Array, active: Active, count: int, x: Array) -> None:
-    """The nearest point where the active rows hold with equality: Q'y with R'y = d, R u = -y."""
+    """Compute the point where the active rows hold with equality: Q'y with R'y = d, R u = -y."""
     rows, Q, R, u = active.rows, active.Q, active.R, active.u
     x.fill(0.0)
     for i in range(count):

@@ -14,9 +14,9 @@ These rules replace it wherever something is chosen.
    second key decides, as a rule the faces, ascending. Of numbers that come one by one, `graded`
    counts the cells of a grid up to each. The grid is shifted by a fraction that no ratio of small
    whole numbers comes near: the numbers of regular objects (0, 1/2, 1/3) are far from borders.
-4. *Searches of many steps*, whose every comparison would need a margin, are told no last digits:
-   compiled loops are given numbers that lie on a grid, see `on_grid`. Their sums have one order on
-   all machines, so that they decide alike. What they find is proved for the exact numbers.
+4. *Searches of many steps*, whose every comparison would need a margin, are given no last digits:
+   compiled loops get numbers that lie on a grid, see `on_grid`. Their sums have one order on all
+   machines, so that they decide alike. What they find is proved for the exact numbers.
 
 What is left to chance is a number that comes within rounding of a border by accident: with
 fourteen good digits and cells of 1e-7, one in ten million.
@@ -37,15 +37,15 @@ SAME_VALUE = 1e-5
 which rounding moves the nearest point farther."""
 FOUND = 1e-7
 """How far the nearest optimum may miss its conditions. They are met by far or not at all: an answer
-near this border would be taken on one machine only."""
+near this border would be accepted on one machine only."""
 GRID_DIGITS = 9
-"""Digits after the point that searches of many steps are told, at size one."""
+"""Digits after the point that searches of many steps are given, at size one."""
 FEASIBLE = 1e-9
-"""How far it may be beyond a row."""
+"""How far the nearest optimum may be beyond a row."""
 SAME_DIGITS = 7
-"""Figures are equal to so many digits after the point (object size one), unless told otherwise."""
+"""Digits after the point, at object size one, within which figures are equal by default."""
 SAME_SHARE = 1e-6
-"""Figures whose difference is a smaller share of the best are equal."""
+"""Share of the best figure below which a difference from it does not count."""
 
 
 @overload
@@ -53,11 +53,11 @@ def graded(values: float, digits: int = SAME_DIGITS) -> float: ...
 @overload
 def graded(values: Array, digits: int = SAME_DIGITS) -> Array: ...
 def graded(values: float | Array, digits: int = SAME_DIGITS) -> float | Array:
-    """Number of the cell in which each value lies, of any shape; equal values share a cell.
+    """Number the cell in which each value lies, of any shape; equal values share a cell.
 
     Args:
-        values: Infinite ones lie in infinite cells.
-        digits: After the point, how narrow cells are.
+        values: Numbers to grade; infinite ones lie in infinite cells.
+        digits: Digits after the point that a cell spans.
     """
     cells = np.floor(np.asarray(values, dtype=np.float64) * 10.0**digits + SHIFT)
     return cells if cells.ndim else float(cells)
@@ -68,23 +68,23 @@ def coarse(values: float, digits: int = SAME_DIGITS) -> float: ...
 @overload
 def coarse(values: Array, digits: int = SAME_DIGITS) -> Array: ...
 def coarse(values: float | Array, digits: int = SAME_DIGITS) -> float | Array:
-    """The upper end of each value's cell: an upper bound that equal values share."""
+    """Return the upper end of each value's cell: an upper bound that equal values share."""
     return (graded(values, digits) + (1.0 - SHIFT)) * 10.0**-digits
 
 
 def on_grid(values: Array, digits: int = GRID_DIGITS) -> Array:
-    """A number of each value's cell, of any shape, so that equal values share all bits.
+    """Replace each value by a number of its cell, of any shape; equal values then share all bits.
 
-    It has so many digits after the point, and is at most 0.62 units of the last one away.
+    The number has `digits` digits after the point, and is at most 0.62 units of the last one away.
     """
     return graded(values, digits) * 10.0**-digits
 
 
 def ranks(values: ArrayLike, share: float = SAME_SHARE) -> Indices:
-    """Place of each number among its like, (n,): 0 for the smallest and all that equal it.
+    """Rank each number, (n,): 0 for the smallest and all that equal it, and so on.
 
     Args:
-        values: (n,)
+        values: Numbers to rank, (n,).
         share: Neighbours are equal if their gap is a smaller share of the larger one in size.
     """
     numbers = np.asarray(values, dtype=np.float64)
@@ -100,21 +100,21 @@ def ranks(values: ArrayLike, share: float = SAME_SHARE) -> Indices:
 
 
 def smallest_first(values: ArrayLike) -> list[int]:
-    """Places of numbers in rising order, (n,); equal ones stay in the order in which they come."""
+    """List places of numbers in rising order, (n,); equal ones keep the order they come in."""
     return [int(place) for place in np.argsort(ranks(values), kind="stable")]
 
 
 def largest_first(values: ArrayLike) -> list[int]:
-    """As `smallest_first`, in falling order."""
+    """List places of numbers in falling order, (n,); equal ones keep the order they come in."""
     return smallest_first(-np.asarray(values, dtype=np.float64))
 
 
 def first_best(values: ArrayLike, margin: float | None = None) -> int:
-    """Place of the first value that is as large as the largest, ties apart.
+    """Find the place of the first value that is as large as the largest, ties apart.
 
     Args:
-        values: (n,), at least one.
-        margin: By how much less counts as equal; a share of the largest one if not given.
+        values: Numbers to compare, (n,), at least one.
+        margin: By how much less counts as equal; by default a share of the largest one.
     """
     numbers = np.asarray(values, dtype=np.float64)
     best = float(numbers.max())
@@ -124,17 +124,17 @@ def first_best(values: ArrayLike, margin: float | None = None) -> int:
 
 
 def surpassing(best: float) -> float:
-    """What a challenger's figure must exceed to be larger than the best so far, ties apart."""
+    """Return what a challenger's figure must exceed to beat the best so far, ties apart."""
     return best + SAME_SHARE * abs(best) if math.isfinite(best) else best
 
 
 def nearest_optimum(program: LinearProgram, optimum: Optimum, share: float = SAME_VALUE) -> Array:
-    """Of all optima of a program the one nearest to the origin, (n,).
+    """Find, of all optima of a program, the one nearest to the origin, (n,).
 
     Args:
-        program: Its data are of order one.
+        program: Program whose data are of order one.
         optimum: One of its optima.
-        share: What may be given up of the value, as a share of 1 + |value|.
+        share: Part of the value that may be given up, as a share of 1 + |value|.
 
     Returns:
         A point that meets all rows with such a value; the optimum itself if the nearest one cannot

@@ -94,7 +94,7 @@ def test_long_settings_are_refused_before_they_are_read(tmp_path):
 
 
 JSON = {
-    '{"a": 1, "a": 2}': "a: the key is there twice",
+    '{"a": 1, "a": 2}': "a: the key occurs twice",
     '{"a": NaN}': "a: expected a finite number, got nan",
     '{"a": [{"b": 1e999}]}': r"a\[0\].b: expected a finite number, got inf",
     '{"a": %s}' % ("9" * 400): "a: a whole number of 1329 bits is too large",
