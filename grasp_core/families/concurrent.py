@@ -64,7 +64,7 @@ RADII, SMALLEST = slice(11, 15), 15
 
 
 Sides: TypeAlias = tuple[float, float, float, float]
-# signs of (4) for the four fingers
+# values of `side` in (4), one per finger
 BEFORE, BEHIND = (1.0, 1.0, 1.0, 1.0), (-1.0, -1.0, -1.0, -1.0)
 MIXED_SIDES: tuple[Sides, ...] = tuple(
     four(sides) for sides in product((1.0, -1.0), repeat=FINGERS) if abs(sum(sides)) < FINGERS
@@ -241,7 +241,7 @@ def _rows(
         aim = np.zeros((len(G), 16))
         aim[:, :3], aim[:, 3 + 2 * i : 5 + 2 * i] = -G, flat
         aim[:, 11 + i] = np.linalg.norm(flat, axis=1)
-        # (2)
+        # (2): the disc stays inside the face
         inside = np.zeros((len(piece.E), 16))
         inside[:, 3 + 2 * i : 5 + 2 * i], inside[:, 11 + i] = piece.E, 1.0
         # r <= r_i: the program maximises the smallest radius

@@ -54,6 +54,7 @@ def largest_discs(
 
     Returns:
         The discs, or a proved bound below `least` on their common radius.
+
     Raises:
         SolverError: A program's answer failed its check.
     """

@@ -220,7 +220,7 @@ def place_by_forces(pieces: Sequence[FacePiece], forces: Array) -> Placement | N
         turn = -cross_matrix(force)
         A_eq[:, 2 * i : 2 * i + 2] = turn @ piece.frame
         b_eq -= turn @ piece.origin
-        # (4)
+        # (4): contacts keep a distance t from the edges
         inside = np.zeros((len(piece.E), 2 * FINGERS + 1))
         inside[:, 2 * i : 2 * i + 2], inside[:, -1] = piece.E, 1.0
         rows.append(inside)
@@ -277,7 +277,7 @@ def _grasp(
     forces = np.array([at_corners[owner == i].sum(axis=0) for i in range(FINGERS)])
     if found := place_by_forces(pieces, forces - forces.mean(axis=0)):
         return found
-    # (5)
+    # (5): pressed harder, a corner draws the contact nearer
     pushes, _ = normal_and_tangential(at_corners, patch.normals)
     weights = np.maximum(pushes, ROUNDED)
     centers = np.array(
