@@ -1,4 +1,4 @@
-"""PLY: a header that says what follows, then elements with properties, as text or binary."""
+"""Reads PLY: a header that lists elements and properties, then their rows, as text or binary."""
 
 import re
 from collections.abc import Iterator
@@ -27,32 +27,32 @@ LARGEST_CORNER = 2**32
 LISTS = ("vertex_indices", "vertex_index")
 POINT = ("x", "y", "z")
 Cell = tuple[str, list[float]]
-"""Name and values of a property in one row; of those that are passed over, no values."""
+"""Name and values of a property in one row; properties that are ignored get no values."""
 
 
 @dataclass(frozen=True, slots=True)
 class Property:
-    """A number, or a list of numbers, of each thing of an element."""
+    """A property of an element: each row has a number for it, or a list of numbers."""
 
     name: str
     kind: str
     count_kind: str | None = None
-    """Of the length of a list; None for a number."""
+    """Type of the length of a list; None for a number."""
 
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """A table of the file."""
+    """A table of the file: its name, number of rows, and properties."""
 
     name: str
     rows: int
     properties: list[Property] = field(default_factory=list[Property])
 
     def place(self, names: tuple[str, ...]) -> Property:
-        """The property of one of the names.
+        """The one property with one of the given names.
 
         Raises:
-            MeshError: There is none.
+            MeshError: There is no such property, or there are several.
         """
         found = [each for each in self.properties if each.name in names]
         if len(found) != 1:
@@ -64,7 +64,7 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     """Vertices (n, 3) and triangles (t, 3) of a PLY file.
 
     Raises:
-        MeshError: It breaks a rule, or has more than `most` triangles.
+        MeshError: The file breaks a rule, or has more than `most` triangles.
     """
     found = END.search(data[:LONGEST_HEADER])
     if not found:
@@ -88,7 +88,7 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
 
 
 def is_text(data: bytes) -> bool:
-    """Whether the header says that text follows; what comes after it means nothing here."""
+    """Whether the header says that text follows; what comes after the header is not looked at."""
     ended = END.search(data[:LONGEST_HEADER])
     return ended is not None and b"\nformat ascii" in data[: ended.start()]
 
@@ -168,7 +168,7 @@ def _cells(element: Element, words: Iterator[bytes], where: str) -> Iterator[Cel
 
 
 def _rounded(values: list[float], kind: str, where: str) -> list[float]:
-    """Numbers as their type keeps them."""
+    """Round numbers as their type would keep them."""
     if not kind.startswith("f"):
         return values
     with np.errstate(over="ignore", under="ignore"):
@@ -206,7 +206,7 @@ def _add_binary(surface: Surface, elements: list[Element], body: bytes, order: s
 
 
 def _row_type(element: Element, body: bytes, order: str) -> np.dtype[np.void]:
-    """Of a row, if the lists of all rows are as long as those of the first."""
+    """Type of a binary row, if the lists of all rows are as long as the lists of the first."""
     parts = list[tuple[str, str] | tuple[str, str, tuple[int]]]()
     for each in element.properties:
         if each.count_kind is None:
