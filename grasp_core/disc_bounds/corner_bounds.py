@@ -139,6 +139,7 @@ def _reaches(corners: Array, axes: Array) -> Array:
     """The bound (1) on the mean distance of a focus before or behind its contacts, (q,)."""
     heights = np.einsum("qfki,qfi->qfk", corners, axes)
     weights = balancing_weights(axes)
+    # (1) holds for whichever side the focus is on: the larger bound covers both
     before = -np.einsum("qf,qf->q", weights, heights.min(axis=2, initial=np.inf))
     behind = np.einsum("qf,qf->q", weights, heights.max(axis=2, initial=-np.inf))
     return np.maximum(before, behind)

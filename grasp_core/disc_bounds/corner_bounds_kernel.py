@@ -43,7 +43,7 @@ def fill(
         limits: Filled with upper bounds, (q, 4).
     """
     for q in range(len(faces)):
-        if half_angles[q] <= 0.0:
+        if half_angles[q] <= 0.0:  # there are no such cones, and so no discs
             limits[q] = 0.0
             continue
         before, behind = reaches(corners, faces[q], axes[q])
@@ -79,7 +79,7 @@ def _width(corners: Corners, faces: Indices, axes: Array, pair: tuple[int, int])
     (i, j), apart = pair, np.empty(3)
     for d in range(3):
         apart[d] = axes[i, d] - axes[j, d]
-    share = 0.5 * dotted(apart, apart)
+    share = 0.5 * dotted(apart, apart)  # 1 - a_i.a_j of (2)
     if share <= PARALLEL:
         return np.inf
     return (_extent(corners, faces[j], apart)[1] - _extent(corners, faces[i], apart)[0]) / share
@@ -111,6 +111,7 @@ def _across(
             lower, higher = _extent(corners, faces[other], N)
             # (4), with its sign: it tells which of the two discs is higher
             away = dotted(axes[other], N) / half if f >= pair else 0.0
+            # left sides of (3) and (4) per unit of r
             total = lean + _lean(normals[faces[other]], N) + abs(away)
             if total <= PARALLEL:
                 continue

@@ -123,9 +123,9 @@ def _edge_rows(
             back += edge * axis[j]
             far += edge * u[j]
             high += edge * o[j]
-        # c part of q
+        # along u, k moves the focus c
         rows.At[K, row], rows.At[-1, row] = sign * far, 1.0
-        # s a part of q
+        # the disc lies s back from c along the axis
         for j in range(K + 1):
             rows.At[j, row] -= back * s[j]
         rows.b[row] = faces.b[face, e] + back * s0 + high

@@ -55,6 +55,7 @@ class AttemptBounds:
         )
         if construction.limits is None:
             return self._of_reguli(attempts)
+        # hulls stand for faces of several pieces: they offer no less than any piece
         kernel = compiled(KERNELS[construction.family])
         if kernel is None:
             return self._by_constructions(construction, attempts, least)
@@ -71,6 +72,7 @@ class AttemptBounds:
         bounds = np.full(len(attempts.faces), np.inf)
         known = regulus_bounds(self._table, attempts, -np.inf)
         if known is not None:
+            # merits are no radii: only a proof that excludes all slopes tells anything
             merits, _ = known
             bounds[merits == -np.inf] = -np.inf
         return bounds

@@ -74,7 +74,7 @@ def vertex_of(n: int) -> Vertex:
 
 @njit(cache=True)
 def measure(rows: Rows) -> None:
-    """Fill in the lengths of the rows, which the solver scales by."""
+    """Fill in the lengths of the rows, by which the solver measures violations."""
     rows.norms[:] = 0.0
     for i in range(len(rows.At)):
         for k in range(len(rows.norms)):

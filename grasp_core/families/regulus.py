@@ -176,6 +176,7 @@ def _best_of(
         lines = [_line(pairs, slopes, finger) for finger in range(FINGERS)]
         program = _program(pieces, facets, lines, slopes, SIDES[side])
         found = maximize(program)
+        # ties go to the first choice: rounding must not decide between equal ones
         if isinstance(found, Optimum) and found.value > _merit(best) + SAME_OFFSET:
             best = _placement(pieces, lines, nearest_optimum(program, found, GIVEN_UP), found.value)
     return best

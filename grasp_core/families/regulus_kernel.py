@@ -37,8 +37,8 @@ from grasp_core.solvers.lp_kernel import (
 VARIABLES, K, P, X, Z, T = 10, 3, 4, 5, 7, 9
 """Number and places of the variables."""
 ACCURACY, FARTHEST = 1e-11, 1e4
-"""How far multipliers may be from giving the objective; and the size of the variables up to which a
-proof of infeasibility has to hold."""
+"""How far multipliers may be from giving the objective, and the size |x|_1 of the variables up to
+which a proof of infeasibility has to hold."""
 NONE, PLUS, MINUS = -1, 0, 1
 """Codes of the side: no slopes are feasible, p > 0, p < 0."""
 

@@ -39,7 +39,7 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     try:
         return _scene(tree, binary, most)
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        message = f"the JSON part is no glTF ({type(error).__name__}: {shown(error)})"
+        message = f"the JSON part is not glTF ({type(error).__name__}: {shown(error)})"
         raise MeshError(MeshRefusal.UNREADABLE, f"{message}; export it again") from error
 
 
@@ -53,14 +53,14 @@ def _chunks(data: bytes) -> tuple[Tree, bytes]:
     chunks, place = list[tuple[int, bytes]](), HEAD
     while place < len(data):
         if place + CHUNK_HEAD > len(data):
-            broken("the end", "half of a chunk's head")
+            broken("the end", "the head of a chunk is cut off")
         size, kind = struct.unpack_from("<II", data, place)
         place += CHUNK_HEAD + size
         if place > len(data):
             broken("the end", f"a chunk of {size} bytes is cut off")
         chunks.append((kind, data[place - size : place]))
     if [kind for kind, _ in chunks] not in ([JSON_CHUNK], [JSON_CHUNK, BINARY_CHUNK]):
-        broken("the chunks", "expected one of JSON, and one binary")
+        broken("the chunks", "expected one of JSON, then at most one of binary numbers")
     return _tree(chunks[0][1]), chunks[1][1] if len(chunks) > 1 else b""
 
 
@@ -140,14 +140,14 @@ def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
 
 def _check_place(place: object, listed: list[Any]) -> None:
     if type(place) is not int or not 0 <= place < len(listed):
-        broken("the JSON part", f"names number {shown(place)} of {len(listed)}")
+        broken("the JSON part", f"names item {shown(place)} of {len(listed)}")
 
 
 def _matrix(node: Tree) -> Array:
     matrix = np.eye(4)
     if "matrix" in node:
         if {"translation", "rotation", "scale"} & node.keys():
-            broken("a node", "has a matrix and parts of one")
+            broken("a node", "has a matrix as well as a translation, rotation or scale")
         # glTF lists matrices by columns
         matrix = _floats(node, "matrix", 16).reshape(4, 4).T
         if (matrix[3] != (0.0, 0.0, 0.0, 1.0)).any():
@@ -205,7 +205,7 @@ def _primitive(tree: Tree, binary: bytes, primitive: Tree) -> tuple[Indices, Arr
         # every other triangle of a strip is wound the other way
         rows[1::2] = rows[1::2, [1, 0, 2]]
     elif len(flat) % CORNERS:
-        broken("a part", f"{len(flat)} corners make no whole triangles")
+        broken("a part", f"{len(flat)} corners do not make whole triangles")
     else:
         rows = flat.reshape(-1, 3)
     check_corners(rows, len(points))

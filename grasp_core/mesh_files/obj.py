@@ -35,7 +35,7 @@ def read(text: bytes, most: int) -> tuple[Array, Indices]:
             surface.add(_corners(words, len(surface.points), where), where)
         elif keyword not in PASSED_OVER:
             unsupported(
-                f"{where}: {shown(keyword)!r} is no part of a polyhedron", "export polygons only"
+                f"{where}: {shown(keyword)!r} is not part of a polyhedron", "export polygons only"
             )
     return surface.arrays()
 
@@ -53,7 +53,7 @@ def _corners(words: list[bytes], vertices: int, where: str) -> list[int]:
     """Vertex numbers from 0 on; the file counts from 1, or back from the last vertex by then."""
     for word in words:
         if not CORNER.fullmatch(word):
-            broken(where, f"a corner must be whole numbers parted by `/`, got {shown(word)!r}")
+            broken(where, f"a corner must be whole numbers separated by `/`, got {shown(word)!r}")
     corners = [whole(word.partition(b"/")[0], where) for word in words]
     for corner in corners:
         if not 1 <= abs(corner) <= vertices:

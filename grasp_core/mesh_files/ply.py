@@ -119,7 +119,9 @@ def _header(text: bytes) -> tuple[str, list[Element]]:
             case ["property", first, *others] if elements:
                 elements[-1].properties.append(_property([first, *others], where))
             case _:
-                broken(where, f"got {shown(' '.join(words))!r}")
+                broken(
+                    where, f"expected a format, element or property, got {shown(' '.join(words))!r}"
+                )
     return order, elements
 
 
@@ -135,7 +137,7 @@ def _property(said: list[str], where: str) -> Property:
     lists = said[0] == "list"
     kinds = said[1:-1] if lists else said[:-1]
     if len(kinds) != 1 + lists or not TYPES.keys() >= set(kinds):
-        broken(where, f"got the property {shown(' '.join(said))!r}")
+        broken(where, f"expected a property of known type, got {shown(' '.join(said))!r}")
     if lists and TYPES[kinds[0]].startswith("f"):
         broken(where, "the length of a list must be a whole number")
     return Property(said[-1], TYPES[kinds[-1]], TYPES[kinds[0]] if lists else None)
@@ -148,11 +150,11 @@ def _add_text(surface: Surface, elements: list[Element], body: bytes) -> None:
             number, words = next(lines, (0, list[bytes]()))
             where = f"{element.name} {row}, line {number} after the header"
             if not words:
-                broken("the end", f"{element.rows} of {element.name} are counted, {row} are there")
+                broken("the end", f"{element.rows} rows of {element.name} are counted, got {row}")
             values = dict(_cells(element, iter(words), where))
             _add_row(surface, element.name, values, where)
     if (after := next(lines, None)) is not None:
-        broken(f"line {after[0]} after the header", "comes after all that is counted")
+        broken(f"line {after[0]} after the header", "comes after the last row that is counted")
 
 
 def _cells(element: Element, words: Iterator[bytes], where: str) -> Iterator[Cell]:
@@ -160,7 +162,7 @@ def _cells(element: Element, words: Iterator[bytes], where: str) -> Iterator[Cel
         length = 1 if each.count_kind is None else whole(next(words, b""), where)
         found = list(islice(words, max(length, 0)))
         if len(found) != length:
-            broken(where, f"{each.name} lists {length} values, {len(found)} are there")
+            broken(where, f"{each.name} lists {length} values, got {len(found)}")
         kept = element.name in {"vertex", "face"} and each.name in (*POINT, *LISTS)
         yield each.name, _rounded(numbers(found, where), each.kind, where) if kept else []
     if next(words, None) is not None:
@@ -194,7 +196,7 @@ def _add_binary(surface: Surface, elements: list[Element], body: bytes, order: s
         row = _row_type(element, body, order)
         size = row.itemsize * element.rows
         if len(body) < size:
-            broken("the end", f"{element.rows} of {element.name} are counted, fewer are there")
+            broken("the end", f"{element.rows} rows of {element.name} are counted, got fewer")
         rows = np.frombuffer(body[:size], dtype=row)
         for each in element.properties:
             if each.count_kind and (rows["count " + each.name] != row[each.name].shape[0]).any():
@@ -202,7 +204,7 @@ def _add_binary(surface: Surface, elements: list[Element], body: bytes, order: s
         _add_rows(surface, element, rows)
         body = body[size:]
     if body:
-        broken("the end", f"{len(body)} bytes come after all that is counted")
+        broken("the end", f"{len(body)} bytes come after the last row that is counted")
 
 
 def _row_type(element: Element, body: bytes, order: str) -> np.dtype[np.void]:

@@ -45,7 +45,7 @@ def mesh_bytes(path: Path, limits: MeshLimits) -> bytes:
         message = f"{path}: cannot be read ({error.strerror}); check the path and its rights"
         raise MeshError(MeshRefusal.UNREADABLE, message) from error
     if len(data) > limits.max_bytes:
-        message = f"{path}: over {limits.max_bytes} bytes, the limit; simplify the mesh"
+        message = f"{path}: is over the limit of {limits.max_bytes} bytes; simplify the mesh"
         raise MeshError(MeshRefusal.TOO_MANY, message)
     if not data:
         raise MeshError(MeshRefusal.EMPTY, f"{path}: the file is empty; export it again")
@@ -68,7 +68,7 @@ def check_beginning(kind: str, data: bytes) -> None:
             raise MeshError(MeshRefusal.FORMAT, message)
     for other, beginning in MAGIC.items():
         if other != kind and data.startswith(beginning):
-            message = f"is a {other.upper()} file, as it begins; rename it to .{other}"
+            message = f"is a {other.upper()} file by its beginning; rename it to .{other}"
             raise MeshError(MeshRefusal.FORMAT, message)
     if kind == "stl" and not stl.is_text(data) and not stl.is_binary(data):
         counted = int.from_bytes(data[stl.HEADER : stl.HEADER + 4], "little")

@@ -88,7 +88,7 @@ def _facet(number: int, words: list[bytes], lines: Lines) -> list[list[float]]:
 def _next(lines: Lines) -> tuple[int, list[bytes]]:
     line = next(lines, None)
     if line is None:
-        broken("the end", "the last triangle is not whole")
+        broken("the end", "expected a whole triangle")
     return line
 
 

@@ -119,7 +119,7 @@ def _manifold(solid: Solid) -> Any:
     )
     body = kernel.Manifold(mesh)
     if body.status() != kernel.Error.NoError:
-        raise InputError(f"not a closed, orientable mesh: {body.status().name}")
+        raise InputError(f"expected a closed, orientable mesh, got {body.status().name}; repair it")
     return body
 
 

@@ -160,8 +160,8 @@ def _patched(
         raise MeshError(
             MeshRefusal.NOT_FLAT,
             f"{len(patches)} patches are within {limits.spread_deg:g} deg and {limits.depth:g} "
-            "of the extent from flat, four fingers need four; allow more (--patch-spread-deg, "
-            "--patch-depth), or refine the mesh",
+            "of the extent from flat, but four fingers need four; allow more "
+            "(--patch-spread-deg, --patch-depth), or refine the mesh",
         )
     lean = max((face.spread for face in patches), default=0.0)
     off = max((face.depth for face in patches), default=0.0)
@@ -197,7 +197,7 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tup
         raise MeshError(MeshRefusal.NON_FINITE, f"vertex {bad} is {points[bad]}, not finite")
     if corners.min() < 0 or corners.max() >= len(points):
         wrong = corners.min() if corners.min() < 0 else corners.max()
-        message = f"a triangle names vertex {wrong}, there are 0..{len(points) - 1}"
+        message = f"a triangle names vertex {wrong}, but there are 0..{len(points) - 1}"
         raise MeshError(MeshRefusal.INDEX, message)
     with np.errstate(over="ignore"):
         extent = float(np.ptp(points[np.unique(corners)], axis=0).max())

@@ -19,7 +19,11 @@ only touch share what rounding leaves."""
 
 
 def welded(points: Array, corners: Indices) -> tuple[Array, Indices, int]:
-    """Join vertices closer than `WELD`, drop unused ones and collapsed triangles, counted."""
+    """Join vertices closer than `WELD`, and drop unused vertices and collapsed triangles.
+
+    Returns:
+        Vertices, triangles, and the number of triangles that were dropped.
+    """
     used, corners = np.unique(corners, return_inverse=True)
     points, corners = points[used], corners.reshape(-1, 3)
     reach = WELD * float(np.ptp(points, axis=0).max())
@@ -66,6 +70,7 @@ def surface_fault(corners: Indices) -> MeshError | None:
     if (uses != SIDES).any():
         message = (
             f"edge {edges[uses != SIDES][0].tolist()} belongs to {uses[uses != SIDES][0]} triangles"
+            ", expected two; separate what meets there, or take its sound parts (--faces patches)"
         )
         return MeshError(MeshRefusal.NON_MANIFOLD, message)
     return None
@@ -100,7 +105,9 @@ def check_volume(solid: Solid) -> None:
     """
     extent = float(np.ptp(solid.vertices, axis=0).max())
     if abs(solid.volume) < THINNEST * extent**3:
-        message = f"the volume is {solid.volume:.3g} m^3; a solid must have one"
+        message = (
+            f"the volume is {solid.volume:.3g} m^3, expected more; close the mesh around a solid"
+        )
         raise MeshError(MeshRefusal.ZERO_VOLUME, message)
 
 
@@ -127,7 +134,9 @@ def oriented(points: Array, corners: Indices, most: int) -> tuple[Indices, bool]
         message = f"{len(bodies)} solids overlap; unite them into one surface first"
         raise MeshError(MeshRefusal.OVERLAP, message)
     if len(bodies) > 1:
-        message = f"{len(bodies)} separate solids; a grasp holds one, so give one solid a file"
+        message = (
+            f"{len(bodies)} separate solids; a grasp holds one solid, so give each its own file"
+        )
         raise MeshError(MeshRefusal.SEPARATE, message)
     for cavity in cavities:
         inside = sum(intersection_volume(body, cavity) for body in bodies)

@@ -139,7 +139,7 @@ def _unranked(numbers: Indices, count: int) -> Indices:
 
 
 def _face_ends(count: int, largest: int) -> Sequence[int]:
-    """Last face of each block: each adds as many quadruples as there were, up to a size."""
+    """Numbers of faces that blocks reach to: each as large as all before, up to a size."""
     ends = [min(FIRST_FACES, count)]
     while ends[-1] < count:
         before = math.comb(ends[-1], FINGERS)

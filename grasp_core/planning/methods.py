@@ -215,7 +215,7 @@ class Searches:
         return Outcomes(len(held), absent, undecided, out_of_reach)
 
     def unreached(self) -> dict[FaceQuadruple, str]:
-        """Quadruples with contacts that no fingers reached and no other grasp, and why not."""
+        """Quadruples with contacts, none of which fingers reach, and why not the last ones."""
         searches = list(self.by_method.values())
         known = set[FaceQuadruple]().union(*(s.held for s in searches))
         known = known.union(*(search.absences for search in searches))

@@ -31,8 +31,8 @@ TOUCHING = 1e-6
 """Overlap that does not count, in object radii: what six digits in a file keep."""
 RINGS_DEG = (30.0, 60.0)
 """Angles from the normal at which fingers may come, besides straight along it [deg]."""
-# 6 directions on each ring
 RING_DIRECTIONS = 6
+"""Directions tried on each ring."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ class _Surroundings:
 
     @classmethod
     def of(cls, body: Polyhedron, face: int) -> "_Surroundings":
-        """All triangles of an object but those of the face or patch that is touched."""
+        """All triangles of an object but those of the curved patch that is touched."""
         keep = np.ones(len(body.triangles), dtype=np.bool_)
         keep[body.faces[face].facets] = False
         corners = body.vertices[body.triangles[keep]]

@@ -138,7 +138,9 @@ def _check_kinds(request: PlanRequest) -> None:
     if unknown or not families:
         raise InputError(f"families must be among {', '.join(METHODS)}; got {shown(families)}")
     if request.complete and "free" not in request.families:
-        raise InputError("complete decides all faces, which takes the free method; add it")
+        raise InputError(
+            "complete takes the free method, which decides all faces; add free to families"
+        )
     one_of(request.cones, get_args(ConeKind), "cones")
     one_of(request.rank_by, get_args(RankBy), "rank_by")
 

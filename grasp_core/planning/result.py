@@ -36,7 +36,7 @@ class MethodCounts:
     far from symmetric for a regulus, the free method is not needed on them, or they cannot enter
     the best `limit`."""
     solved: int = 0
-    """Choices of one convex piece per face that were tried."""
+    """Choices of one convex piece per face that were considered."""
     infeasible: int = 0
     """Candidates without a placement that has discs of the least radius at the planned angle, would
     enter the best if there is a limit, and exists on the surface of curved patches; for the free

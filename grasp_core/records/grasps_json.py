@@ -163,7 +163,7 @@ def grasps_from_json(text: str) -> SavedGrasps:
         limits=RECORDED,
     )
     if body.content_sha256 != record.object.content_sha256:
-        raise InputError("object.content_sha256: is not that of its mesh; plan again")
+        raise InputError("object.content_sha256: is not the hash of its mesh; plan again")
     grasps = tuple(
         _named_grasp(body, grasp, record.friction, i) for i, grasp in enumerate(record.grasps)
     )
@@ -213,5 +213,5 @@ def _grasp_from_record(body: Polyhedron, record: "GraspRecord", friction: float)
     check_witness(body, grasp, friction)
     off = np.abs(grasp.witness.directions - np.array(record.witness.directions)).max()
     if off > SAME_DIRECTION:
-        raise InputError(f"grasp {grasp.id}: a witness direction is not that of its force")
+        raise InputError(f"grasp {grasp.id}: a witness direction differs from that of its force")
     return grasp

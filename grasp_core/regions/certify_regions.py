@@ -105,7 +105,9 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     left = coefficient(friction) * (1.0 - reserve)
     positions, normals = stacked(grasp.contacts)
     if not force_closure(positions, normals, left).closed:
-        raise InputError(f"grasp {grasp.id} is not in force closure at friction {left:.6g}")
+        raise InputError(
+            f"grasp {grasp.id} is not in force closure at friction {left:.6g}; allow more friction"
+        )
     unit = _Unit.of(body, positions)
     pieces = _pieces(body, grasp, unit, clearance)
     # where the surface leans more than the friction angle nothing can be proved

@@ -85,7 +85,7 @@ class TwistCover:
         forces = frozen(self.forces, (leaves, None, 3), "forces", most=np.inf)  # of any size
         object.__setattr__(self, "forces", forces)
         if self.codes.min(initial=0) < 0 or self.codes.max(initial=0) > LEAF:
-            raise InputError(f"codes of a cover are from 0 to {LEAF}")
+            raise InputError(f"codes of a cover must be whole numbers from 0 to {LEAF}")
 
     def leaves(self) -> Iterator[tuple[slice, Array]]:
         """Yield the uncut cones by levels: their slice of `forces`, and their rays, (m, 6, 6).
@@ -97,14 +97,18 @@ class TwistCover:
         while len(cones):
             codes = self.codes[at : at + len(cones)]
             if len(codes) < len(cones):
-                raise InputError("the cover ends before its cones do")
+                raise InputError(
+                    "codes end before the cones of the cover do; expected one code per cone"
+                )
             uncut = codes == LEAF
             count = int(np.count_nonzero(uncut))
             yield slice(begun, begun + count), cones[uncut]
             at, begun = at + len(cones), begun + count
             cones = halves(cones[~uncut], codes[~uncut])
         if at < len(self.codes):
-            raise InputError("the cover goes on after its cones have ended")
+            raise InputError(
+                "codes go on after the last cone of the cover; expected one code per cone"
+            )
 
     def verify(self, regions: Sequence[Array], normals: Array, friction: Array) -> bool:
         """Whether all choices of contacts in regions are force-closed, in plain arithmetic.

@@ -84,7 +84,7 @@ def stacked_corners(polygons: list[Array]) -> Array:
         InputError: A polygon has no corners, so that nothing would be asked of its contact.
     """
     if min(map(len, polygons)) == 0:
-        raise InputError("a contact's site has no corners")
+        raise InputError("a contact's site has no corners, expected one at least")
     most = max(map(len, polygons))
     return np.array([
         np.vstack([polygon, np.repeat(polygon[-1:], most - len(polygon), axis=0)])
