@@ -33,7 +33,7 @@ DEPENDENT = 1e-6
 def smallest_forces(
     pieces: Sequence[FacePiece], points: Array, normals: Array, friction: float, depth: float
 ) -> Array | None:
-    """The smallest balanced forces at points of pieces, (k, 3); None where there are none.
+    """The smallest balanced forces at points of pieces, (k, 3), or None if there are none.
 
     Args:
         pieces: The piece of each point, k of them.

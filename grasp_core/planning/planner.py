@@ -51,7 +51,7 @@ def plan(  # noqa: PLR0913 - the contract's keywords
         body: The object.
         friction: Coulomb coefficient at every contact.
         families: Methods to try: constructions of the paper, and `free`, the method without a fixed
-            type, which gets the quadruples that the constructions leave over.
+            type. Beside constructions `free` gets the quadruples that they leave over.
         theta_deg: Half-angle of the friction cones to plan with [deg]; atan(friction) when
             None, and never more than that.
         cones: `normal` keeps force cones around the normals, as in the paper; `tilted` also tries
