@@ -1,4 +1,4 @@
-"""Solids as triangle meshes: hulls, extrusions and booleans; only this module imports manifold3d."""
+"""Hulls, extrusions and booleans of triangle meshes. Only this module imports manifold3d."""
 
 import importlib
 from collections.abc import Sequence
