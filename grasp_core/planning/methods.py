@@ -140,7 +140,7 @@ class Searches:
         """Most grasps that a construction can keep, given what the constructions before it found.
 
         Families take turns. If all earlier ones but k run out, with n_1, n_2, .. grasps, this one
-        gets at most every (k + 1)-th grasp of what the others leave.
+        gets at most every (k + 1)-th grasp of what they leave.
         """
         limit = self.request.searched
         if limit is None:
