@@ -1,7 +1,8 @@
 """Upper bounds on the discs of concurrent grasps, with one common radius.
 
-The program of `concurrent_grasps` for four equal discs, over (x0, y_1 .. y_4, r), for the focus
-before and behind all fingers. See `kernels.attempts`.
+Solved: the program of `families.concurrent` for four equal discs, over (x0, y_1 .. y_4, r), for a
+focus before and behind all fingers; numbers in comments are those of its derivation. See
+`families.attempts_kernel` for why one radius is enough.
 """
 
 import numpy as np
@@ -21,11 +22,11 @@ from grasp_core.families.kernel_tables import Attempts, Corners, FaceTable
 from grasp_core.geometry.vectors_kernel import across
 from grasp_core.solvers.lp_kernel import Rows
 
-VARIABLES = 12
+VARIABLES = 12  # x0 (3), y (4 x 2), r
 
 
 def try_out() -> None:
-    """Bound one attempt."""
+    """Bound one attempt, so that everything here is compiled."""
     concurrent_bounds(*tilted_faces(), np.ones((16, 2)), 0.0, np.empty(1))
 
 
@@ -36,8 +37,8 @@ def concurrent_bounds(
     """Bound the discs of concurrent grasps, with the focus before or behind all fingers.
 
     Args:
-        faces: Of the object.
-        attempts: In finger order.
+        faces: The faces of the object.
+        attempts: Faces in finger order, with their force cones.
         turns: Cosines and sines of the directions in which a pyramid's facets lean, (m, 2).
         least: Smaller discs do not matter: their bounds may be anything up to this.
         bounds: Filled with the bounds, (a,); infinite where none was proved.
@@ -49,6 +50,7 @@ def concurrent_bounds(
         before, behind = reaches(corners, attempts.faces[a], attempts.axes[a])
         bounds[a] = -np.inf
         for side, reach in ((1.0, before), (-1.0, behind)):
+            # (5): no program is needed where this limit is small enough
             limit = reach * np.tan(attempts.half_angles[a])
             if limit <= max(least, bounds[a]):
                 bounds[a] = max(bounds[a], limit)
@@ -69,9 +71,10 @@ def _aim_rows(
     rows: Rows,
     row: int,
 ) -> int:
-    """What keeps the focus x0 in the cones of a disc, over (x0 (3), y (4 x 2), r)."""
+    """Fill in rows (1): the focus x0 stays in the cones of a disc, over (x0 (3), y (4 x 2), r)."""
     (a, finger), (turns, side) = place, facets
     sine, cosine = facet_sines(attempts.half_angles[a], len(turns))
+    # (4): a focus behind the finger turns the facets round
     sine, cosine = side * sine, side * cosine
     face, y, r = attempts.faces[a, finger], 3 + 2 * finger, VARIABLES - 1
     axis, T, o = attempts.axes[a, finger], faces.frames[face], faces.origins[face]
@@ -86,7 +89,9 @@ def _aim_rows(
             height += g * o[j]
             lean += g * faces.normals[face, j]
         rows.At[y, row], rows.At[y + 1, row] = flat, flat_too
+        # r |T'g| of (1)
         rows.At[r, row] = np.sqrt(flat * flat + flat_too * flat_too)
+        # (3) takes eps |g.n| from the limit
         rows.b[row] = -height - faces.depths[face] * abs(lean)
         row += 1
     return row
@@ -94,7 +99,7 @@ def _aim_rows(
 
 @njit(cache=True)
 def _inside_rows(faces: FaceTable, face: int, finger: int, rows: Rows, row: int) -> int:
-    """What keeps a disc inside its face."""
+    """Fill in rows (2): a disc stays inside its face."""
     y, r = 3 + 2 * finger, VARIABLES - 1
     for e in range(faces.edges[face]):
         rows.At[y, row], rows.At[y + 1, row] = faces.E[face, e, 0], faces.E[face, e, 1]

@@ -1,24 +1,33 @@
 """Upper bounds on discs from the faces' corners alone, at next to no cost.
 
 Reach. With positive weights w of sum w_i a_i = 0 for the axes, and contacts c_i on the faces,
-sum w_i a_i.(x0 - c_i) = -sum w_i a_i.c_i wherever the focus x0 is: the weighted mean of the
-distances along the axes is at most -sum w_i min a_i.c_i over the corners of each face, and for a
-focus behind the fingers at most sum w_i max a_i.c_i.
+sum w_i a_i.(x0 - c_i) = -sum w_i a_i.c_i wherever the focus x0 is. So the weighted mean of the
+distances along the axes is, over the corners of each face, at most
+
+    -sum w_i min a_i.c_i for a focus before the fingers, sum w_i max a_i.c_i for one behind.  (1)
 
 Width. If two axes lead from one focus back to their contacts, c_i = x - s_i a_i and
 c_j = x - s_j a_j, then d = (a_i - a_j) / (1 - a_i.a_j) has d.a_i = 1 and d.a_j = -1, and so
-s_i + s_j = d.(c_j - c_i), which the corners of the two faces bound.
 
-What these mean for discs is said in `concurrent_radius_bounds` and `pencil_radius_bounds`.
+    s_i + s_j = d.(c_j - c_i),                                                                (2)
+
+which the corners of the two faces bound. See `concurrent_radius_bounds` and `pencil_radius_bounds`
+for what reach and width mean for discs.
 
 Across. Let N be the unit vector across both axes of one pair of a pencil. It is across the line of
 the foci too, so both foci c have the same height h = N.c, and so have the disc centres q_i and q_j
 of that pair. As a disc of radius r reaches r |T'N| to either side, the heights of the corners, from
 lo_i to hi_i, leave r |T_i'N| <= hi_i - h and r |T_j'N| <= h - lo_j, or
-r (|T_i'N| + |T_j'N|) <= hi_i - lo_j. A finger m of the other pair is at
-N.q_m = h - s_m N.a_m with s_m >= r / tan(psi / 2), which makes the left side larger by
-r |N.a_m| / tan(psi / 2). Only compiled code asks for these: they spare programs
-that would find discs below the least radius, or below those already found.
+
+    r (|T_i'N| + |T_j'N|) <= hi_i - lo_j.                                                     (3)
+
+A finger m of the other pair is at N.q_m = h - s_m N.a_m with s_m >= r / tan(psi / 2). In place of j
+it makes the left side of (3) larger by
+
+    r |N.a_m| / tan(psi / 2).                                                                 (4)
+
+Only compiled code uses (3) and (4): they spare programs that would find discs below the least
+radius, or below those already found.
 """
 
 from itertools import combinations
@@ -37,11 +46,11 @@ from grasp_core.values import FINGERS
 
 KERNEL = "grasp_core.disc_bounds.corner_bounds_kernel"
 PARALLEL = 1e-6
-"""Axes whose 1 - a_i.a_j is below this bound no width."""
+"""Axes with 1 - a_i.a_j below this are so nearly parallel that they bound no width."""
 
 
 def corners_of(body: Polyhedron) -> Corners:
-    """Corners of each face about the centre of mass over the radius, the first one repeated."""
+    """Corners of each face about the centre of mass over the radius, the first corner repeated."""
     corners = [
         (np.vstack([face.polygon, *face.holes]) - body.center_of_mass) / body.radius
         for face in body.faces
@@ -55,18 +64,18 @@ def corners_of(body: Polyhedron) -> Corners:
 def disc_limits(
     corners: Corners, normals: Array, faces: Indices, axes: Array, half_angles: Array
 ) -> Array:
-    """Limits for many quadruples.
+    """Upper bounds on the discs of many quadruples, (q, 4).
 
     Args:
-        corners: Of all faces.
-        normals: Likewise, (f, 3).
-        faces: (q, 4)
-        axes: Of force cones that positively span, (q, 4, 3).
-        half_angles: One for all four, (q,) [rad]; not positive where there are no such cones.
+        corners: Corners of all faces.
+        normals: Inward unit normals of all faces, (f, 3).
+        faces: Faces of each quadruple, (q, 4).
+        axes: Axes of force cones that positively span, (q, 4, 3).
+        half_angles: Half-angle of all four cones, (q,) [rad]; not positive where there are none.
 
     Returns:
-        Upper bounds on the smallest of four discs, (q, 4): in a concurrent grasp, then in a pencil
-        in each of the `PAIRINGS`. In units of the corners.
+        Upper bounds on the smallest of four discs: in a concurrent grasp, then in a pencil in
+        each of the `PAIRINGS`. They are in units of the corners.
     """
     kernel = compiled(KERNEL)
     if kernel is None:
@@ -83,12 +92,12 @@ def disc_limits(
 
 
 def angle_limits(extent: float, widths: Array, half_angles: Array) -> Array:
-    """What is left of the limits where the axes are not known, (q, 4).
+    """Upper bounds on discs where only the cones' widths are known, not their axes, (q, 4).
 
     Args:
         extent: Largest distance of a corner from the centre of mass, which no reach exceeds.
         widths: Upper bounds on s_i + s_j (see `widths_apart`), (q, 4, 4).
-        half_angles: Upper bounds, (q,) [rad].
+        half_angles: Upper bounds on the half-angles, (q,) [rad].
     """
     reaches = np.full(len(half_angles), extent)
     concurrent = concurrent_radius_bounds(reaches, widths, half_angles)
@@ -96,28 +105,30 @@ def angle_limits(extent: float, widths: Array, half_angles: Array) -> Array:
 
 
 def distances(corners: Corners) -> Array:
-    """Upper bounds on the distance of a point of one face from one of another, (f, f)."""
+    """Upper bounds on the distance between a point of one face and one of another, (f, f)."""
     middles = corners.points.mean(axis=1)
     radii = np.linalg.norm(corners.points - middles[:, None], axis=-1).max(axis=1)
     between = np.linalg.norm(middles[:, None] - middles, axis=-1)
+    # between the middles, and from each middle to the farthest corner
     return between + radii[:, None] + radii
 
 
 def widths_apart(faces: Indices, apart: Array, halves: Array, leaning: Array) -> Array:
     """Upper bounds on s_i + s_j for axes that lean from the normals, (q, 4, 4).
 
-    The vector d above has the length 2 / |a_i - a_j|, and the angle between the axes is that
-    between the normals but for what both lean.
+    The vector d of (2) has the length 2 / |a_i - a_j|, and the angle between the axes differs from
+    the angle between the normals by at most what both lean.
 
     Args:
-        faces: (q, 4)
+        faces: Faces of each quadruple, (q, 4).
         apart: The `distances` of all faces, (f, f).
         halves: Half the angles between their normals, (f, f) [rad].
-        leaning: How far an axis leans at most, (q,) [rad].
+        leaning: Largest angle between an axis and its normal, (q,) [rad].
     """
     widths = np.full((len(faces), FINGERS, FINGERS), np.inf)
     for i, j in combinations(range(FINGERS), 2):
         pair = faces[:, i], faces[:, j]
+        # |a_i - a_j| is twice the sine of half the angle between them
         sines = np.sin(np.maximum(halves[pair] - leaning, 0.0))
         bound = np.where(sines > PARALLEL, apart[pair] / np.maximum(sines, PARALLEL), np.inf)
         widths[:, i, j] = widths[:, j, i] = bound
@@ -125,21 +136,23 @@ def widths_apart(faces: Indices, apart: Array, halves: Array, leaning: Array) ->
 
 
 def _reaches(corners: Array, axes: Array) -> Array:
-    """Upper bounds on the mean distance of a focus before or behind its contacts, (q,)."""
+    """The bound (1) on the mean distance of a focus before or behind its contacts, (q,)."""
     heights = np.einsum("qfki,qfi->qfk", corners, axes)
     weights = balancing_weights(axes)
+    # (1) holds for whichever side the focus is on: the larger bound covers both
     before = -np.einsum("qf,qf->q", weights, heights.min(axis=2, initial=np.inf))
     behind = np.einsum("qf,qf->q", weights, heights.max(axis=2, initial=-np.inf))
     return np.maximum(before, behind)
 
 
 def _widths(corners: Array, axes: Array) -> Array:
-    """Upper bounds on s_i + s_j for contacts i and j of one focus, (q, 4, 4)."""
+    """The bound (2) on s_i + s_j for contacts i and j of one focus, (q, 4, 4)."""
     widths = np.full((len(axes), FINGERS, FINGERS), np.inf)
     for i, j in combinations(range(FINGERS), 2):
         apart = axes[:, i] - axes[:, j]
         low = np.einsum("qki,qi->qk", corners[:, i], apart).min(axis=1, initial=np.inf)
         high = np.einsum("qki,qi->qk", corners[:, j], apart).max(axis=1, initial=-np.inf)
+        # 1 - a_i.a_j of (2) is half of |a_i - a_j|^2
         share = 0.5 * np.einsum("qi,qi->q", apart, apart)
         bound = np.where(share > PARALLEL, (high - low) / np.maximum(share, PARALLEL), np.inf)
         widths[:, i, j] = widths[:, j, i] = bound

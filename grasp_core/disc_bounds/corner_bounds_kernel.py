@@ -1,4 +1,7 @@
-"""Upper bounds on discs from the faces' corners, for many quadruples (see `disc_limits`)."""
+"""Upper bounds on discs from the faces' corners, compiled for many quadruples.
+
+Numbers in comments are those of the derivation in `disc_bounds.corner_bounds`.
+"""
 
 import numpy as np
 from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
@@ -10,11 +13,11 @@ from grasp_core.geometry.vectors_kernel import balancing_weights, cross, dotted
 FINGERS = 4
 PAIRINGS = ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2))
 PARALLEL = 1e-6
-"""Axes whose 1 - a_i.a_j, or whose cross product, is below this bound nothing."""
+"""Axes with 1 - a_i.a_j, or with a cross product, below this are nearly parallel: no bound."""
 
 
 def try_out() -> None:
-    """Bound one quadruple."""
+    """Bound one quadruple, so that everything here is compiled."""
     corners = Corners(np.zeros((4, 1, 3)), np.ones(4, dtype=np.int64))
     faces, axes = np.arange(4)[None], np.ones((1, 4, 3))
     fill(corners, np.ones((4, 3)), faces, axes, np.ones(1), np.empty((1, 4)))
@@ -29,24 +32,26 @@ def fill(
     half_angles: Array,
     limits: Array,
 ) -> None:
-    """Bound the discs of quadruples.
+    """Bound the discs of quadruples (see `disc_limits`).
 
     Args:
-        corners: Of all faces.
-        normals: Likewise, (f, 3).
-        faces: (q, 4)
-        axes: Of force cones that positively span, (q, 4, 3).
-        half_angles: (q,) [rad]; not positive where there are no such cones.
+        corners: Corners of all faces.
+        normals: Inward unit normals of all faces, (f, 3).
+        faces: Faces of each quadruple, (q, 4).
+        axes: Axes of force cones that positively span, (q, 4, 3).
+        half_angles: Half-angle of all four cones, (q,) [rad]; not positive where there are none.
         limits: Filled with upper bounds, (q, 4).
     """
     for q in range(len(faces)):
-        if half_angles[q] <= 0.0:
+        if half_angles[q] <= 0.0:  # there are no such cones, and so no discs
             limits[q] = 0.0
             continue
         before, behind = reaches(corners, faces[q], axes[q])
         reach, half = max(before, behind), np.tan(0.5 * half_angles[q])
+        # see `concurrent_radius_bounds`
         limits[q, 0] = reach * np.tan(half_angles[q])
         for pairing, (i, j, k, m) in enumerate(PAIRINGS):
+            # see `pencil_radius_bounds`: reach first, then the widths of both pairs
             limit = 2.0 * reach * half
             for first, second, third, fourth in ((i, j, k, m), (k, m, i, j)):
                 width = _width(corners, faces[q], axes[q], (first, second))
@@ -59,7 +64,7 @@ def fill(
 
 @njit(cache=True)
 def reaches(corners: Corners, faces: Indices, axes: Array) -> tuple[float, float]:
-    """Upper bounds on the mean distance of a focus before, and behind, its contacts."""
+    """The bound (1) on the mean distance of a focus before, and behind, its contacts."""
     weights, before, behind = np.empty(FINGERS), 0.0, 0.0
     balancing_weights(axes, weights)
     for i in range(FINGERS):
@@ -70,11 +75,11 @@ def reaches(corners: Corners, faces: Indices, axes: Array) -> tuple[float, float
 
 @njit(cache=True)
 def _width(corners: Corners, faces: Indices, axes: Array, pair: tuple[int, int]) -> float:
-    """Upper bound on s_i + s_j."""
+    """The bound (2) on s_i + s_j."""
     (i, j), apart = pair, np.empty(3)
     for d in range(3):
         apart[d] = axes[i, d] - axes[j, d]
-    share = 0.5 * dotted(apart, apart)
+    share = 0.5 * dotted(apart, apart)  # 1 - a_i.a_j of (2)
     if share <= PARALLEL:
         return np.inf
     return (_extent(corners, faces[j], apart)[1] - _extent(corners, faces[i], apart)[0]) / share
@@ -89,7 +94,7 @@ def _across(
     places: tuple[int, int, int, int],
     half: float,
 ) -> float:
-    """Upper bound from the heights along N, across the axes of the first two fingers."""
+    """The bound on r by (3) and (4), with N across the axes of the first two fingers."""
     N, limit, pair = np.empty(3), np.inf, FINGERS // 2
     cross(axes[places[0]], axes[places[1]], N)
     length = np.sqrt(dotted(N, N))
@@ -104,7 +109,9 @@ def _across(
         for f in range(e + 1, FINGERS):
             other = places[f]
             lower, higher = _extent(corners, faces[other], N)
+            # (4), with its sign: it tells which of the two discs is higher
             away = dotted(axes[other], N) / half if f >= pair else 0.0
+            # left sides of (3) and (4) per unit of r
             total = lean + _lean(normals[faces[other]], N) + abs(away)
             if total <= PARALLEL:
                 continue
@@ -117,7 +124,7 @@ def _across(
 
 @njit(cache=True)
 def _lean(normal: Array, N: Array) -> float:
-    """|T'N|, how far a disc of radius one reaches along N."""
+    """|T'N|: how far a disc of radius one reaches along N."""
     return np.sqrt(max(1.0 - dotted(normal, N) ** 2, 0.0))
 
 

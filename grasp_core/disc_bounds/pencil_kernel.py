@@ -1,8 +1,9 @@
 """Upper bounds on the discs of pencil grasps, with one common radius.
 
-The program of `pencil_grasps` for four equal discs, in both cells. The ball about each focus is no
-larger than needed, R = r + the largest depth, which leaves the variables (x0, k, r). See
-`kernels.attempts`.
+Solved: the program of `families.pencil` for four equal discs, in both cells; numbers in comments
+are those of its derivation. The ball about each focus is no larger than needed, R = r + the largest
+depth, which leaves the variables (x0, k, r). See `families.attempts_kernel` for why one radius is
+enough.
 """
 
 import numpy as np
@@ -21,13 +22,13 @@ from grasp_core.geometry.vectors_kernel import angle_between, dotted, focus_dire
 from grasp_core.solvers.lp_kernel import Rows
 
 VARIABLES, K = 5, 3
-"""How many there are, and where half the distance of the foci is among them."""
+"""Number of variables, and the place of k, half the distance of the foci, among them."""
 CELL_A, CELL_B = -1.0, 1.0
 """Sign of k u in the focus of the first two fingers."""
 
 
 def try_out() -> None:
-    """Bound one attempt."""
+    """Bound one attempt, so that everything here is compiled."""
     pencil_bounds(*tilted_faces(), 0.0, 0.0, np.empty(1))
 
 
@@ -38,8 +39,8 @@ def pencil_bounds(
     """Bound the discs of pencil grasps in both cells.
 
     Args:
-        faces: Of the object.
-        attempts: In finger order; the pencils are (0, 1) and (2, 3).
+        faces: The faces of the object.
+        attempts: Faces in finger order, with their force cones; the pencils are (0, 1) and (2, 3).
         least_gap: Least distance of the foci.
         least: Smaller discs do not matter: their bounds may be anything up to this.
         bounds: Filled with the bounds, (a,); infinite where none was proved.
@@ -51,6 +52,7 @@ def pencil_bounds(
         for cell in (CELL_A, CELL_B):
             near = FINGERS if cell == CELL_B else 0
             rows, row = room_for(room, VARIABLES, 1 + FINGERS + edges + near), 1
+            # the foci are 2 k apart
             rows.At[K, 0], rows.b[0] = -2.0, -least_gap
             for finger in range(FINGERS):
                 depth = _depth_along(faces, attempts, (a, finger), cell, u)
@@ -65,7 +67,7 @@ def pencil_bounds(
 def _depth_along(
     faces: FaceTable, attempts: Attempts, place: tuple[int, int], cell: float, u: Array
 ) -> tuple[Array, float, float]:
-    """Of a finger: s as a function of (x0, k), its constant, and the sign of k u in its focus."""
+    """The depth s of a finger by (1): its slopes in (x0, k), its constant, the sign of k u."""
     a, finger = place
     face, s = attempts.faces[a, finger], np.empty(K + 1)
     n, o = faces.normals[face], faces.origins[face]
@@ -86,7 +88,7 @@ def _ball_row(
     rows: Rows,
     row: int,
 ) -> int:
-    """What keeps the ball about a focus in the cones of a disc, over (x0 (3), k, r)."""
+    """Fill in the row (2): the ball about a focus stays in the cones of a disc."""
     (a, finger), (s, s0, _) = place, depth
     face, psi, largest = attempts.faces[a, finger], attempts.half_angles[a], 0.0
     for other in range(FINGERS):
@@ -95,6 +97,7 @@ def _ball_row(
     for j in range(K + 1):
         rows.At[j, row] = -np.sin(psi) * s[j]
     rows.At[-1, row] = 2.0 if lean >= psi else 1.0 + np.cos(psi - lean)  # 1 + kappa
+    # (6), for this disc in (2) and for the largest R of (3)
     rows.b[row] = np.sin(psi) * s0 - faces.depths[face] - largest
     return row + 1
 
@@ -108,7 +111,7 @@ def _edge_rows(
     rows: Rows,
     row: int,
 ) -> int:
-    """What keeps the disc around where the axis comes from inside its face."""
+    """Fill in rows that keep the disc about q = c - s a inside its face."""
     (a, finger, u), (s, s0, sign) = setting, depth
     face, axis = attempts.faces[a, finger], attempts.axes[a, finger]
     T, o = faces.frames[face], faces.origins[face]
@@ -120,7 +123,9 @@ def _edge_rows(
             back += edge * axis[j]
             far += edge * u[j]
             high += edge * o[j]
+        # along u, k moves the focus c
         rows.At[K, row], rows.At[-1, row] = sign * far, 1.0
+        # the disc lies s back from c along the axis
         for j in range(K + 1):
             rows.At[j, row] -= back * s[j]
         rows.b[row] = faces.b[face, e] + back * s0 + high
@@ -137,7 +142,7 @@ def _near_row(
     rows: Rows,
     row: int,
 ) -> int:
-    """What keeps a focus of cell B from passing the other crossing."""
+    """Fill in the row (5): a focus of cell B does not pass the other crossing."""
     (a, finger, u), (s, s0, sign) = setting, depth
     face = attempts.faces[a, finger]
     toward = sign * dotted(attempts.axes[a, finger], u)
@@ -145,6 +150,8 @@ def _near_row(
     for j in range(K + 1):
         rows.At[j, row] = -toward * s[j]
     rows.At[K, row] += 2.0
+    # r |T'u| of (5)
     rows.At[-1, row] = np.hypot(dotted(T[:, 0], u), dotted(T[:, 1], u))
+    # (6) takes eps |n.u| from the limit
     rows.b[row] = toward * s0 - faces.depths[face] * across
     return row + 1

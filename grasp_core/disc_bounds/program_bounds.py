@@ -1,10 +1,11 @@
-"""What many attempts can offer at most: small programs, solved in compiled code.
+"""Upper bounds on the disc radius of many attempts, from small programs in compiled code.
 
-An attempt is four faces in the order of the fingers with a force cone each. Where a construction
+An attempt is four faces in the order of the fingers, with a force cone each. Where a construction
 has discs, the bound is the value of the first program of `largest_discs`, which maximises the
 smallest radius, on the convex hulls of the faces: no choice of their pieces offers more. For
-reguli it only says whether any slopes are feasible there. Without kernels the constructions
-themselves are asked for discs, at a hundred times the cost, and reguli are not bounded.
+reguli the bound only says whether any slopes are feasible on the hulls. Without kernels the
+constructions themselves are solved for discs, at a hundred times the cost, and reguli are not
+bounded.
 """
 
 from dataclasses import dataclass
@@ -33,19 +34,19 @@ KERNELS: dict[Family, str] = {
 
 @dataclass(frozen=True, eq=False)
 class AttemptBounds:
-    """Those on the faces of one object."""
+    """Upper bounds on disc radii for attempts on one object's faces."""
 
     shapes: Shapes
 
     def of(self, construction: Construction, attempts: Attempts, least: float) -> Array:
-        """Upper bounds on the smallest radius, (a,), in object radii; infinite if none is proved.
+        """Upper bounds on the smallest radius, (a,) [object radii]; infinite where none is proved.
 
-        Those of reguli are infinite or, where no slopes are feasible, minus infinity.
+        For reguli they are infinite or, where no slopes are feasible, minus infinity.
 
         Args:
-            construction: Of a family.
-            attempts: On faces with room, in finger order, with cones that positively span (P3).
-            least: Smaller discs do not matter; their bounds are the best ones or this at most.
+            construction: The construction of a family.
+            attempts: Faces with room, in finger order, with cones that positively span (P3).
+            least: Smaller discs do not matter: bounds below it need not be tight.
         """
         attempts = Attempts(
             np.ascontiguousarray(attempts.faces),
@@ -54,6 +55,7 @@ class AttemptBounds:
         )
         if construction.limits is None:
             return self._of_reguli(attempts)
+        # hulls stand for faces of several pieces: they offer no less than any piece
         kernel = compiled(KERNELS[construction.family])
         if kernel is None:
             return self._by_constructions(construction, attempts, least)
@@ -63,12 +65,14 @@ class AttemptBounds:
         else:
             turns = np.array(facet_turns(PYRAMID_SIDES))
             kernel.concurrent_bounds(self._table, attempts, turns, least, bounds)
+        # a proved bound may be off by what the check of multipliers allows
         return bounds + RESIDUAL
 
     def _of_reguli(self, attempts: Attempts) -> Array:
         bounds = np.full(len(attempts.faces), np.inf)
         known = regulus_bounds(self._table, attempts, -np.inf)
         if known is not None:
+            # merits are no radii: only a proof that excludes all slopes tells anything
             merits, _ = known
             bounds[merits == -np.inf] = -np.inf
         return bounds
@@ -83,6 +87,7 @@ class AttemptBounds:
             try:
                 found = construction.place(hulls, cones, least)
             except SolverError:
+                # undecided: only infinity is a safe bound
                 bounds[place] = np.inf
                 continue
             bounds[place] = found.merit if isinstance(found, Placement) else found.bound
@@ -96,5 +101,5 @@ class AttemptBounds:
 
     @cached_property
     def _table(self) -> FaceTable:
-        """The hulls as kernels want them."""
+        """The hulls of all faces as one table."""
         return face_table([shape.hull if shape else None for shape in self.shapes])

@@ -1,9 +1,9 @@
-"""What the programs for discs have in common: the faces, the attempts and the room for rows.
+"""Shared parts of the disc programs in compiled code: rows, cone facets and checked bounds.
 
-The programs of `concurrent_grasps` and `pencil_grasps` grow four discs and maximise the smallest.
-That smallest radius alone is found with all four equal: rows only get tighter as a radius grows.
-With one radius, the last variable, every program is feasible for small enough ones, so that
-the multipliers alone, checked here, bound every radius.
+The programs of `concurrent` and `pencil` grow four discs and maximise the smallest radius. Its
+optimum alone is found with all four radii equal, since rows only get tighter as a radius grows.
+With one radius, the last variable, every program is feasible for a small enough one, so the
+multipliers alone, checked here, bound every radius.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ away, this is worth less than the accuracy of a program's answer."""
 
 
 def tilted_faces() -> tuple[FaceTable, Attempts]:
-    """Four squares and an attempt on them, to try kernels out."""
+    """Four tilted square faces and an attempt on them, to try kernels out."""
     square = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
     n = np.array([[0.0, 0.0, 1.0], [0.9, 0.0, -0.4], [-0.5, 0.8, -0.4], [-0.5, -0.8, -0.4]])
     frames = np.repeat(np.eye(3, 2)[None], 4, axis=0)
@@ -32,7 +32,7 @@ def tilted_faces() -> tuple[FaceTable, Attempts]:
 
 @njit(cache=True)
 def edges_of(faces: FaceTable, attempts: Attempts, a: int) -> int:
-    """How many edges the faces of an attempt have."""
+    """Number of edges of the four faces of an attempt."""
     count = 0
     for finger in range(FINGERS):
         count += int(faces.edges[attempts.faces[a, finger]])
@@ -48,7 +48,7 @@ def facet_sines(half_angle: float, sides: int) -> tuple[float, float]:
 
 @njit(cache=True)
 def room_for(room: Array, n: int, count: int) -> Rows:
-    """So many empty rows, in memory that is used again and again."""
+    """Empty rows of a program of n variables, in memory that is reused."""
     At = room[: n * count].reshape(n, count)
     At[:] = 0.0
     b, norms = room[n * count : (n + 1) * count], room[(n + 1) * count : (n + 2) * count]
@@ -57,23 +57,24 @@ def room_for(room: Array, n: int, count: int) -> Rows:
 
 @njit(cache=True)
 def bounded(rows: Rows, least: float) -> float:
-    """An upper bound on the radius; the best one where it is above the least."""
+    """An upper bound on the radius; where it is above `least`, the tightest one."""
     c, vertex = np.zeros(len(rows.At)), vertex_of(len(rows.At))
     c[-1] = 1.0
     measure(rows)
     status, _ = solve(c, rows, least, vertex)
+    # checked here: a wrong answer of the solver costs tightness, never correctness
     return np.inf if status == LOST else proved_bound(c, rows, vertex, ACCURACY)
 
 
 @njit(cache=True)
 def vertex_of(n: int) -> Vertex:
-    """Room for one of a program with so many variables."""
+    """Room for one vertex of a program with n variables."""
     return Vertex(np.empty(n, dtype=np.int64), np.empty(n), np.empty(n))
 
 
 @njit(cache=True)
 def measure(rows: Rows) -> None:
-    """Fill in the lengths of the rows."""
+    """Fill in the lengths of the rows, by which the solver measures violations."""
     rows.norms[:] = 0.0
     for i in range(len(rows.At)):
         for k in range(len(rows.norms)):

@@ -11,20 +11,31 @@ g.(x0 - c_i - T_i y) >= 0 for all g. Over a disc of radius r around y_i the wors
 g.(x0 - c_i - T_i y_i) - r |T_i'g|, and the disc lies inside the face iff e.y_i + r <= b for
 its edges. All of it is linear in (x0, y_1..y_4, r):
 
-    maximise r  subject to  g.x0 - (T_i'g).y_i - r |T_i'g| >= g.c_i    for all i, g
-                            e.y_i + r <= b                             for all i, edges
+    maximise r  subject to  g.x0 - (T_i'g).y_i - r |T_i'g| >= g.c_i    for all i, g      (1)
+                            e.y_i + r <= b                             for all i, edges  (2)
 
-A curved patch has its surface at c_i + T_i y + h n_i, |h| <= eps: each left side loses eps |g.n_i|.
+A curved patch has its surface at c_i + T_i y + h n_i, |h| <= eps: the left side of (1) loses
+
+    eps |g.n_i|.                                                                         (3)
 
 The disc centres stay variables: eliminating them by shrinking the face over-estimates r as
-soon as an edge of the shrunk face vanishes.
+soon as an edge of the shrunk face vanishes. In the code each disc has its own radius r_i, and
+r is at most each of them.
 
-The lines of force, not the forces, have to meet: fingers may also push away from a focus behind
-them, as from inside a hole. With side = -1 for such a finger, side (x0 - c_i - T_i y) has to be in
-its cone; as P3 makes the weights of the force directions positive, nothing else changes. All four
-on one side and all on the other are tried first; mixed sides on faces that would have no regions.
+The lines of force have to meet, not the forces: fingers may also push away from a focus behind
+them, as from inside a hole. For such a finger side = -1, and the cone has to hold
 
-With axis = normal, half-angle = theta and all sides +1 this is section 3.1 of the paper.
+    side (x0 - c_i - T_i y).                                                             (4)
+
+As P3 makes the weights of the force directions positive, nothing else changes. The focus before
+all fingers and behind all of them is tried first; mixed sides follow on faces that would have no
+regions. With axis = normal, half-angle = theta and all sides +1 this is section 3.1 of the paper.
+
+Before any program, discs are bounded by the distance s_i along the axis between the planes across
+it through the focus and through the disc's centre. The two points of the disc's border across the
+axis see the focus at no less than r, hence
+
+    r <= s_i tan(half_angle).                                                            (5)
 
 Source: Sudsang & Ponce 1995, section 3.1 and Proposition 5; the far side is this project's.
 """
@@ -49,10 +60,11 @@ from grasp_core.values import FINGERS, ForceCone, four
 PYRAMID_SIDES = 16
 """An inscribed 16-sided pyramid loses 1.9 % of the cone's tangent, on the safe side."""
 RADII, SMALLEST = slice(11, 15), 15
-"""Where the radii and their lower bound are among the variables."""
+"""Places of the four radii and of their lower bound r among the 16 variables."""
 
 
 Sides: TypeAlias = tuple[float, float, float, float]
+# values of `side` in (4), one per finger
 BEFORE, BEHIND = (1.0, 1.0, 1.0, 1.0), (-1.0, -1.0, -1.0, -1.0)
 MIXED_SIDES: tuple[Sides, ...] = tuple(
     four(sides) for sides in product((1.0, -1.0), repeat=FINGERS) if abs(sum(sides)) < FINGERS
@@ -67,7 +79,7 @@ def place_concurrent(
     Args:
         pieces: Four convex pieces, in finger order, in units where the object has size one.
         cones: The force cones, in the same order; they must satisfy the generalised P3.
-        least: Smaller discs count as none.
+        least: Least radius of the discs; smaller ones count as none.
 
     Raises:
         SolverError: A program's answer failed its check.
@@ -80,10 +92,10 @@ def place_concurrent(
 def place_on_mixed_sides(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone], *, least: float
 ) -> Placement | NoPlacement:
-    """As `place_concurrent`, with the focus before some fingers and behind the others.
+    """Place a focus before some fingers and behind the others, with discs as `place_concurrent`.
 
-    Fourteen patterns of sides, each with discs larger than those before: for faces on which
-    nothing else was found. On convex objects it hardly ever finds anything.
+    Fourteen patterns of sides are tried, each for discs larger than the ones before. This is for
+    faces on which nothing else was found; on convex objects it hardly ever finds anything.
     """
     return _best(pieces, cones, ((sides, math.inf) for sides in MIXED_SIDES), least)
 
@@ -94,10 +106,11 @@ def _best(
     patterns: Iterable[tuple[Sides, float]],
     least: float,
 ) -> Placement | NoPlacement:
-    """The largest discs over patterns of sides, each with an upper bound on its discs."""
+    """The largest discs over patterns of sides, each given with an upper bound on its discs."""
     best: Placement | None = None
     bound = -math.inf
     for sides, limit in patterns:
+        # (5): no program is needed to rule this pattern out
         if limit < least:
             bound = max(bound, limit)
             continue
@@ -110,7 +123,7 @@ def _best(
 
 
 def _reaches(pieces: Sequence[FacePiece], cones: Sequence[ForceCone]) -> tuple[float, float]:
-    """How far a focus before, or behind, all fingers may be in the mean (see `disc_limits`)."""
+    """Upper bounds on the weighted mean of s_i in (5), the focus before and behind all fingers."""
     heights = [
         cone.axis @ (piece.origin[:, None] + piece.frame @ piece.corners.T)
         for piece, cone in zip(pieces, cones, strict=True)
@@ -130,8 +143,8 @@ def place_on_sides(
         pieces: Four convex pieces, in finger order, in units where the object has size one.
         cones: The force cones, in the same order; together they must satisfy the
             generalised P3 for the result to mean equilibrium.
-        sides: Of each finger: 1 where it pushes towards the focus, -1 where away from it.
-        least: Smaller discs count as none.
+        sides: 1 for a finger that pushes towards the focus, -1 for one that pushes away from it.
+        least: Least radius of the discs; smaller ones count as none.
 
     Raises:
         SolverError: A program's answer failed its check.
@@ -149,12 +162,14 @@ def place_on_sides(
 
 
 def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array, contact: Array) -> Array:
-    """Where on a piece a line in its force cone meets the focus, on the focus's side, (k, 3).
+    """Corners of the part of a piece from which a line in the force cone meets the focus, (k, 3).
 
-    The inverted cone of section 3.1, inscribed by the same pyramid as in the program.
+    This is the inverted cone of section 3.1 on the contact's side of the focus, inscribed by the
+    same pyramid as in the program.
     """
     side = 1.0 if float(cone.axis @ (focus - contact)) > 0.0 else -1.0
     G = side * inscribed_facets(cone, piece.frame[:, 0])
+    # (1) and (3) with r = 0 and x0 fixed bound the point y alone
     limits = G @ (focus - piece.origin) - piece.depth * np.abs(G @ piece.normal)
     flat = clip(piece.corners, G @ piece.frame, limits)
     return piece.origin + flat @ piece.frame.T
@@ -175,12 +190,14 @@ def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES)
 
 
 def pyramid_facets(axes: Array, half_angle: float, toward: Array, sides: int) -> Array:
-    """As `inscribed_facets`, of equally wide cones around many axes, (..., sides, 3).
+    """Inward unit normals of pyramids inscribed in equally wide cones, (..., sides, 3).
+
+    See `inscribed_facets` for what such a pyramid is.
 
     Args:
-        axes: Unit vectors, (..., 3).
-        half_angle: [rad]
-        toward: (..., 3)
+        axes: Unit vectors along the cones' axes, (..., 3).
+        half_angle: Half-angle of all cones [rad].
+        toward: Directions in which the first edges lean, (..., 3).
         sides: Number of facets.
     """
     first = toward - np.sum(toward * axes, axis=-1, keepdims=True) * axes
@@ -198,15 +215,13 @@ def facet_turns(sides: int) -> Array:
 
 
 def concurrent_radius_bounds(reaches: Array, _: Array, half_angles: Array) -> Array:
-    """Upper bounds on the discs of quadruples, (..., 1).
+    """Upper bounds on the discs of quadruples, (..., 1), by (5).
 
-    A disc needs r <= s_i tan(half_angle), s_i the distance along the axis between the planes
-    across it through the focus and through the disc's centre: the two points of its border across
-    the axis see the focus at no less than r. The least s_i is at most the weighted mean.
+    The least s_i is at most the weighted mean.
 
     Args:
-        reaches: Upper bounds of the mean distance along the axes, of any shape.
-        half_angles: Likewise [rad].
+        reaches: Upper bounds on the weighted mean of s_i, any shape [object radii].
+        half_angles: Half-angles of the cones, the same shape [rad].
     """
     bounds: Array = reaches * np.tan(half_angles)
     return bounds[..., None]
@@ -215,19 +230,24 @@ def concurrent_radius_bounds(reaches: Array, _: Array, half_angles: Array) -> Ar
 def _rows(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone], sides: Sides
 ) -> tuple[Array, Array]:
-    """Rows over (x0 (3), y (4 x 2), radii (4), smallest radius)."""
+    """Rows A x <= b over x = (x0 (3), y (4 x 2), radii r_i (4), r), (rows, 16) and (rows,)."""
     rows: list[Array] = []
     limits: list[Array] = []
     for i, (piece, cone, side) in enumerate(zip(pieces, cones, sides, strict=True)):
+        # (4): the sign of the facets is the side
         G = side * inscribed_facets(cone, piece.frame[:, 0])
         flat = G @ piece.frame
+        # (1), with the radius r_i of this disc
         aim = np.zeros((len(G), 16))
         aim[:, :3], aim[:, 3 + 2 * i : 5 + 2 * i] = -G, flat
         aim[:, 11 + i] = np.linalg.norm(flat, axis=1)
+        # (2): the disc stays inside the face
         inside = np.zeros((len(piece.E), 16))
         inside[:, 3 + 2 * i : 5 + 2 * i], inside[:, 11 + i] = piece.E, 1.0
+        # r <= r_i: the program maximises the smallest radius
         smallest = np.zeros((1, 16))
         smallest[0, 15], smallest[0, 11 + i] = 1.0, -1.0
         rows += [aim, inside, smallest]
+        # (3) takes eps |g.n_i| from the limit of (1)
         limits += [-G @ piece.origin - piece.depth * np.abs(G @ piece.normal), piece.b, np.zeros(1)]
     return np.vstack(rows), np.concatenate(limits)

@@ -1,4 +1,4 @@
-"""The paper's three constructions behind one interface, so that the planner treats them alike."""
+"""The paper's three constructions behind one interface, which the planner uses for all of them."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -27,33 +27,33 @@ AS_LISTED: tuple[FingerOrder, ...] = ((0, 1, 2, 3),)
 PAIRINGS: tuple[FingerOrder, ...] = ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2))
 """The three ways to group four faces into the pairs (first, second) and (third, fourth)."""
 LEAST_RADIUS = 1e-3
-"""Smaller discs, relative to the object's radius, do not count as a region to stand in; pencils'
-foci closer than this count as one point."""
+"""Least radius, relative to the object's, of a disc that counts as a region to stand in; foci of a
+pencil closer than this count as one point."""
 DISC_CORNERS = 64
-"""How many points of a disc's border are listed."""
+"""Number of points of a disc's border that are listed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Construction:
-    """How one family is built on a quadruple of face pieces."""
+    """The construction of one family, with what the planner needs to know about it."""
 
     family: Family
     orders: tuple[FingerOrder, ...]
     """Finger orders that give different grasps of the same faces."""
     place: Callable[[Sequence[FacePiece], Sequence[ForceCone], float], Placement | NoPlacement]
-    """From pieces, force cones and the least merit worth having."""
+    """Places contacts, given pieces, force cones and the least merit that counts."""
     limits: slice | None
-    """Which of a quadruple's `disc_limits` are those of its finger orders; None where no disc is
+    """The `disc_limits` of a quadruple that belong to the finger orders; None where no disc is
     claimed."""
     admits: Callable[[Array, Array], NDArray[np.bool_]]
-    """Whether quadruples are worth a program, from their normals in finger order, (q, 4, 3), and
-    half-angles (q,): False only where none can be feasible."""
+    """Whether quadruples are worth a program, (q,), from their normals in finger order, (q, 4, 3),
+    and half-angles, (q,) [rad]: False only where no program can be feasible."""
     region: Region
-    """The region of one finger, in the pieces' units."""
+    """Makes the region of one finger, in the pieces' units."""
 
     @property
     def least(self) -> float:
-        """The merit above which a placement counts."""
+        """The merit that a placement must exceed to count."""
         return LEAST_RADIUS if self.limits else -math.inf
 
 
@@ -86,7 +86,7 @@ def regions_of(
 
 
 def point_region(_: FacePiece, __: ForceCone, placed: Placement, finger: int) -> ContactRegion:
-    """Nothing but the contact."""
+    """A region of one point, the contact itself."""
     return ContactRegion("point", placed.positions[finger][None], 0.0)
 
 

@@ -1,10 +1,10 @@
-"""Four discs of the largest common radius, and then each as large as it can be.
+"""Four discs of the largest common radius, each of them then as large as it can be.
 
-The first program maximises the smallest radius. It is free in sign, so that the program is
+The first program maximises the smallest radius. That radius may be negative, so the program is
 always feasible and the sign of its optimum, with the multipliers that prove it, decides. The
 second keeps the smallest radius and maximises the sum of the four, so that contacts whose discs
-have room do not end up against an arbitrary edge. Of all that is best so far, the point nearest to
-the origin of the variables is taken (see `ties`).
+have room do not end up against an arbitrary edge. Among its optima the point nearest to the origin
+of the variables is taken (see `ties`).
 """
 
 from dataclasses import dataclass
@@ -32,10 +32,10 @@ slivers, in which rounding moves the nearest point a thousand times as far."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LargestDiscs:
-    """The variables of the discs' program, and what it maximised."""
+    """The variables of the disc program, and the radius that it maximised."""
 
     x: Array
-    """With the radii reduced by what a program's answer may be off, (n,)."""
+    """Variables, (n,); their radii are reduced by what a program's answer may be off."""
     merit: float
     """Optimum of the smallest radius: the same on every machine but for the last digits."""
 
@@ -46,14 +46,14 @@ def largest_discs(
     """Solve both programs over the variables x with A x <= b.
 
     Args:
-        A: (rows, n); rows must keep the smallest radius below each of the four.
-        b: (rows,)
-        radii: Where the four radii are in x.
-        smallest: Where their lower bound is.
-        least: Smaller discs count as none.
+        A: Rows over the variables, (rows, n); they keep the smallest radius below each of the four.
+        b: Limits of the rows, (rows,).
+        radii: Places of the four radii in x.
+        smallest: Place of the radii's lower bound in x.
+        least: Least radius of the discs; smaller ones count as none.
 
     Returns:
-        The discs; or, if the common radius is below `least`, the proof.
+        The discs, or a proved bound below `least` on their common radius.
 
     Raises:
         SolverError: A program's answer failed its check.

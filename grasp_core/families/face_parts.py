@@ -1,4 +1,4 @@
-"""Parts of four convex pieces: halves of halves, pieces shrunk at random, and their corners."""
+"""Parts of four convex pieces: repeated halves, randomly shrunk pieces, and contacts at corners."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -12,19 +12,19 @@ from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.ties import first_best
 
 SMALLER = 0.5
-"""Size of random parts, as a share of the piece."""
+"""Size of random parts relative to the piece."""
 DEEPEST = 1000
-"""More cuts in a row leave parts smaller than numbers tell apart."""
+"""Most cuts in a row: more leave parts smaller than floating-point numbers can tell apart."""
 Corners = tuple[Array, ...]
-"""Corners of a convex part of each piece, (k, 2) in its plane."""
+"""Corners of a convex part of each piece, each (k, 2) in the plane coordinates of its piece."""
 Path = tuple[int, ...]
-"""Which half was taken at each cut."""
+"""The half, 0 or 1, that was taken at each cut."""
 
 
 def random_parts(
     pieces: Sequence[FacePiece], rng: np.random.Generator, count: int
 ) -> Iterator[Corners]:
-    """The pieces shrunk about random points of theirs."""
+    """Yield the pieces, each shrunk about one of its points at random."""
     for _ in range(count):
         parts: list[Array] = []
         for piece in pieces:
@@ -34,14 +34,14 @@ def random_parts(
 
 
 def corner_contacts(pieces: Sequence[FacePiece], part: Corners) -> tuple[Array, Array]:
-    """Positions and normals of contacts at all corners of a part."""
+    """Positions and normals of contacts at all corners of a part, each (k, 3)."""
     points = [p.origin + corners @ p.frame.T for p, corners in zip(pieces, part, strict=True)]
     normals = [np.tile(p.normal, (len(c), 1)) for p, c in zip(pieces, part, strict=True)]
     return np.vstack(points), np.vstack(normals)
 
 
 def part_at(pieces: Sequence[FacePiece], path: Path) -> Corners:
-    """The part reached by cutting the longest polygon again and again."""
+    """The part reached by cutting the polygon with the longest diagonal at each step of a path."""
     part = [piece.corners for piece in pieces]
     for half in path:
         spans = [_longest(corners) for corners in part]
@@ -51,12 +51,12 @@ def part_at(pieces: Sequence[FacePiece], path: Path) -> Corners:
 
 
 def is_path(value: Any) -> bool:
-    """Whether a value says which half to take, cut by cut."""
+    """Whether a value is a path: a tuple of halves, not too long."""
     return is_tuple_of(value, int) and len(value) <= DEEPEST and set(value) <= {0, 1}
 
 
 def cover_everything(paths: Sequence[Path]) -> bool:
-    """Whether parts, none within another, together are the whole."""
+    """Whether parts, none of them within another, together make up the whole."""
     halves = all(half in {0, 1} for path in paths for half in path)
     apart = not any(
         two[: len(one)] == one
@@ -64,13 +64,14 @@ def cover_everything(paths: Sequence[Path]) -> bool:
         for j, two in enumerate(paths)
         if i != j
     )
+    # a part after k cuts is 2^-k of the whole; whole numbers keep the sum exact
     deepest = max((len(path) for path in paths), default=0)
     shares = sum(1 << (deepest - len(path)) for path in paths)
     return halves and apart and shares == 1 << deepest
 
 
 def _longest(corners: Array) -> tuple[float, Array]:
-    """Length and direction of the longest line between two corners."""
+    """Length and unit direction of the longest line between two corners."""
     between = (corners[:, None] - corners[None]).reshape(-1, 2)
     lengths = np.linalg.norm(between, axis=1)
     far = first_best(lengths)

@@ -1,4 +1,4 @@
-"""Convex face pieces as kernels want them, in one array per property."""
+"""Convex face pieces in one array per property, as kernels need them."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ from grasp_core.objects.face_pieces import FacePiece
 
 
 def face_table(pieces: Sequence[FacePiece | None]) -> FaceTable:
-    """A row per piece; those of faces without room stay zero."""
+    """A table with one row per piece; rows of faces without room stay zero."""
     count, most = len(pieces), max((len(piece.E) for piece in pieces if piece), default=0)
     table = FaceTable(
         normals=np.zeros((count, 3)),

@@ -4,22 +4,28 @@ Solved: whether any four contacts, one on each of four convex faces, are in forc
 given friction, at any friction and for any normals.
 
 Derivation. Put a contact at every corner of the four faces: the patch. A force at any point of
-a convex face is a convex combination of the same force at its corners, so if four contacts on
-the faces were in force closure, the patch would be too. A separating twist of the patch is
-therefore a proof of absence; by convexity of the supports it separates every grasp on these
-faces.
+a convex face is a convex combination of the same force at its corners, so
 
-If the patch is closed, take the smallest forces that show it and add them face by face. The sums
-F_i lie inside the cones and balance as forces. With these forces fixed, equilibrium is linear in
-the positions x_i = o_i + T_i y_i:
+    four contacts on the faces in force closure  =>  the patch in force closure.         (1)
 
-    maximise t  subject to  sum_i (o_i + T_i y_i) x F_i = 0,    e.y_i + t <= b for all edges.
+A separating twist of the patch is therefore a proof of absence; by convexity of the supports it
+separates every grasp on these faces.
 
-Any solution inside the faces, unless all on one line, is in force closure. Of those nearly as far
-from the edges as these forces allow, the one nearest to the middles of the faces is taken.
-If there is none, the centres of pressure of the patch are tried as contacts, then patches of
-smaller random pieces of the faces, which give other forces. What is still open can be split:
-each face quadruple is cut through its longest face, parts are dropped with their proof of
+If the patch is closed, take the smallest forces that show it and add them face by face:
+
+    F_i = sum of the forces at the corners of face i.                                    (2)
+
+The F_i lie inside the cones and balance as forces. With them fixed, equilibrium is linear in the
+positions x_i = o_i + T_i y_i:
+
+    maximise t  subject to  sum_i (o_i + T_i y_i) x F_i = 0,                             (3)
+                            e.y_i + t <= b                   for all i, edges.           (4)
+
+Any solution inside the faces, unless all on one line, is in force closure. Among solutions nearly
+as far from the edges as these forces allow, the one nearest to the middles of the faces is taken.
+If there is none, the centres of pressure of the patch are tried as contacts (5), then patches of
+smaller random pieces of the faces, which give other forces (6). What is still open can be split
+(7): each face quadruple is cut through its longest face, parts are dropped with their proof of
 absence, until a grasp is found, nothing is left, or the budget is spent.
 
 Nothing here depends on P3. The lines of force are of the most general type, as a rule a
@@ -60,17 +66,17 @@ from grasp_core.solvers.ties import graded
 from grasp_core.values import FINGERS
 
 RESTARTS = 12
-"""Smaller random patches that are tried, unless told otherwise."""
+"""Default number of smaller random patches that are tried."""
 LEAST_INSET = 1e-4
 """Least distance of a contact from the edges of its face, in object radii."""
 DEPTH_KEPT = 0.5
 """Share of the patch's margin that its forces keep inside their cones."""
 ROUNDED = 1e-12
-"""Least weight of a corner."""
+"""Least weight of a corner in a centre of pressure: keeps the weights' sum above zero."""
 INSET_KEPT = 0.9
 """Share of the largest distance from the edges that contacts keep when they move to the middles."""
 SAME_PLANE = 1e-6
-"""Smaller moments, relative to the largest, are those of forces in a plane, but for rounding."""
+"""Moments smaller than this, relative to the largest, are rounding: the forces lie in a plane."""
 LEAST_SPREAD = 1e-3
 """Least extent of the contacts across the line they are closest to, in object radii."""
 
@@ -91,8 +97,8 @@ class Absence:
     def verify(self) -> bool:
         """Re-check every field in plain arithmetic.
 
-        That the pieces are convex polygons, and that the parts cover them and are all separated.
-        That the pieces are those of an object's faces is for who has the object.
+        This checks that the pieces are convex polygons, and that the parts cover them and are all
+        separated. Whoever has the object checks that the pieces are parts of its faces.
         """
         with np.errstate(all="ignore"):
             return (
@@ -108,6 +114,7 @@ class Absence:
 
     def _separated(self, path: Path, proof: ClosureCertificate) -> bool:
         if not is_a(proof, ClosureCertificate) or proof.closed is not False:
+            # a twist that separates at more friction separates at less
             return False
         if not proof.verify() or float(proof.friction.min()) < self.friction:
             return False
@@ -122,11 +129,11 @@ class Absence:
 
 @dataclass(frozen=True, slots=True)
 class Undecided:
-    """Neither a grasp nor a proof of absence within the budget."""
+    """The free method found neither a grasp nor a proof of absence within its budget."""
 
     open_parts: int
     open_share: float
-    """Of all choices of contacts, where each cut counts for half."""
+    """Open share of all choices of contacts, where each cut counts for half."""
 
 
 def place_free(
@@ -142,9 +149,9 @@ def place_free(
     Args:
         pieces: Four convex pieces, in finger order, in units where the object has size one.
         friction: Coulomb coefficient at every contact, positive.
-        rng: Chooses the restarts.
-        cells: How many parts of the pieces to examine at most: with 1 there is no splitting.
-        restarts: How many smaller random patches to try before giving up or splitting.
+        rng: Source of the random restarts.
+        cells: Most parts of the pieces to examine; with 1 nothing is split.
+        restarts: Number of smaller random patches to try before giving up or splitting.
 
     Raises:
         InputError: The friction is not positive.
@@ -160,16 +167,19 @@ def place_free(
         part = part_at(pieces, path)
         patch = close_patch(pieces, part, friction)
         examined += 1
+        # (1): this part holds no grasp
         if patch is not None and not patch.closed:
             leaves.append((path, patch))
             continue
         found = _grasp(pieces, part, patch, friction) if patch is not None else None
+        # (6), once for the whole pieces
         if found is None and not path:
             found = _restarted(pieces, friction, rng, restarts)
         if found is not None:
             general = of_general_type(pieces, found, friction, rng)
             return general or Undecided(len(waiting) + 1, _share([*waiting, (0.0, path)]))
         margin = patch.margin if patch is not None else 0.0
+        # (7): parts with the largest margin are examined first
         for half in (0, 1):
             heappush(waiting, (-graded(margin), (*path, half)))
     if waiting:
@@ -184,7 +194,7 @@ def _share(waiting: Sequence[tuple[float, Path]]) -> float:
 def close_patch(
     pieces: Sequence[FacePiece], part: Corners, friction: float
 ) -> ClosureCertificate | None:
-    """Force closure of contacts at all corners of a part; None too close to the boundary."""
+    """Closure certificate of contacts at all corners of a part; None if too close to call."""
     try:
         return force_closure(*corner_contacts(pieces, part), friction)
     except UndecidedError:
@@ -192,20 +202,25 @@ def close_patch(
 
 
 def place_by_forces(pieces: Sequence[FacePiece], forces: Array) -> Placement | None:
-    """Contacts at which given forces balance, as far from the edges as possible.
+    """Place contacts at which given forces balance, as far from the edges as possible.
 
     Args:
         pieces: Four convex pieces.
-        forces: One for each, summing to zero, (4, 3).
+        forces: One force per piece, summing to zero, (4, 3).
+
+    Returns:
+        The placement; None if the contacts would be too near an edge or on one line.
     """
     A_eq = np.zeros((3, 2 * FINGERS + 1))
     b_eq = np.zeros(3)
     rows: list[Array] = []
     limits: list[Array] = []
     for i, (piece, force) in enumerate(zip(pieces, forces, strict=True)):
+        # (3): x_i x F_i = -F_i x (o_i + T_i y_i)
         turn = -cross_matrix(force)
         A_eq[:, 2 * i : 2 * i + 2] = turn @ piece.frame
         b_eq -= turn @ piece.origin
+        # (4): contacts keep a distance t from the edges
         inside = np.zeros((len(piece.E), 2 * FINGERS + 1))
         inside[:, 2 * i : 2 * i + 2], inside[:, -1] = piece.E, 1.0
         rows.append(inside)
@@ -213,6 +228,7 @@ def place_by_forces(pieces: Sequence[FacePiece], forces: Array) -> Placement | N
     objective = np.eye(2 * FINGERS + 1)[-1]
     scale = float(np.abs(forces).max())
     found = maximize(
+        # scaling (3) by the largest force leaves the solver numbers of size one
         LinearProgram(objective, np.vstack(rows), np.hstack(limits), A_eq / scale, b_eq / scale)
     )
     if not isinstance(found, Optimum) or INSET_KEPT * found.value < LEAST_INSET:
@@ -232,11 +248,12 @@ def place_by_forces(pieces: Sequence[FacePiece], forces: Array) -> Placement | N
 def _nearest_to_middles(
     pieces: Sequence[FacePiece], start: Array, A_eq: Array, rows: Array, limits: Array
 ) -> Array:
-    """Of all balanced contacts with rows @ y <= limits those nearest to the pieces' middles, (8,).
+    """Balanced contacts with rows @ y <= limits that are nearest to the pieces' middles, (8,).
 
-    They are unique, unlike those farthest from the edges: an object that is turned keeps them.
+    They are unique, unlike the contacts farthest from the edges, so they turn with the object.
     """
     _, sizes, right = np.linalg.svd(A_eq)
+    # the null space of (3): moves along it keep the balance
     free = right[int((sizes > SAME_PLANE * sizes[0]).sum()) :].T
     middles = np.concatenate([piece.corners.mean(axis=0) for piece in pieces])
     y = start + free @ (free.T @ (middles - start))
@@ -247,7 +264,7 @@ def _nearest_to_middles(
 def _grasp(
     pieces: Sequence[FacePiece], part: Corners, patch: ClosureCertificate, friction: float
 ) -> Placement | None:
-    """A grasp made from the forces of a closed patch."""
+    """Make a placement from the forces of a closed patch; None if no attempt holds."""
     if patch.forces is None:
         return None
     owner = np.repeat(np.arange(FINGERS), [len(corners) for corners in part])
@@ -256,9 +273,11 @@ def _grasp(
         DEPTH_KEPT * patch.margin,
     )  # fmt: skip
     at_corners = patch.forces if at_corners is None else at_corners
+    # (2); the mean takes away what rounding leaves of the sum
     forces = np.array([at_corners[owner == i].sum(axis=0) for i in range(FINGERS)])
     if found := place_by_forces(pieces, forces - forces.mean(axis=0)):
         return found
+    # (5): pressed harder, a corner draws the contact nearer
     pushes, _ = normal_and_tangential(at_corners, patch.normals)
     weights = np.maximum(pushes, ROUNDED)
     centers = np.array(
@@ -273,11 +292,11 @@ def _grasp(
 def of_general_type(
     pieces: Sequence[FacePiece], found: Placement, friction: float, rng: np.random.Generator
 ) -> Placement | None:
-    """The same contacts with forces that form a regulus.
+    """Give a placement forces whose lines form a regulus, at the same contacts.
 
     On symmetric faces the patch's forces may all meet, or lie in one plane. Adding internal
-    forces, half as large as the cones have room for, makes the lines skew; None where that room
-    is too small to tell.
+    forces, half as large as the cones have room for, makes the lines skew. The result is None
+    where that room is too small to tell.
     """
     if classify_lines(found.positions, found.forces) == "regulus":
         return found
@@ -286,6 +305,7 @@ def of_general_type(
     drawn = np.concatenate(
         [np.column_stack([piece.normal, piece.frame]) @ rng.normal(size=3) for piece in pieces]
     )
+    # internal forces make no wrench: take away the part of the drawn ones that does
     internal = (drawn - np.linalg.pinv(G) @ (G @ drawn)).reshape(FINGERS, 3)
     along, across = normal_and_tangential(found.forces, normals)
     inward, sideways = normal_and_tangential(internal, normals)
@@ -298,7 +318,7 @@ def of_general_type(
 
 
 def _held_at(pieces: Sequence[FacePiece], positions: Array, friction: float) -> Placement | None:
-    """The placement at given contacts, if they are in force closure."""
+    """Make a placement at given contacts if they are in force closure; None otherwise."""
     inset = min(
         float((piece.b - piece.E @ (piece.frame.T @ (at - piece.origin))).min())
         for piece, at in zip(pieces, positions, strict=True)
@@ -314,7 +334,7 @@ def _held_at(pieces: Sequence[FacePiece], positions: Array, friction: float) -> 
 
 
 def _on_one_line(positions: Array) -> bool:
-    """Whether contacts can do next to nothing against turning about the line through them."""
+    """Whether contacts are so near one line that they hardly resist turning about it."""
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
     return bool(spread[1] < LEAST_SPREAD)
 

@@ -1,4 +1,4 @@
-"""What kernels are given, as plain arrays; numba is not needed to fill them."""
+"""The inputs of kernels as plain arrays; numba is not needed to fill them."""
 
 from typing import NamedTuple
 
@@ -9,57 +9,57 @@ class FaceTable(NamedTuple):
     """Convex faces at unit size, in the letters of `FacePiece`."""
 
     normals: Array
-    """(f, 3)"""
+    """Inward unit normals, (f, 3)."""
     origins: Array
-    """(f, 3)"""
+    """Origins of the plane coordinates, (f, 3)."""
     frames: Array
-    """(f, 3, 2)"""
+    """Frames of the plane coordinates, (f, 3, 2)."""
     E: Array
-    """(f, e, 2), as many rows of each face as it has edges."""
+    """Rows of E y <= b inside the faces, (f, e, 2); a face fills as many rows as it has edges."""
     b: Array
-    """(f, e)"""
+    """Limits of these rows, (f, e)."""
     edges: Indices
-    """(f,)"""
+    """Number of edges of each face, (f,)."""
     corners: Array
-    """In space, (f, e, 3), as many of each face."""
+    """Corners in space, (f, e, 3); a face fills as many rows as it has edges."""
     depths: Array
-    """(f,)"""
+    """Largest distance of the surface from each plane, (f,)."""
 
 
 class Attempts(NamedTuple):
-    """Ordered faces with a force cone each."""
+    """Attempts: four faces in finger order with a force cone each."""
 
     faces: Indices
-    """(a, 4)"""
+    """Indices of the faces, (a, 4)."""
     axes: Array
-    """(a, 4, 3)"""
+    """Unit cone axes, (a, 4, 3)."""
     half_angles: Array
-    """(a,) [rad]"""
+    """Half-angle of the four cones, (a,) [rad]."""
 
 
 class Corners(NamedTuple):
-    """Corners of faces."""
+    """Corners of faces, padded to the largest number of corners."""
 
     points: Array
-    """(f, c, 3), as many of each face as it has."""
+    """Corners in space, (f, c, 3); a face fills as many rows as it has corners."""
     counts: Indices
-    """(f,)"""
+    """Number of corners of each face, (f,)."""
 
 
 class RegulusTerms(NamedTuple):
-    """What `regulus_grasps` counts as a regulus."""
+    """Settings of `families.regulus`: which slopes are tried, and what counts as a regulus."""
 
     turns: Array
     """Cosines and sines of the directions in which a pyramid's facets lean, (m, 2)."""
     shares: Array
-    """Where in its interval each slope's angle is tried, (s,)."""
+    """Shares of each slope's interval of angles at which it is tried, (s,)."""
     depth: float
     """Least height of the passing points over their faces, in object radii."""
     inset: float
-    """Least distance of a contact from the edges of its face, likewise."""
+    """Least distance of a contact from the edges of its face, in object radii."""
     gap: float
-    """Least distance at which a line passes the focus line, likewise."""
+    """Least distance at which a line passes the focus line, in object radii."""
     tie: float
-    """Merits that differ by no more are equal: the slopes tried first win."""
+    """Merits that differ by no more count as equal: the slopes tried first win."""
     enough: float
-    """The merit above which no better slopes are looked for."""
+    """Merit above which no better slopes are sought."""

@@ -8,34 +8,40 @@ pencils. The four cones must positively span whatever direction each contributes
 Derivation. Let a_ij be the axes of pair i, P_i the plane they span with unit normal N_i, and
 lam > 0 the weights with sum lam_ij a_ij = 0. Then w = lam_11 a_11 + lam_12 a_12 lies in both
 planes; u = w / |w| is the direction of the focus line c_1 c_2. From c_i the axis a_ij leads
-back to the disc centre q_ij = c_i - s_ij a_ij, s_ij = n_ij.(c_i - o_ij) / (n_ij.a_ij). A ball
-of radius R about c_i lies in the cone of every point of the disc of radius r_ij iff
+back to the disc centre
 
-    s_ij sin(psi) >= R + kappa_ij r_ij,   kappa = 1 if the axis leans by alpha >= psi from the
-                                          normal, else cos(psi - alpha).
+    q_ij = c_i - s_ij a_ij,    s_ij = n_ij.(c_i - o_ij) / (n_ij.a_ij).                       (1)
+
+A ball of radius R about c_i lies in the cone of every point of the disc of radius r_ij iff
+
+    s_ij sin(psi) >= R + kappa_ij r_ij,   kappa = 1 if the axis leans by alpha >= psi from   (2)
+                                          the normal, else cos(psi - alpha).
 
 Now take any contacts x_ij in the discs and project them along N_i into the plane of the focus
 line and P_i. The direction c_i - x_ij stays in the cone when projected, and P3 keeps it off
 the line u and on the side of a_ij; the two axes are on opposite sides. So the line L_i through
-x_i1 and x_i2 passes the focus line at some e_i with an offset of at most max_j r_ij <= R along
-N_i, and c_1 - e_1 and e_2 - c_2, sums of cone directions, point along +w. Join the two crossing
+x_i1 and x_i2 passes the focus line at some e_i with an offset along N_i of at most
+
+    max_j r_ij <= R,                                                                         (3)
+
+and c_1 - e_1 and e_2 - c_2, sums of cone directions, point along +w. Join the two crossing
 points by a line L. If c_1 and c_2 lie between e_1 and e_2, the offset of L there is a convex
 combination of two offsets of at most R, so L meets both balls, in z_1 and z_2. The lines
 (x_ij, z_i) lie in the cones and form two flat pencils that share L: dependent, and by P3 in
 equilibrium. The order is safe in two cells, c_1 = x0 -+ k u, c_2 = x0 +- k u with k >= 0:
 
-    A   (c_2 - c_1).w >= 0: e_1 < c_1 <= c_2 < e_2 whatever the contacts;
-    B   (c_2 - c_1).w <= 0 and 2 k <= s_ij a_ij.u_i - r_ij |T_ij'u|, u_1 = u, u_2 = -u: the right
-        side bounds |c_i - e_i| from below, so neither focus passes the other crossing.
+    A   (c_2 - c_1).w >= 0: e_1 < c_1 <= c_2 < e_2 whatever the contacts;                    (4)
+    B   (c_2 - c_1).w <= 0 and 2 k <= s_ij a_ij.u_i - r_ij |T_ij'u|, u_1 = u, u_2 = -u: the  (5)
+        right side bounds |c_i - e_i| from below, so neither focus passes the other crossing.
 
 Each is a linear program in (x0, k, R, r_11..r_22, r). The paper's text leaves out the order:
 outside both cells extending L beyond e_1 and e_2 can magnify its offset without limit. The
 paper's program often ends there, and some of its regions then hold contacts out of equilibrium.
-As R >= r_ij is needed, the radii are at most depth times tan(theta / 2) when axis = normal.
+As (3) is needed, the radii are at most depth times tan(theta / 2) when axis = normal.
 
 Where the surface of a curved patch is up to eps off its plane, contacts are that much nearer to the
-borders of their cones and farther from P_i: s_ij sin(psi) >= R + kappa_ij r_ij + eps and
-R >= r_ij + eps, and the bound of cell B loses eps |n_ij.u|.
+borders of their cones and farther from P_i: the right sides of (2) and of R >= r_ij in (3) grow by
+eps, and the bound of (5) loses eps |n_ij.u|. (6)
 
 Source: Sudsang & Ponce 1995, section 3.2; the order and the two cells are this project's.
 """
@@ -62,9 +68,9 @@ from grasp_core.values import FINGERS, FaceQuadruple, ForceCone
 
 Cell: TypeAlias = tuple[float, float]
 CELL_A, CELL_B = (-1.0, 1.0), (1.0, -1.0)
-"""Sign of k u in c_1 and c_2."""
+"""Signs of k u in c_1 and c_2, by (4) and (5)."""
 X0, K, BALL, RADII, SMALLEST = slice(0, 3), 3, 4, slice(5, 9), 9
-"""Where the variables are."""
+"""Places of the variables: x0, k, R, the radii r_ij and their lower bound r."""
 VARIABLES = 10
 
 
@@ -81,8 +87,8 @@ def place_pencil(
     Args:
         pieces: Four convex pieces; the pencils are (0, 1) and (2, 3).
         cones: The force cones, in the same order; they must satisfy the generalised P3.
-        least: Smaller discs count as none.
-        least_gap: The foci must be this far apart: nearer ones would make the grasp concurrent.
+        least: Least radius of the discs; smaller ones count as none.
+        least_gap: Least distance of the foci; nearer ones would make the grasp concurrent.
         cells: Orders of the foci to try.
 
     Raises:
@@ -105,19 +111,19 @@ def pencil_radius_bounds(
 ) -> Array:
     """Upper bounds on the discs of quadruples, in several orders of the fingers, (..., orders).
 
-    R + kappa r <= s sin(psi) with R >= r and kappa >= cos(psi) leaves r <= s tan(psi / 2), for each
-    finger, and so for the mean of any. Two fingers of a pair share a focus, hence the mean of
-    their s is at most half of their width.
+    With kappa >= cos(psi), (2) and (3) leave r <= s tan(psi / 2) for each finger, and so for the
+    mean of any fingers. Two fingers of a pair share a focus, hence the mean of their s is at most
+    half of their width.
 
-    With positive weights of sum lam a = 0 and distances s_ij of the foci along the axes,
+    With positive weights of sum lam a = 0, (1) gives
     sum lam_ij s_ij = -sum lam_ij a_ij.q_ij - (c_2 - c_1).w. In cell A the last term only lowers it.
     In cell B it is 2 k |w|, at most half of the left side, which can therefore double.
 
     Args:
-        reaches: Upper bounds of the mean distance of a focus along the axes, of any shape.
-        widths: Upper bounds of s_i + s_j for two fingers of one focus, (..., 4, 4).
-        half_angles: As `reaches` [rad].
-        orders: In finger order, pairs are the first two and the last two.
+        reaches: Upper bounds on the mean distance of a focus along the axes, any shape.
+        widths: Upper bounds on s_i + s_j for two fingers of one focus, (..., 4, 4).
+        half_angles: Half-angles of the cones, shaped like `reaches` [rad].
+        orders: Finger orders; the pairs are the first two and the last two.
     """
     depths = [
         np.minimum(2.0 * reaches, 0.5 * np.minimum(widths[..., i, j], widths[..., k, m]))
@@ -128,20 +134,20 @@ def pencil_radius_bounds(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Discs:
-    """Disc centres as functions of the variables v: depths s v + s0, centres Q v + q."""
+    """Disc centres (1) as functions of the variables v: depths s v + s0, plane points Q v + q."""
 
     C: Array
-    """From the variables to each finger's focus, (4, 3, VARIABLES)."""
+    """Maps from the variables to each finger's focus, (4, 3, VARIABLES)."""
     s: Array
-    """(4, VARIABLES)"""
+    """Linear part of the depths, (4, VARIABLES); `s0` is the constant part, (4,)."""
     s0: Array
     Q: Array
-    """(4, 2, VARIABLES)"""
+    """Linear part of the centres in their planes, (4, 2, VARIABLES)."""
     q: Array
-    """(4, 2)"""
+    """Constant part of the centres, (4, 2)."""
 
     def in_cell(self, cell: Cell) -> "_Discs":
-        """The same, where those of cell A are given: in the other one k counts the other way."""
+        """The discs in another cell, given those of cell A: in cell B the sign of k changes."""
         turn = np.ones(VARIABLES)
         turn[K] = cell[0] * CELL_A[0]
         return _Discs(self.C * turn, self.s * turn, self.s0, self.Q * turn, self.q)
@@ -175,7 +181,7 @@ def _place_in_cell(  # noqa: PLR0913, PLR0917 - a program's data
 
 
 def _discs(pieces: Sequence[FacePiece], cones: Sequence[ForceCone], u: Array) -> _Discs:
-    """Of cell A."""
+    """Disc centres and depths for cell A, as linear functions of the variables."""
     n = np.array([piece.normal for piece in pieces])
     o = np.array([piece.origin for piece in pieces])
     T = np.array([piece.frame for piece in pieces])
@@ -186,6 +192,7 @@ def _discs(pieces: Sequence[FacePiece], cones: Sequence[ForceCone], u: Array) ->
     along = np.einsum("fi,fi->f", n, a)[:, None]
     s = np.einsum("fi,fiv->fv", n, C) / along
     s0 = -np.einsum("fi,fi->f", n, o)[:, None] / along
+    # (1), solved for s and then for q in plane coordinates
     Q = np.einsum("fit,fiv->ftv", T, C - a[:, :, None] * s[:, None, :])
     return _Discs(C, s, s0[:, 0], Q, -np.einsum("fit,fi->ft", T, s0 * a + o))
 
@@ -193,18 +200,22 @@ def _discs(pieces: Sequence[FacePiece], cones: Sequence[ForceCone], u: Array) ->
 def _rows(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone], discs: _Discs, least_gap: float
 ) -> tuple[Array, Array]:
-    """The rows of both cells: the gap, three per finger, then the edges."""
+    """The rows of both cells: the gap, three rows per finger, then the edges of the faces."""
     depths = np.array([piece.depth for piece in pieces])
     sines = np.sin([cone.half_angle for cone in cones])
     fingers = np.arange(FINGERS)
     ball, inside, below = (np.zeros((FINGERS, VARIABLES)) for _ in range(3))
+    # (2): R + kappa r - sin(psi) s <= 0, eps off the limit by (6)
     ball[:, BALL] = 1.0
     ball[fingers, RADII.start + fingers] = list(map(_kappa, pieces, cones))
     ball -= sines[:, None] * discs.s
+    # (3), and r <= r_ij
     inside[fingers, RADII.start + fingers], inside[:, BALL] = 1.0, -1.0
     below[fingers, RADII.start + fingers], below[:, SMALLEST] = -1.0, 1.0
+    # the foci are 2 k apart
     gap = np.zeros((1, VARIABLES))
     gap[0, K] = -2.0
+    # the disc about Q v + q stays inside the face
     edges = [piece.E @ Q for piece, Q in zip(pieces, discs.Q, strict=True)]
     for finger, rows in enumerate(edges):
         rows[:, RADII.start + finger] += 1.0
@@ -216,17 +227,19 @@ def _rows(
 def _near_rows(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone], discs: _Discs, u: Array
 ) -> tuple[Array, Array]:
-    """What keeps the foci of cell B near each other, a row per finger."""
+    """The rows of (5) that keep the foci of cell B near each other, one row per finger."""
+    # u_1 = u and u_2 = -u
     toward = np.repeat(CELL_A, 2) * -np.array([float(cone.axis @ u) for cone in cones])
     across = np.array([abs(float(piece.normal @ u)) for piece in pieces])
     rows, fingers = -toward[:, None] * discs.s, np.arange(FINGERS)
     rows[:, K] += 2.0
     rows[fingers, RADII.start + fingers] += [np.linalg.norm(piece.frame.T @ u) for piece in pieces]
+    # eps |n.u| off the limit by (6)
     depths = np.array([piece.depth for piece in pieces])
     return rows, toward * discs.s0 - depths * across
 
 
 def _kappa(piece: FacePiece, cone: ForceCone) -> float:
-    """How far a disc of radius one reaches towards the cone's facets at most."""
+    """Largest extent of a disc of radius one towards the facets of a cone: kappa in (2)."""
     lean = float(angles_between(piece.normal, cone.axis))
     return 1.0 if lean >= cone.half_angle else math.cos(cone.half_angle - lean)

@@ -1,6 +1,6 @@
-"""What a construction returns: contacts with the forces that witness them, or a bound.
+"""The result of a construction: contacts with the forces that witness them, or a bound.
 
-Everything is in the pieces' units, where the object has size one.
+Lengths are in the pieces' units, where the object has size one.
 """
 
 from collections.abc import Sequence
@@ -18,18 +18,18 @@ class Placement:
     """Four contacts, one on each piece, and the forces that hold them."""
 
     positions: Array
-    """(4, 3)"""
+    """Contact points, (4, 3)."""
     forces: Array
     """Balanced forces along the witness lines, normal parts summing to one, (4, 3)."""
     foci: Array
-    """Where witness lines meet, (k, 3): one point for a concurrent grasp, two for a pencil; for
-    a regulus the point midway between the two lines of each pair, or nothing."""
+    """Points where witness lines meet, (k, 3): one for a concurrent grasp, two for a pencil; for a
+    regulus the points midway between the two lines of each pair, or none."""
     radii: Array
     """Radius of the independent disc around each contact, (4,); zeros where none is claimed."""
     merit: float
-    """What the construction maximised."""
+    """The quantity that the construction maximised."""
     planned: Array | None = None
-    """Forces for which the contacts were chosen, where those of the witness are others, (4, 3)."""
+    """Forces for which the contacts were chosen, if they differ from the witness's, (4, 3)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,10 +54,10 @@ def focus_direction(axes: Array) -> Array:
     """Direction u of the line between the foci of pairs (0, 1) and (2, 3), (..., 3).
 
     It lies in the planes of both pairs, and the first pair pushes along it: with positive
-    weights lam of sum lam a = 0, it is that of w = lam_0 a_0 + lam_1 a_1 = -lam_2 a_2 - lam_3 a_3.
+    weights lam of sum lam a = 0, u points along w = lam_0 a_0 + lam_1 a_1 = -lam_2 a_2 - lam_3 a_3.
 
     Args:
-        axes: Of four force cones that positively span, in finger order, (..., 4, 3).
+        axes: Axes of four force cones that positively span, in finger order, (..., 4, 3).
     """
     first = np.einsum("...i,...ij->...j", balancing_weights(axes)[..., :2], axes[..., :2, :])
     w = np.asarray(first, dtype=np.float64)

@@ -8,12 +8,12 @@ Derivation. With axes a_ij, planes P_i, and u along both planes as for pencils, 
 unit normal of P_i and v_i = N_i x u. The two lines of pair i pass the focus line on either side
 of c_i = x0 +- k u, at d_i1 = c_i + l_i N_i and d_i2 = c_i - l_i N_i, along
 
-    f_i1 = x_i u + y_i v_i + z_i N_i,      f_i2 = x_i u - y_i v_i - z_i N_i,
+    f_i1 = x_i u + y_i v_i + z_i N_i,      f_i2 = x_i u - y_i v_i - z_i N_i,             (1)
 
 and the contacts are x_ij = d_ij - f_ij. With equal weights the two forces of a pair amount to
 the force 2 x_i u with the moment 2 x_i (x0 x u) - 2 l_i y_i u, so pairs 1 and 2 cancel iff
 
-    l_1 y_1 / x_1 = l_2 y_2 / x_2                                      (equal pitch).
+    l_1 y_1 / x_1 = l_2 y_2 / x_2                                      (equal pitch).    (2)
 
 The paper calls the lines "clearly linearly dependent", but without this equation they are
 independent in general, and of the grasps its program returns on random polyhedra two in five
@@ -22,15 +22,17 @@ The equation is bilinear. Fixing both slopes tau_i = y_i / x_i makes it linear: 
 l_2 = p tau_1 with one free p. The projection of f_ij into P_i stays within psi of a_ij, so if
 phi_ij is the angle of a_ij from the resultant of its pair, +u or -u, then
 
-    max_j phi_ij - psi <= atan|tau_i| <= min(min_j phi_ij + psi, pi / 2),
+    max_j phi_ij - psi <= atan|tau_i| <= min(min_j phi_ij + psi, pi / 2),                (3)
 
 an interval of which a few values are tried; tau_i has the sign of x_i. It is empty unless the
 pair is nearly symmetric about u, |phi_i1 - phi_i2| <= 2 psi. In (x0, k, p, x_i, z_i, t) the
 program is linear:
 
-    minimise t  subject to  x_ij inside its face, |x_ij - centre| <= t along both axes of the face,
-                            f_ij in an inscribed pyramid, n_ij.f_ij >= a least depth,
-                            p beyond a least gap, on either side.
+    minimise t  subject to  x_ij inside its face,                                        (4)
+                            |x_ij - centre| <= t along both axes of the face,            (5)
+                            f_ij in an inscribed pyramid,                                (6)
+                            n_ij.f_ij >= a least depth,                                  (7)
+                            p beyond a least gap, on either side.                        (8)
 
 The last two keep out the zero force, and lines that meet: those are pencils.
 
@@ -64,7 +66,7 @@ from grasp_core.solvers.ties import nearest_optimum
 from grasp_core.values import FINGERS, ForceCone
 
 SLOPES = (0.5, 0.2, 0.8)
-"""Where in its interval each slope's angle is tried."""
+"""Shares of the interval (3) at which each slope's angle is tried."""
 LEAST_DEPTH = 0.02
 """Least height of the passing points over their faces, in object radii."""
 LEAST_INSET = 1e-3
@@ -72,21 +74,21 @@ LEAST_INSET = 1e-3
 LEAST_GAP = 0.01
 """Least distance l_i, along N_i, at which a line passes the focus line, in object radii."""
 SAME_OFFSET = 1e-9
-"""Offsets that differ by no more are equal: the slopes tried first win."""
+"""Offsets that differ by no more count as equal: the slopes tried first win."""
 GIVEN_UP = 1e-9
-"""Of an offset, in favour of the least variables: less than makes the contacts of two pairings
-others than each other's."""
+"""Offset given up in favour of the least variables: giving up less makes the contacts of two
+pairings differ from each other's."""
 X0, K, P, X, Z, T = slice(0, 3), 3, 4, slice(5, 7), slice(7, 9), 9
-"""Where the variables are."""
+"""Places of the variables x0, k, p, x_i, z_i and t."""
 VARIABLES = 10
 
 RESULTANTS = np.array([1.0, 1.0, -1.0, -1.0])
 """Signs of the resultants of the fingers' pairs along u."""
 KERNEL = "grasp_core.families.regulus_kernel"
 SIDES = (1.0, -1.0)
-"""Of the focus line, on which the lines of the first finger pass it."""
+"""Signs of p: the side of the focus line on which the first finger's line passes it."""
 Choice: TypeAlias = tuple[int, int, int]
-"""Which of the `SLOPES` the pairs have, and on which of the `SIDES` the lines pass."""
+"""Indices of the two pairs' slopes in `SLOPES`, and of the side in `SIDES`."""
 CHOICES: tuple[Choice, ...] = tuple(
     product(range(len(SLOPES)), range(len(SLOPES)), range(len(SIDES)))
 )
@@ -102,8 +104,8 @@ def place_regulus(
         cones: The force cones, in the same order; they must satisfy the generalised P3.
 
     Returns:
-        The placement, with minus the largest offset t as its merit, or that there is none for
-        the slopes tried.
+        The placement, with minus the largest offset t as its merit, or its absence for the slopes
+        tried.
 
     Raises:
         SolverError: A program's answer failed its check.
@@ -112,6 +114,7 @@ def place_regulus(
     if known is not None:
         merit, choices = known
         best = _best_of(pieces, cones, choices)
+        # whole programs, solved again, have to confirm what compiled code chose
         if _merit(best) == merit or abs(_merit(best) - merit) <= RESIDUAL:
             return best
     return _best_of(pieces, cones, CHOICES)
@@ -120,16 +123,16 @@ def place_regulus(
 def regulus_bounds(
     table: FaceTable, attempts: Attempts, enough: float = -SAME_OFFSET
 ) -> tuple[Array, Indices] | None:
-    """How good reguli can be, in compiled code, or None where there is none.
+    """Bound the merit of reguli for many attempts in compiled code; None where there is none.
 
     Args:
-        table: Of the faces.
-        attempts: Which of them, in finger order, with cones that positively span (P3).
-        enough: Merit above which to be content; no offset is below zero.
+        table: The faces.
+        attempts: Faces in finger order, with cones that positively span (P3).
+        enough: Merit above which no better choice is sought; no offset is below zero.
 
     Returns:
-        The merits of the best choices, (a,): minus infinity where a proof excludes each, infinity
-        where one was not decided; and these choices, (a, 3), -1 where there is none.
+        The merits of the best choices, (a,): minus infinity where a proof excludes every choice,
+        infinity where a choice was not decided. Then these choices, (a, 3), -1 where there is none.
     """
     kernel = compiled(KERNEL)
     if kernel is None:
@@ -145,7 +148,7 @@ def regulus_bounds(
 def _best_choice(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone]
 ) -> tuple[float, tuple[Choice, ...]] | None:
-    """The best choice, if there is any, and its merit; None where this is not known."""
+    """The best choice, if there is any, and its merit; None if compiled code cannot tell."""
     half_angle = cones[0].half_angle
     if any(cone.half_angle != half_angle for cone in cones):
         return None
@@ -173,28 +176,32 @@ def _best_of(
         lines = [_line(pairs, slopes, finger) for finger in range(FINGERS)]
         program = _program(pieces, facets, lines, slopes, SIDES[side])
         found = maximize(program)
+        # ties go to the first choice: rounding must not decide between equal ones
         if isinstance(found, Optimum) and found.value > _merit(best) + SAME_OFFSET:
             best = _placement(pieces, lines, nearest_optimum(program, found, GIVEN_UP), found.value)
     return best
 
 
 def nearly_symmetric(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
-    """Whether both pairs of many quadruples leave their slope an interval, (q,).
+    """Whether both pairs of each quadruple leave their slopes an interval (3), (q,).
 
     Args:
-        axes: Of the force cones in finger order, (q, 4, 3).
-        half_angles: (q,) [rad].
+        axes: Axes of the force cones in finger order, (q, 4, 3).
+        half_angles: Half-angles of the cones, (q,) [rad].
     """
     least, largest = _slope_angles(axes, half_angles[:, None])
     return np.all(least < largest, axis=1)
 
 
 def _slope_angles(axes: Array, half_angles: Array) -> tuple[Array, Array]:
-    """Least and largest angle of each pair's forces from its resultant, each (..., 2).
+    """The ends of (3): least and largest angle of each pair's forces from its resultant [rad].
 
     Args:
-        axes: (..., 4, 3)
-        half_angles: One for all fingers, (..., 1), or one each, (..., 4).
+        axes: Axes of the force cones in finger order, (..., 4, 3).
+        half_angles: One half-angle for all fingers, (..., 1), or one each, (..., 4) [rad].
+
+    Returns:
+        Two arrays, each (..., 2).
     """
     resultants = focus_direction(axes)[..., None, :] * RESULTANTS[:, None]
     phi = angles_between(axes, resultants)
@@ -206,20 +213,20 @@ def _slope_angles(axes: Array, half_angles: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pair:
-    """Frame of one pair, and the angles its slope may have."""
+    """Frame (u, v, N) of one pair, each (3,), and the angles (3) that its slope may have [rad]."""
 
     u: Array
     v: Array
     N: Array
     resultant: float
-    """+1 where the pair pushes along u, -1 where against it."""
+    """+1 where the pair pushes along u, -1 where it pushes against u."""
     least_angle: float
     largest_angle: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Line:
-    """Force direction F v and contact D v - F v as functions of the variables v."""
+    """Force direction F v and contact D v - F v as functions of the variables v, each (3, 10)."""
 
     D: Array
     F: Array
@@ -232,6 +239,7 @@ def _pairs(cones: Sequence[ForceCone]) -> list[_Pair]:
     pairs: list[_Pair] = []
     for pair, resultant in enumerate((1.0, -1.0)):
         a, c = axes[2 * pair], axes[2 * pair + 1]
+        # turned so that v has the first axis on its side
         across = np.cross(a, c) * np.sign(np.cross(np.cross(a, c), u) @ a)
         N = np.asarray(across / np.linalg.norm(across), dtype=np.float64)
         angles = float(least[pair]), float(largest[pair])
@@ -240,7 +248,7 @@ def _pairs(cones: Sequence[ForceCone]) -> list[_Pair]:
 
 
 def _slope(pair: _Pair, share: float) -> float:
-    """Value of y / x somewhere in its interval."""
+    """The slope y / x at a share of its interval (3), with the sign of x."""
     width = pair.largest_angle - pair.least_angle
     return pair.resultant * math.tan(pair.least_angle + share * width)
 
@@ -249,9 +257,11 @@ def _line(pairs: Sequence[_Pair], slopes: Sequence[float], finger: int) -> _Line
     i, side = finger // 2, 1.0 if finger % 2 == 0 else -1.0
     pair = pairs[i]
     D = np.zeros((3, VARIABLES))
+    # d of (1), with l_i = p tau of the other pair by (2)
     D[:, X0], D[:, K] = np.eye(3), pair.resultant * pair.u
     D[:, P] = side * slopes[1 - i] * pair.N
     F = np.zeros((3, VARIABLES))
+    # f of (1), with y = tau x
     F[:, X.start + i] = pair.u + side * slopes[i] * pair.v
     F[:, Z.start + i] = side * pair.N
     return _Line(D, F)
@@ -267,10 +277,12 @@ def _program(
     """The least offset t for given slopes, with the lines on one side of the focus line."""
     offset = np.eye(VARIABLES)[T]
     gap = -side * np.eye(VARIABLES)[P]
+    # (8), for both pairs: l_i is p times the slope of the other
     rows: list[Array] = [gap[None]]
     limits: list[Array | float] = [-LEAST_GAP / min(abs(slope) for slope in slopes)]
     for piece, G, line in zip(pieces, facets, lines, strict=True):
         flat, middle = piece.frame.T @ (line.D - line.F), piece.frame.T @ piece.origin
+        # (4), (5) with both signs, (6) and (7)
         rows += [
             piece.E @ flat,
             flat - offset,
@@ -285,6 +297,7 @@ def _program(
             np.zeros(len(G)),
             -LEAST_DEPTH,
         ]
+    # contacts lie in the planes of their faces
     normals = np.array([piece.normal for piece in pieces])
     A_eq = np.array([n @ (line.D - line.F) for n, line in zip(normals, lines, strict=True)])
     b_eq = np.array([piece.normal @ piece.origin for piece in pieces])
@@ -296,6 +309,7 @@ def _placement(
 ) -> Placement:
     positions: list[Array] = []
     for piece, line in zip(pieces, lines, strict=True):
+        # takes away what the program's answer may be off the plane
         contact = (line.D - line.F) @ x
         positions.append(contact - piece.normal * (piece.normal @ (contact - piece.origin)))
     passing = np.array([line.D @ x for line in lines])

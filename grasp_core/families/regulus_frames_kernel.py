@@ -1,7 +1,4 @@
-"""What two pairs of fingers have to do with each other in a regulus: planes, slopes and forces.
-
-In the letters of `regulus_grasps`.
-"""
+"""Frames, slopes and force rows of the two pairs of a regulus, in the letters of `regulus`."""
 
 from typing import NamedTuple
 
@@ -15,30 +12,30 @@ from grasp_core.families.kernel_tables import Attempts, FaceTable, RegulusTerms
 from grasp_core.geometry.vectors_kernel import across, angle_between, cross, dotted, focus_direction
 
 FLAT = 1e-12
-"""Facets that lean no more than this do not bound z / x: they allow all of it or nothing."""
+"""Facets whose part along N is no larger do not bound z / x: they allow all of it or nothing."""
 
 
 class PairFrames(NamedTuple):
-    """Of both pairs: along and across their planes, and what their slopes may be."""
+    """Frames of both pairs of an attempt, and what their slopes may be."""
 
     u: Array
-    """(3,)"""
+    """Direction along both planes, (3,)."""
     v: Array
-    """(2, 3)"""
+    """Directions in each pair's plane across u, (2, 3)."""
     N: Array
-    """(2, 3)"""
+    """Unit normals of the planes, (2, 3)."""
     tau: Array
-    """(2, slopes)"""
+    """Slopes to try, (2, slopes)."""
     tight: Array
-    """Of each slope the rows (alpha, beta) of alpha x + beta z >= 0 that bound z / x from below and
-    from above, (2, slopes, 2, 2)."""
+    """Rows (alpha, beta) of alpha x + beta z >= 0 that bound z / x from below and from above, for
+    each slope, (2, slopes, 2, 2)."""
     usable: NDArray[np.bool_]
-    """Whether they leave anything between them, (2, slopes)."""
+    """Whether these rows leave anything between them, (2, slopes)."""
 
 
 @njit(cache=True)
 def pair_frames(faces: FaceTable, attempts: Attempts, a: int, terms: RegulusTerms) -> PairFrames:
-    """Of one attempt; slopes of pairs that are too far from symmetric are not usable."""
+    """Frames of one attempt; slopes of pairs that are too far from symmetric are not usable."""
     axes, slopes = attempts.axes[a], len(terms.shares)
     u, normal = focus_direction(axes), np.empty(3)
     frames = PairFrames(
@@ -54,6 +51,7 @@ def pair_frames(faces: FaceTable, attempts: Attempts, a: int, terms: RegulusTerm
         for j in range(3):
             frames.N[pair, j] = scale * normal[j]
             frames.v[pair, j] *= scale
+        # the interval (3) of `regulus`
         least, largest = -np.pi, np.pi / 2.0
         for axis in (first, second):
             phi = angle_between(axis, resultant * u)
@@ -75,7 +73,7 @@ def pair_frames(faces: FaceTable, attempts: Attempts, a: int, terms: RegulusTerm
 def _facets(
     faces: FaceTable, attempts: Attempts, place: tuple[int, int], frames: PairFrames, turns: Array
 ) -> Array:
-    """Normals of the facets of a pair's pyramids, along u, v and N, (2, facets, 3)."""
+    """Normals of the facets of a pair's pyramids, as components along u, v, N, (2, facets, 3)."""
     a, pair = place
     found = np.empty((2, len(turns), 3))
     sine, cosine = facet_sines(attempts.half_angles[a], len(turns))
@@ -93,15 +91,16 @@ def _facets(
 
 @njit(cache=True)
 def _tightest(facets: Array, resultant: float, tau: float, tight: Array) -> bool:
-    """Which rows alpha x + beta z >= 0 bound z / |x|, for x on the side of the resultant.
+    """Find the rows alpha x + beta z >= 0 that bound z / |x|, for x on the resultant's side.
 
     Returns:
-        Whether anything is left between them.
+        Whether the two rows leave anything between them.
     """
     lower, upper = -np.inf, np.inf
     tight[:] = 0.0
     for each, side in ((0, 1.0), (1, -1.0)):
         for m in range(facets.shape[1]):
+            # g.f of a force x (u +- tau v) +- z N
             alpha = facets[each, m, 0] + side * tau * facets[each, m, 1]
             beta = side * facets[each, m, 2]
             if abs(beta) <= FLAT:

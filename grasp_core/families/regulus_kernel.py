@@ -1,10 +1,10 @@
-"""Which slopes suit a regulus best: the programs of `regulus_grasps` for all slopes tried.
+"""Compiled search for the best slopes of a regulus: the programs of `regulus` for all slopes tried.
 
-A program, over (x0, k, p, x_1, x_2, z_1, z_2, t), is solved without its gap first: where p keeps
-beyond the gap anyway, that was the better side. As the cones span (P3), x_i is on the side of its
-pair's resultant; there the rows that keep the forces of a pair in their pyramids are bounds on
-z_i / x_i, of which the tightest imply the others. `regulus_grasps` builds the same programs whole
-and solves the best one again. See `kernels.attempts`.
+A program, over (x0, k, p, x_1, x_2, z_1, z_2, t), is first solved without its gap: if p stays
+beyond the gap anyway, that side was the better one. As the cones span (P3), x_i is on the side of
+its pair's resultant; there the rows that keep the forces of a pair in their pyramids are bounds on
+z_i / x_i, of which the tightest imply the others. `regulus` builds the same programs whole and
+solves the best one again. Numbers in comments are those of its derivation.
 """
 
 from typing import NamedTuple
@@ -35,30 +35,30 @@ from grasp_core.solvers.lp_kernel import (
 )
 
 VARIABLES, K, P, X, Z, T = 10, 3, 4, 5, 7, 9
-"""How many there are, and where they are."""
+"""Number and places of the variables."""
 ACCURACY, FARTHEST = 1e-11, 1e4
-"""How far multipliers may be from giving the objective, and from which points a proof that there
-are none may not keep away."""
+"""How far multipliers may be from giving the objective, and the size |x|_1 of the variables up to
+which a proof of infeasibility has to hold."""
 NONE, PLUS, MINUS = -1, 0, 1
-"""No slopes; those of p > 0 and of p < 0."""
+"""Codes of the side: no slopes are feasible, p > 0, p < 0."""
 
 
 class _Line(NamedTuple):
-    """Through D along F, as functions of the variables."""
+    """The line through D along F, both as functions of the variables."""
 
     pair: int
     k: Array
-    """What D gains with k, (3,)."""
+    """Change of D with k, (3,)."""
     p: Array
-    """What D gains with p, (3,)."""
+    """Change of D with p, (3,)."""
     x: Array
-    """What F gains with x of its pair, (3,)."""
+    """Change of F with x of the pair, (3,)."""
     z: Array
-    """What F gains with z of its pair, (3,)."""
+    """Change of F with z of the pair, (3,)."""
 
 
 def try_out() -> None:
-    """Decide one attempt."""
+    """Bound one attempt, so that everything here is compiled."""
     terms = RegulusTerms(np.ones((16, 2)), np.ones(1), 0.0, 0.0, 0.0, 0.0, 0.0)
     regulus_bounds(*tilted_faces(), terms, np.empty(1), np.empty((1, 3), dtype=np.int64))
 
@@ -74,12 +74,12 @@ def regulus_bounds(
     """Bound the merit, minus the largest offset t, over the slopes tried until one is enough.
 
     Args:
-        faces: Of the object.
-        attempts: In finger order; the pairs are (0, 1) and (2, 3).
-        terms: What counts as a regulus.
+        faces: The faces of the object.
+        attempts: Faces in finger order; the pairs are (0, 1) and (2, 3).
+        terms: Which slopes are tried, and what counts as a regulus.
         bounds: Filled with the bounds, (a,): minus infinity where no slopes are feasible, and
             infinity where a program was not decided.
-        chosen: Filled with which slopes of the pairs are best, and the side, (a, 3); -1 if none.
+        chosen: Filled with the best slopes of the two pairs and the side, (a, 3); -1 if none.
     """
     others = 1 + FINGERS * (4 + 1 + 1) + 4  # gap; offsets, depth, equality; bounds on z / x
     room = np.empty((VARIABLES + 2) * (others + FINGERS * faces.E.shape[1]))
@@ -126,7 +126,7 @@ def _best_side(
 
 @njit(cache=True)
 def _bounded(rows: Rows, worth: float, vertex: Vertex) -> float:
-    """An upper bound of a program: minus infinity if it is infeasible, infinity if not decided."""
+    """Upper bound of a program: minus infinity if proved infeasible, infinity if undecided."""
     c = np.zeros(VARIABLES)
     c[T] = -1.0
     measure(rows)
@@ -145,7 +145,7 @@ def _fill(
     terms: RegulusTerms,
     rows: Rows,
 ) -> None:
-    """All rows but the first, which is left for the gap; equalities last."""
+    """Fill in all rows but the first, which is left for the gap (8); equalities come last."""
     row, equality = 1, len(rows.b) - FINGERS
     rows.b[0] = 0.0
     for finger in range(FINGERS):
@@ -153,13 +153,16 @@ def _fill(
         row = _edge_rows(faces, face, line, terms.inset, rows, row)
         row = _offset_rows(faces, face, line, rows, row)
         n = faces.normals[face]
+        # (7): the passing point is high enough over the face
         _add(line, n, (0.0, -1.0), rows, row)
         rows.b[row] = -terms.depth
+        # the contact lies in the plane of its face
         _add(line, n, (1.0, -1.0), rows, equality + finger)
         rows.b[equality + finger] = dotted(n, faces.origins[face])
         row += 1
     for pair in range(2):
         for bound in range(2):
+            # (6), as bounds on z / x
             tight = frames.tight[pair, slopes[pair], bound]
             rows.At[X + pair, row], rows.At[Z + pair, row] = -tight[0], -tight[1]
             rows.b[row] = 0.0
@@ -168,7 +171,7 @@ def _fill(
 
 @njit(cache=True)
 def _edge_rows(faces: FaceTable, face: int, line: _Line, inset: float, rows: Rows, row: int) -> int:
-    """What keeps the contact D - F of a line inside its face."""
+    """Fill in the rows (4), which keep the contact D - F of a line inside its face."""
     edge, frame = np.empty(3), faces.frames[face]
     for e in range(faces.edges[face]):
         for j in range(3):
@@ -181,7 +184,7 @@ def _edge_rows(faces: FaceTable, face: int, line: _Line, inset: float, rows: Row
 
 @njit(cache=True)
 def _offset_rows(faces: FaceTable, face: int, line: _Line, rows: Rows, row: int) -> int:
-    """What makes t the largest offset from the middle of the face."""
+    """Fill in the rows (5), which make t the largest offset from the middle of the face."""
     along = np.empty(3)
     for axis in range(2):
         for sign in (1.0, -1.0):
@@ -209,7 +212,7 @@ def _line(frames: PairFrames, slopes: tuple[int, int], finger: int) -> _Line:
 
 @njit(cache=True)
 def _add(line: _Line, d: Array, shares: tuple[float, float], rows: Rows, row: int) -> None:
-    """Fill in d.(share D + other share F)."""
+    """Fill in a row with passing d.D + force d.F, for `shares` = (passing, force)."""
     passing, force = shares
     for j in range(3):
         rows.At[j, row] = passing * d[j]

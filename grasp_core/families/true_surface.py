@@ -1,9 +1,9 @@
-"""Contacts on curved patches move from the plane they were planned on to the true surface.
+"""Moves contacts on curved patches from the planes they were planned on to the true surface.
 
-Solved: for a placement on the planes of patches, one with the same force cones on the triangles
-that the surface is made of over the contacts, each within the region of its finger.
+Solved: given a placement on the planes of patches, a placement with the same force cones on the
+triangles of the surface over the contacts, each within the region of its finger.
 
-Why there is one. The planes were planned with friction cones that fit inside those of every
+Why it exists. The planes were planned with friction cones that fit inside the cones of every
 triangle over them, and with contacts anywhere within `depth` of the planes. So a concurrent grasp's
 contacts on the surface can aim at the planned focus. Otherwise the construction is run again on the
 triangles. Either way the contacts are on the surface, and are certified with the true normals.
@@ -22,10 +22,10 @@ from grasp_core.solvers.ties import graded
 from grasp_core.values import ContactRegion, ForceCone
 
 LEAST_FACET = 1e-5
-"""Parts of triangles without room for a disc of this radius (object size one) are left."""
+"""Least radius of a disc on part of a triangle (object size one); smaller parts are left out."""
 ON_EDGE = 1e-12
-"""A line that passes an edge no farther out meets both triangles beside it, of which the first
-one with room counts: lengths and volumes of an object of size one, a thousand rounding errors."""
+"""A line that passes an edge no farther out meets both triangles beside it, and the first one with
+room counts: lengths and volumes of an object of size one, a thousand rounding errors."""
 
 OnFacets = Callable[[tuple[FacePiece, ...]], Placement | None]
 
@@ -38,15 +38,18 @@ def on_true_surface(
     regions: Sequence[ContactRegion],
     place: OnFacets,
 ) -> tuple[tuple[FacePiece, ...], Placement] | None:
-    """The same grasp with contacts on the surface, None if that fails.
+    """Move a placement to the surface; None if no contacts there hold the same grasp.
 
     Args:
-        shapes: Of the four faces, in finger order.
-        pieces: On which it is planned.
+        shapes: Shapes of the four faces, in finger order.
+        pieces: The pieces on which the grasp is planned.
         cones: The force cones.
         planned: The placement on the planes; its radii and merit are kept.
-        regions: Of the fingers, in the pieces' units.
+        regions: Regions of the fingers, in the pieces' units.
         place: The construction, as a function of pieces.
+
+    Returns:
+        The pieces that the contacts are on, and the placement.
     """
     if all(shape.facets is None for shape in shapes):
         return pieces, planned
@@ -73,7 +76,7 @@ def _aimed(
     planned: Placement,
     directions: Array,
 ) -> Placement | None:
-    """Contacts straight over or under the planned ones whose lines meet in the planned focus."""
+    """Contacts over or under the planned ones, aimed at the planned focus; None if that fails."""
     if len(planned.foci) != 1:
         return None
     heights = [
@@ -101,7 +104,7 @@ def _holds(facet: FacePiece, point: Array) -> bool:
 def _facet(
     shape: FaceShape, piece: FacePiece, at: Array, along: Array, region: ContactRegion
 ) -> FacePiece | None:
-    """The part of the surface's triangle on the line through a point that is over a region."""
+    """Part of a surface triangle on the line through a point, as far as it is over a region."""
     if shape.facets is None:
         return piece
     parts = (_part(piece, triangle, region) for triangle in _hit(shape.facets, at, along))
@@ -109,7 +112,7 @@ def _facet(
 
 
 def _part(piece: FacePiece, triangle: Array, region: ContactRegion) -> FacePiece | None:
-    """The part of a triangle that is over a region, if there is room on it."""
+    """The part of a triangle that is over a region, or None if there is no room on it."""
     cross = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
     facet = piece_of(piece.face, cross / np.linalg.norm(cross), triangle)
     claimed = (region.polygon - piece.origin) @ piece.frame
@@ -124,7 +127,7 @@ def _part(piece: FacePiece, triangle: Array, region: ContactRegion) -> FacePiece
 
 
 def _hit(triangles: Array, point: Array, along: Array) -> Array:
-    """The triangles that a line meets, those nearest to the line's point first, (k, 3, 3)."""
+    """The triangles that a line meets, the nearest to the given point first, (k, 3, 3)."""
     edges = np.roll(triangles, -1, axis=1) - triangles
     sides = np.cross(edges, point - triangles) @ along
     normals = np.cross(edges[:, 0], edges[:, 1])

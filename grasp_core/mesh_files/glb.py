@@ -1,9 +1,8 @@
-"""GLB: a JSON tree of nodes and meshes whose numbers lie in one binary chunk.
+"""Reads GLB: a JSON tree of nodes and meshes whose numbers lie in one binary chunk.
 
 The frame of a mesh is the product of the matrices from the root of its scene to its node; a mirror
-turns its triangles, so that outside stays outside. What
-would change shapes and is not read - compression, sparse numbers, skins, morphs, other files - is
-refused.
+turns its triangles, so that outside stays outside. Features that would change shapes and are not
+read (compression, sparse numbers, skins, morphs, other files) are refused.
 """
 
 import json
@@ -26,7 +25,7 @@ FLOAT_TYPE = 5126
 TRIANGLES, STRIP = 4, 5
 MOST_NODES = 10_000
 PLAIN_EXTENSIONS = ("KHR_materials", "KHR_texture", "KHR_lights", "EXT_texture", "KHR_xmp")
-"""They change looks only."""
+"""Beginnings of the extensions that change looks only; all others are refused."""
 Tree = dict[str, Any]
 
 
@@ -34,18 +33,18 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     """Vertices (n, 3) and triangles (t, 3) of the scene of a GLB file.
 
     Raises:
-        MeshError: It breaks a rule, or has more than `most` triangles.
+        MeshError: The file breaks a rule, or has more than `most` triangles.
     """
     tree, binary = _chunks(data)
     try:
         return _scene(tree, binary, most)
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        message = f"the JSON part is no glTF ({type(error).__name__}: {shown(error)})"
+        message = f"the JSON part is not glTF ({type(error).__name__}: {shown(error)})"
         raise MeshError(MeshRefusal.UNREADABLE, f"{message}; export it again") from error
 
 
 def _chunks(data: bytes) -> tuple[Tree, bytes]:
-    """The tree, and the binary chunk, empty where there is none."""
+    """The tree, and the binary chunk, which is empty where the file has none."""
     if len(data) < HEAD:
         broken("the head", f"expected {HEAD} bytes")
     magic, version, length = struct.unpack_from("<4sII", data)
@@ -54,14 +53,14 @@ def _chunks(data: bytes) -> tuple[Tree, bytes]:
     chunks, place = list[tuple[int, bytes]](), HEAD
     while place < len(data):
         if place + CHUNK_HEAD > len(data):
-            broken("the end", "half of a chunk's head")
+            broken("the end", "the head of a chunk is cut off")
         size, kind = struct.unpack_from("<II", data, place)
         place += CHUNK_HEAD + size
         if place > len(data):
             broken("the end", f"a chunk of {size} bytes is cut off")
         chunks.append((kind, data[place - size : place]))
     if [kind for kind, _ in chunks] not in ([JSON_CHUNK], [JSON_CHUNK, BINARY_CHUNK]):
-        broken("the chunks", "expected one of JSON, and one binary")
+        broken("the chunks", "expected one of JSON, then at most one of binary numbers")
     return _tree(chunks[0][1]), chunks[1][1] if len(chunks) > 1 else b""
 
 
@@ -87,6 +86,7 @@ def _scene(tree: Tree, binary: bytes, most: int) -> tuple[Array, Indices]:
             if count > most:
                 too_many(count, most)
             points.append(local @ matrix[:3, :3].T + matrix[:3, 3])
+            # a mirror turns triangles inside out: their order is turned back
             mirrored = np.linalg.det(matrix[:3, :3]) < 0.0
             triangles.append(before + (corners[:, ::-1] if mirrored else corners))
             before += len(local)
@@ -110,10 +110,10 @@ def _check_features(tree: Tree) -> None:
 
 
 def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
-    """Each mesh of the scene with its matrix (4, 4).
+    """Yield each mesh of the scene by its number, with its matrix, (4, 4).
 
     Raises:
-        MeshError: Nodes form no tree, or there are too many.
+        MeshError: The nodes do not form a tree, or there are too many.
     """
     scenes = tree.get("scenes", [])
     if not scenes:
@@ -140,14 +140,15 @@ def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
 
 def _check_place(place: object, listed: list[Any]) -> None:
     if type(place) is not int or not 0 <= place < len(listed):
-        broken("the JSON part", f"names number {shown(place)} of {len(listed)}")
+        broken("the JSON part", f"names item {shown(place)} of {len(listed)}")
 
 
 def _matrix(node: Tree) -> Array:
     matrix = np.eye(4)
     if "matrix" in node:
         if {"translation", "rotation", "scale"} & node.keys():
-            broken("a node", "has a matrix and parts of one")
+            broken("a node", "has a matrix as well as a translation, rotation or scale")
+        # glTF lists matrices by columns
         matrix = _floats(node, "matrix", 16).reshape(4, 4).T
         if (matrix[3] != (0.0, 0.0, 0.0, 1.0)).any():
             unsupported("a node with a projective matrix", "export it without")
@@ -173,7 +174,7 @@ def _floats(node: Tree, name: str, count: int) -> Array:
 
 
 def _rotation(quaternion: Array) -> Array:
-    """The matrix of a quaternion (x, y, z, w), whose length does not matter."""
+    """The rotation matrix, (3, 3), of a quaternion (x, y, z, w), whose length does not matter."""
     size = float(np.linalg.norm(quaternion))
     if not 0.5 < size < 2.0:  # noqa: PLR2004 - rounding does not get there
         broken("a node", f"its rotation is a quaternion of length {size:.3g}, expected 1")
@@ -188,7 +189,7 @@ def _rotation(quaternion: Array) -> Array:
 
 
 def _primitive(tree: Tree, binary: bytes, primitive: Tree) -> tuple[Indices, Array]:
-    """Triangles (t, 3) and vertices (n, 3) of a part of a mesh."""
+    """Triangles (t, 3) and vertices (n, 3) of one part of a mesh."""
     mode = primitive.get("mode", TRIANGLES)
     if "targets" in primitive or primitive.get("extensions"):
         unsupported("a part with morphs or compression", "export plain triangles")
@@ -201,9 +202,10 @@ def _primitive(tree: Tree, binary: bytes, primitive: Tree) -> tuple[Indices, Arr
         flat = np.arange(len(points))
     if mode == STRIP:
         rows = np.stack([flat[:-2], flat[1:-1], flat[2:]], axis=1)
+        # every other triangle of a strip is wound the other way
         rows[1::2] = rows[1::2, [1, 0, 2]]
     elif len(flat) % CORNERS:
-        broken("a part", f"{len(flat)} corners make no whole triangles")
+        broken("a part", f"{len(flat)} corners do not make whole triangles")
     else:
         rows = flat.reshape(-1, 3)
     check_corners(rows, len(points))
@@ -211,7 +213,7 @@ def _primitive(tree: Tree, binary: bytes, primitive: Tree) -> tuple[Indices, Arr
 
 
 def _numbers(tree: Tree, binary: bytes, number: int, shape: str) -> Any:
-    """The numbers of an accessor, a row for each of its elements."""
+    """The numbers of an accessor, one row per element."""
     _check_place(number, tree["accessors"])
     accessor = tree["accessors"][number]
     kind = accessor["componentType"]
@@ -241,5 +243,6 @@ def _numbers(tree: Tree, binary: bytes, number: int, shape: str) -> Any:
     if inside + length > view["byteLength"] or start + view["byteLength"] > len(binary):
         broken(f"accessor {number}", f"{count} numbers do not fit into their {len(binary)} bytes")
     raw = np.frombuffer(binary, dtype=np.uint8, offset=start + inside, count=length)
+    # copied before the view: rows in the file need not be contiguous or aligned
     rows = np.lib.stride_tricks.as_strided(raw, (count, row), (stride, 1)).copy()
     return rows.view(item).reshape(count, columns)

@@ -1,6 +1,6 @@
-"""How much a mesh file may be, and may cost to read.
+"""How large a mesh file may be, and how much reading it may cost.
 
-Nothing heavy is imported here, so that flags have the same values.
+Nothing heavy is imported here, so that command-line flags can show the same values.
 """
 
 from dataclasses import dataclass
@@ -10,16 +10,16 @@ from grasp_core.checked import positive, whole
 
 @dataclass(frozen=True, slots=True)
 class MeshLimits:
-    """How much a mesh file may be, and may cost to read."""
+    """Largest size of a mesh file, and largest cost of reading it."""
 
     max_bytes: int = 64 * 2**20
     max_triangles: int = 200_000
     max_faces: int = 5_000
-    """Planar faces."""
+    """Most planar faces."""
     max_parts: int = 64
-    """Of the surface: bodies and cavities."""
+    """Most parts of the surface: bodies and cavities."""
     max_seconds: float = 30.0
-    """For reading the file; what follows is bounded by the numbers above."""
+    """Longest time for reading the file [s]; the numbers above bound what follows."""
     max_memory_mib: int = 2048
 
     def __post_init__(self) -> None:

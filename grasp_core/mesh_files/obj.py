@@ -1,4 +1,4 @@
-"""OBJ text: `v` and `f` lines; looks and groups are passed over, curved surfaces refused."""
+"""Reads OBJ text: `v` and `f` lines; looks and groups are ignored, curved surfaces refused."""
 
 import re
 
@@ -11,11 +11,11 @@ PASSED_OVER = frozenset(
     b"vt vn g o s usemtl mtllib usemap maplib lod bevel c_interp d_interp shadow_obj trace_obj mg "
     b"l p".split()
 )
-"""They change looks, names or curves, not the surface."""
+"""Keywords that change looks, names or curves, not the surface."""
 CORNER = re.compile(rb"[+-]?\d+(/([+-]?\d+)?){0,2}")
-"""A vertex, perhaps of a texture and a normal."""
+"""A corner of a face: a vertex, perhaps with a texture and a normal."""
 WIDTHS = (3, 4, 6, 7)
-"""Numbers of a vertex: a point, perhaps its weight, perhaps a colour."""
+"""How many numbers a vertex may have: a point, perhaps its weight, perhaps a colour."""
 WEIGHTED = (4, 7)
 FLOATS = 3
 
@@ -24,7 +24,7 @@ def read(text: bytes, most: int) -> tuple[Array, Indices]:
     """Vertices (n, 3) and triangles (t, 3) of an OBJ text.
 
     Raises:
-        MeshError: It breaks a rule, with the line, or has more than `most` triangles.
+        MeshError: The text breaks a rule, with the line, or has more than `most` triangles.
     """
     surface = Surface(most)
     for number, (keyword, *words) in worded_lines(text):
@@ -35,7 +35,7 @@ def read(text: bytes, most: int) -> tuple[Array, Indices]:
             surface.add(_corners(words, len(surface.points), where), where)
         elif keyword not in PASSED_OVER:
             unsupported(
-                f"{where}: {shown(keyword)!r} is no part of a polyhedron", "export polygons only"
+                f"{where}: {shown(keyword)!r} is not part of a polyhedron", "export polygons only"
             )
     return surface.arrays()
 
@@ -50,10 +50,10 @@ def _vertex(words: list[bytes], where: str) -> list[float]:
 
 
 def _corners(words: list[bytes], vertices: int, where: str) -> list[int]:
-    """Numbers of vertices from 0 on; those in the file count from 1, or back from the last."""
+    """Vertex numbers from 0 on; the file counts from 1, or back from the last vertex by then."""
     for word in words:
         if not CORNER.fullmatch(word):
-            broken(where, f"a corner must be whole numbers parted by `/`, got {shown(word)!r}")
+            broken(where, f"a corner must be whole numbers separated by `/`, got {shown(word)!r}")
     corners = [whole(word.partition(b"/")[0], where) for word in words]
     for corner in corners:
         if not 1 <= abs(corner) <= vertices:

@@ -1,4 +1,4 @@
-"""OFF text: the word OFF, three counts, so many vertices, so many polygons, and nothing else."""
+"""Reads OFF text: the word OFF, three counts, the vertices, the polygons, and nothing else."""
 
 from collections.abc import Iterator
 
@@ -17,7 +17,7 @@ def read(text: bytes, most: int) -> tuple[Array, Indices]:
     """Vertices (n, 3) and triangles (t, 3) of an OFF text.
 
     Raises:
-        MeshError: It breaks a rule, with the line, or has more than `most` triangles.
+        MeshError: The text breaks a rule, with the line, or has more than `most` triangles.
     """
     lines = worded_lines(text)
     vertices, faces = _counts(lines)

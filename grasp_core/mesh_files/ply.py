@@ -1,4 +1,4 @@
-"""PLY: a header that says what follows, then elements with properties, as text or binary."""
+"""Reads PLY: a header that lists elements and properties, then their rows, as text or binary."""
 
 import re
 from collections.abc import Iterator
@@ -27,32 +27,32 @@ LARGEST_CORNER = 2**32
 LISTS = ("vertex_indices", "vertex_index")
 POINT = ("x", "y", "z")
 Cell = tuple[str, list[float]]
-"""Name and values of a property in one row; of those that are passed over, no values."""
+"""Name and values of a property in one row; properties that are ignored get no values."""
 
 
 @dataclass(frozen=True, slots=True)
 class Property:
-    """A number, or a list of numbers, of each thing of an element."""
+    """A property of an element: each row has a number for it, or a list of numbers."""
 
     name: str
     kind: str
     count_kind: str | None = None
-    """Of the length of a list; None for a number."""
+    """Type of the length of a list; None for a number."""
 
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """A table of the file."""
+    """A table of the file: its name, number of rows, and properties."""
 
     name: str
     rows: int
     properties: list[Property] = field(default_factory=list[Property])
 
     def place(self, names: tuple[str, ...]) -> Property:
-        """The property of one of the names.
+        """The one property with one of the given names.
 
         Raises:
-            MeshError: There is none.
+            MeshError: There is no such property, or there are several.
         """
         found = [each for each in self.properties if each.name in names]
         if len(found) != 1:
@@ -64,7 +64,7 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     """Vertices (n, 3) and triangles (t, 3) of a PLY file.
 
     Raises:
-        MeshError: It breaks a rule, or has more than `most` triangles.
+        MeshError: The file breaks a rule, or has more than `most` triangles.
     """
     found = END.search(data[:LONGEST_HEADER])
     if not found:
@@ -88,7 +88,7 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
 
 
 def is_text(data: bytes) -> bool:
-    """Whether the header says that text follows; what comes after it means nothing here."""
+    """Whether the header says that text follows; what comes after the header is not looked at."""
     ended = END.search(data[:LONGEST_HEADER])
     return ended is not None and b"\nformat ascii" in data[: ended.start()]
 
@@ -119,7 +119,9 @@ def _header(text: bytes) -> tuple[str, list[Element]]:
             case ["property", first, *others] if elements:
                 elements[-1].properties.append(_property([first, *others], where))
             case _:
-                broken(where, f"got {shown(' '.join(words))!r}")
+                broken(
+                    where, f"expected a format, element or property, got {shown(' '.join(words))!r}"
+                )
     return order, elements
 
 
@@ -135,7 +137,7 @@ def _property(said: list[str], where: str) -> Property:
     lists = said[0] == "list"
     kinds = said[1:-1] if lists else said[:-1]
     if len(kinds) != 1 + lists or not TYPES.keys() >= set(kinds):
-        broken(where, f"got the property {shown(' '.join(said))!r}")
+        broken(where, f"expected a property of known type, got {shown(' '.join(said))!r}")
     if lists and TYPES[kinds[0]].startswith("f"):
         broken(where, "the length of a list must be a whole number")
     return Property(said[-1], TYPES[kinds[-1]], TYPES[kinds[0]] if lists else None)
@@ -148,11 +150,11 @@ def _add_text(surface: Surface, elements: list[Element], body: bytes) -> None:
             number, words = next(lines, (0, list[bytes]()))
             where = f"{element.name} {row}, line {number} after the header"
             if not words:
-                broken("the end", f"{element.rows} of {element.name} are counted, {row} are there")
+                broken("the end", f"{element.rows} rows of {element.name} are counted, got {row}")
             values = dict(_cells(element, iter(words), where))
             _add_row(surface, element.name, values, where)
     if (after := next(lines, None)) is not None:
-        broken(f"line {after[0]} after the header", "comes after all that is counted")
+        broken(f"line {after[0]} after the header", "comes after the last row that is counted")
 
 
 def _cells(element: Element, words: Iterator[bytes], where: str) -> Iterator[Cell]:
@@ -160,7 +162,7 @@ def _cells(element: Element, words: Iterator[bytes], where: str) -> Iterator[Cel
         length = 1 if each.count_kind is None else whole(next(words, b""), where)
         found = list(islice(words, max(length, 0)))
         if len(found) != length:
-            broken(where, f"{each.name} lists {length} values, {len(found)} are there")
+            broken(where, f"{each.name} lists {length} values, got {len(found)}")
         kept = element.name in {"vertex", "face"} and each.name in (*POINT, *LISTS)
         yield each.name, _rounded(numbers(found, where), each.kind, where) if kept else []
     if next(words, None) is not None:
@@ -168,7 +170,7 @@ def _cells(element: Element, words: Iterator[bytes], where: str) -> Iterator[Cel
 
 
 def _rounded(values: list[float], kind: str, where: str) -> list[float]:
-    """Numbers as their type keeps them."""
+    """Round numbers as their type would keep them."""
     if not kind.startswith("f"):
         return values
     with np.errstate(over="ignore", under="ignore"):
@@ -194,7 +196,7 @@ def _add_binary(surface: Surface, elements: list[Element], body: bytes, order: s
         row = _row_type(element, body, order)
         size = row.itemsize * element.rows
         if len(body) < size:
-            broken("the end", f"{element.rows} of {element.name} are counted, fewer are there")
+            broken("the end", f"{element.rows} rows of {element.name} are counted, got fewer")
         rows = np.frombuffer(body[:size], dtype=row)
         for each in element.properties:
             if each.count_kind and (rows["count " + each.name] != row[each.name].shape[0]).any():
@@ -202,11 +204,11 @@ def _add_binary(surface: Surface, elements: list[Element], body: bytes, order: s
         _add_rows(surface, element, rows)
         body = body[size:]
     if body:
-        broken("the end", f"{len(body)} bytes come after all that is counted")
+        broken("the end", f"{len(body)} bytes come after the last row that is counted")
 
 
 def _row_type(element: Element, body: bytes, order: str) -> np.dtype[np.void]:
-    """Of a row, if the lists of all rows are as long as those of the first."""
+    """Type of a binary row, if the lists of all rows are as long as the lists of the first."""
     parts = list[tuple[str, str] | tuple[str, str, tuple[int]]]()
     for each in element.properties:
         if each.count_kind is None:

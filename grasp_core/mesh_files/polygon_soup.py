@@ -1,4 +1,4 @@
-"""Vertices and polygons as a file lists them -> triangles: fans, where a fan is the polygon."""
+"""Turns vertices and polygons as a file lists them into triangles, if fans give the polygons."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -12,23 +12,23 @@ from grasp_core.mesh_files.refusals import broken, outside
 CORNERS = 3
 QUAD = 4
 FOLDED = 1e-9
-"""A triangle of a fan that faces backwards by more than this share of its polygon."""
+"""A triangle of a fan counts as backwards beyond this share of its polygon."""
 FLATTEST = 0.5
 """Least area of a polygon seen along its normal, relative to that of its triangles."""
 
 
 @dataclass(slots=True)
 class Surface:
-    """What was read so far."""
+    """The vertices and triangles read so far."""
 
     most: int
-    """Triangles that may be."""
+    """Largest number of triangles."""
     points: list[Sequence[float]] = field(default_factory=list[Sequence[float]])
     triangles: list[tuple[int, int, int]] = field(default_factory=list[tuple[int, int, int]])
     polygons: list[tuple[str, Sequence[int]]] = field(
         default_factory=list[tuple[str, Sequence[int]]]
     )
-    """Those of four corners and more, with where they are written."""
+    """Polygons of four corners and more, each with its place in the file."""
 
     def add(self, corners: Sequence[int], where: str) -> None:
         """Add a polygon, by the numbers of its vertices from 0 on.
@@ -55,7 +55,7 @@ class Surface:
         """Vertices (n, 3) and triangles (t, 3).
 
         Raises:
-            MeshError: A corner is no vertex, or a fan folds back on its polygon.
+            MeshError: A corner names a missing vertex, or a fan folds back on its polygon.
         """
         points = np.array(self.points, dtype=np.float64).reshape(-1, 3)
         triangles = np.array(self.triangles, dtype=np.int64).reshape(-1, 3)
@@ -66,7 +66,7 @@ class Surface:
 
 
 def too_many(triangles: int, most: int) -> None:
-    """Refuse a file for its size.
+    """Refuse a file for its number of triangles.
 
     Raises:
         MeshError: Always.
@@ -76,10 +76,10 @@ def too_many(triangles: int, most: int) -> None:
 
 
 def check_corners(triangles: Indices, vertices: int) -> None:
-    """Refuse triangles that name vertices that are not there.
+    """Refuse triangles that name missing vertices.
 
     Raises:
-        MeshError: One does.
+        MeshError: A triangle names a missing vertex.
     """
     wrong = np.flatnonzero(((triangles < 0) | (triangles >= vertices)).any(axis=1))
     if wrong.size:

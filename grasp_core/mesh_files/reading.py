@@ -1,4 +1,4 @@
-"""A mesh file's bytes: of a regular file, of a known kind, and no more than are allowed."""
+"""Reads a mesh file's bytes: from a regular file, of a known kind, and not too many."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ OTHER_FILES = {
     b"\x28\xb5\x2f\xfd": "a zstd archive", b"<?xml": "an XML file", b"<!DOCTYPE": "an HTML file",
     b"%PDF": "a PDF file", b"\x89PNG": "a picture", b"DRACO": "a Draco file",
 }  # fmt: skip
-"""How files begin that are none of ours."""
+"""Beginnings of files of other kinds, and what to call them."""
 MAGIC = {"ply": b"ply", "glb": b"glTF"}
 
 
@@ -22,7 +22,7 @@ def mesh_kind(path: Path) -> str:
     """The format of a file, by its ending.
 
     Raises:
-        MeshError: It is none of those that are read.
+        MeshError: The ending is not that of a format that is read.
     """
     kind = path.suffix.lower().lstrip(".")
     if kind not in FORMATS:
@@ -32,10 +32,11 @@ def mesh_kind(path: Path) -> str:
 
 
 def mesh_bytes(path: Path, limits: MeshLimits) -> bytes:
-    """The bytes of a mesh file, which begin as its ending promises.
+    """The bytes of a mesh file; they begin as files with its ending do.
 
     Raises:
-        MeshError: It cannot be read, is no regular file, too large, empty, or of another kind.
+        MeshError: The file cannot be read, is not a regular file, too large, empty, or of
+            another kind.
     """
     kind = mesh_kind(path)
     try:
@@ -44,7 +45,7 @@ def mesh_bytes(path: Path, limits: MeshLimits) -> bytes:
         message = f"{path}: cannot be read ({error.strerror}); check the path and its rights"
         raise MeshError(MeshRefusal.UNREADABLE, message) from error
     if len(data) > limits.max_bytes:
-        message = f"{path}: over {limits.max_bytes} bytes, the limit; simplify the mesh"
+        message = f"{path}: is over the limit of {limits.max_bytes} bytes; simplify the mesh"
         raise MeshError(MeshRefusal.TOO_MANY, message)
     if not data:
         raise MeshError(MeshRefusal.EMPTY, f"{path}: the file is empty; export it again")
@@ -56,10 +57,10 @@ def mesh_bytes(path: Path, limits: MeshLimits) -> bytes:
 
 
 def check_beginning(kind: str, data: bytes) -> None:
-    """Refuse bytes that begin otherwise than files of a kind do.
+    """Refuse bytes that do not begin as files of a kind do.
 
     Raises:
-        MeshError: They do.
+        MeshError: The bytes begin otherwise.
     """
     for beginning, other in OTHER_FILES.items():
         if data.startswith(beginning):
@@ -67,7 +68,7 @@ def check_beginning(kind: str, data: bytes) -> None:
             raise MeshError(MeshRefusal.FORMAT, message)
     for other, beginning in MAGIC.items():
         if other != kind and data.startswith(beginning):
-            message = f"is a {other.upper()} file, as it begins; rename it to .{other}"
+            message = f"is a {other.upper()} file by its beginning; rename it to .{other}"
             raise MeshError(MeshRefusal.FORMAT, message)
     if kind == "stl" and not stl.is_text(data) and not stl.is_binary(data):
         counted = int.from_bytes(data[stl.HEADER : stl.HEADER + 4], "little")

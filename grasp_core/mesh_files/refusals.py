@@ -1,21 +1,21 @@
-"""Refusals of mesh files, in one line each."""
+"""Raises the refusals of mesh files, each with a message of one line."""
 
 from typing import NoReturn
 
 from grasp_core.errors import MeshError, MeshRefusal
 
 LONGEST = 60
-"""Characters of a file that a message shows."""
+"""Most characters of a file that a message shows."""
 
 
 def shown(value: object) -> str:
-    """What stands in a file, for a message: short, and without what could steer a terminal."""
+    """Part of a file for a message: short, and without characters that could steer a terminal."""
     text = value.decode("latin-1") if isinstance(value, bytes) else str(value)
     return "".join(c if c.isascii() and c.isprintable() else "?" for c in text[:LONGEST])
 
 
 def broken(where: str, said: str) -> NoReturn:
-    """The file breaks the rules of its format.
+    """Refuse a file that breaks the rules of its format.
 
     Raises:
         MeshError: Always.
@@ -24,7 +24,7 @@ def broken(where: str, said: str) -> NoReturn:
 
 
 def unsupported(said: str, remedy: str) -> NoReturn:
-    """The file uses a part of its format that is not read, so that geometry would be lost.
+    """Refuse a file that uses a part of its format that is not read: geometry would be lost.
 
     Raises:
         MeshError: Always.
@@ -33,7 +33,7 @@ def unsupported(said: str, remedy: str) -> NoReturn:
 
 
 def outside(where: str, corner: int, vertices: int) -> NoReturn:
-    """A triangle names a vertex that there is not.
+    """Refuse a triangle that names a missing vertex.
 
     Raises:
         MeshError: Always.

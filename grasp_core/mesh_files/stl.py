@@ -1,4 +1,4 @@
-"""STL, binary or text; normals are passed over, as many programs write none."""
+"""Reads STL, binary or text; normals are ignored, as many programs write none."""
 
 from collections.abc import Iterator, Sequence
 
@@ -11,27 +11,27 @@ from grasp_core.mesh_files.refusals import broken, shown
 from grasp_core.mesh_files.words import numbers, worded_lines
 
 HEADER, TRIANGLE = 80, 50
-"""Bytes of a binary file before the number of triangles, and of each triangle."""
+"""Bytes of a binary file before the number of triangles, and bytes of each triangle."""
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 Lines = Iterator[tuple[int, list[bytes]]]
 
 
 def is_binary(data: bytes) -> bool:
-    """Whether the bytes are as many as their count of triangles says."""
+    """Whether there are as many bytes as the count of triangles says."""
     counted = int.from_bytes(data[HEADER : HEADER + 4], "little")
     return len(data) == HEADER + 4 + TRIANGLE * counted
 
 
 def is_text(data: bytes) -> bool:
-    """Whether the bytes begin as a text does."""
+    """Whether the bytes begin as an STL text does."""
     return data.lstrip()[:5].lower() == b"solid"
 
 
 def read(data: bytes, most: int) -> tuple[Array, Indices]:
-    """Vertices (3 t, 3), three of each triangle, and triangles (t, 3).
+    """Vertices (3 t, 3), three for each triangle, and triangles (t, 3).
 
     Raises:
-        MeshError: It breaks a rule, or has more than `most` triangles.
+        MeshError: The file breaks a rule, or has more than `most` triangles.
     """
     points = _of_binary(data) if is_binary(data) else _of_text(data, most)
     if len(points) > 3 * most:
@@ -88,7 +88,7 @@ def _facet(number: int, words: list[bytes], lines: Lines) -> list[list[float]]:
 def _next(lines: Lines) -> tuple[int, list[bytes]]:
     line = next(lines, None)
     if line is None:
-        broken("the end", "the last triangle is not whole")
+        broken("the end", "expected a whole triangle")
     return line
 
 

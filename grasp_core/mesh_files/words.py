@@ -1,4 +1,4 @@
-"""Lines of text as words, words as numbers: in ASCII only, which all readers see alike."""
+"""Splits text into words and reads numbers, in ASCII only, which all readers read alike."""
 
 import io
 import math
@@ -23,10 +23,10 @@ Where = str
 
 
 def plain_text(data: bytes) -> bytes:
-    """Text with one byte a character: comments and names in other alphabets become `?`.
+    """Text with one byte per character: comments and names in other alphabets become `?`.
 
     Raises:
-        MeshError: It is UTF-16, holds control characters, or a line is too long.
+        MeshError: The data are UTF-16, hold control characters, or have too long a line.
     """
     if data.startswith(UTF_16):
         broken("byte 0", "expected UTF-8 text, got UTF-16")
@@ -43,11 +43,11 @@ def tidied(text: bytes, *, continued: bool) -> bytes:
     """The words of each line with one space between them, without what follows a `#`.
 
     Args:
-        text: Lines.
-        continued: Whether a backslash at the end of a line goes on with the next.
+        text: Lines of text.
+        continued: Whether a backslash at the end of a line continues it on the next.
 
     Raises:
-        MeshError: A comment ends in a backslash: whether it goes on is for each reader to guess.
+        MeshError: A comment ends in a backslash: readers differ on whether it goes on.
     """
     if found := CONTINUED_COMMENT.search(text):
         line = text.count(b"\n", 0, found.start()) + 1
@@ -58,7 +58,7 @@ def tidied(text: bytes, *, continued: bool) -> bytes:
 
 
 def worded_lines(text: bytes) -> Iterator[tuple[int, list[bytes]]]:
-    """The words of each line that has some, with the number of the line."""
+    """Yield the number and the words of each line that has words."""
     for number, line in enumerate(io.BytesIO(text), 1):
         words = line.split()
         if words:
@@ -66,10 +66,10 @@ def worded_lines(text: bytes) -> Iterator[tuple[int, list[bytes]]]:
 
 
 def numbers(words: Sequence[bytes], where: Where) -> list[float]:
-    """Finite numbers.
+    """Read words as finite numbers.
 
     Raises:
-        MeshError: A word is not one.
+        MeshError: A word is not a finite number.
     """
     values = [float(word) if NUMBER.fullmatch(word) else _refused(word, where) for word in words]
     for word, value in zip(words, values, strict=True):
@@ -86,10 +86,10 @@ def _refused(word: bytes, where: Where) -> float:
 
 
 def whole(word: bytes, where: Where) -> int:
-    """A whole number.
+    """Read a word as a whole number.
 
     Raises:
-        MeshError: It is not one.
+        MeshError: The word is not a whole number.
     """
     if not WHOLE.fullmatch(word):
         broken(where, f"expected a whole number, got {shown(word)!r}")

@@ -1,4 +1,4 @@
-"""Solids as triangle meshes: hulls, extrusions and booleans; the only door to manifold3d."""
+"""Hulls, extrusions and booleans of triangle meshes. Only this module imports manifold3d."""
 
 import importlib
 from collections.abc import Sequence
@@ -14,9 +14,9 @@ from grasp_core.geometry.polygons import signed_area
 from grasp_core.solvers.ties import graded, largest_first
 
 GRID_DIGITS = 9
-"""Corners that are triangulated are on a grid of so many digits, relative to the figure."""
+"""Digits of the grid, relative to the figure, on which corners are put before triangulation."""
 GRID = 4e-8
-"""Figures of size one are inset by so much more: the kernel rounds coordinates to 1e-8."""
+"""Extra inset of figures of size one: the kernel rounds coordinates to 1e-8."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,36 +24,36 @@ class Solid:
     """A closed triangle mesh, wound counter-clockwise seen from outside."""
 
     vertices: Array
-    """(n, 3) [m]"""
+    """Vertices, (n, 3) [m]."""
     triangles: Indices
-    """(t, 3)"""
+    """Vertex indices, (t, 3)."""
 
     def __add__(self, other: "Solid") -> "Solid":
         """The union of two solids."""
         return _solid(_manifold(self) + _manifold(other))
 
     def __sub__(self, other: "Solid") -> "Solid":
-        """What remains of this solid when the other is cut away."""
+        """The part of this solid that is outside of the other."""
         return _solid(_manifold(self) - _manifold(other))
 
     @property
     def volume(self) -> float:
-        """[m^3]; negative when the mesh is inside out."""
+        """Enclosed volume [m^3]; negative when the mesh is inside out."""
         corners = self.vertices[self.triangles] - self.vertices.mean(axis=0)
         return float(np.linalg.det(corners).sum()) / 6.0
 
     def moved(self, offset: ArrayLike) -> "Solid":
-        """The same solid somewhere else."""
+        """This solid moved by an offset, (3,) [m]."""
         return Solid(self.vertices + np.asarray(offset, dtype=np.float64), self.triangles)
 
 
 def hull(points: ArrayLike) -> Solid:
-    """Convex hull of points, (n, 3)."""
+    """Convex hull of points, (n, 3) [m]."""
     return _solid(_kernel().Manifold.hull_points(np.asarray(points, dtype=np.float64)))
 
 
 def extrusion(outline: ArrayLike, height: float, holes: Sequence[ArrayLike] = ()) -> Solid:
-    """A plane figure (k, 2) in z = 0 drawn out to z = height, with straight holes."""
+    """Extrude a plane figure (k, 2) from z = 0 to z = height, with straight holes [m]."""
     loops = [np.asarray(loop, dtype=np.float64) for loop in (outline, *holes)]
     kernel = _kernel()
     figure = kernel.CrossSection(loops, kernel.FillRule.EvenOdd)
@@ -61,9 +61,9 @@ def extrusion(outline: ArrayLike, height: float, holes: Sequence[ArrayLike] = ()
 
 
 def triangulate(loops: Sequence[Array]) -> Indices:
-    """Triangles between an outer border and its holes, as indices into all corners in order.
+    """Triangulate an outer border with holes; indices count all corners in order, (t, 3).
 
-    Corners are put on a grid first, on which those of regular figures are truly on one line or
+    Corners are put on a grid first, where corners of regular figures are exactly on one line or
     circle, so that rounding does not choose between triangulations.
     """
     size = float(np.ptp(np.vstack(loops), axis=0).max())
@@ -78,10 +78,10 @@ def inset_figure(loops: Sequence[Array], margin: float) -> list[list[Array]]:
 
     Args:
         loops: Outer border and holes, each (k, 2).
-        margin: In the same unit.
+        margin: Least distance from the border, in the unit of the loops.
 
     Returns:
-        Outer border and holes of each part; nothing if the figure is too narrow.
+        Outer border and holes of each part; an empty list if the figure is too narrow.
     """
     kernel = _kernel()
     size = float(np.ptp(np.vstack(loops), axis=0).max())
@@ -92,7 +92,7 @@ def inset_figure(loops: Sequence[Array], margin: float) -> list[list[Array]]:
 
 
 def _outer_first(loops: Sequence[Array]) -> list[Array]:
-    """The largest loop, then the others in the order in which they come."""
+    """The largest loop first, then the others in their order."""
     return [loops[place] for place in largest_first([signed_area(loop) for loop in loops])]
 
 
@@ -119,7 +119,7 @@ def _manifold(solid: Solid) -> Any:
     )
     body = kernel.Manifold(mesh)
     if body.status() != kernel.Error.NoError:
-        raise InputError(f"not a closed, orientable mesh: {body.status().name}")
+        raise InputError(f"expected a closed, orientable mesh, got {body.status().name}; repair it")
     return body
 
 

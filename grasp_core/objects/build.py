@@ -1,10 +1,10 @@
-"""Triangles -> the parts of a polyhedron, or a refusal with its reason.
+"""Checks triangles and builds the parts of a polyhedron, or refuses them with a reason.
 
 The order of the checks: the file, its numbers, one consistent side, that it is closed with two
 triangles per edge, its volume, and that no two of its parts overlap. Close vertices are welded, and
-a closed inside-out mesh is turned. A surface that is taken as patches need not be closed: of a
-faulty one the largest part is used, wound as it is. The notes say what was done.
-Nothing else is repaired.
+a closed inside-out mesh is turned. A surface that is taken as patches need not be closed: if it is
+faulty, its largest part is used, wound as it is. The notes say what was done. Nothing else is
+repaired.
 """
 
 import hashlib
@@ -34,19 +34,19 @@ from grasp_core.objects.solid_checks import (
 from grasp_core.values import FINGERS
 
 SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0
-"""Half a millimetre to twenty metres: outside it the unit is almost surely wrong."""
+"""Half a millimetre to twenty metres: for any other extent the unit is almost surely wrong."""
 SURROUNDINGS = 1e-6
-"""How far outside the object's bounds a centre of mass may be, relative to the extent."""
+"""Largest distance of a centre of mass from the object's bounds, relative to the extent."""
 DEFAULT_FLATNESS = FlatnessLimits()
 DEFAULT_LIMITS = MeshLimits()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Parts:
-    """What a polyhedron is made of."""
+    """The parts that a polyhedron is made of."""
 
     vertices: Array
-    """Welded, (n, 3) [m]."""
+    """Welded vertices, (n, 3) [m]."""
     triangles: Indices
     """Vertex indices, (t, 3), counter-clockwise seen from outside."""
     faces: tuple[Face, ...]
@@ -54,9 +54,9 @@ class Parts:
     content_sha256: str
     """Hash of the canonical mesh."""
     patches: PatchLimits | None
-    """How flat patches are; None where faces are exact."""
+    """Limits of flatness of the patches; None where faces are exact."""
     notes: tuple[str, ...]
-    """What was mended, for people to read."""
+    """Notes on what was mended, for people to read."""
 
 
 def build(  # noqa: PLR0913, PLR0917 - as `load_polyhedron`
@@ -68,7 +68,7 @@ def build(  # noqa: PLR0913, PLR0917 - as `load_polyhedron`
     center_of_mass: ArrayLike | None,
     limits: MeshLimits,
 ) -> Parts:
-    """Check a triangle mesh and find its faces; arguments as `load_polyhedron`.
+    """Check a triangle mesh and find its faces; for arguments see `load_polyhedron`.
 
     Raises:
         InputError: The centre of mass is not a point.
@@ -107,7 +107,7 @@ def check_choices(faces: FaceKind, patches: PatchLimits | None, flatness: Flatne
     """Refuse choices of the wrong kind.
 
     Raises:
-        InputError: One of them is.
+        InputError: A choice is of the wrong kind.
     """
     one_of(faces, get_args(FaceKind), "faces")
     if patches is not None:
@@ -116,7 +116,7 @@ def check_choices(faces: FaceKind, patches: PatchLimits | None, flatness: Flatne
 
 
 def _given_center(points: Array, center_of_mass: ArrayLike | None) -> Array | None:
-    """A centre of mass that someone states, checked."""
+    """Check a stated centre of mass, (3,) [m]; None if none is stated."""
     if center_of_mass is None:
         return None
     center = frozen(center_of_mass, (3,), "center_of_mass")
@@ -143,7 +143,7 @@ def _planar_groups(
 def _sound_surface(
     points: Array, corners: Indices, fault: MeshError | None, most: int
 ) -> tuple[Array, Indices, list[str]]:
-    """The surface with its outside outside, of a faulty one the largest part as it is."""
+    """The surface wound outwards; if it is faulty, its largest part, wound as it is."""
     if fault:
         return largest_part(points, corners)
     corners, flipped = oriented(points, corners, most)
@@ -154,14 +154,14 @@ def _sound_surface(
 def _patched(
     points: Array, corners: Indices, limits: PatchLimits, fault: MeshError | None
 ) -> tuple[tuple[Face, ...], list[str]]:
-    """The patches of a surface, and what to say of them."""
+    """The patches of a surface, and notes about them."""
     patches = flat_patches(points, corners, limits)
     if len(patches) < FINGERS:
         raise MeshError(
             MeshRefusal.NOT_FLAT,
             f"{len(patches)} patches are within {limits.spread_deg:g} deg and {limits.depth:g} "
-            "of the extent from flat, four fingers need four; allow more (--patch-spread-deg, "
-            "--patch-depth), or refine the mesh",
+            "of the extent from flat, but four fingers need four; allow more "
+            "(--patch-spread-deg, --patch-depth), or refine the mesh",
         )
     lean = max((face.spread for face in patches), default=0.0)
     off = max((face.depth for face in patches), default=0.0)
@@ -197,7 +197,7 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tup
         raise MeshError(MeshRefusal.NON_FINITE, f"vertex {bad} is {points[bad]}, not finite")
     if corners.min() < 0 or corners.max() >= len(points):
         wrong = corners.min() if corners.min() < 0 else corners.max()
-        message = f"a triangle names vertex {wrong}, there are 0..{len(points) - 1}"
+        message = f"a triangle names vertex {wrong}, but there are 0..{len(points) - 1}"
         raise MeshError(MeshRefusal.INDEX, message)
     with np.errstate(over="ignore"):
         extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
@@ -214,7 +214,7 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tup
 
 
 def content_hash(points: Array, corners: Indices) -> str:
-    """Hash of the mesh with vertices and triangles in sorted order."""
+    """SHA-256 of the mesh with vertices and triangles in sorted order."""
     order = np.lexsort(points.T[::-1])
     place = np.empty_like(order)
     place[order] = np.arange(len(order))

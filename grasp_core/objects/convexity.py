@@ -1,8 +1,8 @@
-"""Whether a surface is that of its convex hull, so that the hull can stand in for it.
+"""Whether a surface is the surface of its convex hull, so that the hull can stand in for it.
 
 A point of the hull is at most d from its border iff it is at most d below the plane of some facet.
-If the centroid of a triangle is, so are its corners, three times as far below the same plane, as
-none of them is above it: the whole triangle is then within 3 d of the hull's border.
+If that holds for the centroid of a triangle, each corner is at most 3 d below the same plane, as no
+corner is above it. The whole triangle is then within 3 d of the hull's border.
 """
 
 import importlib
@@ -12,10 +12,10 @@ from grasp_core.arrays import Array
 from grasp_core.objects.polyhedron import Polyhedron
 
 FLUSH = 1e-6
-"""How far below the hull's border a triangle's centroid may be, in object radii: coordinates in
+"""Largest depth of a triangle's centroid below the hull's border, in object radii: coordinates in
 single precision are off by a tenth of this."""
 BLOCK = 256
-"""Triangles that are compared with all facets at a time: a few megabytes."""
+"""Number of triangles compared with all facets at a time: a few megabytes."""
 
 
 def is_convex(body: Polyhedron) -> bool:

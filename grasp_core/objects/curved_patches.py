@@ -1,4 +1,4 @@
-"""Curved and scanned surfaces as patches: nearly flat parts, each with how far it is from flat.
+"""Finds nearly flat parts of curved and scanned surfaces, and measures how far each is from flat.
 
 Solved: planes and convex polygons in them such that over each point of a polygon, along the plane's
 normal, there is exactly one point of a connected group of triangles, at most `depth` from the
@@ -33,26 +33,27 @@ from grasp_core.solvers.ties import first_best, graded, largest_first, ranks
 SMOOTHING = 10
 """Rounds in which normals are averaged with those of neighbours, to find where it is flat."""
 FITS = 3
-"""How often a group is grown, and its plane fitted again."""
+"""Number of times that a group is grown and its plane is fitted again."""
 FLATNESS_DIGITS = 9
-"""Cosines between normals and their averages that are equal to so many digits are ties."""
+"""Cosines between normals and their averages that are equal to this many digits are ties."""
 BORDER_GAP = 1e-9
-"""How far polygons stay from the borders of their groups, relative to the object's extent."""
+"""Distance of polygons from the borders of their groups, relative to the object's extent."""
 
 
 def flat_patches(vertices: Array, triangles: Indices, limits: PatchLimits) -> tuple[Face, ...]:
-    """The largest nearly flat parts of a surface, those with the largest discs first.
+    """The largest nearly flat parts of a surface, with the largest discs first.
 
     Args:
-        vertices: (n, 3) [m]
-        triangles: (t, 3), counter-clockwise seen from outside.
-        limits: How flat, and how many.
+        vertices: Vertices, (n, 3) [m].
+        triangles: Vertex indices, (t, 3), counter-clockwise seen from outside.
+        limits: Limits of flatness, and the number of patches.
     """
     surface = _Surface.of(vertices, triangles)
     depth = limits.depth * surface.extent
     found: list[tuple[float, Face]] = []
     radii: list[float] = []
     for group in _groups(surface, math.radians(limits.spread_deg), depth):
+        # groups come by falling area, and no disc is larger than its group
         enough = len(radii) >= limits.most
         if enough and math.pi * radii[-limits.most] ** 2 >= group.area:
             break
@@ -63,14 +64,14 @@ def flat_patches(vertices: Array, triangles: Indices, limits: PatchLimits) -> tu
 
 
 def _largest_apart(found: list[tuple[float, Face]], most: int, extent: float) -> tuple[Face, ...]:
-    """The patches with the largest discs; of equal ones each next as far from all as can be.
+    """The patches with the largest discs; among equal ones, each next as far from all as can be.
 
     A ring has dozens of equal patches, and the first ones of its list are all on one side.
 
     Args:
-        found: Radii of the largest discs, and patches.
-        most: How many to keep.
-        extent: Of the object [m].
+        found: Radius of the largest disc of each patch [m], and the patch.
+        most: Number of patches to keep.
+        extent: Largest extent of the object [m].
     """
     sizes = ranks([-radius for radius, _ in found])
     places = np.array([[*face.normal, *(face.centroid / extent)] for _, face in found])
@@ -86,18 +87,18 @@ def _largest_apart(found: list[tuple[float, Face]], most: int, extent: float) ->
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Surface:
-    """A triangle mesh with what growing needs."""
+    """A triangle mesh with what the growth of groups needs."""
 
     corners: Array
-    """(t, 3, 3) [m]"""
+    """Corners of the triangles, (t, 3, 3) [m]."""
     normals: Array
     """Outward unit normals, zero for triangles without area, (t, 3)."""
     areas: Array
-    """(t,) [m^2]"""
+    """Areas, (t,) [m^2]."""
     across: Indices
     """The triangle across each edge (k, k+1), -1 at borders, (t, 3)."""
     extent: float
-    """[m]"""
+    """Largest extent of the object [m]."""
 
     @classmethod
     def of(cls, vertices: Array, triangles: Indices) -> "_Surface":
@@ -111,7 +112,7 @@ class _Surface:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Group:
-    """Connected triangles, the outward normal of the plane they grew along, and their area."""
+    """Connected triangles, the outward normal of the plane they grew along, their area [m^2]."""
 
     triangles: Indices
     outward: Array
@@ -119,7 +120,7 @@ class _Group:
 
 
 def _groups(surface: _Surface, spread: float, depth: float) -> list[_Group]:
-    """Groups of triangles, none in two of them, largest first."""
+    """Disjoint groups of triangles, the largest first."""
     smooth = _smoothed(surface)
     flatness: Array = np.einsum("ti,ti->t", smooth, surface.normals)
     flat_first = np.argsort(-graded(flatness, FLATNESS_DIGITS), kind="stable")
@@ -128,6 +129,7 @@ def _groups(surface: _Surface, spread: float, depth: float) -> list[_Group]:
     for seed in flat_first:
         if not free[seed]:
             continue
+        # on flat ground the average is the better normal, beside an edge the triangle's own
         level = float(smooth[seed] @ surface.normals[seed]) >= math.cos(0.5 * spread)
         plane = (smooth if level else surface.normals)[seed], surface.corners[seed].mean(axis=0)
         group = _Group(np.array([seed]), plane[0], 0.0)
@@ -153,7 +155,7 @@ def _grown(
     depth: float,
     free: NDArray[np.bool_],
 ) -> Indices:
-    """The free triangles near a plane that are reached from one across edges, (g,)."""
+    """Free triangles near a plane that are reached from the seed across edges, (g,)."""
     normal, origin = plane
     seen = ~free
     seen[seed] = True
@@ -182,7 +184,7 @@ def _smoothed(surface: _Surface) -> Array:
 
 
 def _patch(surface: _Surface, group: Indices, normal: Array) -> tuple[float, Face] | None:
-    """The convex polygon that a group covers once, and the radius of its largest disc."""
+    """The convex polygon that a group covers once, with the radius of its largest disc [m]."""
     frame = plane_frame(normal)
     origin = surface.corners[group].mean(axis=(0, 1))
     flat = (surface.corners[group] - origin) @ frame
@@ -190,6 +192,7 @@ def _patch(surface: _Surface, group: Indices, normal: Array) -> tuple[float, Fac
     tails, heads = flat, np.roll(flat, -1, axis=1)
     border = np.stack([tails[~inside], heads[~inside]], axis=1)
     start, room = clearest_point(flat.mean(axis=1), border)
+    # the derivation needs one triangle over the point from which the polygon grows
     if room <= 0.0 or _sheets(flat, start) != 1:
         return None
     polygon = clearing(start, border, BORDER_GAP * surface.extent)
@@ -218,7 +221,7 @@ def _patch(surface: _Surface, group: Indices, normal: Array) -> tuple[float, Fac
 
 
 def _sheets(flat: Array, point: Array) -> int:
-    """How many triangles (t, 3, 2) cover a point."""
+    """Number of triangles (t, 3, 2) that cover a point."""
     tails, heads = flat, np.roll(flat, -1, axis=1)
     along, away = heads - tails, point - tails
     turns = along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0]

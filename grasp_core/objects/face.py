@@ -1,4 +1,4 @@
-"""The face of a polyhedron, and how flat a patch must be to count as one."""
+"""The face of a polyhedron, and the limits of flatness for patches that count as faces."""
 
 from dataclasses import dataclass, field
 from functools import partial
@@ -12,7 +12,7 @@ from grasp_core.short_text import counted, summary
 from grasp_core.values import FINGERS, RIGHT_ANGLE
 
 FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
-"""What counts as a face: flat parts, nearly flat patches, or what suits the surface."""
+"""Kinds of faces: flat parts, nearly flat patches, or whichever suits the surface."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -24,7 +24,7 @@ class Face:
     centroid: Array
     """Centre of area, on the plane, (3,) [m]."""
     area: float
-    """[m^2]"""
+    """Area of the face without its holes [m^2]."""
     polygon: Array
     """Outer border, (k, 3) [m], counter-clockwise when `normal` points at the viewer."""
     holes: tuple[Array, ...]
@@ -32,11 +32,11 @@ class Face:
     pieces: tuple[Array, ...]
     """Convex polygons that tile the face, each (k, 3) [m], wound as `polygon`."""
     spread: float = 0.0
-    """Of a curved patch: the most that the surface over it leans from the plane [rad]."""
+    """Largest angle that the surface over a curved patch leans from the plane [rad]."""
     depth: float = 0.0
-    """Of a curved patch: largest distance of the surface over it from the plane [m]."""
+    """Largest distance of the surface over a curved patch from the plane [m]."""
     facets: Indices = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    """Of a curved patch: the triangles that are the surface over the polygon, (f,)."""
+    """Indices of the triangles over a curved patch, (f,); empty for an exact face."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "facets", frozen_indices(self.facets, (None,), "facets"))
@@ -58,7 +58,7 @@ class Face:
 
 @dataclass(frozen=True, slots=True)
 class PatchLimits:
-    """How far a patch may be from flat, and how many there are.
+    """Limits of flatness for patches, and their number.
 
     Raises:
         InputError: A limit is out of range.
@@ -69,7 +69,7 @@ class PatchLimits:
     depth: float = 0.01
     """Largest distance of the surface from the plane, relative to the object's largest extent."""
     most: int = 20
-    """So many patches, those with the largest discs."""
+    """Keep at most this many patches: those with the largest inscribed discs."""
 
     def __post_init__(self) -> None:
         number(self.spread_deg, "spread_deg", above=0.0, most=45.0)  # above it nothing is flat

@@ -1,6 +1,6 @@
 """Convex pieces of an object's faces, moved and scaled so that the object has size one.
 
-The programs work on these: their tolerances then mean the same for every object.
+All programs work on these pieces, so their tolerances mean the same for every object.
 """
 
 from collections.abc import Sequence
@@ -24,19 +24,19 @@ from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import graded
 
 THINNEST = 1e-6
-"""Pieces without room for a disc of this radius (object size one) hold no contact."""
+"""Least radius of a disc (object size one) in a piece that can hold a contact."""
 SOUND = 1e-9
-"""How far the parts of a piece may disagree (object size one)."""
+"""Largest disagreement between the fields of a piece (object size one)."""
 
 SAME_PLACE = 6
-"""Distances equal to so many digits (object size one) are ties, broken by the pieces' order."""
+"""Distances equal to this many digits (object size one) are ties, broken by the pieces' order."""
 LARGEST_INSET = 0.5
-"""Most that edges are kept clear of, in radii of the piece's largest disc."""
+"""Largest distance that is kept from edges, in radii of the piece's largest disc."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FacePiece:
-    """One convex piece: the points origin + frame @ y with E y <= b."""
+    """One convex piece of a face: the points origin + frame @ y with E y <= b."""
 
     face: int
     """Index of its face in the polyhedron."""
@@ -47,25 +47,26 @@ class FacePiece:
     frame: Array
     """Orthonormal columns spanning the plane, the first along an edge, (3, 2).
 
-    Tied to the object, so that turning it turns the pyramids inscribed in force cones too.
+    The frame is tied to the object: the pyramids inscribed in force cones turn with it.
     """
     corners: Array
-    """(k, 2), counter-clockwise in the frame, which is a mirror image where the piece is one."""
+    """Corners in plane coordinates, (k, 2), counter-clockwise in the frame. The frame of a mirrored
+    piece is a mirror image."""
     E: Array
     """Unit outward edge normals, (k, 2)."""
     b: Array
-    """(k,)"""
+    """Limits of the edges: E y <= b inside, (k,)."""
     inradius: float
-    """Radius of the largest disc inside."""
+    """Radius of the largest disc in the piece."""
     spread: float = 0.0
-    """How far the true surface leans from the plane at most [rad]."""
+    """Largest angle that the true surface leans from the plane [rad]."""
     depth: float = 0.0
-    """How far the true surface is from the plane at most."""
+    """Largest distance of the true surface from the plane."""
 
     def sound(self) -> bool:
         """Whether the fields describe one convex polygon, at about unit size.
 
-        `face`, `spread` and `depth` say where a piece is from, which no polygon tells.
+        `face`, `spread` and `depth` are not checked: they refer to the object.
         """
         with np.errstate(all="ignore"):
             count = len(self.corners) if is_array(self.corners, None, 2) else 0
@@ -84,7 +85,7 @@ class FacePiece:
             return bool(np.abs(axes.T @ axes - np.eye(3)).max() <= SOUND) and self._is_polygon()
 
     def _is_polygon(self) -> bool:
-        """Whether `corners` are those of {y : E y <= b}, and `inradius` is that of its discs."""
+        """Whether `corners` are the corners of {y : E y <= b}, and `inradius` is its inradius."""
         polygon = convex_polygon(self.corners, SOUND)
         if polygon is None:
             return False
@@ -94,27 +95,27 @@ class FacePiece:
         return within and has_inscribed_radius(polygon, self.inradius)
 
     def point(self, y: Array) -> Array:
-        """The point in space of plane coordinates, (3,)."""
+        """The point in space, (3,), with plane coordinates `y`, (2,)."""
         return self.origin + self.frame @ y
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FaceShape:
-    """A face as convex pieces with room for a contact, and as their convex hull."""
+    """One face as convex pieces with room for a contact, and as their convex hull."""
 
     pieces: tuple[FacePiece, ...]
     hull: FacePiece
-    """What is impossible here is impossible on every piece."""
+    """Convex hull of the pieces: what is impossible on it is impossible on every piece."""
     facets: Array | None = None
-    """Of a curved patch: corners of the triangles over it, wound as the piece, (f, 3, 3)."""
+    """Corners of the triangles over a curved patch, wound as the piece, (f, 3, 3), if curved."""
 
 
 Shapes: TypeAlias = Sequence[FaceShape | None]
-"""The faces of an object as the programs see them; None for those without room."""
+"""The faces of an object as the programs use them; None for faces without room."""
 
 
 def face_shapes(body: Polyhedron) -> tuple[FaceShape | None, ...]:
-    """The faces of an object as the programs see them."""
+    """The faces of an object as the programs use them; None for faces without room."""
     by_face: list[list[FacePiece]] = [[] for _ in body.faces]
     for piece in unit_pieces(body):
         by_face[piece.face].append(piece)
@@ -128,7 +129,7 @@ def face_shapes(body: Polyhedron) -> tuple[FaceShape | None, ...]:
 
 
 def shape_of(pieces: Sequence[FacePiece]) -> FaceShape:
-    """Convex pieces of one plane, together."""
+    """Put convex pieces of one plane together as a shape, with their hull."""
     first = pieces[0]
     if len(pieces) == 1:
         return FaceShape((first,), first)
@@ -143,12 +144,12 @@ def shape_of(pieces: Sequence[FacePiece]) -> FaceShape:
 def choices_near(
     shapes: Sequence[FaceShape], positions: Array, most: int
 ) -> list[tuple[FacePiece, ...]]:
-    """Choices of one piece per face, those nearest to given points of the planes first.
+    """Choices of one piece per face, the nearest to given points of the planes first.
 
     Args:
-        shapes: Of k faces.
+        shapes: Shapes of k faces.
         positions: A point of each plane, (k, 3).
-        most: At most so many.
+        most: Largest number of choices.
     """
     ranked = [
         _nearest_first(shape.pieces, at)[:most] for shape, at in zip(shapes, positions, strict=True)
@@ -159,13 +160,13 @@ def choices_near(
 
 
 def _nearest_first(pieces: Sequence[FacePiece], at: Array) -> list[FacePiece]:
-    """Pieces of a face, the nearest to a point of its plane first."""
+    """Order pieces of a face, the nearest to a point of its plane first."""
     apart = [graded(_outside(piece, at), SAME_PLACE) for piece in pieces]
     return [pieces[place] for place in sorted(range(len(pieces)), key=apart.__getitem__)]
 
 
 def _outside(piece: FacePiece, point: Array) -> float:
-    """How far a point of the plane is beyond the farthest edge line of a piece."""
+    """Distance of a point of the plane beyond the farthest edge line of a piece."""
     return float((piece.E @ (piece.frame.T @ (point - piece.origin)) - piece.b).max())
 
 
@@ -174,7 +175,7 @@ def inset_piece(piece: FacePiece, inset: float) -> FacePiece:
 
     Args:
         piece: Any convex piece.
-        inset: How far to stay from the edges; at most half the radius of the largest disc counts.
+        inset: Distance from the edges; at most half the radius of the largest disc counts.
     """
     away = min(inset, LARGEST_INSET * piece.inradius)
     b = piece.b - away
@@ -197,12 +198,12 @@ def unit_pieces(body: Polyhedron) -> tuple[FacePiece, ...]:
 
 
 def piece_of(face: int, normal: Array, polygon: Array) -> FacePiece:
-    """A convex polygon as a piece.
+    """Describe a convex polygon as a piece.
 
     Args:
         face: Index of its face.
         normal: Unit vector into the object, (3,).
-        polygon: (k, 3), counter-clockwise about the normal.
+        polygon: Corners, (k, 3), counter-clockwise about the normal.
     """
     edge = polygon[1] - polygon[0]
     along = np.asarray(edge / np.linalg.norm(edge), dtype=np.float64)

@@ -1,8 +1,8 @@
 """Volume, centre of mass and inertia of a solid of uniform density, from its surface.
 
-Volume and centre are integrals over the surface, by the divergence theorem: of x n_x and of
-x_i^2 n_i / 2, which on a triangle with corners a, b, c are polynomials in them. Second moments are
-those of the tetrahedra between the centre and the triangles.
+By the divergence theorem volume and centre are integrals over the surface, of x n_x and of
+x_i^2 n_i / 2. On a triangle with corners a, b, c they are polynomials in the corners. Second
+moments are summed over the tetrahedra between the centre and the triangles.
 
 Source: Eberly, "Polyhedral mass properties (revisited)", 2002.
 """
@@ -17,14 +17,14 @@ from grasp_core.objects.booleans import Solid
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MassProperties:
-    """Of a solid at density 1 kg/m^3."""
+    """Mass properties of a solid at density 1 kg/m^3."""
 
     volume: float
-    """[m^3]"""
+    """Volume [m^3]."""
     center: Array
-    """(3,) [m]"""
+    """Centre of mass, (3,) [m]."""
     inertia: Array
-    """About the centre, (3, 3) [kg m^2]."""
+    """Inertia about the centre, (3, 3) [kg m^2]."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", frozen(self.center, (3,), "center"))
@@ -32,11 +32,11 @@ class MassProperties:
 
 
 def mass_properties(solid: Solid, center: Array | None = None) -> MassProperties:
-    """Mass properties of uniform density.
+    """Mass properties of a solid of uniform density.
 
     Args:
         solid: A closed surface.
-        center: Where the centre of mass is known to be, (3,) [m]; inertia is then about it.
+        center: The centre of mass if it is known, (3,) [m]; the inertia is then about it.
     """
     a, b, c = solid.vertices[solid.triangles].transpose(1, 0, 2)
     areas = np.cross(b - a, c - b)  # normals, as long as twice the area
@@ -49,7 +49,7 @@ def mass_properties(solid: Solid, center: Array | None = None) -> MassProperties
 
 
 def _inertia(a: Array, b: Array, c: Array) -> Array:
-    """Inertia about the origin, (3, 3), of tetrahedra between it and triangles."""
+    """Inertia about the origin, (3, 3), of the tetrahedra between it and triangles."""
     sizes = np.einsum("ti,ti->t", a, np.cross(b, c))[:, None]
     moments = sum(part.T @ (sizes * part) for part in (a, b, c, a + b + c)) / 120.0
     return np.trace(moments) * np.eye(3) - moments

@@ -1,4 +1,4 @@
-"""Where contacts are on an object: the face, and on curved patches the triangle, under each."""
+"""Finds the face, or the triangle of a curved patch, under each contact on an object."""
 
 import numpy as np
 
@@ -10,14 +10,14 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 
 ON_FACE = 1e-6
-"""How far a contact may be off its face, in object radii: what six digits in a file keep."""
+"""Largest distance of a contact from its face, in object radii: six digits in a file keep it."""
 
 
 def check_body(body: Polyhedron) -> None:
-    """Refuse what is no object.
+    """Refuse a value that is not an object.
 
     Raises:
-        InputError: It is none.
+        InputError: The value is not a `Polyhedron`.
     """
     instance(body, Polyhedron, "body", "gc.load_polyhedron reads one from a mesh file")
 
@@ -26,7 +26,7 @@ def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
     """Refuse a grasp whose contacts are not on the faces it names.
 
     Raises:
-        InputError: One of them is no object or no grasp, a face does not exist, or a contact is off
+        InputError: The object or the grasp is not one, a face does not exist, or a contact is off
             its surface or outside its border.
     """
     check_body(body)
@@ -44,7 +44,7 @@ def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
 
 
 def face_under(body: Polyhedron, contact: Contact) -> Face | None:
-    """The face on which a contact lies, with its surface's normal, if there is one."""
+    """The face on which a contact lies with the surface's normal; None if there is none."""
     slack = ON_FACE * body.radius
     for face in body.faces:
         if _on_surface(body, face, contact) and any(
@@ -72,13 +72,13 @@ def _on_surface(body: Polyhedron, face: Face, contact: Contact) -> bool:
 
 
 def within(point: Array, polygon: Array, normal: Array, slack: float) -> bool:
-    """Whether a point in the plane of a convex polygon is inside it, or outside by a slack at most.
+    """Whether a point in the plane of a convex polygon is inside it, or outside by at most `slack`.
 
     Args:
-        point: (3,) [m]
+        point: A point in the plane, (3,) [m].
         polygon: Corners in order about `normal`, (n, 3) [m].
-        normal: (3,)
-        slack: [m]
+        normal: Unit normal of the plane, (3,).
+        slack: Allowed distance outside [m].
     """
     edges = np.roll(polygon, -1, axis=0) - polygon
     inward = np.cross(normal, edges) / np.linalg.norm(edges, axis=1, keepdims=True)

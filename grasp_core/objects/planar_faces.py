@@ -1,4 +1,4 @@
-"""Triangles become planar faces: grouping by explicit angle and distance, then outlines.
+"""Groups triangles into planar faces, by explicit limits of angle and distance, and outlines them.
 
 A group grows across shared edges from a seed triangle and is measured against the seed's
 own plane, never from neighbour to neighbour, so that the facets of a fine sphere cannot
@@ -25,23 +25,25 @@ from grasp_core.objects.face import Face
 from grasp_core.solvers.ties import largest_first
 
 MAX_FACES = 200
-"""Objects with more count as curved: 65 million quadruples, some 6 million of which span."""
+"""Objects with more faces count as curved: 200 faces have 65 million quadruples, some 6 million of
+which span."""
 SIDES = 2
-"""Triangles at an edge of a closed surface."""
+"""Number of triangles at an edge of a closed surface."""
 
 Triangulate: TypeAlias = Callable[[list[Array]], Indices]
-"""Corners of an outer border and holes, in order, to counter-clockwise triangles."""
+"""Maps the corners of an outer border and holes, in order, to counter-clockwise triangles."""
 
 
 @dataclass(frozen=True, slots=True)
 class FlatnessLimits:
-    """How far triangles may deviate and still be one planar face."""
+    """Limits within which triangles count as one planar face."""
 
     angle: float = 1e-3
-    """[rad]; about a thousand times the normal error of a millimetre-high triangle in single
-    precision, and far below any friction angle of interest."""
+    """Largest angle between normals [rad]; about a thousand times the normal error of a
+    millimetre-high triangle in single precision, and far below any friction angle of interest."""
     distance: float = 1e-6
-    """Relative to the object's largest extent; some ten single-precision steps."""
+    """Largest distance from the plane, relative to the object's largest extent; some ten
+    single-precision steps."""
 
     def __post_init__(self) -> None:
         number(self.angle, "angle", least=0.0, most=1.0)
@@ -61,9 +63,9 @@ def planar_faces(
 
 
 def coplanar_groups(vertices: Array, triangles: Indices, limits: FlatnessLimits) -> list[Indices]:
-    """Edge-connected groups of triangles that lie in one plane within the limits.
+    """Edge-connected groups of triangles that lie in one plane within the limits, each (g,).
 
-    They are in the order of their first triangle; wound inwards or outwards, they are the same.
+    Groups are in the order of their first triangle, and do not depend on the winding.
 
     The largest triangles seed first: their planes are the least affected by rounding. A
     triangle thinner than the distance limit has no meaningful normal, so only its
@@ -101,7 +103,7 @@ def _off(points: Array, origin: Array, normal: Array) -> float:
 
 
 def triangle_neighbours(triangles: Indices) -> Indices:
-    """The triangle across each edge (k, k+1) of each triangle, -1 if it is not one, (t, 3)."""
+    """The triangle across each edge (k, k+1) of each triangle, (t, 3); -1 unless exactly one."""
     tail, head = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     edges = np.sort(np.column_stack([tail, head]), axis=1)
     _, place, uses = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
@@ -148,8 +150,8 @@ def convex_pieces(loops: list[Array], triangulate: Triangulate, slack: float) ->
 
     Args:
         loops: Outer border, counter-clockwise, and holes, clockwise, each (k, 2).
-        triangulate: The door to a library that does.
-        slack: How far corners may be from a line and still be on it.
+        triangulate: Triangulates a border with holes by an outside library.
+        slack: Corners within this distance of a line count as on it.
     """
     if len(loops) == 1 and is_convex(loops[0]):
         return loops

@@ -33,19 +33,19 @@ class Polyhedron:
     """Vertex indices, (t, 3), counter-clockwise seen from outside."""
     faces: tuple[Face, ...]
     volume: float
-    """[m^3]"""
+    """Volume [m^3]."""
     center_of_mass: Array
-    """(3,) [m]"""
+    """Centre of mass, (3,) [m]."""
     inertia: Array
-    """About the centre of mass at density 1 kg/m^3, (3, 3) [kg m^2]."""
+    """Inertia about the centre of mass at density 1 kg/m^3, (3, 3) [kg m^2]."""
     content_sha256: str
     """Hash of the canonical mesh: the same for any file name, vertex or triangle order."""
     source_sha256: str
-    """Hash of the file's bytes; `content_sha256` when there was no file."""
+    """Hash of the file's bytes; equal to `content_sha256` when there was no file."""
     patches: PatchLimits | None = None
-    """Of a curved or scanned surface whose faces are patches; None where they are exact."""
+    """Limits of flatness of a curved or scanned surface's patches; None where faces are exact."""
     notes: tuple[str, ...] = ()
-    """What was mended on the way in, for people to read."""
+    """Notes on what was mended when the mesh was read, for people to read."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", frozen(self.vertices, (None, 3), "vertices"))
@@ -78,12 +78,12 @@ class Polyhedron:
         """Build from a triangle mesh, with the checks and refusals of a mesh file.
 
         Args:
-            vertices: (n, 3) [m].
+            vertices: Vertices, (n, 3) [m].
             triangles: Vertex indices, (t, 3).
-            name: What to call the object.
-            faces: As `load_polyhedron`.
-            patches: As `load_polyhedron`.
-            center_of_mass: As `load_polyhedron`.
+            name: Name of the object.
+            faces: See `load_polyhedron`.
+            patches: See `load_polyhedron`.
+            center_of_mass: See `load_polyhedron`.
 
         Raises:
             MeshError: The mesh is not a solid; its `reason` says why.
@@ -100,7 +100,7 @@ class Polyhedron:
 
     @property
     def normals(self) -> Array:
-        """The faces' normals, (faces, 3)."""
+        """Unit normals of the faces, into the object, (faces, 3)."""
         return np.array([face.normal for face in self.faces]).reshape(-1, 3)
 
     def __repr__(self) -> str:
@@ -127,15 +127,15 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
 
     Args:
         path: An OBJ, STL, PLY, OFF or GLB file.
-        unit: What one unit in the file is: "m", "cm", "mm" or "in".
-        flatness: How far triangles may deviate and still be one planar face.
+        unit: Unit of length of the file: "m", "cm", "mm" or "in".
+        flatness: Limits within which triangles count as one planar face.
         faces: `planar` for exact planar faces; `patches` for the nearly flat parts of a curved or
             scanned surface, which may have holes; `auto` takes patches where there are more than
             `MAX_FACES` planar faces.
-        patches: How flat patches are, and how many.
-        center_of_mass: (3,) [m], in the file's frame; that of uniform density if not given,
-            estimated from the convex hull where the surface has holes.
-        limits: How large the file may be, and what reading it may cost.
+        patches: Limits of flatness for patches, and their number.
+        center_of_mass: Centre of mass in the file's frame, (3,) [m]. If not given, it is that of
+            uniform density, estimated from the convex hull where the surface has holes.
+        limits: Largest size of the file, and largest cost of reading it.
 
     Raises:
         InputError: The unit is unknown.
@@ -180,15 +180,15 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
     """Check a triangle mesh and build the polyhedron of its faces.
 
     Args:
-        vertices: (n, 3) [m].
+        vertices: Vertices, (n, 3) [m].
         triangles: Vertex indices, (t, 3).
-        name: What to call the object.
-        source_sha256: Hash of the file it came from, if any.
-        flatness: As `load_polyhedron`.
-        faces: As `load_polyhedron`.
-        patches: As `load_polyhedron`.
-        center_of_mass: As `load_polyhedron`.
-        limits: As `load_polyhedron`.
+        name: Name of the object.
+        source_sha256: Hash of the file that the mesh came from, if any.
+        flatness: See `load_polyhedron`.
+        faces: See `load_polyhedron`.
+        patches: See `load_polyhedron`.
+        center_of_mass: See `load_polyhedron`.
+        limits: See `load_polyhedron`.
         kind: The class to build.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Whether triangles bound one solid: welding, closure, winding, separate and overlapping parts."""
+"""Checks that triangles bound one solid: welding, closure, winding, and overlap of parts."""
 
 import numpy as np
 
@@ -9,17 +9,21 @@ from grasp_core.objects.booleans import Solid, intersection_volume, union_volume
 from grasp_core.objects.planar_faces import SIDES, triangle_neighbours
 
 WELD = 1e-8
-"""Vertices closer than this, relative to the extent, are one: single precision in a file
+"""Vertices closer than this, relative to the extent, are joined: single precision in a file
 keeps 6e-8, and equal numbers in a file are equal to the last bit."""
 THINNEST = 1e-9
-"""Least volume relative to the cube of the extent."""
+"""Least volume of a solid, relative to the cube of the extent."""
 OVERLAP = 1e-6
 """Shared volume of two parts, relative to the whole, that counts as overlap; parts that
 only touch share what rounding leaves."""
 
 
 def welded(points: Array, corners: Indices) -> tuple[Array, Indices, int]:
-    """Join vertices closer than WELD, drop unused ones and collapsed triangles."""
+    """Join vertices closer than `WELD`, and drop unused vertices and collapsed triangles.
+
+    Returns:
+        Vertices, triangles, and the number of triangles that were dropped.
+    """
     used, corners = np.unique(corners, return_inverse=True)
     points, corners = points[used], corners.reshape(-1, 3)
     reach = WELD * float(np.ptp(points, axis=0).max())
@@ -39,10 +43,10 @@ def _links(points: Array, reach: float) -> Indices:
 
 
 def surface_fault(corners: Indices) -> MeshError | None:
-    """Why triangles are not a closed surface without junctions, wound to one side; None if so.
+    """Why triangles are not a closed, one-sided surface without junctions; None if they are.
 
     Each undirected edge must belong to two triangles that run along it both ways. Contradictory
-    sides come first: of the other faults, what is left of the surface can be sound.
+    sides are reported first, since a surface with any other fault may have sound parts.
     """
     tail, head = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
     edges, where, uses = np.unique(
@@ -66,15 +70,16 @@ def surface_fault(corners: Indices) -> MeshError | None:
     if (uses != SIDES).any():
         message = (
             f"edge {edges[uses != SIDES][0].tolist()} belongs to {uses[uses != SIDES][0]} triangles"
+            ", expected two; separate what meets there, or take its sound parts (--faces patches)"
         )
         return MeshError(MeshRefusal.NON_MANIFOLD, message)
     return None
 
 
 def largest_part(points: Array, corners: Indices) -> tuple[Array, Indices, list[str]]:
-    """The largest connected part of a faulty surface, wound as it is, and what to say of it.
+    """The largest connected part of a faulty surface, wound as it is, and notes about it.
 
-    Nothing tells the outside of an open surface but its winding, so it is never turned.
+    Only its winding tells the outside of an open surface, so it is never turned.
     """
     parts = _labels(points, corners)
     crosses = np.cross(
@@ -93,24 +98,26 @@ def largest_part(points: Array, corners: Indices) -> tuple[Array, Indices, list[
 
 
 def check_volume(solid: Solid) -> None:
-    """Refuse what is flat.
+    """Refuse a solid that is flat.
 
     Raises:
         MeshError: The volume is next to nothing.
     """
     extent = float(np.ptp(solid.vertices, axis=0).max())
     if abs(solid.volume) < THINNEST * extent**3:
-        message = f"the volume is {solid.volume:.3g} m^3; a solid must have one"
+        message = (
+            f"the volume is {solid.volume:.3g} m^3, expected more; close the mesh around a solid"
+        )
         raise MeshError(MeshRefusal.ZERO_VOLUME, message)
 
 
 def oriented(points: Array, corners: Indices, most: int) -> tuple[Indices, bool]:
-    """The triangles with their outsides outside, and whether they were turned.
+    """The triangles wound counter-clockwise seen from outside, and whether they were turned.
 
     Args:
-        points: (n, 3) [m]
-        corners: (t, 3)
-        most: Parts that may be.
+        points: Vertices, (n, 3) [m].
+        corners: Vertex indices, (t, 3).
+        most: Largest number of parts.
 
     Raises:
         MeshError: The mesh is flat, or its parts are separate, overlap or contradict each other.
@@ -127,7 +134,9 @@ def oriented(points: Array, corners: Indices, most: int) -> tuple[Indices, bool]
         message = f"{len(bodies)} solids overlap; unite them into one surface first"
         raise MeshError(MeshRefusal.OVERLAP, message)
     if len(bodies) > 1:
-        message = f"{len(bodies)} separate solids; a grasp holds one, so give one solid a file"
+        message = (
+            f"{len(bodies)} separate solids; a grasp holds one solid, so give each its own file"
+        )
         raise MeshError(MeshRefusal.SEPARATE, message)
     for cavity in cavities:
         inside = sum(intersection_volume(body, cavity) for body in bodies)
@@ -138,10 +147,10 @@ def oriented(points: Array, corners: Indices, most: int) -> tuple[Indices, bool]
 
 
 def _parts(points: Array, corners: Indices, most: int) -> list[Solid]:
-    """The edge-connected parts of a closed mesh; two that meet in a point are two.
+    """The edge-connected parts of a closed mesh; parts that meet only in a point are separate.
 
     Raises:
-        MeshError: There are too many.
+        MeshError: There are too many parts.
     """
     across = triangle_neighbours(corners)
     links = np.column_stack([np.repeat(np.arange(len(corners)), SIDES + 1), across.ravel()])
@@ -157,7 +166,7 @@ def _parts(points: Array, corners: Indices, most: int) -> list[Solid]:
 
 
 def _labels(points: Array, corners: Indices) -> Indices:
-    """Of each triangle the number of its part, of those that share vertices, (t,)."""
+    """The number of each triangle's part, (t,), where parts share no vertex."""
     sides = np.column_stack([corners.ravel(), np.roll(corners, 1, axis=1).ravel()])
     label = components(len(points), sides)
     _, part = np.unique(label[corners[:, 0]], return_inverse=True)

@@ -1,16 +1,16 @@
-"""The order of faces and the handedness in which an object is planned, whatever its file's.
+"""Puts the faces and the handedness of an object into an order that does not depend on its file.
 
 Solved: an order of the faces, a first corner of each border and a handedness that depend on the
 shape alone, so that the planner sees the same object when it is turned or mirrored, or when its
 vertices and faces are listed in another order.
 
 Method. A flag is a face with one of its corners, of the object or of its mirror image. It spans a
-frame: the face's normal, the direction from the face's centre to the corner, and what is across
-both. In that frame each face has an area, a centre and a normal, and their list, sorted, is
-what the object looks like from there. The flag from which the list is the first of all in
-lexicographic order is taken, and the object is listed in its order. Numbers are compared by the
-cells they lie in (see `ties`). Flags with the same list are symmetries of the object, so it
-makes no difference to its shape which of them counts: the first in the order of the file does.
+frame: the face's normal, the direction from the face's centre to the corner, and the direction
+across both. In that frame each face has an area, a centre and a normal; their sorted list is what
+the object looks like from there. The flag whose list comes first in lexicographic order is taken,
+and the object is listed in its order. Numbers are compared by the cells they lie in (see `ties`).
+Flags with the same list are symmetries of the object, so it makes no difference to its shape which
+of them counts: the first in the order of the file does.
 
 Only flags on the rarest kind of face, at its rarest kind of corner, are compared.
 """
@@ -30,28 +30,28 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import graded
 
 FLIP = np.array([1.0, 1.0, -1.0])
-"""The mirror image: z changes its sign, which is exact."""
+"""Signs of the coordinates in the mirror image: changing the sign of z is exact."""
 CELL_DIGITS = 6
-"""Lengths (object size one) and cosines that are equal to so many digits are the same."""
+"""Lengths (object size one) and cosines that are equal to this many digits are the same."""
 SHORTEST = 1e-3
-"""From a face's centre to a corner that gives a direction, in object radii."""
+"""Least distance of a corner that gives a direction from its face's centre, in object radii."""
 
 Cells: TypeAlias = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Standard:
-    """An object as it is planned."""
+    """An object as it is planned, and how it relates to the object as given."""
 
     body: Polyhedron
-    """With its faces in standard order, perhaps mirrored."""
+    """The object with its faces in standard order, perhaps mirrored."""
     faces: tuple[int, ...]
-    """Which face of the object as given each of them is."""
+    """For each face of `body`, its number on the object as given."""
     mirrored: bool
 
 
 def standard(body: Polyhedron) -> Standard:
-    """The object in standard order and handedness."""
+    """Put an object into standard order and handedness."""
     images = (body, mirror_image(body))
     views = ((image, _frame(image, *flag)) for image in images for flag in _rarest_flags(image))
     first = min(((_looks(image, frame), image, frame) for image, frame in views), default=None,
@@ -66,7 +66,7 @@ def standard(body: Polyhedron) -> Standard:
 
 
 def mirror_image(body: Polyhedron) -> Polyhedron:
-    """The object behind a mirror; its faces keep their numbers."""
+    """The mirror image of an object; its faces keep their numbers."""
     return replace(
         body,
         vertices=body.vertices * FLIP,
@@ -89,7 +89,7 @@ def _mirrored(face: Face) -> Face:
 
 
 def _rarest_flags(body: Polyhedron) -> Iterator[tuple[int, int]]:
-    """Face and corner of each flag that is compared, in the order of the file."""
+    """Yield face and corner of each flag that is compared, in the order of the file."""
     kinds = [_kind_of_face(body, face) for face in body.faces]
     rarest = _rarest([kind for kind in kinds if kind])
     flags = [
@@ -104,7 +104,7 @@ def _rarest_flags(body: Polyhedron) -> Iterator[tuple[int, int]]:
 
 
 def _rarest(kinds: Sequence[Cells]) -> Cells:
-    """The kind that occurs least often, of these the first in order."""
+    """The kind that occurs least often; among equally rare ones, the first in order."""
     return min(((count, kind) for kind, count in Counter(kinds).items()), default=(0, ()))[1]
 
 
@@ -115,7 +115,7 @@ def _kind_of_face(body: Polyhedron, face: Face) -> Cells:
 
 
 def _kind_of_corner(body: Polyhedron, face: int, corner: int) -> Cells:
-    """How far a corner is from the face's centre and the object's; nothing without a direction."""
+    """Distances of a corner from the centres of face and object; empty if it gives no direction."""
     at = body.faces[face].polygon[corner]
     middles = body.faces[face].centroid, body.center_of_mass
     lengths = [float(np.linalg.norm(at - middle)) / body.radius for middle in middles]
@@ -127,7 +127,7 @@ def _graded(numbers: Sequence[float]) -> Cells:
 
 
 def _frame(body: Polyhedron, face: int, corner: int) -> Array:
-    """Orthonormal columns: towards the corner, across, and the normal, (3, 3)."""
+    """Orthonormal columns towards the corner, across, and along the normal, (3, 3)."""
     toward = body.faces[face].polygon[corner] - body.faces[face].centroid
     normal = body.faces[face].normal
     toward = toward - normal * float(normal @ toward)
@@ -137,13 +137,13 @@ def _frame(body: Polyhedron, face: int, corner: int) -> Array:
 
 
 def _looks(body: Polyhedron, frame: Array) -> tuple[Cells, ...]:
-    """What all faces look like in a frame, in lexicographic order."""
+    """The rows of `_cells` for all faces in a frame, in lexicographic order."""
     cells = _cells(body, frame)
     return tuple(map(tuple, cells[np.lexsort(cells.T[::-1])].tolist()))
 
 
 def _cells(body: Polyhedron, frame: Array) -> Array:
-    """Area, centre and normal of each face in a frame, by cells, (f, 7)."""
+    """Area, centre and normal of each face in a frame, rounded to cells, (f, 7)."""
     areas = np.array([face.area for face in body.faces]) / body.radius**2
     centers = np.array([face.centroid for face in body.faces]) - body.center_of_mass
     seen = [areas[:, None], centers @ frame / body.radius, body.normals @ frame]
@@ -151,7 +151,7 @@ def _cells(body: Polyhedron, frame: Array) -> Array:
 
 
 def _relisted(face: Face, body: Polyhedron, frame: Array, slack: float) -> Face:
-    """A face whose borders begin with their first corner in a frame, in new convex pieces."""
+    """List a face anew: borders from their first corner in a frame on, and new convex pieces."""
     polygon, *holes = (_begun(loop, body, frame) for loop in (face.polygon, *face.holes))
     holes = sorted(holes, key=lambda hole: tuple(_corner_cells(hole[:1], body, frame)[0]))
     if len(face.pieces) == 1 and not holes:
@@ -165,7 +165,7 @@ def _relisted(face: Face, body: Polyhedron, frame: Array, slack: float) -> Face:
 
 
 def _begun(loop: Array, body: Polyhedron, frame: Array) -> Array:
-    """A closed border from its first corner on."""
+    """Roll a closed border so that it begins with its first corner in a frame, (k, 3)."""
     cells = _corner_cells(loop, body, frame)
     return np.roll(loop, -int(np.lexsort(cells.T[::-1])[0]), axis=0)
 

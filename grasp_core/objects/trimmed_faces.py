@@ -1,8 +1,8 @@
-"""Faces made smaller before planning: two halves for two fingers, or a margin along the edges.
+"""Makes faces smaller before planning: two halves for two fingers, or a margin along the edges.
 
 For two fingers on one face, the face counts twice, as two halves with a gap between them. It is cut
-once, across its longest direction and in its middle. What is found there holds for the face; that
-nothing is found proves nothing, as other cuts were not tried.
+once, across its longest direction and in its middle. Grasps found on the halves hold for the face.
+If none are found, nothing is proved, as other cuts were not tried.
 """
 
 from collections.abc import Sequence
@@ -19,18 +19,19 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import FINGERS
 
 SAME_LENGTH = 1.0 - 1e-6
-"""Of equally long directions the first counts, so that rounding decides nothing."""
+"""Share of the largest length from which directions count as equally long: the first of them is
+taken, so that rounding decides nothing."""
 
 
 def with_halves(body: Polyhedron, apart: float) -> tuple[Polyhedron, tuple[int, ...]]:
-    """The object with two more faces for each that is long enough.
+    """Add two half faces to an object for each face that is long enough.
 
     Args:
         body: The object.
         apart: Least distance of two contacts on one face [m].
 
     Returns:
-        The object, and for each of its faces the one that it is or is a part of.
+        The object, and for each of its faces the whole face that it is or is a part of.
     """
     faces, owners = list(body.faces), list(range(len(body.faces)))
     for index, face in enumerate(body.faces):
@@ -41,10 +42,10 @@ def with_halves(body: Polyhedron, apart: float) -> tuple[Polyhedron, tuple[int, 
 
 
 def shared_quadruples(owners: Sequence[int]) -> Indices:
-    """Quadruples with both halves of one face or of two, ascending, (q, 4).
+    """Quadruples with both halves of one face, or of two faces, ascending, (q, 4).
 
     Args:
-        owners: As returned by `with_halves`.
+        owners: The owners that `with_halves` returned.
     """
     whole = [index for index, owner in enumerate(owners) if index == owner]
     halves: dict[int, list[int]] = {}
@@ -98,7 +99,7 @@ def clear_of_edges(body: Polyhedron, margin: float) -> Polyhedron:
 
     Args:
         body: The object.
-        margin: [m]; faces without room keep no pieces.
+        margin: The distance [m]; faces without room keep no pieces.
     """
     return replace(body, faces=tuple(_without_margin(face, margin) for face in body.faces))
 

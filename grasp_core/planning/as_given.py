@@ -1,9 +1,9 @@
-"""What was found on an object in standard order, said of the object as it was given.
+"""Translates what was found on an object in standard order back to the object as it was given.
 
-Faces get their own numbers back, fingers are listed by them, and what was found on a mirror image
-is mirrored: a reflection D keeps forces in their cones and turns the torque x x f into
--(D x) x (D f), so balance, closure and regions stay what they are. A twist (a, b) that separates
-becomes (D a, -D b).
+Faces get their original numbers back, and fingers are listed by face number. A grasp found on a
+mirror image is mirrored: a reflection D keeps forces in their cones and turns the torque x x f into
+-(D x) x (D f), so balance, closure and regions are preserved. A separating twist (a, b) becomes
+(D a, -D b).
 """
 
 from collections.abc import Sequence
@@ -21,31 +21,31 @@ from grasp_core.planning.certify import Certified
 from grasp_core.values import ContactRegion, ForceCone, four
 
 PAIRED = ("p", "r")
-"""Letters of the constructions whose fingers (0, 1) and (2, 3) are pairs."""
+"""Letters of the constructions whose fingers (0, 1) and (2, 3) are pairs: pencil and regulus."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Place:
-    """Where a finger stands."""
+    """The face, or half of a face, on which a finger stands."""
 
     face: int
     """The face's number on the object as it was given."""
     half: str
-    """The half of the face that is meant, `a` or `b`; empty for a whole face."""
+    """Half of the face, `a` or `b`; empty for a whole face."""
 
     @property
     def name(self) -> str:
-        """The face and its half as the id of a grasp writes them."""
+        """Face number and half, as the id of a grasp spells them."""
         return f"{self.face}{self.half}"
 
 
 def as_given(found: Certified, places: Sequence[Place], *, mirrored: bool) -> Certified:
-    """A grasp with its fingers in the order of their faces.
+    """Translate a grasp to the object as given, fingers in the order of their faces.
 
     Args:
-        found: In standard order.
-        places: Of its four fingers.
-        mirrored: Whether it was found on the mirror image.
+        found: The grasp in standard order.
+        places: Where its four fingers stand, in finger order.
+        mirrored: Whether the grasp was found on the mirror image.
     """
     order = _finger_order(found.id[0], places)
     named = "-".join([found.id[0], *(places[finger].name for finger in order)])
@@ -64,7 +64,7 @@ def as_given(found: Certified, places: Sequence[Place], *, mirrored: bool) -> Ce
 
 
 def _finger_order(letter: str, places: Sequence[Place]) -> list[int]:
-    """Fingers by their faces: within each pair and then the pairs, or all of them."""
+    """Finger order by face: within pairs, then the pairs; all four where there are no pairs."""
     if letter not in PAIRED:
         return sorted(range(len(places)), key=places.__getitem__)
     pairs = [sorted(pair, key=places.__getitem__) for pair in ((0, 1), (2, 3))]
@@ -105,7 +105,7 @@ def _mirrored_grasp(found: Certified) -> Certified:
 
 
 def _mirrored_piece(piece: FacePiece) -> FacePiece:
-    """The piece behind a mirror: its frame is mirrored, its plane coordinates stay."""
+    """Mirror image of a piece: its frame is mirrored, so its plane coordinates stay the same."""
     return replace(
         piece,
         normal=piece.normal * FLIP,
@@ -115,12 +115,12 @@ def _mirrored_piece(piece: FacePiece) -> FacePiece:
 
 
 def absence_as_given(proof: Absence, standard: Standard, owners: Sequence[int]) -> Absence:
-    """A proof that faces hold no grasp, about the faces of the object as it was given.
+    """Translate a proof of absence to the faces of the object as it was given.
 
     Args:
-        proof: On pieces of the standard object's faces.
+        proof: Proof about pieces of the standard object's faces.
         standard: The object in standard order.
-        owners: Of each face the one that it is, or is a half of.
+        owners: For each face index, the whole face it is or is a half of.
     """
     pieces = [replace(piece, face=standard.faces[owners[piece.face]]) for piece in proof.pieces]
     if not standard.mirrored:
@@ -133,6 +133,7 @@ def absence_as_given(proof: Absence, standard: Standard, owners: Sequence[int]) 
 
 
 def _mirrored_certificate(leaf: ClosureCertificate) -> ClosureCertificate:
+    # a torque is an axial vector: it takes the other sign
     wrench = leaf.separating_wrench
     return replace(
         leaf,

@@ -1,11 +1,11 @@
-"""Quadruples with tight bounds, best first over several blocks, as far as they are asked for.
+"""Best-first search over face quadruples, tightening bounds only at the head of one queue.
 
-Four kinds of things wait in one queue: blocks that nobody made yet, bounded by the room of their
-faces; made ones, by how wide their cones can be; some quadruples with their cones, by their
-corners; and single quadruples, by small programs. What has the largest bound comes first: a block
-is made, cones are chosen for some dozens of quadruples, their bounds are tightened, or a quadruple
-is handed out. So none with larger discs can follow, and hardly a cone is tilted and hardly a
-program solved that was not needed to know this.
+Four kinds of items wait in the queue: blocks not made yet, bounded by the room of their faces; made
+blocks, bounded by how wide their cones can be; quadruples with chosen cones, bounded by their
+corners; and single quadruples, bounded by small programs. The item with the largest bound comes
+first: a block is made, cones are chosen for some dozens of quadruples, their bounds are tightened,
+or a quadruple is handed out. So no later quadruple has larger discs than one handed out, and few
+cones are tilted and few programs solved that were not needed to know this.
 """
 
 from collections import Counter
@@ -26,31 +26,31 @@ from grasp_core.planning.ranking import Outlook, Quadruple, Ranking, outlook
 from grasp_core.solvers.ties import coarse
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 32, 2048
-"""Quadruples whose bounds are tightened together."""
+"""Fewest and most quadruples whose bounds are tightened together."""
 SMALLEST_TILT = 512
-"""Quadruples whose cones are chosen together: fewer take hardly less time."""
+"""Fewest quadruples whose cones are chosen together: smaller groups take hardly less time."""
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Quadruples that are listed when they are needed."""
+    """A group of quadruples that is listed only when it is needed."""
 
     room: float
-    """No disc is larger; equal rooms are equal numbers (see `ties.coarse`)."""
+    """Upper bound on its discs; equal rooms are equal numbers (see `ties.coarse`)."""
     make: Callable[[], Prospects]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rest:
-    """What is left of a list of quadruples from a row on."""
+    """The rows of a list of quadruples that still wait, from `start` on."""
 
     listed: Outlook | Ranking
     best: Array
-    """The bounds of its quadruples, falling, those alike made equal (see `ties.coarse`)."""
+    """Falling bounds of the quadruples, nearly equal ones made equal (see `ties.coarse`)."""
     start: int
 
     def until(self, bound: float) -> slice:
-        """Those that are worth a closer look before what else has a bound."""
+        """Rows to look at more closely next: the ones with bounds above the rest of the queue."""
         larger = int(np.searchsorted(-self.best[self.start :], -bound))
         least = SMALLEST_TILT if isinstance(self.listed, Outlook) else SMALLEST_CHUNK
         count = min(max(larger, least), LARGEST_CHUNK)
@@ -58,7 +58,7 @@ class _Rest:
 
 
 _Waiting: TypeAlias = tuple[float, int, tuple[int, ...], Block | _Rest | Callable[[], Quadruple]]
-"""Minus the coarse bound, then what makes ties go by kind and by faces."""
+"""Minus the coarse bound, then kind and faces, which break ties; then the item itself."""
 BLOCK, REST, QUADRUPLE = range(3)
 
 
@@ -69,14 +69,14 @@ def promising(
     least: Callable[[Construction], float],
     tally: Counter[str],
 ) -> Iterator[Quadruple]:
-    """Quadruples that may be worth having, with tight bounds, best first.
+    """Yield quadruples with tight bounds above the threshold, best first.
 
     Args:
-        construction: With discs; others are gone through by `in_rows`.
-        blocks: Of all quadruples.
-        bounded: What attempts on the object's faces can offer.
-        least: The radius above which discs are worth having at present.
-        tally: Where to count attempts whose bound proves that they have none at all.
+        construction: A construction with discs; `in_rows` is for constructions without.
+        blocks: Blocks of all quadruples.
+        bounded: Bounds attempts on the object's faces by small programs.
+        least: Returns the radius that discs must exceed at present.
+        tally: Counts quadruples whose bounds prove that they have no discs at all.
     """
     waiting: list[_Waiting] = [
         (-block.room, BLOCK, (place,), block) for place, block in enumerate(blocks)
@@ -84,6 +84,7 @@ def promising(
     heapify(waiting)
     while waiting:
         bound, _, place, item = heappop(waiting)
+        # the threshold rises while grasps are found: read it anew
         worth = least(construction)
         if -bound <= worth:
             return
@@ -104,7 +105,7 @@ def promising(
 
 
 def _closer(listed: Outlook, rows: slice, worth: float) -> _Rest:
-    """Some quadruples with their cones, without what is not worth having: that is forgotten."""
+    """Choose cones for some quadruples and drop the ones whose bounds are not above `worth`."""
     ranking = listed.ranking(rows)
     bounds: Array = np.max(ranking.bounds, axis=(1, 2), initial=-np.inf)
     best = coarse(bounds)
@@ -121,13 +122,13 @@ def _put_back(waiting: list[_Waiting], rest: _Rest, place: tuple[int, ...]) -> N
 def in_rows(
     listed: Outlook, bounded: AttemptBounds, worth: float, tally: Counter[str]
 ) -> Iterator[Quadruple]:
-    """Quadruples that may be worth having, some after others as they are listed.
+    """Yield quadruples with bounds above the threshold, in the order of the list.
 
     Args:
-        listed: Of one block.
-        bounded: What attempts on the object's faces can offer.
-        worth: The merit above which grasps are worth having.
-        tally: Where to count attempts whose bound proves that they have none.
+        listed: The quadruples of one block.
+        bounded: Bounds attempts on the object's faces by small programs.
+        worth: The merit that grasps must exceed.
+        tally: Counts quadruples whose bounds prove that they have no grasp.
     """
     for start in range(0, len(listed), SMALLEST_CHUNK):
         ranking = listed.ranking(slice(start, start + SMALLEST_CHUNK))
@@ -139,7 +140,7 @@ def in_rows(
 def _tightened(
     ranking: Ranking, rows: slice, bounded: AttemptBounds, worth: float, tally: Counter[str]
 ) -> Iterator[tuple[float, int, tuple[int, ...], Callable[[], Quadruple]]]:
-    """Some quadruples, those of them that are worth having, with tight bounds."""
+    """Tighten the bounds of some quadruples and yield the ones still above the threshold."""
     construction, candidates = ranking.construction, ranking.candidates
     cheap = ranking.bounds[rows]
     row, kind, column = np.nonzero(cheap > worth)
@@ -152,8 +153,10 @@ def _tightened(
         candidates.half_angles[place, kind],
     )
     bounds[row, kind, column] = bounded.of(construction, attempts, worth)
+    # both are upper bounds: the smaller one holds
     bounds = np.minimum(bounds, cheap)
     solved = cheap > worth
+    # no discs even of the least radius: settled here, whatever was found elsewhere
     none = solved.any(axis=1) & (bounds.max(axis=1) <= construction.least)
     tally["tried"] += int(none.sum())
     tally["infeasible"] += int(none.sum())

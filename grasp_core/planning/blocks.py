@@ -1,9 +1,9 @@
-"""Face quadruples in blocks, those of faces with more room first, before cones are chosen for them.
+"""Face quadruples in blocks, faces with more room first, before cones are chosen for them.
 
-Four numbers i < j < k < l of faces in the order of their room are counted like this: all with
-smaller l first, then all with smaller k, then j, then i. So the quadruple number is
-C(l, 4) + C(k, 3) + C(j, 2) + i, a block is a range of numbers, and no disc of this block or a later
-one is larger than the room of its first l.
+Faces are numbered by falling room. Quadruples i < j < k < l are counted with the smallest l first,
+then by k, then j, then i. So the quadruple has number C(l, 4) + C(k, 3) + C(j, 2) + i, a block is
+a range of numbers, and no disc of this block or a later one is larger than the room of the block's
+first l.
 """
 
 import math
@@ -19,22 +19,22 @@ from grasp_core.solvers.ties import coarse, graded
 from grasp_core.values import FINGERS
 
 FIRST_FACES = 14
-"""Faces of the first block: 1,001 quadruples."""
+"""Number of faces in the first block: 1,001 quadruples."""
 LARGEST_BLOCK = 30_000
-"""Quadruples of one block."""
+"""Most quadruples in one block."""
 SPANNING_SHARE = 0.125
-"""Of four random directions, the share that positively spans."""
+"""Share of quadruples of random directions that positively span."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prospects:
-    """Quadruples of faces, and how wide their cones can be."""
+    """Face quadruples with upper bounds on their cones, before cones are chosen."""
 
     cones: PlannedCones
     faces: Indices
-    """(q, 4)"""
+    """Faces of each quadruple, (q, 4)."""
     widest: Array
-    """No choice of force cones is wider, (q,) [rad]."""
+    """Upper bound on the half-angle of any choice of force cones, (q,) [rad]."""
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -45,20 +45,20 @@ class Prospects:
         return self.cones.rooms[self.faces].min(axis=1, initial=np.inf)
 
     def some(self, places: Indices) -> "Prospects":
-        """The quadruples at some places, in that order."""
+        """The quadruples at the given places, in that order."""
         return Prospects(self.cones, self.faces[places], self.widest[places])
 
     def candidates(self, rows: slice) -> Candidates:
-        """Some of them with their cones."""
+        """Choose force cones for the quadruples in `rows`."""
         return self.cones.candidates(self.faces[rows])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Blocks:
-    """Blocks of quadruples, made on request."""
+    """Blocks of quadruples that are made on request."""
 
     rooms: Array
-    """No disc of each block is larger, (blocks,)."""
+    """Upper bound on the discs of each block, (blocks,) [object radii]."""
     make: Callable[[int], Prospects]
 
     def __len__(self) -> int:
@@ -66,12 +66,12 @@ class Blocks:
 
 
 def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
-    """All quadruples of an object.
+    """Put all quadruples of an object into blocks.
 
     Args:
         cones: How force cones are chosen.
-        whole: How many of the faces count by themselves; the others are parts of them.
-        shared: Quadruples with such parts, (s, 4), which come last.
+        whole: Number of whole faces; faces after them are parts of whole ones.
+        shared: Quadruples with such parts, (s, 4); their blocks come last.
     """
     order = _by_room(cones, whole)
     order = order[cones.rooms[order] > 0.0]
@@ -94,7 +94,7 @@ def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
 
 
 def spanning_blocks(cones: PlannedCones, whole: int) -> Blocks:
-    """Those whose normals span (P3), whether there is room on their faces or not."""
+    """Blocks of quadruples whose normals positively span (P3), with room on their faces or not."""
     order = _by_room(cones, whole)
     table = SpanningTable(cones.body.normals[order], LEAST_SPAN_ANGLE)
     cuts = _face_ends(len(order), int(LARGEST_BLOCK / SPANNING_SHARE))
@@ -118,7 +118,7 @@ def _prospects(cones: PlannedCones, quads: Indices) -> Prospects:
 
 
 def _range_ends(count: int) -> Indices:
-    """Where blocks of so many quadruples end: each as large as all before, up to a size."""
+    """Ends of the blocks of `count` quadruples: each is as large as all before, up to a size."""
     ends = [min(math.comb(FIRST_FACES, FINGERS), count)]
     while ends[-1] < min(LARGEST_BLOCK, count):
         ends.append(min(2 * ends[-1], count))
@@ -127,9 +127,10 @@ def _range_ends(count: int) -> Indices:
 
 
 def _unranked(numbers: Indices, count: int) -> Indices:
-    """The quadruples of so many faces with some numbers, ascending in each, (q, 4)."""
+    """Quadruples of faces with the given numbers, each ascending, (q, 4)."""
     found = np.empty((len(numbers), FINGERS), dtype=np.int64)
     left = numbers.copy()
+    # greedy: the largest C(face, size) that fits gives the face, as in the module docstring
     for size in range(FINGERS, 0, -1):
         before = np.array([math.comb(face, size) for face in range(count)], dtype=np.int64)
         found[:, size - 1] = np.searchsorted(before, left, side="right") - 1
@@ -138,7 +139,7 @@ def _unranked(numbers: Indices, count: int) -> Indices:
 
 
 def _face_ends(count: int, largest: int) -> Sequence[int]:
-    """How many faces each block reaches to: as many new quadruples as before, up to a size."""
+    """Numbers of faces that blocks reach to: each as large as all before, up to a size."""
     ends = [min(FIRST_FACES, count)]
     while ends[-1] < count:
         before = math.comb(ends[-1], FINGERS)

@@ -1,8 +1,8 @@
-"""Force cones for face quadruples, and what bounds their discs.
+"""Force cones for face quadruples, and upper bounds on their discs.
 
-Around the normals, as in the paper, each is planned at theta_plan = min(theta, just below its span
-angle theta*): the smaller cones lie inside the real ones, so what holds there holds at the friction
-asked for. Tilted cones are an alternative, and for most quadruples the only one.
+Cones around the normals, as in the paper, are planned at theta_plan = min(theta, just below the
+span angle theta*): these smaller cones lie inside the real ones, so what holds for them holds at
+the friction asked for. Tilted cones are an alternative, and for most quadruples the only one.
 """
 
 import math
@@ -28,68 +28,69 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import ForceCone, four
 
 LEAST_SPAN_ANGLE = math.atan(LEAST_RADIUS)
-"""With narrower cones no disc at a depth of one object radius would count."""
+"""Least half-angle to plan with [rad]: narrower cones hold no disc that counts at a depth of one
+object radius."""
 BELOW_SPAN_ANGLE = 0.999
-"""Share of theta* to plan with: P3 is strict."""
+"""Share of theta* to plan with: P3 is a strict inequality."""
 INSIDE_FRICTION = 1.0 - 1e-6
 """Share of the friction angle to plan with, so that equilibrium is not marginal."""
 NORMAL, TILTED = 0, 1
-"""The two choices of force cones."""
+"""Indices of the two choices of force cones."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidates:
-    """Quadruples of faces with two choices of force cones, and what bounds their grasps."""
+    """Face quadruples with two choices of force cones each, and upper bounds on their grasps."""
 
     faces: Indices
-    """(q, 4)"""
+    """Faces of each quadruple, (q, 4)."""
     normals: Array
-    """(q, 4, 3)"""
+    """Inward unit normals of the faces, (q, 4, 3)."""
     axes: Array
-    """Of both choices, around the normals and tilted, (q, 2, 4, 3)."""
+    """Unit cone axes of both choices, around the normals and tilted, (q, 2, 4, 3)."""
     half_angles: Array
-    """(q, 2) [rad]; not positive where there is no such choice."""
+    """Half-angle of each choice, (q, 2) [rad]; not positive where the choice does not exist."""
     limits: Array
-    """Upper bounds on the discs of each choice (see `disc_limits`), (q, 2, 4), in object radii."""
+    """Upper bounds on the discs of each choice (see `disc_limits`), (q, 2, 4) [object radii]."""
     rooms: Array
-    """Radius of the largest disc that fits in each of the four faces, (q,)."""
+    """Radius of the largest disc that fits in each of the four faces, (q,) [object radii]."""
 
     def __len__(self) -> int:
         return len(self.faces)
 
     def some(self, places: Indices) -> "Candidates":
-        """The quadruples at some places, in that order."""
+        """The quadruples at the given places, in that order."""
         return Candidates(*(getattr(self, each.name)[places] for each in fields(self)))
 
     def cones(self, place: int, kind: int) -> tuple[ForceCone, ForceCone, ForceCone, ForceCone]:
-        """One choice of force cones of one quadruple."""
+        """The force cones of one choice for one quadruple, in the order of its faces."""
         half_angle = float(self.half_angles[place, kind])
         return four(ForceCone(axis, half_angle) for axis in self.axes[place, kind])
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedCones:
-    """How the force cones of one object's quadruples are chosen."""
+    """Chooses force cones for the quadruples of one object."""
 
     body: Polyhedron
     shapes: Shapes
     theta: float
     """Half-angle of the friction cones to plan with [rad]."""
     tilted: bool
-    """Whether cones may be tilted, not only around the normals."""
+    """Whether cones may also be tilted away from the normals."""
 
     @cached_property
     def rooms(self) -> Array:
-        """Radius of the largest disc in each face, zero without room, (f,)."""
+        """Radius of the largest disc in each face, zero where none fits, (f,) [object radii]."""
         return np.array(
             [max(p.inradius for p in shape.pieces) if shape else 0.0 for shape in self.shapes]
         )
 
     def widest(self, quads: Indices) -> Array:
-        """Half-angles that no choice of cones exceeds, (q,) [rad].
+        """Upper bounds on the half-angles of any choice of cones, (q,) [rad].
 
         Args:
-            quads: Faces, (q, 4).
+            quads: Faces of each quadruple, (q, 4).
         """
         normals, thetas = self._normals[quads], self._thetas[quads]
         sines = span_sines(normals)
@@ -99,21 +100,21 @@ class PlannedCones:
         return np.maximum(around, widest_half_angles(normals, thetas, sines))
 
     def limits(self, quads: Indices, widest: Array) -> Array:
-        """Upper bounds on discs of cones that are no wider (see `disc_limits`), (q, 4).
+        """Upper bounds on discs whose cones are no wider than `widest` (see `disc_limits`), (q, 4).
 
         With psi the half-angle, theta the friction angle and h half the angle between two normals,
-        narrower cones may lean more, and the bound tan(psi / 2) / sin(h - theta + psi) of a pair is
+        narrower cones may lean more, so the bound tan(psi / 2) / sin(h - theta + psi) of a pair has
         to hold for all psi up to the widest w. Where h >= theta it grows with psi, as
-        1 / sin(psi) is above cot(h - theta + psi). Where h < theta cones that positively span (P3)
-        still never overlap: half the angle between their axes is above psi, so that the true bound
-        is below tan(psi / 2) / sin(psi) = 1 / (2 cos^2(psi / 2)), and that of w above this.
+        1 / sin(psi) is above cot(h - theta + psi). Where h < theta, cones that positively span (P3)
+        still never overlap: half the angle between their axes is above psi, so the true bound is
+        below tan(psi / 2) / sin(psi) = 1 / (2 cos^2(psi / 2)), and the bound of w is above this.
 
         Args:
-            quads: Faces, (q, 4).
-            widest: Half-angles, (q,) [rad].
+            quads: Faces of each quadruple, (q, 4).
+            widest: Upper bounds on the half-angles, (q,) [rad].
 
         Returns:
-            In object radii, for cones that positively span.
+            Bounds in object radii, for cones that positively span.
         """
         extent = float(np.linalg.norm(self._corners.points, axis=-1).max(initial=0.0))
         leaning = np.maximum(self._thetas[quads].max(axis=1, initial=0.0) - widest, 0.0)
@@ -121,7 +122,7 @@ class PlannedCones:
         return angle_limits(extent, widths, widest)
 
     def candidates(self, quads: Indices) -> Candidates:
-        """Quadruples of faces (q, 4) with their cones."""
+        """Choose force cones for the face quadruples `quads`, (q, 4)."""
         normals, thetas = self._normals[quads], self._thetas[quads]
         axes = [normals, normals]
         half_angles = [_around(span_sines(normals), thetas), np.zeros(len(quads))]
@@ -152,7 +153,7 @@ class PlannedCones:
 
     @cached_property
     def _halves(self) -> Array:
-        """Half the angles between normals, (f, f) [rad]."""
+        """Half the angle between every two normals, (f, f) [rad]."""
         apart = np.linalg.norm(self._normals[:, None] - self._normals, axis=-1)
         return np.arcsin(np.minimum(0.5 * apart, 1.0))
 
@@ -171,15 +172,16 @@ def usable_half_angles(theta: float, spreads: Array) -> Array:
 
     Args:
         theta: Half-angle of the friction cones to plan with [rad].
-        spreads: How far each patch leans from its plane [rad].
+        spreads: How far each patch leans from its plane, any shape [rad].
 
     Returns:
-        Like `spreads`; a trifle, of no use to any construction, where nothing is left.
+        Half-angles shaped like `spreads`; where nothing is left, a positive one too small for any
+        construction.
     """
     return np.maximum(INSIDE_FRICTION * theta - spreads, 0.5 * LEAST_SPAN_ANGLE)
 
 
 def _around(sines: Array, thetas: Array) -> Array:
-    """Half-angles of cones around normals, (q,), from the sines of their span angles."""
+    """Half-angles of cones around normals, (q,) [rad], from the sines of the span angles."""
     spanned = BELOW_SPAN_ANGLE * np.arcsin(np.maximum(sines, 0.0))
     return np.minimum(thetas.min(axis=1, initial=np.inf), spanned)

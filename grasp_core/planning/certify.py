@@ -1,4 +1,4 @@
-"""A placement becomes a grasp when its witness and exact force closure both confirm it."""
+"""Turns a placement into a grasp if its witness and exact force closure both confirm it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,12 +29,12 @@ from grasp_core.values import (
 
 BALANCED = 1e-6
 """Largest wrench that witness forces may leave, for normal parts that sum to one and an object
-of size one: what six digits in a file keep."""
+of size one: six digits in a file keep this much."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Certified:
-    """A confirmed placement, before it is written out as a grasp."""
+    """A confirmed placement, before it is converted to a grasp in the object's frame."""
 
     id: str
     faces: FaceQuadruple
@@ -43,11 +43,11 @@ class Certified:
     pieces: tuple[FacePiece, ...]
     cones: tuple[ForceCone, ...]
     regions: tuple[ContactRegion, ...]
-    """In the pieces' units."""
+    """Contact regions, one per finger, in the pieces' units."""
     placement: Placement
     margin: float
     ways_out: Array | None = None
-    """Unit vectors along the fingers' free lines, away from their tips, (4, 3), if sought."""
+    """Unit vectors along the fingers' free lines, away from the tips, (4, 3), if sought."""
 
     @property
     def normals(self) -> Array:
@@ -56,7 +56,7 @@ class Certified:
 
 
 def named(letter: str, faces: FaceQuadruple) -> str:
-    """The id of a grasp: the method's letter and the faces in finger order."""
+    """The id of a grasp: the method's letter and the faces in finger order, as in `p-0-3-1-2`."""
     return f"{letter}-" + "-".join(str(face) for face in faces)
 
 
@@ -70,7 +70,7 @@ def certify(  # noqa: PLR0913, PLR0917 - everything a grasp is made of
     friction: float,
     regions: tuple[ContactRegion, ...],
 ) -> Certified | None:
-    """The placement, if its witness and the exact closure test both confirm it."""
+    """Certify a placement; None if its witness or the exact closure test does not confirm it."""
     normals = np.array([piece.normal for piece in pieces])
     margin = closure_margin(pieces, placement, friction)
     fault = witness_fault(placement.positions, normals, placement.forces, friction, family)
@@ -83,7 +83,7 @@ def certify(  # noqa: PLR0913, PLR0917 - everything a grasp is made of
 def closure_margin(
     pieces: Sequence[FacePiece], placement: Placement, friction: float
 ) -> float | None:
-    """Margin of the exact closure test; None unless it certifies the contacts."""
+    """Margin of the exact closure test; None unless the test certifies the contacts."""
     normals = np.array([piece.normal for piece in pieces])
     try:
         certificate = force_closure(placement.positions, normals, friction)
@@ -95,14 +95,14 @@ def closure_margin(
 def witness_fault(
     points: Array, normals: Array, forces: Array, friction: float, family: Family
 ) -> str | None:
-    """What is wrong with a witness, or None: unbalanced, outside a cone, or of another class.
+    """Why a witness is wrong (unbalanced, outside a cone, of another class); None if it is right.
 
     Args:
-        points: Contacts of an object of size one, (4, 3).
-        normals: (4, 3)
-        forces: Normal parts summing to one, (4, 3).
+        points: Contacts on an object of size one, (4, 3).
+        normals: Inward unit normals at the contacts, (4, 3).
+        forces: Contact forces whose normal parts sum to one, (4, 3).
         friction: Coulomb coefficient.
-        family: What the lines of force should form.
+        family: The class that the lines of force should form.
     """
     along, across = normal_and_tangential(forces, normals)
     if abs(float(along.sum()) - 1.0) > BALANCED:
@@ -116,7 +116,7 @@ def witness_fault(
 
 
 def check_witness(body: Polyhedron, grasp: Grasp, friction: float) -> None:
-    """Refuse a grasp from elsewhere whose witness does not show what it claims.
+    """Refuse a grasp read from elsewhere whose witness does not show what the grasp claims.
 
     Raises:
         InputError: The forces are not at the contacts, do not balance, leave their friction
@@ -134,7 +134,7 @@ def check_witness(body: Polyhedron, grasp: Grasp, friction: float) -> None:
 
 
 def _beside_foci(body: Polyhedron, grasp: Grasp) -> bool:
-    """Whether a line of force misses its focus: the only one, or that of its pair."""
+    """Whether a line of force misses its focus: the only focus, or the focus of its pair."""
     count = 1 if grasp.family == "concurrent" else 2
     if len(grasp.focus_points) != count:
         return True
@@ -144,7 +144,7 @@ def _beside_foci(body: Polyhedron, grasp: Grasp) -> bool:
 
 
 def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:
-    """The grasp in the object's frame, with its critical friction."""
+    """Convert a certified placement to a grasp in the object's frame, with critical friction."""
     placement = found.placement
     positions = _at(body, placement.positions)
     normals = found.normals
@@ -172,7 +172,7 @@ def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:
 
 
 def _at(body: Polyhedron, unit_points: Array) -> Array:
-    """Points in the pieces' units back in the object's frame [m]."""
+    """Convert points from the pieces' units to the object's frame, (k, 3) [m]."""
     return body.center_of_mass + body.radius * unit_points
 
 
@@ -182,5 +182,5 @@ def _quality(placement: Placement, normals: Array, friction: float) -> tuple[flo
 
 
 def _critical(placement: Placement, normals: Array, friction: float) -> float:
-    """The critical friction, no more than the friction that is proved enough."""
+    """Critical friction, at most the friction that is already proved enough."""
     return min(critical_friction(placement.positions, normals), friction)

@@ -1,4 +1,4 @@
-"""One method over the face quadruples of one object: what it finds, best first, and counts."""
+"""Runs one method over the face quadruples of one object, keeping its best grasps and counts."""
 
 import math
 from bisect import insort
@@ -33,39 +33,40 @@ Found: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement]
 """Pieces, force cones and the placement on them."""
 
 MOST_CHOICES = 8
-"""Choices of pieces that are tried on faces that are not convex; times the cells allowed."""
+"""Most choices of pieces tried on faces that are not convex; the free method multiplies it by its
+cells."""
 TOGETHER = 32
-"""Blocks that are open at once: a million quadruples, some hundred megabytes."""
+"""Blocks that are open at once: a million quadruples take some hundred megabytes."""
 SAME_MERIT = 1e-5
-"""What cannot be better than the worst kept by more than this share is not looked at: symmetric
-objects hold thousands of equal grasps."""
+"""A placement must beat the worst grasp kept by this share: symmetric objects hold thousands of
+equal grasps."""
 SAME_CONTACTS = 1e-6
-"""Contacts closer than this, in object radii, are the same grasp found twice."""
+"""Contacts closer than this, in object radii, count as one grasp found twice."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
-    """A construction on four faces."""
+    """A construction to be tried on four faces."""
 
     construction: Construction
     faces: FaceQuadruple
     shapes: Sequence[FaceShape]
-    """Of the four faces."""
+    """Shapes of the four faces."""
     friction: float
     """Coulomb coefficient at every contact."""
 
 
 @dataclass(slots=True, eq=False)
 class Search:
-    """What one method has found so far."""
+    """The grasps, proofs and counts that one method has gathered so far."""
 
     limit: int | None
     reach: Callable[[Certified], Reach]
-    """How fingers get to the contacts of a grasp, or why they do not."""
+    """Returns how fingers get to the contacts of a grasp, or why they do not."""
     best: list[Certified] = field(default_factory=list[Certified])
     """At most `limit` grasps, best first."""
     held: set[FaceQuadruple] = field(default_factory=set[FaceQuadruple])
-    """Faces, ascending, on which a grasp was found, kept or not."""
+    """Ascending faces on which a grasp was found, whether it was kept or not."""
     tally: Counter[str] = field(default_factory=Counter[str])
     absences: dict[FaceQuadruple, tuple[Absence, ...]] = field(
         default_factory=dict[FaceQuadruple, tuple[Absence, ...]]
@@ -81,22 +82,22 @@ class Search:
 
     @property
     def full(self) -> bool:
-        """Whether another grasp would push one out."""
+        """Whether keeping another grasp would drop one."""
         return self.limit is not None and len(self.best) == self.limit
 
     def least(self, construction: Construction) -> float:
-        """Above which merit a placement counts, and may still enter the best."""
+        """The merit that a placement must exceed to count and to enter the best."""
         if self.full and (construction.limits is None or not self.best):
             return math.inf
         worst = self.best[-1].placement.merit if self.full else -math.inf
         return max(worst * (1.0 + SAME_MERIT), construction.least)
 
     def may_gain(self, construction: Construction, room: float) -> bool:
-        """Whether discs up to a radius may still enter the best."""
+        """Whether discs up to the radius `room` may still enter the best."""
         return room > self.least(construction)
 
     def keep(self, found: Certified) -> list[Certified]:
-        """Count a grasp and, if fingers reach it, sort it in: as it was kept, or nothing."""
+        """Count a grasp and sort it in if fingers reach it; return it as kept, or an empty list."""
         faces = four(sorted(found.faces))
         way = self.reach(found)
         if way.reason:
@@ -113,7 +114,7 @@ class Search:
 
 
 def best_first(found: Certified) -> tuple[float, FaceQuadruple, FaceQuadruple]:
-    """Largest merit first; ties are broken by the faces, then by the fingers, not by rounding."""
+    """Sort key: largest merit first; ties are broken by faces, then by fingers, not by rounding."""
     return -graded(found.placement.merit), four(sorted(found.faces)), found.faces
 
 
@@ -124,9 +125,9 @@ def search_construction(
     blocks: Blocks,
     search: Search,
 ) -> Iterator[list[Certified]]:
-    """Go through blocks of quadruples, yielding what each promising one gave.
+    """Go through blocks of quadruples, yielding the grasps kept from each promising quadruple.
 
-    With a limit the search ends when no bound reaches the worst grasp kept; a construction
+    With a limit the search ends when no bound exceeds the worst grasp kept. A construction
     without bounds ends as soon as the limit is reached.
     """
     for quadruple in _in_order(construction, AttemptBounds(shapes), blocks, search):
@@ -134,6 +135,7 @@ def search_construction(
         case = Case(construction, faces, chosen_shapes(shapes, faces), friction)
         found: list[Certified] = []
         for attempt in quadruple.attempts:
+            # grasps kept meanwhile may have raised the threshold
             if not search.may_gain(construction, attempt.bound):
                 continue
             one = tried(case, attempt, search.least(construction), search.tally)
@@ -145,7 +147,7 @@ def search_construction(
 def _in_order(
     construction: Construction, bounded: AttemptBounds, blocks: Blocks, search: Search
 ) -> Iterator[Quadruple]:
-    """Quadruples to try: with a limit best first over many blocks, else block by block."""
+    """Quadruples to try: best first over many blocks if there is a limit, else block by block."""
     if construction.limits is not None:
         size = 1 if search.limit is None else TOGETHER
         for start in range(0, len(blocks), size):
@@ -164,18 +166,21 @@ def _in_order(
 
 
 def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]:
-    """The shapes of four faces with room."""
+    """The shapes of those of four faces that have room for a contact."""
     return tuple(shape for face in faces if (shape := shapes[face]) is not None)
 
 
 def tried(case: Case, attempt: Attempt, least: float, tally: Counter[str]) -> Certified | None:
-    """What a construction makes of four faces in one order of the fingers.
+    """Try a construction on four faces in one order of the fingers.
 
     Args:
         case: The construction and the faces.
         attempt: Which of the faces each finger touches, and with which force cones.
-        least: Placements of no larger merit are not worth having.
-        tally: Where to count.
+        least: The merit that a placement must exceed.
+        tally: Counts what became of the attempt.
+
+    Returns:
+        The certified grasp, or None.
     """
     faces = four(case.faces[finger] for finger in attempt.order)
     ordered = [case.shapes[finger] for finger in attempt.order]
@@ -211,6 +216,7 @@ def _settled(
     """The best placement over the choices of cones, with its regions, on the true surface."""
     placed = None
     for choice in attempt.choices:
+        # choices come with falling bounds: the later ones cannot be better either
         if choice.bound <= least:
             break
         cones = four(choice.cones[finger] for finger in attempt.order)
@@ -229,7 +235,7 @@ def _settled(
 def _placed_on(
     construction: Construction, cones: Cones, pieces: tuple[FacePiece, ...]
 ) -> Placement | None:
-    """Any placement on pieces, however small its discs."""
+    """A placement on the pieces, however small its discs, or None."""
     placed = construction.place(pieces, cones, 0.0 if construction.limits else -math.inf)
     return placed if isinstance(placed, Placement) else None
 
@@ -241,10 +247,10 @@ def _best_placement(
     least: float,
     tally: Counter[str],
 ) -> Found | None:
-    """The best over choices of one convex piece per face, if better than `least`.
+    """The best placement over choices of one convex piece per face, None unless above `least`.
 
-    Where faces have several pieces, their hulls are asked first: what they do not offer, no piece
-    does, and where they place the contacts the best pieces are likely to be.
+    Where faces have several pieces, their hulls are tried first: what hulls do not offer, no piece
+    does, and the contacts on the hulls show which pieces are likely to be best.
     """
     hulls = tuple(shape.hull for shape in shapes)
     tally["solved"] += 1
@@ -265,7 +271,7 @@ def _best_placement(
 
 
 def _without_duplicates(found: list[Certified], tally: Counter[str]) -> list[Certified]:
-    """Grasps of the same faces with different contacts, the best of each."""
+    """Drop grasps with the contacts of a better one; all are on the same faces."""
     kept: list[Certified] = []
     for one in sorted(found, key=best_first):
         here = one.placement.positions[np.argsort(one.faces)]

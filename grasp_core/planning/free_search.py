@@ -1,7 +1,7 @@
-"""The free method over the face quadruples of one object that no construction holds.
+"""Runs the free method over the face quadruples of one object that no construction holds.
 
-What it finds has no regions. But forces that balance, strictly inside the friction cones, are good
-axes for tilted force cones, so the constructions are asked once more around them.
+Grasps of the free method have no regions. But forces that balance strictly inside the friction
+cones are good axes for tilted force cones, so the constructions are tried once more around them.
 """
 
 import math
@@ -35,32 +35,32 @@ from grasp_core.planning.ranking import Attempt, ConeChoice
 from grasp_core.values import FINGERS, FaceQuadruple, ForceCone, four
 
 BATCH = 64
-"""Quadruples whose force cones are sought together."""
+"""Number of quadruples whose force cones are sought together."""
 
 Pieces: TypeAlias = tuple[FacePiece, ...]
 Answer: TypeAlias = tuple[Pieces, Placement | Absence | Undecided]
-"""What the method says about a choice of pieces."""
+"""Convex pieces of four faces, and what the free method says about them."""
 
 
 @dataclass(frozen=True, slots=True)
 class FreeRequest:
-    """What the free method is to do."""
+    """Settings of the free method."""
 
     friction: float
     theta: float
     """Half-angle of the friction cones to plan with [rad]."""
     seed: int
     cells: int
-    """Into how many parts the faces of one quadruple may be cut."""
+    """Most parts into which the faces of one quadruple may be cut."""
     upgrades: Sequence[Construction]
-    """Constructions to try with force cones around the forces of what is found."""
+    """Constructions to try with force cones around the forces of each free grasp."""
     owners: Sequence[int]
-    """Of each face the one that it is, or is a half of."""
+    """For each face index, the whole face it is or is a half of."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Placed:
-    """Contacts on a choice of pieces of four faces."""
+    """Contacts on one choice of pieces of four faces."""
 
     faces: FaceQuadruple
     pieces: Pieces
@@ -68,7 +68,7 @@ class _Placed:
 
     @property
     def normals(self) -> list[np.ndarray]:
-        """Of the four pieces."""
+        """Inward unit normals of the four pieces, four arrays (3,)."""
         return [piece.normal for piece in self.pieces]
 
 
@@ -79,7 +79,7 @@ def search_free(
     search: Search,
     held: AbstractSet[FaceQuadruple],
 ) -> Iterator[list[Certified]]:
-    """Go through the quadruples of faces that no family holds, until a limit is reached."""
+    """Go through the quadruples that no family holds, until the limit is reached."""
     while batch := list(islice(quadruples, BATCH)):
         if search.full:
             return
@@ -96,6 +96,7 @@ def search_undecided(
     """Go once more, with more cells, through the quadruples that were left undecided."""
     for faces in tuple(search.undecided):
         del search.undecided[faces]
+        # they were counted the first time, and are counted again below
         search.tally["undecided"] -= 1
         search.tally["tried"] -= 1
         placed = _decide(shapes, faces, request, search, frozenset())
@@ -113,7 +114,7 @@ def _decide(
     search: Search,
     held: AbstractSet[FaceQuadruple],
 ) -> _Placed | None:
-    """Contacts on four faces; where there are none, the proof or the doubt is noted."""
+    """Find contacts on four faces; if there are none, record the proof or that it is undecided."""
     chosen = chosen_shapes(shapes, faces)
     if faces in held or len(chosen) < FINGERS:
         return None
@@ -139,7 +140,7 @@ def _decide(
 
 
 def _whole(shapes: Shapes, faces: FaceQuadruple, request: FreeRequest, search: Search) -> Answer:
-    """Whether faces hold no grasp at all, where their halves were not proved to hold one."""
+    """Ask whether whole faces hold no grasp, where choices of their halves gave none."""
     whole = four(request.owners[face] for face in faces)
     hulls = tuple(shape.hull for shape in chosen_shapes(shapes, whole))
     search.tally["solved"] += 1
@@ -150,10 +151,10 @@ def _whole(shapes: Shapes, faces: FaceQuadruple, request: FreeRequest, search: S
 def _answers(
     faces: FaceQuadruple, shapes: Sequence[FaceShape], request: FreeRequest, search: Search
 ) -> list[Answer]:
-    """Answers that together decide four faces, unless one is undecided; a placement comes last.
+    """Answers that together decide four faces unless one is undecided; a placement comes last.
 
-    First for the hulls: their absence is that of all pieces. Then for choices of pieces, until
-    one holds a grasp, and at last with more effort for the most likely one.
+    The hulls come first: if they hold no grasp, no pieces do. Choices of pieces follow until one
+    holds a grasp, and last the most likely choice with more effort.
     """
     rng = np.random.default_rng([request.seed, *faces])
     hulls = tuple(shape.hull for shape in shapes)
@@ -174,6 +175,7 @@ def _answers(
         answers.append((pieces, _place(pieces, request, rng)))
         if isinstance(answers[-1][1], Placement):
             return answers
+    # more choices than were tried: the rest stays undecided
     if math.prod(len(shape.pieces) for shape in shapes) > most:
         answers.append((hulls, Undecided(1, 1.0)))
     return answers
@@ -187,7 +189,7 @@ def _on_triangles(
     request: FreeRequest,
     search: Search,
 ) -> _Placed | None:
-    """Contacts on the triangles of curved patches; that patches hold none proves nothing."""
+    """Contacts on the triangles of curved patches; planes without a grasp prove nothing here."""
     if isinstance(answer, Placement):
         cones = [ForceCone(piece.normal, 0.0) for piece in pieces]
         points = regions_of(point_region, pieces, cones, answer)
@@ -217,7 +219,7 @@ def _place(
 
 
 def _cone_choices(placed: Sequence[_Placed], request: FreeRequest) -> list[tuple[ConeChoice, ...]]:
-    """Tilted force cones for placements: towards foci in the middle, or around their forces."""
+    """Tilted force cones: towards the faces' or the object's middle, or around the forces."""
     if not (placed and request.upgrades):
         return [()] * len(placed)
     normals = np.array([each.normals for each in placed])
@@ -246,7 +248,7 @@ def _cone_choices(placed: Sequence[_Placed], request: FreeRequest) -> list[tuple
 def _certified(
     placed: _Placed, choices: tuple[ConeChoice, ...], request: FreeRequest, search: Search
 ) -> Certified | None:
-    """The grasp, with regions if a construction offers them."""
+    """Certify contacts, with regions if a construction offers them around these forces."""
     for construction, choice in product(request.upgrades, choices):
         if better := _upgraded(placed, construction, choice, request.friction):
             return better
@@ -263,7 +265,7 @@ def _certified(
 def _upgraded(
     placed: _Placed, construction: Construction, choice: ConeChoice, friction: float
 ) -> Certified | None:
-    """The best of what a construction offers on the same pieces."""
+    """The best grasp that a construction offers on the same pieces, or None."""
     shapes = [FaceShape((piece,), piece) for piece in placed.pieces]
     attempts = [Attempt(order, (choice,)) for order in construction.orders]
     case = Case(construction, placed.faces, shapes, friction)

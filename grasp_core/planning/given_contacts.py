@@ -1,10 +1,10 @@
-"""Contacts from elsewhere, put on an object's faces and made a grasp where they are closed.
+"""Puts contacts from elsewhere on an object's faces, and makes a grasp of closed ones.
 
-Contacts of other tools lie beside the surface by what rounding, sampling or a simulator's give
-leave. Each is moved to the nearest point of the surface whose normal leans little from the given
-one, and takes the surface's normal there: what is judged is what fingers touch. On planar faces
-that is a face; a curved surface gets a face of its own around each contact, as patches need not
-cover it.
+Contacts of other tools lie beside the surface by as much as rounding, sampling or a simulator's
+give leaves. Each is moved to the nearest point of the surface whose normal leans little from the
+given one, and takes the surface's normal there, so what is judged is what fingers touch. On planar
+faces that is a face of the object; a curved surface gets a new face around each contact, as its
+patches need not cover it.
 """
 
 import math
@@ -37,28 +37,28 @@ from grasp_core.values import (
 )
 
 LARGEST_LEAN = math.radians(20.0)
-"""Between a given normal and that of the face the contact is put on [rad]."""
+"""Largest angle between a given normal and the normal where the contact is put [rad]."""
 SURROUNDINGS = 0.05
 """Radius of the face around a contact on a curved surface, relative to the object's size."""
 CORNERS = 16
-"""Of such a face."""
+"""Corners of the face around a contact on a curved surface."""
 NEARER = 1e-9
-"""A face is nearer to a contact than the ones before it if it is so by this much, relative to the
-object's size: a contact on an edge is on the first of its faces that face alike."""
+"""A face replaces an earlier one as the nearest only if it is nearer by this much, relative to the
+object's size: a contact on an edge goes to the first of its faces with a fitting normal."""
 LARGEST_MOVE = 0.02
-"""How far a contact may be from such a face, relative to the object's size."""
+"""Largest distance of a given contact from the surface, relative to the object's size."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seated:
-    """Contacts on the faces of an object."""
+    """Four contacts on the faces of an object."""
 
     body: Polyhedron
-    """The object; where it is curved, with four more faces, around the contacts."""
+    """The object; a curved one with four more faces, one around each contact."""
     faces: FaceQuadruple
     contacts: tuple[Contact, Contact, Contact, Contact]
     moved_m: float
-    """Largest distance of a contact from where it was given."""
+    """Largest distance of a contact from where it was given [m]."""
 
 
 def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
@@ -66,11 +66,11 @@ def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
 
     Args:
         body: The object.
-        positions: In its frame, (4, 3) [m].
-        normals: Into the object, unit vectors, (4, 3).
+        positions: Contact points in the object's frame, (4, 3) [m].
+        normals: Unit vectors into the object, (4, 3).
 
     Raises:
-        InputError: The numbers are not those of four contacts, or one is near no face.
+        InputError: The arrays are not those of four contacts, or a contact is near no face.
     """
     points = frozen(positions, (FINGERS, 3), "positions")
     inward = frozen_units(normals, (FINGERS, 3), "normals")
@@ -89,17 +89,20 @@ def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
 
 
 def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCertificate:
-    """Four contacts as a grasp, or the proof that they are not in force closure.
+    """Turn four contacts into a grasp, or prove that they are not in force closure.
 
-    The grasp claims no regions, and its lines of force no class but the general one.
+    The grasp claims no regions, and for its lines of force only the general class.
 
     Args:
         seated: Contacts on an object's faces.
         friction: Coulomb coefficient.
-        name: What to call the grasp.
+        name: The id of the grasp.
+
+    Returns:
+        The grasp, or the certificate with a separating wrench.
 
     Raises:
-        UndecidedError: Closure is too close to call.
+        UndecidedError: Force closure is too close to call.
     """
     body = seated.body
     positions = np.array([contact.position for contact in seated.contacts])
@@ -130,18 +133,18 @@ def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCerti
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Part:
-    """A flat convex part of a surface."""
+    """A flat convex part of a surface: a piece of a face, or a triangle of a curved surface."""
 
     face: int
-    """Index of its face, or of its triangle where the object is curved."""
+    """Index of the face, or of the triangle where the object is curved."""
     normal: Array
-    """Into the object, (3,)."""
+    """Unit vector into the object, (3,)."""
     polygon: Array
-    """Counter-clockwise about the normal, (k, 3) [m]."""
+    """Corners, counter-clockwise about the normal, (k, 3) [m]."""
 
 
 def _parts(body: Polyhedron) -> tuple[_Part, ...]:
-    """What the surface of an object consists of."""
+    """The flat convex parts that make up the surface of an object."""
     if body.patches is None:
         return tuple(
             _Part(index, face.normal, piece)
@@ -160,10 +163,10 @@ def _parts(body: Polyhedron) -> tuple[_Part, ...]:
 def _nearest(
     body: Polyhedron, parts: Sequence[_Part], finger: int, point: Array, normal: Array
 ) -> tuple[_Part, Contact, float]:
-    """The part, the contact on it, and how far away it was.
+    """The nearest part with a fitting normal, the contact on it, and the distance moved [m].
 
     Raises:
-        InputError: None is near.
+        InputError: No part with a fitting normal is near.
     """
     reach = LARGEST_MOVE * body.radius
     normals = np.array([part.normal for part in parts])
@@ -189,7 +192,7 @@ def _nearest(
 
 
 def _around(body: Polyhedron, part: _Part, contact: Contact) -> Face:
-    """A face around a contact on a triangle, in the triangle's plane."""
+    """A round face about a contact on a triangle, in the triangle's plane."""
     turns = np.linspace(0.0, 2.0 * math.pi, CORNERS, endpoint=False)
     radius = SURROUNDINGS * body.radius
     ring = radius * np.column_stack([np.cos(turns), np.sin(turns)])
@@ -206,7 +209,7 @@ def _around(body: Polyhedron, part: _Part, contact: Contact) -> Face:
 
 
 def _nearest_in(polygon: Array, normal: Array, point: Array) -> Array:
-    """The point of a convex polygon nearest to a point, (3,)."""
+    """The point of a convex polygon that is nearest to a given point, (3,) [m]."""
     flat = point - float(normal @ (point - polygon[0])) * normal
     if within(flat, polygon, normal, 0.0):
         return flat

@@ -1,4 +1,4 @@
-"""Runs each method over the face quadruples of one object, and adds up what they found."""
+"""Runs the methods over the face quadruples of one object, and adds up what they found."""
 
 import math
 import time
@@ -24,20 +24,20 @@ from grasp_core.planning.result import Outcomes
 from grasp_core.values import FINGERS, FaceQuadruple, Family, Method, four
 
 KEPT_BLOCKS = 8
-"""Blocks of quadruples that are made once for all families: some hundred megabytes."""
+"""Number of blocks made once for all families and kept: they take some hundred megabytes."""
 Progress: TypeAlias = Callable[[int, int, int], None]
-"""Called with a count of quadruples that rises to that of all, the latter, and grasps so far."""
+"""Called with (quadruples finished, all quadruples, grasps so far) after each quadruple tried."""
 
 
 class _Kept:
-    """Blocks of quadruples, of which the first ones are kept once they are made."""
+    """Blocks of quadruples; the first ones are kept once they are made."""
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
         self.made: dict[int, Prospects] = {}
 
     def make(self, place: int) -> Prospects:
-        """One of the blocks."""
+        """Make a block, or return it if it was kept."""
         if place in self.made:
             return self.made[place]
         block = self.blocks.make(place)
@@ -47,7 +47,7 @@ class _Kept:
 
 
 class Searches:
-    """One search per method over blocks of quadruples; the free method goes last."""
+    """The searches of one plan, one per method; the free method goes last."""
 
     def __init__(self, body: Polyhedron, request: PlanRequest) -> None:
         self.request = request
@@ -77,16 +77,16 @@ class Searches:
 
     @property
     def constructions(self) -> dict[Family, Search]:
-        """The searches of the paper's families."""
+        """The searches of the paper's three families, as far as they are asked for."""
         return {family: self.by_method[family] for family in FAMILIES if family in self.by_method}
 
     @property
     def held(self) -> set[FaceQuadruple]:
-        """Faces, ascending, on which some family has a grasp."""
+        """Ascending faces of every quadruple on which a family has a grasp."""
         return set[FaceQuadruple]().union(*(search.held for search in self.constructions.values()))
 
     def run(self, progress: Progress | None) -> Iterator[Certified]:
-        """Yield each certified grasp, in the order of the search."""
+        """Yield each certified grasp in the order of the search, on the standard object."""
         total, found = len(self.by_method) * self.quadruples, 0
         for done, grasps in self._steps():
             found += len(grasps)
@@ -97,7 +97,7 @@ class Searches:
             progress(total, total, found)
 
     def _steps(self) -> Iterator[tuple[int, list[Certified]]]:
-        """What each quadruple gives that is tried, and how many were before it, at least."""
+        """Yield, for each quadruple tried, how many are finished at least, and its grasps."""
         for place, (method, search) in enumerate(self.constructions.items()):
             construction, dealt_with = CONSTRUCTIONS[method], place * self.quadruples
             search.limit = self._share(place)
@@ -106,6 +106,7 @@ class Searches:
                 self._blocks(construction), search,
             )  # fmt: skip
             yield from enumerate(_timed(steps, search), start=dealt_with + 1)
+            # each quadruple counts once per order of the fingers
             every = self.quadruples * len(construction.orders)
             search.tally["pruned"] = every - search.tally["tried"]
         if "free" in self.by_method:
@@ -123,7 +124,7 @@ class Searches:
                     yield dealt_with + self.quadruples, found
 
     def _every(self) -> Iterator[FaceQuadruple]:
-        """All quadruples of faces, those that share one last."""
+        """All quadruples of faces; the ones with two halves of a face come last."""
         yield from combinations(range(self.whole), FINGERS)
         for faces in self.shared.tolist():
             yield four(faces)
@@ -136,10 +137,10 @@ class Searches:
         return max(self.request.searched - found, 0)
 
     def _share(self, place: int) -> int | None:
-        """How many grasps of a construction can be kept, given what those before it found.
+        """Most grasps that a construction can keep, given what the constructions before it found.
 
-        Families take turns. If only some of the earlier ones, with n_1, n_2, .. grasps, do not run
-        out, k of them, this one gets at most every (k + 1)-th of what the others leave.
+        Families take turns. If all earlier ones but k run out, with n_1, n_2, .. grasps, this one
+        gets at most every (k + 1)-th grasp of what they leave.
         """
         limit = self.request.searched
         if limit is None:
@@ -151,7 +152,7 @@ class Searches:
     def _blocks(self, construction: Construction) -> Blocks:
         """Blocks of quadruples for one construction.
 
-        Where nothing bounds discs, only cones around the normals count.
+        A construction without bounds on discs uses only cones around the normals.
         """
         kept = self.spanning_blocks if construction.limits is None else self.tilted_blocks
         return Blocks(kept.blocks.rooms, kept.make)
@@ -167,7 +168,7 @@ class Searches:
         )  # fmt: skip
 
     def _reach(self, found: Certified) -> Reach:
-        """How fingers, if any are given, get to the contacts."""
+        """How fingers get to the contacts; nothing is sought where no finger is given."""
         finger = self.request.finger
         if finger is None:
             return Reach(None)
@@ -175,11 +176,11 @@ class Searches:
         return reach(self.body, found.faces, positions, found.normals, finger)
 
     def whole_faces(self, faces: FaceQuadruple) -> FaceQuadruple:
-        """The faces of the object as it was given, ascending, where some may be halves."""
+        """Ascending faces of the object as given, where halves count as their whole faces."""
         return four(sorted(self.standard.faces[self.owners[face]] for face in faces))
 
     def as_found(self, found: Certified) -> Certified:
-        """A grasp on the object as it was given, named by its faces; halves by `a` and `b`."""
+        """Translate a grasp to the object as given; half faces are named by `a` and `b`."""
         first = {owner: index for index, owner in reversed(list(enumerate(self.owners)))
                  if index != owner}  # fmt: skip
         owners = [self.owners[face] for face in found.faces]
@@ -194,7 +195,7 @@ class Searches:
         return as_given(found, places, mirrored=self.standard.mirrored)
 
     def absences(self, search: Search) -> dict[FaceQuadruple, tuple[Absence, ...]]:
-        """Proofs of absence on the object as it was given."""
+        """Proofs of absence found by a search, translated to the object as it was given."""
         return {
             self.whole_faces(faces): tuple(
                 absence_as_given(proof, self.standard, self.owners) for proof in proofs
@@ -203,17 +204,18 @@ class Searches:
         }
 
     def outcomes(self) -> Outcomes:
-        """What became of every four faces."""
+        """Counts of how the quadruples ended: held, absent, open or out of reach."""
         searches = list(self.by_method.values())
         held = set[FaceQuadruple]().union(*(search.held for search in searches))
         absences = set[FaceQuadruple]().union(*(search.absences for search in searches))
+        # patches leave parts of the surface out, so a patch without room proves nothing
         absent = len(absences) + (0 if self.body.patches else self._without_room())
         out_of_reach = len(self.unreached())
         undecided = self.quadruples - len(held) - absent - out_of_reach
         return Outcomes(len(held), absent, undecided, out_of_reach)
 
     def unreached(self) -> dict[FaceQuadruple, str]:
-        """Faces on which contacts exist, none of which fingers reach, and why not the last ones."""
+        """Quadruples with contacts, none of which fingers reach, and why not the last ones."""
         searches = list(self.by_method.values())
         known = set[FaceQuadruple]().union(*(s.held for s in searches))
         known = known.union(*(search.absences for search in searches))
@@ -225,7 +227,7 @@ class Searches:
         }
 
     def _without_room(self) -> int:
-        """Quadruples with a face that has no room for a contact."""
+        """Number of quadruples with a face that has no room for a contact."""
         roomy = sum(shape is not None for shape in self.shapes[: self.whole])
         shared = sum(
             any(self.shapes[face] is None for face in faces) for faces in self.shared.tolist()
@@ -234,7 +236,7 @@ class Searches:
 
 
 def _timed(steps: Iterator[list[Certified]], search: Search) -> Iterator[list[Certified]]:
-    """The same steps, their processor time added to the search."""
+    """Yield the same steps, adding their processor time to the search."""
     while True:
         start = time.process_time()
         step = next(steps, None)

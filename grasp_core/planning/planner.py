@@ -1,10 +1,10 @@
 """The planner: from an object and a friction coefficient to certified grasps.
 
 The three constructions of the paper work on quadruples with force cones that positively span (P3),
-around the normals or tilted, in the order of an upper bound on their radius; with a `limit`, a
+around the normals or tilted, in the order of an upper bound on their radius. With a `limit`, a
 search ends when the bound falls below the worst radius kept, so the grasps returned are the best
-ones and not merely some. The free method goes through the quadruples that are left, and proves
-for the others that they hold no grasp.
+ones and not merely some. The free method goes through the quadruples that no construction holds,
+and finds grasps on them or proves that there are none.
 """
 
 import math
@@ -50,31 +50,31 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     Args:
         body: The object.
         friction: Coulomb coefficient at every contact.
-        families: What to try: constructions of the paper, and `free`, the method without a fixed
-            type. Beside constructions it gets the quadruples that they leave over.
+        families: Methods to try: constructions of the paper, and `free`, the method without a fixed
+            type. Beside constructions `free` gets the quadruples that they leave over.
         theta_deg: Half-angle of the friction cones to plan with [deg]; atan(friction) when
             None, and never more than that.
-        cones: `normal` keeps force cones around the normals, as in the paper; with `tilted` leaning
-            ones are tried too.
-        limit: Keep only this many grasps.
-        rank_by: Which are the best. By `radius`, families take turns, each with its largest discs.
-            Reguli and free grasps have no discs; of these the first found count, and free ones
-            only as far as the others do not suffice. By `friction-margin` (the least critical
-            friction), `ferrari-canny` (the largest quality) and `diverse` (each next one the
+        cones: `normal` keeps force cones around the normals, as in the paper; `tilted` also tries
+            cones that lean away from the normals.
+        limit: Keep at most this many grasps, the best ones.
+        rank_by: What makes a grasp better. By `radius`, families take turns, each with its largest
+            discs first. Reguli and free grasps have no discs: the first ones found count, and free
+            ones only if the others are too few. By `friction-margin` (the least critical
+            friction), `ferrari-canny` (the largest quality) and `diverse` (each next one is the
             farthest from those before it) all grasps that are found compete.
-        seed: For the restarts of the free method.
-        cells: Into how many parts the free method may cut the faces of one quadruple.
-        complete: Cut the faces that would stay undecided, into 20,000 parts if need be.
+        seed: Seed of the free method's restarts.
+        cells: Most parts into which the free method may cut the faces of one quadruple.
+        complete: Decide the quadruples that would stay undecided, with up to 20,000 parts each.
         finger: Keep only grasps that such fingers reach on straight free lines.
-        clearance: How far contacts and their regions stay from all edges of their faces [m]. Faces
-            are cut back by so much, at corners that turn inwards by somewhat more; what is proved
-            absent is absent from what is left.
-        share_faces: Let two fingers stand on one face, at least so far apart [m]; each face is cut
-            once for that, across its longest direction.
+        clearance: Distance of contacts and their regions from all edges of their faces [m]. Faces
+            are cut back by this much, by somewhat more at corners that turn inwards; absence is
+            then proved for what is left of the faces.
+        share_faces: Let two fingers stand on one face, at least this far apart [m]; each face is
+            cut once for that, across its longest direction.
         progress: Called after each quadruple that is tried.
 
     Returns:
-        The certified grasps, the best first, or the reason why there are none.
+        The certified grasps, the best first, or a sentence why there are none, with counts.
 
     Raises:
         InputError: An argument is out of range, or the object has too many faces.
@@ -109,8 +109,8 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
     """Like `plan`, but yields each grasp as soon as it is certified, in no particular order.
 
     Raises:
-        InputError: As `plan`.
-        SolverError: As `plan`.
+        InputError: An argument is out of range, or the object has too many faces.
+        SolverError: A program was neither solved nor proved infeasible.
     """
     request = PlanRequest(
         friction, _listed(families), theta_deg, cones, seed=seed, cells=cells, finger=finger,
@@ -129,7 +129,7 @@ def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
 
 
 def _planned(body: Polyhedron, request: PlanRequest, searches: Searches) -> Plan:
-    """What the searches found, the best of it as grasps."""
+    """Put together a plan from what the searches found, with the best grasps."""
     grasps: list[Grasp] = []
     owner = {id(found): search for search in searches.by_method.values() for found in search.best}
     for found in chosen([search.best for search in searches.by_method.values()], request):
@@ -161,7 +161,7 @@ def _planned(body: Polyhedron, request: PlanRequest, searches: Searches) -> Plan
 
 
 def _absence(body: Polyhedron, request: PlanRequest, counts: PlanCounts, outcomes: Outcomes) -> str:
-    """Why there is no grasp, as a sentence."""
+    """Why there is no grasp, as a sentence with the object's name."""
     name = body.name
     if outcomes.out_of_reach:
         return (

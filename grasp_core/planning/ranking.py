@@ -1,4 +1,4 @@
-"""In which order quadruples of faces are worth a program, the most promising first."""
+"""Orders quadruples of faces by how promising they are, before any program is solved for them."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ class ConeChoice:
 
     cones: tuple[ForceCone, ForceCone, ForceCone, ForceCone]
     bound: float
-    """No disc can be larger, relative to the object's radius; infinite without discs."""
+    """Upper bound on the discs [object radii]; infinite for constructions without discs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,49 +28,49 @@ class Attempt:
 
     order: FingerOrder
     choices: tuple[ConeChoice, ...]
-    """The larger bound first."""
+    """Choices of cones, the larger bound first."""
 
     @property
     def bound(self) -> float:
-        """No disc of any choice can be larger."""
+        """Upper bound on the discs of all choices [object radii]."""
         return self.choices[0].bound
 
 
 @dataclass(frozen=True, slots=True)
 class Quadruple:
-    """Four faces to try."""
+    """Four faces, with the attempts to make on them."""
 
     faces: FaceQuadruple
     attempts: tuple[Attempt, ...]
 
     @property
     def bound(self) -> float:
-        """No disc of any attempt can be larger."""
+        """Upper bound on the discs of all attempts [object radii]."""
         return max(attempt.bound for attempt in self.attempts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ranking:
-    """Quadruples with force cones, most promising first."""
+    """Quadruples with chosen force cones, the most promising first."""
 
     candidates: Candidates
     places: Indices
-    """Which of the candidates, (q,)."""
+    """Indices into the candidates, (q,)."""
     bounds: Array
-    """Of each choice of cones and finger order, minus infinity where it is not worth a program,
-    (q, 2, orders)."""
+    """Bound of each choice of cones and finger order, (q, 2, orders) [object radii]; minus infinity
+    where an attempt is not worth a program."""
     construction: Construction
 
     def __len__(self) -> int:
         return len(self.places)
 
     def first(self, count: int) -> "Ranking":
-        """The most promising ones alone, without the candidates of the others."""
+        """The first `count` quadruples, without the candidates of the others."""
         some = self.candidates.some(self.places[:count])
         return Ranking(some, np.arange(count), self.bounds[:count].copy(), self.construction)
 
     def quadruple(self, row: int, bounds: Array) -> Quadruple:
-        """One of the quadruples with other bounds, (2, orders).
+        """The quadruple in a row, with the given bounds, (2, orders).
 
         Choices of cones and finger orders with a bound of minus infinity are left out.
         """
@@ -94,28 +94,28 @@ class Ranking:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlook:
-    """Quadruples whose cones are not chosen yet, most promising first."""
+    """Quadruples whose cones are not chosen yet, the most promising first."""
 
     prospects: Prospects
     bounds: Array
-    """No disc is larger, in object radii, (q,); infinite for reguli."""
+    """Upper bounds on the discs, (q,) [object radii]; infinite for reguli, which have none."""
     construction: Construction
 
     def __len__(self) -> int:
         return len(self.bounds)
 
     def ranking(self, rows: slice) -> "Ranking":
-        """Some of them with their cones."""
+        """Choose force cones for the quadruples in `rows`, and rank them."""
         return ranked(self.prospects.candidates(rows), self.construction)
 
 
 def outlook(prospects: Prospects, construction: Construction, worth: float) -> Outlook:
-    """In the order of what the widest cones allow; only what may be worth having.
+    """Order quadruples by what their widest cones allow, dropping those not above `worth`.
 
     Args:
         prospects: Quadruples of faces.
-        construction: What is to be built on them.
-        worth: The merit above which placements are worth having.
+        construction: The construction to be tried on them.
+        worth: The merit that placements must exceed.
     """
     widest, bounds = prospects.widest, np.full(len(prospects), np.inf)
     promise = widest
@@ -129,7 +129,7 @@ def outlook(prospects: Prospects, construction: Construction, worth: float) -> O
 
 
 def ranked(candidates: Candidates, construction: Construction) -> Ranking:
-    """In the order of an upper bound on the radius; for reguli, widest force cones first."""
+    """Order candidates by an upper bound on their radius; for reguli, by the width of the cones."""
     usable: NDArray[np.bool_] = candidates.half_angles > LEAST_SPAN_ANGLE
     usable &= candidates.rooms[:, None] > 0.0
     spans = usable[:, NORMAL].copy()
@@ -139,6 +139,7 @@ def ranked(candidates: Candidates, construction: Construction) -> Ranking:
         promise = candidates.half_angles[:, NORMAL]
     else:
         limits = candidates.limits[:, :, construction.limits]
+        # an undefined limit bounds nothing
         bounds = np.where(np.isnan(limits), np.inf, limits)
         bounds = np.minimum(bounds, candidates.rooms[:, None, None])
         promise = None

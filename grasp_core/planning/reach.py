@@ -1,16 +1,16 @@
-"""Whether four fingers can come to their contacts: balls on straight free lines to their places.
+"""Whether four fingers can get to their contacts on straight free lines.
 
-Solved: for each finger a direction in which its ball of radius r, and the rod behind it, reach the
-place p - r n where the ball touches at p, from a given distance, without touching anything else.
+Solved: for each finger, a direction in which a ball of radius r and the rod behind it reach the
+place p - r n, where the ball touches at p, from a given distance without touching anything else.
 A rod is all points within r of a segment, so it is free of the object iff no triangle is nearer to
 the segment than r, and free of another rod iff the segments are 2 r apart.
 
 A segment and a triangle are nearest where they cross, at an end of the segment above the
-triangle, or at an edge of the triangle. The surface of the curved patch that is touched does not
-count: it is not exactly the plane that the finger is thought to touch.
+triangle, or at an edge of the triangle. The triangles of the curved patch that is touched do not
+count: they are not exactly in the plane that the finger is thought to touch.
 
-Directions tried are the normal and a ring or two around it; that none of them is free does not
-prove that no other is.
+The directions tried are the normal and two rings around it. If none of them is free, another
+direction may still be.
 """
 
 import math
@@ -30,22 +30,23 @@ from grasp_core.values import FaceQuadruple
 TOUCHING = 1e-6
 """Overlap that does not count, in object radii: what six digits in a file keep."""
 RINGS_DEG = (30.0, 60.0)
-"""How far from the normal fingers may come, beside straight along it."""
+"""Angles from the normal at which fingers may come, besides straight along it [deg]."""
 RING_DIRECTIONS = 6
+"""Directions tried on each ring."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finger:
-    """What has to get to a contact.
+    """A finger's size and the length of its way to a contact.
 
     Raises:
         InputError: A length is not positive.
     """
 
     radius_m: float
-    """Of the spherical tip, and of the rod behind it."""
+    """Radius of the spherical tip and of the rod behind it [m]."""
     approach_m: float
-    """How long the free line is on which it comes."""
+    """Length of the free line on which the finger comes [m]."""
 
     def __post_init__(self) -> None:
         positive(self.radius_m, "radius_m")
@@ -69,10 +70,13 @@ def reach(
 
     Args:
         body: The object.
-        faces: Which each finger touches.
+        faces: The face that each finger touches.
         positions: Contacts, (k, 3) [m].
         normals: Unit vectors into the object, (k, 3).
-        finger: What has to get there.
+        finger: Size of the fingers.
+
+    Returns:
+        Directions that are free together, or the reason why none were found.
     """
     slack = TOUCHING * body.radius
     tips = positions - finger.radius_m * normals
@@ -104,18 +108,18 @@ def reach(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Surroundings:
-    """The triangles that a finger may meet, each in a ball."""
+    """Triangles that a finger may meet, each with a ball around it."""
 
     corners: Array
-    """(t, 3, 3)"""
+    """Corners, (t, 3, 3) [m]."""
     middles: Array
-    """(t, 3)"""
+    """Centres of the balls, (t, 3) [m]."""
     extents: Array
-    """Radii of the balls, (t,)."""
+    """Radii of the balls, (t,) [m]."""
 
     @classmethod
     def of(cls, body: Polyhedron, face: int) -> "_Surroundings":
-        """All triangles but those of the curved patch that is touched."""
+        """All triangles of an object but those of the curved patch that is touched."""
         keep = np.ones(len(body.triangles), dtype=np.bool_)
         keep[body.faces[face].facets] = False
         corners = body.vertices[body.triangles[keep]]
@@ -124,9 +128,10 @@ class _Surroundings:
         return cls(corners, middles, extents)
 
     def distance(self, start: Array, end: Array, within: float) -> float:
-        """Distance of a segment from the nearest triangle, if less than `within`."""
+        """Distance of a segment from the nearest triangle [m]; something larger beyond `within`."""
         along = end - start
         squared = float(along @ along)
+        # only triangles whose balls come near enough need the exact distance
         shares = np.clip((self.middles - start) @ along / squared, 0.0, 1.0) if squared else 0.0
         away = self.middles - start - np.multiply.outer(shares, along)
         near = np.einsum("ti,ti->t", away, away) <= (within + self.extents) ** 2
@@ -136,7 +141,7 @@ class _Surroundings:
 
 
 def _directions(outward: Array) -> Iterator[Array]:
-    """The direction along a normal, then those around it."""
+    """Yield the direction along a normal, then the directions of the rings around it."""
     yield outward
     frame = plane_frame(outward)
     for lean in np.radians(RINGS_DEG):
@@ -146,7 +151,7 @@ def _directions(outward: Array) -> Iterator[Array]:
 
 
 def _apart(tips: Array, ways: list[list[Array]], finger: Finger, slack: float) -> Array | None:
-    """The first choice of directions in which no two rods overlap, straight ones first."""
+    """Choose one free direction per finger so that no rods overlap, straight ones first."""
     ends = [
         [tip + finger.approach_m * way for way in each]
         for tip, each in zip(tips, ways, strict=True)
@@ -169,12 +174,12 @@ def _apart(tips: Array, ways: list[list[Array]], finger: Finger, slack: float) -
 
 
 def segment_distances(start: Array, end: Array, triangles: Array) -> Array:
-    """Distances of a segment from triangles, (t,).
+    """Distances of a segment from triangles, (t,) [m].
 
     Args:
-        start: (3,)
-        end: (3,)
-        triangles: (t, 3, 3)
+        start: One end of the segment, (3,) [m].
+        end: The other end, (3,) [m].
+        triangles: Corners, (t, 3, 3) [m].
     """
     after = np.roll(triangles, -1, axis=1)
     edges = [_between(start, end, triangles[:, k], after[:, k]) for k in range(3)]
@@ -199,7 +204,7 @@ def _inside(points: Array, triangles: Array, after: Array, normals: Array) -> ND
 
 
 def _between(start: Array, end: Array, tails: Array, heads: Array) -> Array:
-    """Distances of one segment from others, (t,): the least over the square of both shares."""
+    """Distances of one segment from others, (t,) [m]: the least over the points of both."""
     one, others, apart = end - start, heads - tails, start - tails
     a, e = float(one @ one), np.einsum("ti,ti->t", others, others)
     b, c, f = others @ one, apart @ one, np.einsum("ti,ti->t", others, apart)

@@ -1,4 +1,4 @@
-"""What is asked of the planner, checked."""
+"""The keywords of `plan` as one value, and their checks."""
 
 import math
 from dataclasses import dataclass
@@ -29,15 +29,15 @@ METHODS: tuple[Method, ...] = get_args(Method)
 """Everything that `families` may name: the three constructions and `free`."""
 ConeKind: TypeAlias = Literal["tilted", "normal"]
 RankBy: TypeAlias = Literal["radius", "friction-margin", "ferrari-canny", "diverse"]
-"""What makes one grasp better than another."""
+"""What makes one grasp better than another (see `plan`)."""
 ITS_RADIUS = ", the object's radius in m"
 FARTHEST_APPROACH = 1e3
 """Longest free line of a finger, in object radii."""
 COMPLETE_CELLS = 20_000
 """Parts into which `complete` may cut the faces of one quadruple."""
 MOST_FACES = 1000
-"""Tables of all pairs and, of those whose normals span, triples of faces take some hundred
-megabytes."""
+"""Most faces to plan with: tables of all pairs of faces and of all triples whose normals span then
+take some hundred megabytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,12 +70,12 @@ class PlanRequest:
 
 
 def methods_for(body: Polyhedron) -> tuple[Method, ...]:
-    """What a command tries unless told otherwise: on many faces not the free method."""
+    """The methods that commands try by default: the three families, and on few faces `free`."""
     return METHODS if len(body.faces) <= MAX_FACES else FAMILIES
 
 
 def check_request(body: Polyhedron, request: PlanRequest) -> None:
-    """Refuse what cannot be planned.
+    """Refuse a request that cannot be planned.
 
     Raises:
         InputError: A keyword is out of range, or the object has too many faces.
@@ -138,7 +138,9 @@ def _check_kinds(request: PlanRequest) -> None:
     if unknown or not families:
         raise InputError(f"families must be among {', '.join(METHODS)}; got {shown(families)}")
     if request.complete and "free" not in request.families:
-        raise InputError("complete decides all faces, which takes the free method; add it")
+        raise InputError(
+            "complete takes the free method, which decides all faces; add free to families"
+        )
     one_of(request.cones, get_args(ConeKind), "cones")
     one_of(request.rank_by, get_args(RankBy), "rank_by")
 

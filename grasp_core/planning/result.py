@@ -10,7 +10,7 @@ from grasp_core.short_text import counted, summary
 from grasp_core.values import FaceQuadruple, Grasp
 
 LONGEST_REASON = 160
-"""Characters of a reason in the `repr` of a plan, which is to be two lines at most."""
+"""Most characters of a reason in the `repr` of a plan, which is to take two lines at most."""
 
 
 class Proof(Protocol):
@@ -23,67 +23,68 @@ class Proof(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class MethodCounts:
-    """What became of the candidates of one method.
+    """Counts of what became of the candidates of one method.
 
     A candidate is a set of four faces; for pencils and reguli, with one of the three ways to pair
-    them. Tried candidates end as one of the last six.
+    them. Tried candidates end in one of the last six counts.
     """
 
     tried: int = 0
     """Candidates whose programs were set up."""
     pruned: int = 0
-    """Candidates skipped because a bound showed that their discs are too small, their pairs are too
-    far from symmetric for a regulus, the free method is not needed on them, or because they cannot
-    enter the best `limit`."""
+    """Candidates skipped because a bound shows that their discs are too small, their pairs are too
+    far from symmetric for a regulus, the free method is not needed on them, or they cannot enter
+    the best `limit`."""
     solved: int = 0
     """Choices of one convex piece per face that were considered."""
     infeasible: int = 0
-    """No placement with discs of the least radius at the planned angle, with a limit none that
-    would enter the best, or none on the surface of curved patches; for the free method, proved to
-    have no grasp at all."""
+    """Candidates without a placement that has discs of the least radius at the planned angle, would
+    enter the best if there is a limit, and exists on the surface of curved patches; for the free
+    method, candidates proved to have no grasp at all."""
     undecided: int = 0
-    """Free method: neither a grasp nor a proof of absence. Others: a program was not solved."""
+    """Candidates with neither a grasp nor a proof of absence (free method), or with an unsolved
+    program (other methods)."""
     duplicates: int = 0
-    """Found again at the same contacts, with another pairing."""
+    """Grasps found again at the same contacts, with another pairing of the fingers."""
     found: int = 0
-    """Grasps whose witness is of its family and which exact force closure certified."""
+    """Grasps whose witness is of the method's family and which exact force closure certified."""
     unreachable: int = 0
     """Certified grasps that the fingers asked for do not reach."""
     rejected: int = 0
-    """Placements that the witness or the exact closure test did not confirm: a bug if not 0."""
+    """Placements that the witness or the exact closure test did not confirm: not 0 means a bug."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcomes:
-    """What is known of all sets of four faces."""
+    """Counts of what is known about all sets of four faces."""
 
     held: int
-    """A certified grasp exists."""
+    """Sets with a certified grasp."""
     absent: int
-    """It is proved that there is none, or a face has no room for a contact."""
+    """Sets proved to hold no grasp, or with a face that has no room for a contact."""
     open: int
-    """Neither: undecided by the free method, or, as with a limit, not asked to the end."""
+    """Sets that are neither: the free method left them undecided or, with a limit, untried."""
     out_of_reach: int = 0
-    """Certified contacts exist, but no fingers as asked for reached those that were found."""
+    """Sets with certified contacts, none of which the fingers asked for reached."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlanCounts:
-    """What the planner tried on one object."""
+    """Counts of what the planner tried on one object."""
 
     faces: int
     quadruples: int
-    """All sets of four faces."""
+    """Number of sets of four faces; with `share_faces` also of sets with two halves of a face."""
     spanning: int | None
-    """Those whose normals positively span at the least planned angle (P3); None above 200 faces,
-    where they are too many to count."""
+    """Sets whose normals positively span at the least planned angle (P3); None above 200 faces,
+    where there are too many to count."""
     families: Mapping[str, MethodCounts] = field(default_factory=dict[str, MethodCounts])
-    """By method, the three families and perhaps `free`."""
+    """Counts of each method: the three families and `free`, as far as they were asked for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Plan:
-    """The grasps found on one object, best radius first, and what was tried."""
+    """The grasps found on one object, the best first, and what was tried."""
 
     grasps: tuple[Grasp, ...]
     friction: float
@@ -101,17 +102,17 @@ class Plan:
     a proof for their convex hulls, or for each choice of one convex piece per face. Pieces too
     small for a contact, a millionth of the object, are left out."""
     finger: Finger | None = None
-    """What was to get to the contacts, if anything."""
+    """The finger that was to get to the contacts; None if reach was not asked for."""
     undecided: Mapping[FaceQuadruple, float] = field(default_factory=dict[FaceQuadruple, float])
-    """Face quadruples on which the free method found neither, and the share of the choices of
-    contacts that is open, where each cut counts for half."""
+    """Face quadruples on which the free method found neither a grasp nor a proof, with the share of
+    the choices of contacts that is open, where each cut counts for half."""
     unreached: Mapping[FaceQuadruple, str] = field(default_factory=dict[FaceQuadruple, str])
-    """Face quadruples with contacts that fingers do not reach, and why."""
+    """Face quadruples with contacts that fingers do not reach, and why not."""
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
-    """Processor time of each method, from its first program to the last critical friction."""
+    """Processor time of each method [s], from its first program to the last critical friction."""
 
     def __repr__(self) -> str:
-        """How many grasps there are, the largest of them, and what is known of all quadruples."""
+        """Number of grasps, their largest radius, and what is known about all quadruples."""
         of, known = self.counts.quadruples, self.outcomes
         sets = f"of {counted(of, 'face quadruple')} {known.held} held, {known.absent} absent"
         sets += f", {known.open} open, {known.out_of_reach} out of reach"

@@ -1,4 +1,4 @@
-"""Which of the grasps found are kept, and in which order."""
+"""Selects which of the grasps found are returned, and in which order."""
 
 from collections.abc import Callable, Iterable, Sequence
 from itertools import chain, zip_longest
@@ -13,14 +13,14 @@ from grasp_core.solvers.ties import first_best, smallest_first
 
 
 def chosen(lists: Sequence[Sequence[Certified]], request: PlanRequest) -> list[Certified]:
-    """The grasps to return, best first.
+    """Select the grasps to return, the best first.
 
     By radius, families take turns: the best of each, then the second of each, and so on. By another
     measure all grasps compete. `diverse` begins with the largest discs and goes on with the grasp
     that is farthest from all before it.
 
     Args:
-        lists: What each method found, best first.
+        lists: Grasps of each method, the best first.
         request: How many are wanted, and what makes one better.
     """
     every = _largest_first(chain.from_iterable(lists))
@@ -35,7 +35,7 @@ def chosen(lists: Sequence[Sequence[Certified]], request: PlanRequest) -> list[C
 
 
 def _largest_first(found: Iterable[Certified]) -> list[Certified]:
-    """Grasps by their smallest discs; those without discs come last."""
+    """Order grasps by their smallest discs, the largest first; those without discs come last."""
     listed = list(found)
     # the merit of a grasp with discs is that radius, as reproducible as a program's optimum
     return _in_order(
@@ -44,17 +44,17 @@ def _largest_first(found: Iterable[Certified]) -> list[Certified]:
 
 
 def _in_order(found: Sequence[Certified], figures: Sequence[float]) -> list[Certified]:
-    """Smallest figure first; equal ones stay in the order in which they come."""
+    """Order grasps by a figure, the smallest first; equal ones stay in the order given."""
     return [found[place] for place in smallest_first(figures)]
 
 
 def _critical(found: Certified) -> float:
-    """Least friction at which the contacts are in force closure."""
+    """The least friction at which the contacts are in force closure."""
     return critical_friction(found.placement.positions, found.normals)
 
 
 def _weakness(friction: float) -> Callable[[Certified], float]:
-    """Minus the Ferrari-Canny quality."""
+    """Return a measure of grasps: minus the Ferrari-Canny quality at this friction."""
 
     def measure(found: Certified) -> float:
         contacts = found.placement.positions, found.normals
@@ -64,9 +64,10 @@ def _weakness(friction: float) -> Callable[[Certified], float]:
 
 
 def _far_apart(every: Sequence[Certified], limit: int | None) -> list[Certified]:
-    """Each next one as far as possible from the nearest before it.
+    """Order grasps so that each next one is as far as possible from the nearest before it.
 
-    The distance of two grasps is the largest of a contact of one from the nearest of the other.
+    The distance of two grasps is the largest distance of a contact of one from the nearest contact
+    of the other, relative to the object's radius.
     """
     if not every:
         return []

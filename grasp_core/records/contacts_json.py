@@ -1,8 +1,8 @@
-"""Contacts from elsewhere: the text of a contacts file, or of a `grasps.json`, to checked values.
+"""Reads the text of a contacts file, or of a `grasps.json`, as checked contacts.
 
 A contacts file is JSON: `{"contacts": [...]}` for one grasp, or `{"grasps": [{"id": ...,
 "contacts": [...]}, ...]}`, where a contact is `{"position_m": [3], "normal": [3]}` and perhaps
-`"friction"`. Beside the list may stand `friction`, `center_m` and `torque_scale_m`, for all.
+`"friction"`. Beside the list, `friction`, `center_m` and `torque_scale_m` may be given for all.
 """
 
 from dataclasses import dataclass
@@ -21,18 +21,18 @@ from grasp_core.records.grasps_json import grasps_from_json
 
 FEWEST_CONTACTS = 2
 MOST_CONTACTS = 100
-"""Of one grasp: it takes some seconds then, most of it for the hull's volume."""
+"""Most contacts of one grasp: so many take some seconds, most of it for the hull's volume."""
 MOST_GRASPS = 100_000
-"""Of one file: two hours' work for one processor."""
+"""Most grasps of one file: two hours' work for one processor."""
 LARGEST_LENGTH_M = 1e6
-"""Longer ones are mistakes, and their squares might overflow."""
+"""Largest length: longer ones are mistakes, and their squares might overflow."""
 NEARLY_UNIT = 1e-3
 """How far the length of a normal may be from 1: rounding of a file with three digits."""
 ROUNDING = 1e-15
 """How far rounding takes the length of a unit vector from 1."""
 SAME_POINT = 1e-9
 """Contacts closer than this to their mean, relative to the numbers in the file, are at one point:
-what rounding leaves of smaller differences tells nothing."""
+rounding leaves nothing of smaller differences."""
 
 CenterSource: TypeAlias = Literal["file", "mean contact", "center of mass"]
 ScaleSource: TypeAlias = Literal["flag", "file", "farthest contact", "object radius"]
@@ -83,13 +83,13 @@ class ContactSet:
 
     id: str
     positions: Array
-    """(k, 3) [m], k >= 2"""
+    """Contact points, (k, 3) [m], k >= 2."""
     normals: Array
     """Unit vectors into the object, (k, 3)."""
     friction: Array
     """Coulomb coefficients, (k,)."""
     center: Array
-    """About which torques are taken, (3,) [m]."""
+    """Point about which torques are taken, (3,) [m]."""
     torque_scale: float
     """Length that makes a torque comparable with a force [m]."""
     center_from: CenterSource
@@ -106,12 +106,12 @@ class ContactSet:
 
 @dataclass(frozen=True, slots=True)
 class Overrides:
-    """What a user says about a file's contacts."""
+    """Values that a user gives in place of those in a file of contacts."""
 
     friction: float | None = None
-    """Of contacts without their own, in place of the file's."""
+    """Friction of contacts without their own, in place of the file's."""
     torque_scale: float | None = None
-    """In place of the file's, or of the object's radius [m]."""
+    """Torque scale, in place of the file's or of the object's radius [m]."""
     outward: bool = False
     """Whether the file's normals point out of the object."""
 
@@ -120,8 +120,8 @@ def contact_sets_from_json(text: str, overrides: Overrides = Overrides()) -> tup
     """Read the text of a contacts file or of a `grasps.json`.
 
     Without a centre in the file, torques are taken about the mean contact (about the centre of
-    mass for a `grasps.json`), and compared with forces through the largest distance of a contact
-    from there (the object's radius) unless a torque scale is given.
+    mass for a `grasps.json`). Without a torque scale, the largest distance of a contact from the
+    centre makes them comparable with forces (the object's radius for a `grasps.json`).
 
     Raises:
         InputError: The text is neither, or no friction is given; the message names the field.
@@ -154,7 +154,7 @@ def _check_ids(ids: list[str]) -> None:
 
 
 def _planned(text: str, overrides: Overrides) -> tuple[ContactSet, ...]:
-    """Contacts of a `grasps.json`."""
+    """The contacts of a `grasps.json`."""
     if overrides.outward:
         raise InputError("normals of a grasps.json point into the object: leave out --outward")
     saved = grasps_from_json(text)
@@ -241,5 +241,5 @@ def _frictions(
 
 
 def _first(*given: tuple[float | None, ScaleSource]) -> tuple[float, ScaleSource]:
-    """The first value that there is, and its source."""
+    """The first of some values that is given, and its source."""
     return next((value, source) for value, source in given if value is not None)

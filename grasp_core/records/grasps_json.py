@@ -1,7 +1,7 @@
-"""Grasps <-> JSON text, with units in the keys; what is read is checked field by field.
+"""Writes grasps as JSON text with units in the keys, and reads it back, checking every field.
 
-The file holds the object's mesh, so that grasps can be validated from it alone. The schema it is
-checked against is imported where a file is read: plans are written without it.
+The file holds the object's mesh, so that grasps can be validated from it alone. The schema is
+imported only where a file is read: plans are written without it.
 """
 
 import json
@@ -28,44 +28,44 @@ if TYPE_CHECKING:
 
 SCHEMA = 1
 SAME_DIRECTION = 1e-6
-"""How far a witness direction may be from its force's: what six digits in a file keep."""
+"""Largest distance of a witness direction from its force's: six digits in a file keep it."""
 
 RECORDED = MeshLimits(max_triangles=2_000_000, max_faces=50_000, max_parts=640)
-"""Of the objects in grasps files: ten times what is usual, for those who raised a limit."""
+"""Limits for objects in grasps files: ten times the usual, for users who raised a limit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SavedGrasps:
-    """What a `grasps.json` says, as values."""
+    """The contents of a `grasps.json`, as values."""
 
     body: Polyhedron
     friction: float
     seed: int
     grasps: tuple[Grasp, ...]
     finger: Finger | None = None
-    """What was planned to get to the contacts, if anything."""
+    """The finger that was planned to get to the contacts; None if reach was not asked for."""
 
 
 @dataclass(frozen=True, slots=True)
 class Moved:
-    """How optimisation changed the quality of a grasp."""
+    """How optimisation changed the quality of a grasp, with proved bounds (lower, upper)."""
 
     id: str
     moved_from: str
-    """Id of the planned grasp; the same where it stayed."""
+    """Id of the planned grasp; equal to `id` where the grasp stayed."""
     before: tuple[float, float]
     after: tuple[float, float]
     ceiling: float | None
-    """No contacts on the same faces are better; None where that was not asked."""
+    """Quality that no contacts on the same faces exceed; None where it was not asked for."""
 
     @property
     def gain(self) -> float:
-        """Ratio of the proved lower bounds."""
+        """Ratio of the proved lower bounds, after to before."""
         return self.after[0] / self.before[0]
 
 
 def plan_to_json(body: Polyhedron, plan: Plan, moves: Sequence[Moved] = ()) -> str:
-    """The text of `grasps.json`: the same for the same plan."""
+    """The text of `grasps.json`; equal plans give equal text."""
     document: dict[str, object] = {
         "schema": SCHEMA,
         "object": {
@@ -144,8 +144,8 @@ def grasps_from_json(text: str) -> SavedGrasps:
     """Read the text of a `grasps.json`.
 
     Raises:
-        InputError: The text is not such a file; the message names the field.
-        MeshError: Its mesh is not a solid.
+        InputError: The text is not a `grasps.json`; the message names the field.
+        MeshError: The mesh in it is not a solid.
     """
     from grasp_core.files.complaints import record_of
     from grasp_core.records.grasps_schema import GraspsRecord
@@ -163,7 +163,7 @@ def grasps_from_json(text: str) -> SavedGrasps:
         limits=RECORDED,
     )
     if body.content_sha256 != record.object.content_sha256:
-        raise InputError("object.content_sha256: is not that of its mesh; plan again")
+        raise InputError("object.content_sha256: is not the hash of its mesh; plan again")
     grasps = tuple(
         _named_grasp(body, grasp, record.friction, i) for i, grasp in enumerate(record.grasps)
     )
@@ -174,7 +174,7 @@ def grasps_from_json(text: str) -> SavedGrasps:
 
 
 def _named_grasp(body: Polyhedron, record: "GraspRecord", friction: float, number: int) -> Grasp:
-    """A grasp, whose refusal says where in the file it is."""
+    """Read a grasp; a refusal names its place in the file."""
     try:
         return _grasp_from_record(body, record, friction)
     except InputError as error:
@@ -213,5 +213,5 @@ def _grasp_from_record(body: Polyhedron, record: "GraspRecord", friction: float)
     check_witness(body, grasp, friction)
     off = np.abs(grasp.witness.directions - np.array(record.witness.directions)).max()
     if off > SAME_DIRECTION:
-        raise InputError(f"grasp {grasp.id}: a witness direction is not that of its force")
+        raise InputError(f"grasp {grasp.id}: a witness direction differs from that of its force")
     return grasp

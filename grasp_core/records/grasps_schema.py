@@ -17,14 +17,14 @@ class _Record(BaseModel):
 
 
 class MeshRecord(_Record):
-    """Triangles of the object."""
+    """The triangles of the object."""
 
     vertices_m: list[Triple]
     triangles: list[tuple[int, int, int]]
 
 
 class PatchesRecord(_Record):
-    """How flat the patches of a curved surface are, and how many there may be."""
+    """Limits of flatness for the patches of a curved surface, and their number."""
 
     spread_deg: Finite
     depth: Finite
@@ -32,7 +32,7 @@ class PatchesRecord(_Record):
 
 
 class ObjectRecord(_Record):
-    """The object that was planned on."""
+    """The object that grasps were planned on."""
 
     name: str
     source_sha256: str
@@ -40,11 +40,11 @@ class ObjectRecord(_Record):
     mesh: MeshRecord
     center_of_mass_m: Triple
     patches: PatchesRecord | None = None
-    """None for exact planar faces."""
+    """Limits of patches; None for exact planar faces."""
 
 
 class ContactRecord(_Record):
-    """Where a fingertip touches."""
+    """The point where a fingertip touches, and the inward normal there."""
 
     position_m: Triple
     normal: Triple
@@ -58,7 +58,7 @@ class ConeRecord(_Record):
 
 
 class RegionRecord(_Record):
-    """Where a finger may stand."""
+    """The region in which a finger may stand."""
 
     kind: RegionKind
     polygon_m: list[Triple]
@@ -74,10 +74,10 @@ class WitnessRecord(_Record):
 
 
 class GraspRecord(_Record):
-    """One grasp."""
+    """One grasp, with everything that its claims need to be checked again."""
 
     id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,99}$")
-    """Also the name of the grasp's scene file, hence no dots or slashes."""
+    """Id of the grasp; it also names the grasp's scene file, hence no dots or slashes."""
     family: Family
     faces: tuple[int, int, int, int]
     contacts: tuple[ContactRecord, ContactRecord, ContactRecord, ContactRecord]
@@ -91,11 +91,11 @@ class GraspRecord(_Record):
     ferrari_canny: tuple[Finite, Finite]
     witness: WitnessRecord
     approach_directions: FourTriples | None = None
-    """Which way each finger moves in, on a free line; None if that was not asked."""
+    """Direction in which each finger moves in on a free line; None if that was not asked for."""
 
 
 class MovedRecord(_Record):
-    """How a grasp was moved on its faces, with bounds of its quality."""
+    """How a grasp was moved on its faces, with bounds on its quality before and after."""
 
     id: str
     moved_from: str
@@ -120,7 +120,7 @@ class GraspsRecord(_Record):
     theta_deg: Finite
     seed: Annotated[int, Field(ge=0, le=MOST_SEED)]
     finger: FingerRecord | None = None
-    """None if any fingers would do."""
+    """The finger that was planned for; None if reach was not asked for."""
     versions: dict[str, str]
     counts: dict[str, Any]
     outcomes: dict[str, int] = Field(default_factory=dict)

@@ -1,12 +1,12 @@
-"""Centres of discs moved so that the discs can be larger.
+"""Moves the centres of discs so that the discs can be larger.
 
 A cover has fixed forces on fixed twists, and the power of a fixed force is linear in the place of
 its contact. So the largest radius r that its forces allow, over all centres c_i with the discs on
 their faces, is one linear program:
 
     maximise r  over c_i, r
-    sum over i of F_i.(a + b x c_i) - r |T_i'(F_i x b)| >= 0   for each ray of each cone,
-    E_i c_i + r <= b_i                                          for each face.
+    sum over i of F_i.(a + b x c_i) - r |T_i'(F_i x b)| >= 0   for each ray of each cone,   (1)
+    E_i c_i + r <= b_i                                          for each face.              (2)
 
 New centres allow other forces, so covers are sought anew around them, and so on while the radius
 grows: the paper's own program for concurrent grasps is of this kind, with one focus for all twists.
@@ -24,21 +24,21 @@ from grasp_core.regions.proof import power_of
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import first_best, nearest_optimum, on_grid
 
-MOVES = 12
+MOVES = 12  # of all centres, at most
 MOVING = 8
-"""Covers of moves take so many times fewer cones."""
+"""Covers are sought with this many times fewer cones while centres move."""
 WORTH = 1.005
-"""A move ends the search unless the radius grows by this factor."""
+"""Least growth of the radius, as a factor, for which moving goes on."""
 FARTHEST = 1.0
-"""That a centre moves at once, in radii."""
+"""Largest move of a centre at once, in radii."""
 MOVED_DIGITS = 6
-"""Digits after the point of moved centres."""
+"""Digits after the point that moved centres keep."""
 NEAR = 3.0
-"""Rays count that allow radii up to this factor of the present one."""
+"""Rays count in the program if they would stop a radius up to this factor of the present one."""
 
 
 def better_centers(grounds: Grounds, ys: Array) -> Array:
-    """Centres (k, 2) of discs inside the faces that are larger than around given ones, if found."""
+    """Centres in plane coordinates, (k, 2), with larger discs than `ys` if any are found."""
     coarse = replace(grounds, cones=grounds.cones // MOVING)
     best = largest_discs(coarse, ys)
     if best is None:
@@ -53,20 +53,20 @@ def better_centers(grounds: Grounds, ys: Array) -> Array:
 
 
 def larger_inside(grounds: Grounds, one: Proved | None, other: Proved | None) -> Proved | None:
-    """Those of two sets of discs of which larger ones are inside the faces."""
+    """The one of two sets of discs that has the larger discs inside the faces."""
     if one is None or other is None:
         return other if one is None else one
     return (one, other)[first_best([inside_faces(grounds, each) for each in (one, other)])]
 
 
 def inside_faces(grounds: Grounds, proved: Proved) -> float:
-    """The radius of discs that are proved and inside the faces."""
+    """The largest radius of discs that are proved and inside the faces."""
     depths = [(p.b - p.E @ y).min() for p, y in zip(grounds.pieces, proved.ys, strict=True)]
     return min(proved.radius, *map(float, depths))
 
 
 def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
-    """The best centres for the forces of a cover, near the present ones, (k, 2)."""
+    """The best centres for the forces of a cover, near the present ones, (k, 2), or None."""
     k = len(proved.ys)
     rows, limits = list[Array](), list[Array]()
     points = grounds.points(proved.ys)
@@ -83,9 +83,11 @@ def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
             powers += at_origin[:, 0] + slope @ point - piece.depth * np.abs(slope @ piece.normal)
             falls += np.linalg.norm(across, axis=1)
             moves.append(across)
+        # (1), for moves from the present centres
         near = powers < NEAR * proved.radius * falls
         rows.append(np.column_stack([-np.hstack(moves), falls])[near])
         limits.append(powers[near])
+    # (2), for the same moves
     for i, (piece, y) in enumerate(zip(grounds.pieces, proved.ys, strict=True)):
         edges = np.zeros((len(piece.E), 2 * k + 1))
         edges[:, 2 * i : 2 * i + 2], edges[:, -1] = piece.E, 1.0
@@ -110,5 +112,5 @@ def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
 
 
 def _sizes(forces: Array) -> Array:
-    """Lengths of the forces of each cone together, (m, 1)."""
+    """Lengths of all forces of each cone together, (m, 1)."""
     return np.sqrt(np.einsum("mki,mki->m", forces, forces))[:, None]

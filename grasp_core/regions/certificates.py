@@ -1,4 +1,4 @@
-"""Independent regions with their proof: what is claimed of them, and how each claim is checked."""
+"""Independent regions with their proof: what is claimed about them, and how it is checked."""
 
 import math
 from dataclasses import dataclass
@@ -25,41 +25,41 @@ from grasp_core.regions.proof import TwistCover
 from grasp_core.values import FINGERS, ContactRegion
 
 PLACED = 1e-9
-"""How far points may be off the planes and borders they are on, and radii from what they measure,
-relative to `scale`: what files with ten digits keep."""
+"""How far points may be off the planes and borders they are on, and radii off their measured
+values, relative to `scale`: files with ten digits keep this much."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CertifiedRegions:
-    """Where each finger may stand while the others are anywhere in their own regions."""
+    """Regions where each finger may stand while the others are anywhere in their own regions."""
 
     regions: tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
-    """Convex polygons inside `borders`."""
+    """Contact regions, one per finger: convex polygons inside `borders`."""
     borders: tuple[Array, Array, Array, Array]
-    """Convex piece of its face that each region is on, clear of edges as asked for, (k, 3) [m]."""
+    """Convex piece of the face that each region is on, clear of edges as asked for, (k, 3) [m]."""
     radius: float
-    """Of discs around `centers`: the polygons hold what `borders` have of them, but for two
-    thousandths of the polygon's area; no larger than discs that hold all of `borders` [m]."""
+    """Radius of discs around `centers` [m]. Each polygon holds what its border has of its disc, but
+    for two thousandths of the polygon's area. No larger than discs that hold all of `borders`."""
     centers: Array
-    """In the polygons, (4, 3) [m]."""
+    """Centres of the discs, in the polygons, (4, 3) [m]."""
     limit: float
-    """Of discs that hold `open_choice`, a little larger; infinite if none was found [m]."""
+    """Radius of somewhat larger discs that hold `open_choice` [m]; infinite if none was found."""
     open_choice: Array | None
     """Contacts inside `borders`, in those discs, that are not force-closed, (4, 3) [m]."""
     open_wrench: Array | None
-    """What shows it: as `ClosureCertificate.separating_wrench`, (6,)."""
+    """Proof that the choice is open: like `ClosureCertificate.separating_wrench`, (6,)."""
     friction: Array
-    """For which all choices are force-closed, (4,)."""
+    """Coulomb coefficients at which all choices are force-closed, (4,)."""
     origin: Array
-    """Of the torques of the proof, (3,) [m]."""
+    """Point about which the proof counts torques, (3,) [m]."""
     normals: Array
-    """Of the faces, into the object, (4, 3)."""
+    """Unit normals of the faces, into the object, (4, 3)."""
     depths: Array
-    """How far the surface may be off the regions' planes, (4,) [m]."""
+    """Largest distance of the surface from each region's plane, (4,) [m]."""
     cover: TwistCover
-    """The proof; lengths relative to `scale`."""
+    """The proof that all choices are force-closed, with lengths relative to `scale`."""
     scale: float
-    """[m]"""
+    """Unit of length of the proof [m]."""
 
     def __post_init__(self) -> None:
         for name in ("centers", "normals"):
@@ -79,10 +79,10 @@ class CertifiedRegions:
     def verify(self) -> bool:
         """Re-check every field in plain arithmetic.
 
-        That every choice of contacts in `regions`, on planes with `normals` and at most `depths`
-        off them, is force-closed with `friction`; that the polygons are convex, in their borders,
-        as wide as they say, and hold the discs; and that `open_choice` is open. That `borders`
-        are those of an object's faces is for who has the object.
+        This checks that every choice of contacts in `regions`, on planes with `normals` and at most
+        `depths` off them, is force-closed with `friction`; that the polygons are convex, in their
+        borders, as wide as they say, and hold the discs; and that `open_choice` is open. Whoever
+        has the object checks that `borders` are parts of its faces.
         """
         with np.errstate(all="ignore"):
             return self._has_numbers() and self._has_discs() and self._is_open() and self._closes()
@@ -125,21 +125,21 @@ class CertifiedRegions:
         return self.radius <= (farthest + PLACED) * self.scale
 
     def _flat(self, i: int, polygon: Array) -> FlatPolygon | None:
-        """A polygon in the plane of a finger's border, at unit size; None if it is none there."""
+        """A polygon in the plane of a finger's border, at unit size; None if it is not one."""
         if not is_array(polygon, None, 3) or not FEWEST_CORNERS <= len(polygon) <= MOST_CORNERS:
             return None
         start = self.borders[i][0]
         return flat_polygon((polygon - start) / self.scale, self.normals[i], PLACED)
 
     def _at(self, i: int, point: Array) -> Array | None:
-        """A point in plane coordinates, (2,), as `_flat`; None if it is off the plane."""
+        """A point in the plane coordinates of `_flat`, (2,); None if it is off the plane."""
         arm = (point - self.borders[i][0]) / self.scale
         if abs(float(arm @ self.normals[i])) > PLACED:
             return None
         return arm @ plane_frame(self.normals[i])
 
     def _is_open(self) -> bool:
-        """Whether the open choice is one, in discs of the radius `limit`."""
+        """Whether the open choice is on the borders, at radius `limit`, and not force-closed."""
         choice, wrench = self.open_choice, self.open_wrench
         if choice is None:
             return wrench is None and self.limit == math.inf
@@ -153,6 +153,7 @@ class CertifiedRegions:
         proof = ClosureCertificate(False, 0.0, choice, self.normals, self.friction, None, wrench)
         return abs(away - self.limit) <= PLACED * self.scale and proof.verify()
 
+    # a region with depth is a prism: its corners lie on both sides of the plane
     def _closes(self) -> bool:
         prisms = [
             (np.vstack([r.polygon - depth * n, r.polygon + depth * n]) - self.origin) / self.scale
@@ -162,10 +163,10 @@ class CertifiedRegions:
 
 
 def _check_parts(found: CertifiedRegions) -> None:
-    """Refuse what is no region, no cover, or no length.
+    """Refuse parts of the wrong type, number or sign.
 
     Raises:
-        InputError: A part is none.
+        InputError: A part is not a region, a cover or a length, or one is missing.
     """
     each = partial(instance, kind=ContactRegion, name="regions")
     count = len(several(found.regions, each, "regions", "ContactRegion values"))

@@ -1,13 +1,13 @@
 """Independent regions for the fingers of any grasp, polygons on its faces, with a proof.
 
 Contacts may be anywhere in their own regions, whatever the others do, and the grasp stays in force
-closure: first the largest equal discs for which that is proved (`region_search`), around the
-contacts or around better centres (`region_centers`), then polygons around the discs that the same
-proof allows, or as much area as covers are found for (`region_growth`). Every proof is checked by
+closure. First come the largest equal discs for which that is proved (`largest_discs`), around the
+contacts or around better centres (`centers`); then polygons around the discs that the same proof
+allows, or as much area as covers are found for (`growth`). Every proof is checked by
 `CertifiedRegions.verify` before it is returned.
 
-On patches of curved surfaces a contact may be as far off the plane as the surface is, and friction
-loses the angle by which the surface leans, so that normals are counted as the plane's.
+On patches of curved surfaces a contact may be as far off the plane as the surface is. The plane's
+normals are used there, with friction smaller by the angle that the surface leans.
 """
 
 import math
@@ -50,14 +50,14 @@ from grasp_core.values import ContactRegion, Grasp, four
 Balance: TypeAlias = Literal["radius", "area"]
 """What regions are grown for: the smallest inscribed disc, or the total area."""
 FEWEST = 64
-"""Cones that the search begins with."""
+"""Least number of cones to ask for: the orthants, with which every search begins."""
 MOST_CONES = 1_000_000
 CONES = 10_000
-"""Cones of one cover at most, unless told otherwise: half a second's work."""
+"""Default for the most cones of one cover: half a second's work."""
 UNIT_DIGITS, PLACE_DIGITS = 6, 8
-"""Digits after the point of the unit and its origin, in object radii; of centres, in the unit."""
+"""Digits after the point: of the unit and its origin, in object radii; of centres, in the unit."""
 NARROWED = 1e-3
-"""How finely the discs in grown polygons are measured, relative to those proved first."""
+"""Precision to which discs in grown polygons are measured, relative to the proved radius."""
 
 
 def certify_regions(  # noqa: PLR0913 - what a user may choose
@@ -71,29 +71,29 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     clearance: float = 0.0,
     cones: int = CONES,
 ) -> CertifiedRegions | None:
-    """Regions around the contacts of a grasp, as large as a proof is found for.
+    """Find regions around the contacts of a grasp, as large as a proof is found for.
 
     Args:
         body: The object.
-        grasp: On its faces.
+        grasp: A grasp on faces of the object.
         friction: Coulomb coefficient at every contact.
         reserve: Share of the friction that is not counted on.
-        balance: Seek large discs for all fingers, or much area in total, with smaller discs
-            perhaps, and several times slower.
+        balance: `radius` seeks large discs for all fingers; `area` seeks much area in total, with
+            smaller discs perhaps, and takes several times longer.
         recenter: Move the regions' centres to where the discs can be largest; the contacts may
             then be outside of their regions.
-        clearance: How far regions stay from the edges of their faces [m]. Where a contact does not,
-            the middle of its region is the nearest place that does.
-        cones: Of one attempt at a proof, at least `FEWEST`. With more, radii grow by some
-            hundredths, or not at all where they are as large as can be.
+        clearance: Distance of regions from the edges of their faces [m]. The region of a contact
+            nearer to an edge is centred at the nearest place that keeps it.
+        cones: Most cones of one attempt at a proof, at least `FEWEST`. With more, radii grow by
+            some hundredths, or not at all where they are as large as can be.
 
     Returns:
         The regions; None if no radius could be proved.
 
     Raises:
-        InputError: The contacts are not on the faces, or not closed with what friction is left; a
-            number or a choice is out of its range.
-        UndecidedError: Whether the contacts are closed is too close to call.
+        InputError: The contacts are not on the faces or not force-closed with the friction that is
+            left, or a number or a choice is out of its range.
+        UndecidedError: Force closure of the contacts is too close to call.
         SolverError: A proof failed its check.
     """
     check_on_faces(body, grasp)
@@ -105,9 +105,12 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     left = coefficient(friction) * (1.0 - reserve)
     positions, normals = stacked(grasp.contacts)
     if not force_closure(positions, normals, left).closed:
-        raise InputError(f"grasp {grasp.id} is not in force closure at friction {left:.6g}")
+        raise InputError(
+            f"grasp {grasp.id} is not in force closure at friction {left:.6g}; allow more friction"
+        )
     unit = _Unit.of(body, positions)
     pieces = _pieces(body, grasp, unit, clearance)
+    # where the surface leans more than the friction angle nothing can be proved
     least = math.atan(left) - max(body.faces[face].spread for face in grasp.faces)
     if pieces is None or least <= 0.0:
         return None
@@ -134,9 +137,9 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Unit:
-    """The unit of length, and the origin, in which the contacts' largest lever is about one.
+    """The unit of length and the origin in which the contacts' largest lever is about one.
 
-    Both have few digits, so that places in it do not depend on the last digits of the contacts.
+    Both have few digits, so that places in this unit do not depend on the contacts' last digits.
     """
 
     origin: Array
@@ -152,11 +155,11 @@ class _Unit:
         )
 
     def at(self, points: Array) -> Array:
-        """Points in this unit, (..., 3)."""
+        """Convert points from the object's frame to this unit, (..., 3)."""
         return (points - self.origin) / self.scale
 
     def back(self, points: Array) -> Array:
-        """Points in the object's frame [m]."""
+        """Convert points from this unit to the object's frame, (..., 3) [m]."""
         return self.origin + self.scale * points
 
 
@@ -165,12 +168,12 @@ def _pieces(
 ) -> tuple[FacePiece, ...] | None:
     """The convex pieces that contacts lie on, clear of edges; None if one has no room.
 
-    Of several pieces of a face it is the one that the contact is deepest in.
+    If a face has several pieces, the piece that holds the contact deepest is taken.
     """
     found = list[FacePiece]()
     for index, contact in zip(grasp.faces, grasp.contacts, strict=True):
         face = body.faces[index]
-        normal = face.normal / np.linalg.norm(face.normal)  # files round them
+        normal = face.normal / np.linalg.norm(face.normal)  # files round normals
         every = [piece_of(index, normal, unit.at(corners)) for corners in face.pieces]
         point = unit.at(contact.position)
         whole = every[first_best([_room(point, piece) for piece in every], SAME_CORNER)]
@@ -183,14 +186,14 @@ def _pieces(
 
 
 def _room(point: Array, piece: FacePiece) -> float:
-    """How far inside of a piece a point is."""
+    """Distance of a point inside a piece from its nearest edge; negative outside."""
     return float((piece.b - piece.E @ (piece.frame.T @ (point - piece.origin))).min())
 
 
 def _polygons(
     grounds: Grounds, proved: Proved, balance: Balance, grasp: Grasp, unit: _Unit
 ) -> tuple[list[Array], TwistCover]:
-    """Polygons in plane coordinates, and their proof."""
+    """Polygons in plane coordinates, (c, 2) each, and their proof."""
     if balance == "radius":
         discs = grounds.discs(proved.ys, proved.radius)
         return shared_out(grounds, proved.ys, discs, proved.cover), proved.cover
@@ -207,7 +210,7 @@ def _polygons(
 def _placed(
     grounds: Grounds, proved: Proved, polygons: list[Array], cover: TwistCover, unit: _Unit
 ) -> CertifiedRegions:
-    """Regions in the object's frame, with their proof."""
+    """Put polygons together as regions in the object's frame, with their proof."""
     trimmed = [_trimmed(polygon, y) for polygon, y in zip(polygons, proved.ys, strict=True)]
     centers = unit.back(grounds.points(proved.ys))
     opened = _open_choice(grounds, proved, unit)
@@ -241,9 +244,9 @@ def _farthest(points: Array, centers: Array) -> float:
 
 
 def _radius_held(grounds: Grounds, proved: Proved, polygons: list[Array]) -> float:
-    """The radius of the discs proved first, or of smaller ones that the polygons hold.
+    """The largest radius, up to the proved one, of discs that the polygons hold.
 
-    Polygons grown for their area may begin with smaller discs.
+    Polygons grown for their area may begin with smaller discs than the proved ones.
     """
     pairs = [
         (convex_polygon(polygon, PLACED), convex_polygon(piece.corners, PLACED), y)
@@ -266,17 +269,17 @@ def _radius_held(grounds: Grounds, proved: Proved, polygons: list[Array]) -> flo
 
 
 def _trimmed(polygon: Array, y: Array) -> Array:
-    """A polygon with fewer corners that still holds its centre."""
+    """A polygon with fewer corners, if it still holds its centre; else the polygon itself."""
     fewer = with_fewer_corners(polygon)
     E, b = edge_rows(fewer)
     return fewer if (E @ y <= b).all() else polygon
 
 
 def _open_choice(grounds: Grounds, proved: Proved, unit: _Unit) -> ClosureCertificate | None:
-    """The proof that the choice that a search found is open, in the object's frame.
+    """The proof, in the object's frame, that the choice that a search found is open.
 
-    None unless it is open by the exact test, and on the pieces. Patches of curved surfaces are
-    not planes, so nothing is said of them.
+    The result is None unless the exact test says so and the choice is on the pieces. Patches of
+    curved surfaces are not planes, so nothing is claimed about them.
     """
     if proved.choice is None or any(piece.depth or piece.spread for piece in grounds.pieces):
         return None

@@ -1,8 +1,9 @@
-"""A search for a cover of all twists by cones on each of which contact forces have power together.
+"""Compiled search for cones that cover all twists, with forces that have power on each cone.
 
-What is covered and why is derived in `grasp_core.regions.proof`, which checks every answer; here
-only cones are cut and forces chosen. Cones are cut level by level, the oldest first, so that the
-answer is a tree in levels: for each cone either the edge that is cut, or the forces.
+`grasp_core.regions.proof` derives what is covered and why, and checks every answer; here only cones
+are cut and forces chosen. Numbers in comments are those of its derivation. Cones are cut level by
+level, the oldest first, so the answer is a tree in levels: for each cone the edge that is cut, or
+the forces.
 """
 
 import math
@@ -21,21 +22,21 @@ COVERED, REFUTED, UNDECIDED = 1, -1, 0
 
 
 class Tree(NamedTuple):
-    """What becomes of each cone, n of them at most, filled in."""
+    """The outcome for each cone, n of them at most; arrays are filled in by `search`."""
 
     codes: Indices
-    """(n,)"""
+    """Number of the edge that is cut, or `LEAF`, (n,)."""
     forces: Array
-    """Along the frames, (n, k, 3)."""
+    """Forces on cones that are not cut, along the frames, (n, k, 3)."""
     shifts: Array
-    """Where contacts do not resist a twist, along the frames from the points, (k, 3)."""
+    """Shifts from the points, along the frames, that leave a twist unresisted, (k, 3)."""
 
 
 @njit(cache=True, error_model="numpy")
 def pivot(ids: Indices, weights: Array, motions: Array, i: int, most: float) -> tuple[float, float]:
     """The tangential part of a contact's force along the axis of the mean twist, if allowed.
 
-    It has the same power wherever the contact is.
+    A force along the axis has the same power wherever the contact is.
     """
     f, g, along = 0.0, 0.0, 0.0
     for place in range(RAYS):
@@ -62,12 +63,14 @@ def answer(
             if weights[place] > 0.0:
                 motion = motions[ids[place], i]
                 power, out, x, y = lowest(motion, sites, i, (f, g))
+                # power is linear in the force: its slopes are the velocities at worst places
                 _, q, r = velocity(motion, (out, x, y))
                 total += weights[place] * power
                 slope_f += weights[place] * q
                 slope_g += weights[place] * r
         if turn == 0 or total > best:
             best, best_f, best_g = total, f, g
+        # answers to the mean of all slopes so far do not swing back and forth
         share = 1.0 / (turn + 1.0)
         mean_f += share * (slope_f - mean_f)
         mean_g += share * (slope_g - mean_g)
@@ -77,7 +80,7 @@ def answer(
 
 @njit(cache=True, error_model="numpy")
 def together(ids: Indices, motions: Array, sites: Sites, forces: Array, clear: Array) -> bool:
-    """Whether some forces have power together on the rays of a cone, over all sites."""
+    """Whether some forces have power together on the rays of a cone: h > 0 in (2)."""
     least, needed = np.inf, 0.0
     for i in range(len(forces)):
         needed += forces[i, 0] * clear[i]
@@ -94,7 +97,7 @@ def together(ids: Indices, motions: Array, sites: Sites, forces: Array, clear: A
 
 @njit(cache=True, error_model="numpy")
 def dot(u: Array, v: Array) -> float:
-    """Of the rays' numbers, in one order of sums on all machines, unlike a library's."""
+    """Inner product of two lists of six numbers, summed in one order on all machines."""
     total = 0.0
     for place in range(RAYS):
         total += u[place] * v[place]
@@ -103,7 +106,7 @@ def dot(u: Array, v: Array) -> float:
 
 @njit(cache=True, error_model="numpy")
 def reweigh(regrets: Array, powers: Array, weights: Array) -> None:
-    """Put weight on rays by how little power they would have cost so far, the last time twice."""
+    """Move weight to rays by the power they have lacked so far, counting the last round twice."""
     mean, total = dot(weights, powers), 0.0
     for place in range(RAYS):
         regrets[place] = max(0.0, regrets[place] + mean - powers[place])
@@ -121,7 +124,8 @@ def find_forces(
 ) -> bool:
     """Fill in forces with power on all rays of a cone, if some are found; else a bad twist in it.
 
-    The game of `grasp_core.regions.sites`, which ends at once where no answer has power.
+    This is the game of `grasp_core.regions.sites`. It ends at once where no answer has power, and
+    leaves the weights of the bad twist.
     """
     regrets, powers = np.zeros(RAYS), np.empty(RAYS)
     weights[:] = 1.0 / RAYS
@@ -137,6 +141,7 @@ def find_forces(
             return False
         for place in range(RAYS):
             powers[place] = lowest(motions[ids[place], contact], sites, contact, (f, g))[0]
+        # later answers count more
         forces[contact, 0] += turn + 1.0
         forces[contact, 1] += (turn + 1.0) * f
         forces[contact, 2] += (turn + 1.0) * g
@@ -148,7 +153,7 @@ def find_forces(
 
 @njit(cache=True, error_model="numpy")
 def fill_motions(ray: int, rays: Array, sites: Sites, axes: Array, motions: Array) -> None:
-    """Fill in how the twist of a ray moves each contact, per length of twist."""
+    """Fill in how the twist of a ray moves each contact, for a twist of length one."""
     twist = np.empty(RAYS)
     for part in range(RAYS):
         twist[part] = dot(rays[ray], axes[:, part])
@@ -168,7 +173,7 @@ def fill_motions(ray: int, rays: Array, sites: Sites, axes: Array, motions: Arra
 
 @njit(cache=True, error_model="numpy")
 def edge_to_cut(ids: Indices, rays: Array, weights: Array) -> tuple[int, int, int]:
-    """Number and ends of a long edge of a cone between rays that weigh much."""
+    """Number and ends of the edge to cut: long, between rays that weigh much."""
     longest, chosen, number, first, last = -1.0, 0, 0, 0, 0
     lengths = np.empty(RAYS)
     for i in range(RAYS):
@@ -188,7 +193,7 @@ def edge_to_cut(ids: Indices, rays: Array, weights: Array) -> tuple[int, int, in
 
 @njit(cache=True, error_model="numpy")
 def orthants(rays: Array, sites: Sites, axes: Array, motions: Array, cones: Indices) -> None:
-    """Fill in the first rays, the axes and their opposites, and the cones that they span."""
+    """Fill in the first rays, which are the axes and their opposites, and the cones they span."""
     for ray in range(2 * RAYS):
         rays[ray, ray // 2] = 1.0 - 2.0 * (ray % 2)
         fill_motions(ray, rays, sites, axes, motions)
@@ -204,11 +209,11 @@ def search(sites: Sites, axes: Array, needs: tuple[int, Array], tree: Tree) -> t
     Args:
         sites: Where contacts may be.
         axes: Twists of the first rays as rows, (6, 6).
-        needs: Cones at most, and what `Sites.clear` says, (k,).
-        tree: Filled with what becomes of each.
+        needs: Most cones, and the result of `Sites.clear`, (k,).
+        tree: Filled with the outcome for each cone.
 
     Returns:
-        How it ended, and the number of cones.
+        How the search ended, and the number of cones.
     """
     most, clear = needs
     rays = np.zeros((2 * RAYS + most, RAYS))
@@ -224,11 +229,13 @@ def search(sites: Sites, axes: Array, needs: tuple[int, Array], tree: Tree) -> t
                 return UNDECIDED, done
             edge, a, b = edge_to_cut(cones[done], rays, weights)
             tree.codes[done] = edge
+            # (4): the sum of the ends cuts the edge
             rays[made] = rays[a] + rays[b]
             fill_motions(made, rays, sites, axes, motions)
             bad[:] = 0.0
             for place in range(RAYS):
                 bad += weights[place] * motions[cones[done, place]]
+            # (5): a twist that no contact resists
             if is_open(motions[made], sites, tree.shifts) or is_open(bad, sites, tree.shifts):
                 return REFUTED, done
             for j in range(RAYS):
@@ -241,7 +248,7 @@ def search(sites: Sites, axes: Array, needs: tuple[int, Array], tree: Tree) -> t
 
 
 def try_out() -> None:
-    """Compile for the types in use, on contacts on which nothing is covered."""
+    """Compile for the types in use, on contacts for which nothing is covered."""
     k, most = 4, 1 << RAYS
     tree = Tree(np.zeros(most, np.int64), np.zeros((most, k, 3)), np.zeros((k, 3)))
     frames = np.zeros((k, 3, 3)) + np.eye(3)

@@ -1,9 +1,10 @@
-"""Covers of all twists, found in compiled code or, without it, level by level in NumPy.
+"""Searches covers of all twists, in compiled code or, without it, level by level in NumPy.
 
-Both cut cones until forces have power together on all rays of each (`twist_covers`, which checks
-the answer). Forces are found by a game: weights of the rays are moved to where power lacks, forces
+Both ways cut cones until forces have power together on all rays of each cone; `regions.proof`
+derives why that is enough, and checks the answer. Numbers in comments are those of its derivation.
+Forces are found by the game of `regions.sites`: weight moves to the rays that lack power, forces
 answer, and the mean answer counts. The compiled way also stops at a twist that contacts at some
-places do not resist; the plain one does not look for such.
+places do not resist; the plain way does not look for one.
 """
 
 from dataclasses import dataclass
@@ -21,21 +22,22 @@ KERNEL = "grasp_core.regions.cover_kernel"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Searched:
-    """How a search ended: with a cover, an open choice, or neither within the cones granted."""
+    """How a search ended: with a cover, an open choice, or neither within the cones allowed."""
 
     cover: TwistCover | None = None
     choice: Array | None = None
-    """Places of contacts that leave a twist unresisted, but for rounding, (k, 3)."""
+    """Contact places that leave a twist unresisted, but for rounding, (k, 3)."""
 
 
 def search_cover(sites: Sites, axes: Array, cones: int) -> Searched:
-    """Seek a cover for contacts at sites.
+    """Search a cover for contacts at sites.
 
     Args:
         sites: Where contacts may be.
-        axes: Twists to begin with, as rows, (6, 6).
-        cones: At most; the orthants are always tried.
+        axes: Twists of the first rays, as rows, (6, 6).
+        cones: Most cones; the sixty-four orthants are always tried.
     """
+    # the search sees sites on a grid, so that it ends alike on all machines
     kernel, told = compiled(KERNEL), sites.on_grid()
     if kernel is None:
         plainly = _by_levels(told, axes, max(cones, 1 << TWIST))
@@ -43,6 +45,7 @@ def search_cover(sites: Sites, axes: Array, cones: int) -> Searched:
     k, most = len(sites.points), max(cones, 1 << TWIST)
     tree = kernel.Tree(np.zeros(most, np.int64), np.zeros((most, k, 3)), np.zeros((k, 3)))
     ended, count = kernel.search(told, axes, (most, told.clear()), tree)
+    # (5), translated from shifts along the frames to places
     if ended == kernel.REFUTED:
         return Searched(choice=sites.points + np.einsum("kij,kj->ki", sites.frames, tree.shifts))
     if ended != kernel.COVERED:
@@ -56,7 +59,7 @@ def _cover(sites: Sites, axes: Array, codes: Indices, forces: Array) -> TwistCov
 
 
 def _by_levels(sites: Sites, axes: Array, cones: int) -> tuple[Indices, Array] | None:
-    """Codes of all cones, and forces along the frames of those that are not cut."""
+    """Codes of all cones, and forces along the frames of the cones that are not cut."""
     level, codes, forces = orthants(), list[Indices](), list[Array]()
     total = 0
     while len(level):
@@ -67,12 +70,13 @@ def _by_levels(sites: Sites, axes: Array, cones: int) -> tuple[Indices, Array] |
         code = np.where(covered, LEAF, _edges_to_cut(level, weights))
         codes.append(code)
         forces.append(found[covered])
+        # (4): cones without forces go on to the next level in halves
         level = halves(level[~covered], code[~covered])
     return np.concatenate(codes), np.concatenate(forces)
 
 
 class _Game:
-    """Forces against rays, on many cones at once."""
+    """The game of forces against rays, on many cones at once."""
 
     def __init__(self, cones: Array, axes: Array, sites: Sites) -> None:
         twists = cones @ axes
@@ -84,7 +88,7 @@ class _Game:
         self.clear = sites.clear()
 
     def play(self) -> tuple[NDArray[np.bool_], Array, Array]:
-        """Cones on which forces were found, weights of rays (m, r) and forces (m, k, 3)."""
+        """Cones with forces found, (m,), weights of rays, (m, r), and forces, (m, k, 3)."""
         m, r, k = self.velocity.shape[:3]
         forces, covered, lost = np.zeros((m, k, 3)), np.zeros(m, np.bool_), np.zeros(m, np.bool_)
         weights, regrets = np.full((m, r), 1.0 / r), np.zeros((m, r))
@@ -92,11 +96,13 @@ class _Game:
         for turn in range(ROUNDS):
             sums, answers = self._answers(weights)
             contact = sums.argmax(axis=1)
+            # no answer has power on these weights, so no forces cover the cone
             lost |= ~covered & (sums.max(axis=1) <= AHEAD)
             going = ~(covered | lost)
             if not going.any():
                 break
             powers = self._least(answers)[0][rows, :, contact]
+            # later answers count more
             played = np.zeros((m, k, 3))
             played[rows, contact, 0] = turn + 1.0
             played[rows, contact, 1:] = (turn + 1.0) * answers[rows, contact]
@@ -104,7 +110,9 @@ class _Game:
             along = forces[..., :1]
             tangential = forces[..., 1:] / np.where(along > 0.0, along, 1.0)
             together = np.einsum("mrk,mk->mr", self._least(tangential)[0], along[..., 0])
+            # (2): h > 0 on every ray, by more than rounding to the grid may cost
             covered |= going & (together.min(axis=1) > along[..., 0] @ self.clear)
+            # weight for the rays that have lacked power, counting the last round twice
             regret = (weights * powers).sum(axis=1, keepdims=True) - powers
             regrets = np.where(going[:, None], np.maximum(regrets + regret, 0.0), regrets)
             ahead: Array = np.maximum(regrets + regret, 0.0)
@@ -114,7 +122,7 @@ class _Game:
         return covered, weights, forces
 
     def _answers(self, weights: Array) -> tuple[Array, Array]:
-        """Weighted sums of least powers (m, k) for good tangential parts of forces (m, k, 2)."""
+        """Weighted sums of least powers, (m, k), and good tangential parts of forces, (m, k, 2)."""
         mean = np.einsum("mr,mrkj->mkj", weights, self.turning)
         tried = _allowed(mean[..., 1:], mean[..., :1], self.most)
         best, found, slopes = np.full(mean.shape[:2], -np.inf), tried, np.zeros_like(tried)
@@ -128,12 +136,13 @@ class _Game:
         return best, found
 
     def _least(self, tangential: Array) -> tuple[Array, Array]:
-        """Least powers (m, r, k) of forces over the sites, and slopes in the forces there."""
+        """Least powers of forces over sites, (m, r, k), and slopes in the forces there."""
         v, b, sites = self.velocity, self.turning, self.sites
         g = tangential[:, None]
         across = b[..., 1:] - b[..., :1] * g
         lever = np.stack([-across[..., 1], across[..., 0]], axis=-1)
         places = np.empty_like(lever)
+        # a corner of the polygon, then (3) for the disc around it, then a side of the prism
         for i, corners in enumerate(sites.corners):
             lowest = (lever[:, :, i] @ corners.T).argmin(axis=2)
             places[:, :, i] = corners[lowest]
@@ -148,20 +157,20 @@ class _Game:
 
 
 def _longest(slopes: Array, most: Array) -> Array:
-    """Tangential parts in some directions, as long as friction allows."""
+    """Tangential parts in the given directions, as long as friction allows."""
     lengths = np.linalg.norm(slopes, axis=-1, keepdims=True)
     return most[:, None] * slopes / np.where(lengths > 0.0, lengths, 1.0)
 
 
 def _allowed(parts: Array, along: Array, most: Array) -> Array:
-    """Tangential parts over normal ones, made as short as friction demands."""
+    """Tangential parts over normal parts, shortened to what friction allows."""
     short = np.linalg.norm(parts, axis=-1, keepdims=True) < np.abs(along) * most[:, None]
     divided = parts / np.where(short, along, 1.0)
     return np.where(short, divided, _longest(parts * along, most))
 
 
 def _edges_to_cut(cones: Array, weights: Array) -> Indices:
-    """The number of a long edge of each cone between rays that weigh much, (m,)."""
+    """Number of the edge to cut of each cone, long and between rays that weigh much, (m,)."""
     units = cones / np.linalg.norm(cones, axis=2, keepdims=True)
     ends = np.array(EDGES)
     gaps = units[:, ends[:, 0]] - units[:, ends[:, 1]]

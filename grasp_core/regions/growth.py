@@ -1,12 +1,16 @@
-"""Polygons as large as a cover allows, and larger ones by covers of their own.
+"""Grows polygons as large as a cover allows, and larger ones by covers of their own.
 
 A cover proves more than the discs it was sought for. On a ray of one of its cones the least powers
-of the forces sum to s > 0; each of the m contacts with a force may lose s / m there and no more, so
-its place x is held to F.(a + b x x) >= its least power - s / m: a half-plane. What a face has in
-all half-planes of its finger is a convex polygon around the old region, and the cover proves these
-polygons too, as the losses on each ray sum to s at most. What is left is given away again.
+of the forces sum to s > 0. Each of the m contacts with a force may lose s / m there and no more, so
+its place x has to satisfy
 
-Larger areas: polygons are moved outwards one finger at a time, and kept if a cover is found.
+    F.(a + b x x) >= its least power - s / m,                                               (1)
+
+a half-plane. The part of a face in all half-planes of its finger is a convex polygon around the old
+region. The cover proves these polygons too, as the losses on each ray sum to s at most. The power
+that the polygons leave over is shared out again.
+
+For larger areas, polygons are moved outwards one finger at a time, and kept if a cover is found.
 """
 
 from collections.abc import Sequence
@@ -22,24 +26,24 @@ from grasp_core.regions.sites import Sites
 from grasp_core.solvers.ties import first_best, surpassing
 
 SHARINGS = 2
-"""Times that what is left is given away."""
+"""Number of times that spare power is shared out."""
 MARGIN = 4.0
-"""Powers are kept above so many times the slack of their check."""
+"""Factor by which powers are kept above the slack of their check."""
 FIRST_STEP, LAST_STEP = 0.4, 0.03
-"""By which polygons are moved outwards, relative to the radius of the discs."""
+"""Steps by which polygons are moved outwards, relative to the radius of the discs."""
 BEGINNINGS = (1.0, 0.6)
-"""Radii of discs from which areas grow, relative to the largest that were proved."""
+"""Radii of discs from which areas grow, relative to the largest proved ones."""
 GROWING = 4
-"""Each attempt to grow takes so many times fewer cones."""
+"""Each attempt to grow takes this many times fewer cones."""
 
 
 def shared_out(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) -> list[Array]:
     """Polygons around sites that the same cover proves, in plane coordinates, (c, 2) each.
 
     Args:
-        grounds: What contacts may stand on.
-        ys: Where the points of the sites are in the planes, (k, 2).
-        sites: Proved ones.
+        grounds: The pieces that contacts may stand on.
+        ys: Points of the sites in plane coordinates, (k, 2).
+        sites: Sites that the cover proves.
         cover: Their proof.
     """
     polygons = list[Array]()
@@ -52,7 +56,7 @@ def shared_out(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) -> 
 
 
 def _given_away(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) -> list[Array]:
-    """The pieces' parts in all half-planes, for one sharing of what is left."""
+    """The parts of the pieces in all half-planes (1), for one sharing of the spare power."""
     each = range(len(ys))
     rows, limits = [list[Array]() for _ in each], [list[Array]() for _ in each]
     for where, rays in cover.leaves():
@@ -71,6 +75,7 @@ def _given_away(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) ->
         sharing = np.maximum((forces != 0.0).any(axis=2).sum(axis=0), 1)[:, None]
         for i in each:
             sizes = np.linalg.norm(slopes[i], axis=2)
+            # (1), per length of its slope
             used = sizes > 0.0
             kept = (lowest[i] - np.maximum(spare, 0.0) / sharing)[used] / sizes[used]
             rows[i].append(-slopes[i][used] / sizes[used][:, None])
@@ -82,7 +87,7 @@ def _given_away(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) ->
 
 
 def _inside(polygon: Array, rows: Array, limits: Array) -> Array:
-    """The part of a convex polygon (c, 2) in half-planes rows @ y <= limits, most idle."""
+    """Part of a convex polygon (c, 2) in half-planes rows @ y <= limits, most of them idle."""
     while len(rows) and len(polygon):
         beyond = (rows @ polygon.T).max(axis=1) - limits
         worst = first_best(beyond, ON_LINE)
@@ -95,7 +100,7 @@ def _inside(polygon: Array, rows: Array, limits: Array) -> Array:
 
 
 def disc_polygons(grounds: Grounds, ys: Array, radius: float) -> list[Array]:
-    """What the pieces have of polygons around discs, in plane coordinates, (c, 2) each."""
+    """Parts of the pieces in polygons around discs, in plane coordinates, (c, 2) each."""
     return [
         tidy(part_of_disc(piece, y, radius)) for piece, y in zip(grounds.pieces, ys, strict=True)
     ]
@@ -104,7 +109,7 @@ def disc_polygons(grounds: Grounds, ys: Array, radius: float) -> list[Array]:
 def most_area(
     grounds: Grounds, proved: Proved, beginnings: Sequence[list[Array]]
 ) -> tuple[list[Array], TwistCover]:
-    """Polygons of much area in total, the best of what discs and other beginnings grow to."""
+    """Polygons of much total area: the best that discs and other beginnings grow to."""
     axes, discs = grounds.axes(proved.ys), grounds.discs(proved.ys, proved.radius)
     best = shared_out(grounds, proved.ys, discs, proved.cover), proved.cover
     for polygons in beginnings:
@@ -120,14 +125,14 @@ def most_area(
 
 
 def total_area(polygons: Sequence[Array]) -> float:
-    """Of counter-clockwise polygons (c, 2)."""
+    """Total area of counter-clockwise polygons, (c, 2) each."""
     return sum(map(signed_area, polygons))
 
 
 def _grown(
     grounds: Grounds, proved: Proved, polygons: list[Array], cover: TwistCover, axes: Array
 ) -> tuple[list[Array], TwistCover]:
-    """Polygons moved outwards in turn, each in steps that are halved where no cover is found."""
+    """Move polygons outwards in turn, in steps that are halved where no cover is found."""
     steps = np.full(len(polygons), FIRST_STEP * proved.radius)
     while (steps > LAST_STEP * proved.radius).any():
         for i, piece in enumerate(grounds.pieces):
@@ -150,6 +155,6 @@ def _cover(grounds: Grounds, ys: Array, polygons: list[Array], axes: Array) -> T
 
 
 def _offset(piece: Array, polygon: Array, distance: float) -> Array:
-    """What a piece (c, 2) has of a convex polygon with its edges moved out, (c, 2)."""
+    """The part of a piece (c, 2) in a convex polygon with its edges moved out, (c, 2)."""
     E, b = edge_rows(polygon)
     return tidy(clip(piece, E, b + distance))

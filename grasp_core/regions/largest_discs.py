@@ -1,9 +1,9 @@
-"""The largest equal discs around contacts in which all choices are proved to be force-closed.
+"""Finds the largest equal discs around contacts in which all choices are proved force-closed.
 
-Solved: for contacts on faces, a radius for which a cover of all twists is found (`twist_covers`),
-and a larger one for which some choice is open. What a face does not have of a disc is left out. The
-radius is doubled from a small one and then halved into, first with few cones for each attempt, then
-in smaller steps with as many as are granted.
+Solved: for contacts on faces, a radius for which a cover of all twists is found (`cover_search`),
+and a larger radius for which some choice is open. Parts of a disc that its face does not have are
+left out. The radius is doubled from a small one and then bisected, first with few cones for each
+attempt, then in smaller steps with as many cones as are allowed.
 """
 
 import math
@@ -21,41 +21,41 @@ from grasp_core.regions.sites import TINY, Sites, stacked_corners
 from grasp_core.solvers.ties import coarse
 
 FINENESS = 0.02
-"""The radius is found to this, relative to it."""
+"""Precision to which the radius is found, relative to it."""
 FIRST_RADIUS, LEAST_RADIUS = 0.05, 1e-6
-"""Where the search begins and gives up, relative to the levers of the contacts."""
+"""Radii where the search begins and gives up, relative to the levers of the contacts."""
 COARSE = 16
-"""The first attempts take so many times fewer cones."""
+"""The first attempts take this many times fewer cones."""
 FAST, SLOW = 2.0, 1.1
-"""Steps of the radius, of the first attempts and of the others."""
+"""Factors by which the radius grows, in the first attempts and in the others."""
 NEAR = 0.04
-"""So near to what is proved an open choice is sought, relative to it."""
+"""Distance from the proved radius up to which an open choice is sought, relative to it."""
 REFUTING = 4
-"""Attempts to find one take so many times fewer cones."""
+"""Attempts to find an open choice take this many times fewer cones."""
 REACH_DIGITS = 10
 """Digits after the point of the largest radius that is tried."""
 SIDES = 16
-"""Of the polygon around a disc that a face's border cuts."""
+"""Number of sides of the polygon around a disc that the border of a face cuts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grounds:
-    """What contacts may stand on, at unit size."""
+    """The pieces that contacts may stand on, at unit size, with the means of a proof."""
 
     pieces: tuple[FacePiece, ...]
-    """Of one face each, about any common origin."""
+    """One piece per contact, about any common origin."""
     friction: Array
-    """(k,)"""
+    """Coulomb coefficient of each contact, (k,)."""
     cones: int
-    """Of one proof at most."""
+    """Most cones of one proof."""
 
     @property
     def frames(self) -> Array:
-        """Columns (normal, tangent, tangent) of the pieces, (k, 3, 3)."""
+        """Frames of the pieces as columns (normal, tangent, tangent), (k, 3, 3)."""
         return np.array([np.column_stack([p.normal, p.frame]) for p in self.pieces])
 
     def points(self, ys: Array) -> Array:
-        """Points of the pieces with these plane coordinates (k, 2), (k, 3)."""
+        """Points of the pieces, (k, 3), with the plane coordinates `ys`, (k, 2)."""
         return np.array([piece.point(y) for piece, y in zip(self.pieces, ys, strict=True)])
 
     def places(self, i: int) -> Array:
@@ -64,7 +64,7 @@ class Grounds:
         return piece.origin + piece.corners @ piece.frame.T
 
     def around(self, ys: Array, polygons: Sequence[Array], radii: Array) -> Sites:
-        """Sites of polygons (c, 2), in plane coordinates, widened by discs (k,)."""
+        """Sites in polygons (c, 2), in plane coordinates, widened by discs of `radii`, (k,)."""
         return Sites(
             self.points(ys),
             self.frames,
@@ -75,7 +75,7 @@ class Grounds:
         )
 
     def discs(self, ys: Array, radius: float) -> Sites:
-        """Sites of what the pieces have of discs around points (k, 2)."""
+        """Sites in the parts of the pieces within discs around points `ys`, (k, 2)."""
         radii, polygons = np.zeros(len(ys)), list[Array]()
         for i, (piece, y) in enumerate(zip(self.pieces, ys, strict=True)):
             if (piece.E @ y + radius <= piece.b - SAME_CORNER).all():  # not if it touches an edge
@@ -86,9 +86,9 @@ class Grounds:
         return self.around(ys, polygons, radii)
 
     def axes(self, ys: Array) -> Array:
-        """Twists as rows that move contacts alike, tangents counted with the friction, (6, 6).
+        """Twists as rows, (6, 6), that move contacts alike, tangents counted with the friction.
 
-        Long objects then need no more cones than round ones.
+        With them, long objects need no more cones than round ones.
         """
         motions = list[Array]()
         for (x, y, z), F, mu in zip(self.points(ys), self.frames, self.friction, strict=True):
@@ -103,27 +103,27 @@ class Grounds:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proved:
-    """Discs in which all choices are closed, and larger ones in which one is open."""
+    """Discs in which all choices are closed, and larger ones in which one choice is open."""
 
     ys: Array
     """Centres, in plane coordinates, (k, 2)."""
     radius: float
     cover: TwistCover
     limit: float
-    """A radius with an open choice; infinite where none was found."""
+    """Radius of discs with an open choice; infinite where none was found."""
     choice: Array | None
-    """That choice, (k, 3)."""
+    """Contacts of the open choice, (k, 3)."""
 
 
 def part_of_disc(piece: FacePiece, y: Array, radius: float) -> Array:
-    """Corners of what a piece has of a polygon around a disc about one of its points, (c, 2)."""
+    """Corners of the part of a piece in a polygon around a disc about a point of it, (c, 2)."""
     turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
     rows = np.column_stack([np.cos(turns), np.sin(turns)])
     return clip(piece.corners, rows, rows @ y + radius)
 
 
 def reach_of(grounds: Grounds, ys: Array) -> float:
-    """The least radius of discs that hold whole pieces, or hardly more."""
+    """The least radius of discs that hold the whole pieces, or a little more."""
     least = max(
         float(np.linalg.norm(piece.corners - y, axis=1).max())
         for piece, y in zip(grounds.pieces, ys, strict=True)
@@ -132,11 +132,11 @@ def reach_of(grounds: Grounds, ys: Array) -> float:
 
 
 def largest_discs(grounds: Grounds, ys: Array, first: float = FIRST_RADIUS) -> Proved | None:
-    """The largest equal discs, up to whole faces, for which a cover is found, if there are any.
+    """The largest equal discs, up to whole faces, for which a cover is found, or None.
 
     Args:
-        grounds: What contacts may stand on.
-        ys: Centres, in plane coordinates of the pieces, (k, 2).
+        grounds: The pieces that contacts may stand on.
+        ys: Centres in plane coordinates of the pieces, (k, 2).
         first: The radius to try first.
     """
     search = _Search(grounds, ys)
@@ -149,7 +149,7 @@ def largest_discs(grounds: Grounds, ys: Array, first: float = FIRST_RADIUS) -> P
 
 
 class _Search:
-    """What is known of discs around some centres."""
+    """The state of a search around some centres: what is proved and what is refuted."""
 
     def __init__(self, grounds: Grounds, ys: Array) -> None:
         self.grounds, self.ys, self.axes = grounds, ys, grounds.axes(ys)
@@ -160,7 +160,7 @@ class _Search:
         self.choice: Array | None = None
 
     def widen(self, cones: int, radius: float, growth: float, fineness: float) -> None:
-        """Try a radius, others larger by a factor each, and then those between."""
+        """Try a radius, then larger ones by a factor each, then bisect."""
         upper, radius = self.limit, min(radius, 0.5 * (self.lower + self.limit))
         while radius >= LEAST_RADIUS and upper - self.lower > fineness * self.lower:
             radius = min(radius, self.reach)
@@ -179,7 +179,7 @@ class _Search:
                 radius = 0.5 * (self.lower + upper) if self.lower > 0.0 else 0.25 * upper
 
     def refute(self, cones: int) -> None:
-        """Try larger radii, and then those between, for an open choice."""
+        """Look for an open choice in larger discs, then bisect."""
         below, radius = self.lower, (1.0 + NEAR) * self.lower
         while self.limit - below > NEAR * self.lower and min(radius, self.reach) > below:
             radius = min(radius, self.reach)

@@ -1,7 +1,7 @@
-"""How a twist moves a contact that may be anywhere in its site, and whether friction resists it.
+"""How a twist moves a contact anywhere in its site, and whether friction resists it there.
 
-A motion is six numbers per twist of unit length and contact: the velocity of the contact's point
-along its normal and two tangents, and the turning about these tangents and about the normal.
+A motion is six numbers per twist of length one and contact: the velocity of the contact's point
+along its normal and two tangents, and the rate of turning about these tangents and the normal.
 """
 
 import math
@@ -14,7 +14,7 @@ from grasp_core.regions.sites import AHEAD, TINY, Sites
 
 MOTIONS = 6
 STEPS = 40
-"""Towards the place of a contact where a twist is resisted least."""
+"""Most steps towards the place of a contact where a twist is resisted least."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -42,7 +42,7 @@ def lowest(
 def velocity(
     motion: Array, place: Array | tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """Of a contact that is off its point, along the frame."""
+    """Velocity of a contact that is off its point, along the frame."""
     out, x, y = place
     return (
         motion[0] + motion[3] * y - motion[4] * x,
@@ -53,14 +53,14 @@ def velocity(
 
 @njit(cache=True, error_model="numpy")
 def longest(f: float, g: float, most: float) -> tuple[float, float]:
-    """The tangential part in a direction that friction allows."""
+    """The tangential part in a direction, as long as friction allows."""
     length = math.sqrt(f * f + g * g)
     return (f * most / length, g * most / length) if length > 0.0 else (0.0, 0.0)
 
 
 @njit(cache=True, error_model="numpy")
 def holds(sites: Sites, i: int, x: float, y: float) -> bool:
-    """Whether a place in its plane is in a contact's polygon, or in its disc."""
+    """Whether a place in its plane is in a contact's polygon or in its disc."""
     if x * x + y * y <= sites.radii[i] ** 2:
         return True
     corners, sides = sites.corners[i], 0
@@ -75,15 +75,16 @@ def holds(sites: Sites, i: int, x: float, y: float) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def resists(motion: Array, sites: Sites, i: int, shift: Array) -> bool:
-    """Whether a contact may resist a twist wherever it is; else a place, perhaps, where it cannot.
+    """Whether a contact resists a twist wherever it is; if not, `shift` is where it may not.
 
-    Where a contact does not slide friction has no power, and otherwise the most that it allows is
-    convex in the place, and steps go to where it is least. False, with a place that resists, where
-    the steps do not suffice.
+    Friction has no power on a contact that does not slide. Elsewhere the most power that friction
+    allows is convex in the place, and steps go to where it is least. The result is also False, with
+    a place that does resist, where the steps do not suffice.
     """
     most = sites.friction[i] * (1.0 - TINY)
     out, x, y = 0.0, 0.0, 0.0
     if motion[5] != 0.0:
+        # the one place that does not slide
         shift[0], shift[1], shift[2] = 0.0, -motion[2] / motion[5], motion[1] / motion[5]
         if holds(sites, i, shift[1], shift[2]) and velocity(motion, shift)[0] <= 0.0:
             return False
@@ -105,7 +106,7 @@ def resists(motion: Array, sites: Sites, i: int, shift: Array) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def is_open(motions: Array, sites: Sites, shifts: Array) -> bool:
-    """Whether no contact resists a twist at the places that are filled in."""
+    """Whether no contact resists a twist at the places `shifts`, which are filled in."""
     for i in range(len(sites.points)):
         if resists(motions[i], sites, i, shifts[i]):
             return False

@@ -1,4 +1,4 @@
-"""Regions for fingers that keep force closure wherever in them the contacts are: the proof.
+"""Proof that regions for fingers keep force closure wherever in them the contacts are.
 
 Solved: given convex regions K_i on planes, are contacts x_i in K_i force-closed for every choice?
 
@@ -6,33 +6,35 @@ Criterion. Contacts are in force closure if each twist y = (a, b) other than zer
 one of them: some force f in a friction cone C_i has positive power f.v at its contact, where the
 object moves with v = a + b x x. As the choice of one contact does not bind the others,
 
-    all choices are closed  <=>  for every y != 0 there is an i such that
+    all choices are closed  <=>  for every y != 0 there is an i such that                    (1)
                                  min over x in K_i of max over f in C_i of f.(a + b x x) > 0.
 
 Cover. Choose forces F_i in the cones C_i, some perhaps zero. The least that their powers sum to,
 
-    h(y) = sum over i of min over x in K_i of F_i.(a + b x x),
+    h(y) = sum over i of min over x in K_i of F_i.(a + b x x),                               (2)
 
 is concave in y, as a sum of least values of linear functions, and h(t y) = t h(y) for t > 0. So if
-h is positive on some rays of twists, it is so on the whole cone that they span; and where a sum of
-powers is positive one of them is. A *cover* is a list of cones, six rays each, with forces, whose
-cones fill all of R^6: if h > 0 on the rays of each, every choice of contacts is force-closed. The
-sixty-four orthants of six independent twists fill R^6. A cone is cut into two by a ray on one of
-its edges, the sum of its ends, in place of either end; so cones still fill R^6. For F_i with normal
-part n and tangential part g a disc of radius r around p gives, b_t and b_n being the parts of b
-across and along the normal,
+h is positive on some rays of twists, it is positive on the whole cone that they span; and where a
+sum of powers is positive one of them is. A *cover* is a list of cones, six rays each, with forces,
+whose cones fill all of R^6: if h > 0 on the rays of each, every choice of contacts is force-closed.
+For F_i with normal part n and tangential part g a disc of radius r around p gives, b_t and b_n
+being the parts of b across and along the normal,
 
-    min F_i.(a + b x x) = F_i.(a + b x p) - r |n b_t - b_n g|,
+    min F_i.(a + b x x) = F_i.(a + b x p) - r |n b_t - b_n g|,                               (3)
 
 and over a polygon the least is at a corner. A region that is thicker than its plane, as below a
 patch of a curved surface, is a prism, with corners on both sides.
 
+Cuts (4). The sixty-four orthants of six independent twists fill R^6. A cone is cut into two by a
+ray on one of its edges, the sum of its ends, in place of either end; so cones still fill R^6.
+
 Completeness. If all choices are closed with something to spare, cutting long edges long enough ends
 with a cover; edges are preferred where power lacks, but all are cut in the end. If a twist has
-h <= 0 for any forces, there is a choice that is not closed, as each contact has a best force and a
-worst place (the power is linear in both). Between the two only time decides, and it takes little:
-were regions points, h would be linear, and a cone of twists in a half-space would be covered by one
-set of forces (force closure itself); what bends h is how the worst place moves from ray to ray.
+h <= 0 for any forces, there is a choice that is not closed (5), as each contact has a best force
+and a worst place (the power is linear in both). Between the two only time decides, and it takes
+little: were regions points, h would be linear, and a cone of twists in a half-space would be
+covered by one set of forces (force closure itself); what bends h is how the worst place moves from
+ray to ray.
 
 Source: for single forces the criterion is that of independent regions by primitive wrenches
 (Pollard, "Closure and quality equivalence for efficient synthesis of grasps from examples", 2004).
@@ -51,12 +53,13 @@ from grasp_core.fields import are_frictions, are_units, is_a, is_array
 
 TWIST = 6
 LEAF = 15
-"""Code of a cone that is not cut; smaller ones number its edges (0, 1), (0, 2), ... (4, 5)."""
+"""Code of a cone that is not cut; smaller codes number its edges (0, 1), (0, 2), ... (4, 5)."""
 EDGES = tuple((i, j) for i in range(TWIST) for j in range(i + 1, TWIST))
 SLACK = 1e-12
-"""Of a power, relative to the lengths of wrench and `summed` twist: thousands of roundings."""
+"""Rounding of a power, relative to the lengths of wrench and `summed` twist: thousands of
+roundings."""
 LARGEST = 2.0**50
-"""Entries of rays up to this are exact: they are sums of whole numbers. Lengths of axes are
+"""Entries of rays up to this are exact: they are sums of whole numbers. Lengths of axes must be
 between its inverse and it."""
 
 
@@ -70,10 +73,10 @@ class TwistCover:
     axes: Array
     """Independent twists as rows, velocity of the points' origin before turning, (6, 6)."""
     codes: Indices
-    """The tree, level by level from the sixty-four orthants: for each cone the number of the edge
-    that is cut, or `LEAF`, (n,)."""
+    """The tree of cones, (n,), level by level from the sixty-four orthants: for each cone the
+    number of the edge that is cut, or `LEAF`."""
     forces: Array
-    """For each cone that is not cut, in the same order, forces on the object, (m, k, 3)."""
+    """Forces on the object for each cone that is not cut, in the same order, (m, k, 3)."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axes", frozen(self.axes, (TWIST, TWIST), "axes"))
@@ -82,36 +85,40 @@ class TwistCover:
         forces = frozen(self.forces, (leaves, None, 3), "forces", most=np.inf)  # of any size
         object.__setattr__(self, "forces", forces)
         if self.codes.min(initial=0) < 0 or self.codes.max(initial=0) > LEAF:
-            raise InputError(f"codes of a cover are from 0 to {LEAF}")
+            raise InputError(f"codes of a cover must be whole numbers from 0 to {LEAF}")
 
     def leaves(self) -> Iterator[tuple[slice, Array]]:
-        """The cones, level by level: where they are in the order of `contacts`, and rays (m, 6, 6).
+        """Yield the uncut cones by levels: their slice of `forces`, and their rays, (m, 6, 6).
 
         Raises:
-            InputError: The codes are those of no tree.
+            InputError: The codes do not describe a tree.
         """
         cones, at, begun = orthants(), 0, 0
         while len(cones):
             codes = self.codes[at : at + len(cones)]
             if len(codes) < len(cones):
-                raise InputError("the cover ends before its cones do")
+                raise InputError(
+                    "codes end before the cones of the cover do; expected one code per cone"
+                )
             uncut = codes == LEAF
             count = int(np.count_nonzero(uncut))
             yield slice(begun, begun + count), cones[uncut]
             at, begun = at + len(cones), begun + count
             cones = halves(cones[~uncut], codes[~uncut])
         if at < len(self.codes):
-            raise InputError("the cover goes on after its cones have ended")
+            raise InputError(
+                "codes go on after the last cone of the cover; expected one code per cone"
+            )
 
     def verify(self, regions: Sequence[Array], normals: Array, friction: Array) -> bool:
         """Whether all choices of contacts in regions are force-closed, in plain arithmetic.
 
-        What is no region, normal or friction is answered with False.
+        The answer is False for arguments that are not regions, normals or friction.
 
         Args:
             regions: Corners of each contact's convex region, about the origin of points, (c, 3).
-            normals: Inward normals, (k, 3).
-            friction: (k,)
+            normals: Inward unit normals, (k, 3).
+            friction: Coulomb coefficients, (k,).
         """
         k = self.forces.shape[1]
         if not (are_units(normals, k, 3, slack=SLACK) and are_frictions(friction, k)):
@@ -122,6 +129,7 @@ class TwistCover:
         forces = self.forces / largest[:, None, None]  # else squares of tiny ones are zero
         along = np.einsum("mki,ki->mk", forces, normals)
         across = np.linalg.norm(forces - along[..., None] * normals, axis=2)
+        # every F_i lies in its cone C_i
         if not ((along >= 0.0) & (across <= friction * along)).all():
             return False
         try:
@@ -138,37 +146,39 @@ class TwistCover:
         return bool(np.linalg.svd(self.axes / lengths[:, None], compute_uv=False)[-1] > SLACK)
 
     def _powerful(self, forces: Array, rays: Array, regions: Sequence[Array]) -> bool:
-        """Whether each cone's forces have power on its rays wherever the contacts are."""
+        """Whether h > 0 in (2) for each cone's forces on its rays."""
+        # beyond this the rays would not be exact, nor the cuts (4)
         if np.abs(rays).max(initial=0.0) > LARGEST:
             return False
         powers, sizes = np.zeros(rays.shape[:2]), np.zeros(rays.shape[:2])
         twists, lengths = rays @ self.axes, summed(rays, self.axes)
         for region, F in zip(regions, forces.swapaxes(0, 1), strict=True):
             slopes, at_origin = power_of(F, twists)
+            # the least of (2) is at a corner of the region
             powers += at_origin + (slopes @ region.T).min(axis=2)
             sizes += lengths * slack_of(F, region)[:, None]
         return bool((powers > sizes).all())
 
 
 def _are_places(regions: Sequence[Array], count: int) -> bool:
-    """Whether regions are so many lists of points."""
+    """Whether regions are lists of points, `count` of them."""
     listed = is_a(regions, Sequence) and len(regions) == count
     return listed and all(is_array(region, None, 3) and len(region) > 0 for region in regions)
 
 
 def power_of(F: Array, twists: Array) -> tuple[Array, Array]:
-    """Power F.(a + b x x) of forces (m, 3) on twists (m, r, 6) as slopes in x and the rest.
+    """Power F.(a + b x x) of forces (m, 3) on twists (m, r, 6), as slopes in x and constant part.
 
     Returns:
-        F x b, (m, r, 3), and F.a, (m, r).
+        The slopes F x b, (m, r, 3), and the constant parts F.a, (m, r).
     """
     return np.cross(F[:, None], twists[..., 3:]), np.einsum("mi,mri->mr", F, twists[..., :3])
 
 
 def summed(rays: Array, axes: Array) -> Array:
-    """Lengths (m, r) of the sums that twists are made of: what their rounding is relative to.
+    """Lengths of the sums that twists are made of, (m, r): rounding is relative to them.
 
-    Where axes nearly cancel the twists themselves are shorter.
+    The twists themselves are shorter where axes nearly cancel.
     """
     return np.linalg.norm(np.abs(rays) @ np.abs(axes), axis=2)
 
@@ -186,9 +196,10 @@ def orthants() -> Array:
 
 
 def halves(cones: Array, codes: Indices) -> Array:
-    """Cones (m, 6, 6) cut at the edges with these numbers, both parts next to each other."""
+    """Cut cones (m, 6, 6) at the edges with these numbers, with both parts next to each other."""
     ends = np.array(EDGES)[codes]
     rows = np.arange(len(cones))
+    # (4): the sum of its ends cuts an edge
     middles = cones[rows, ends[:, 0]] + cones[rows, ends[:, 1]]
     halves = np.repeat(cones, 2, axis=0)
     halves[2 * rows, ends[:, 0]] = middles
