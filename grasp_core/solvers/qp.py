@@ -7,7 +7,7 @@ feasible point, and its status is not read: whoever asks checks the answer. It s
 its tolerance, at a point that depends on where its numbers lie in memory. The conditions of
 optimality on the active constraints E x = e are linear equations with one answer,
 
-    [P E'; E 0] (x, u) = (-q, e),                                                                 (2)
+    [P E'; E 0] (x, u) = (-q, e),                                                                (2)
 
 and that answer is returned where it is feasible and as good.
 """
@@ -84,7 +84,7 @@ def minimize(program: QuadraticProgram) -> Array | None:
 
 
 def _polished(program: QuadraticProgram, x: Array) -> Array:
-    """Return the answer of (2) on the constraints active at x, if it is feasible and as good as x."""
+    """Return the answer of (2) for what is active at x, if it is feasible and as good as x."""
     P, q, A, b = program.P, program.q, program.A, program.b
     C, d = program.rows()
     for slack in ACTIVE:
