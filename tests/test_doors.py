@@ -20,7 +20,7 @@ DOORS = {
     "manifold3d": "grasp_core/objects/booleans.py",
     "highspy": "grasp_core/solvers/lp.py",
     "clarabel": "grasp_core/solvers/conic.py",
-    "qpsolvers": "grasp_core/forces/contact_forces.py",
+    "qpsolvers": "grasp_core/solvers/qp.py",
     "scipy.optimize": "grasp_core/solvers/nearest_point.py",
     "mujoco": ("sim_validate/simulation/simulate.py", "scenes/drawing/frames.py"),
     "PIL": "scenes/drawing/frames.py",

@@ -1,4 +1,4 @@
-"""Contact forces that balance wrenches are found by strictly convex programs; the door to ProxQP.
+"""Contact forces that balance wrenches are found by strictly convex programs.
 
 Forces f are sought in pyramids inscribed in the friction cones, so that every answer lies in the
 true cones. With the map G from forces to their wrench, the external wrench w, the least and largest
@@ -19,16 +19,14 @@ exact cones may (`cone_forces`). Where nothing balances, `closest_forces` leaves
 imbalance.
 
 Both objectives ask for the nearest point of a polyhedron (`nearest_point`), once (1) is solved
-(`balance`). Where that point is not found, ProxQP decides. It calls some of these feasible programs
-infeasible, so it is asked for the closest feasible point, and its status is not read: an answer
+(`balance`). Where that point is not found, a quadratic program decides (`qp`), and its answer
 counts when its own residuals are small.
 """
 
-import importlib
 import math
 from collections.abc import Callable
-from functools import cache, partial
-from typing import Any, Literal
+from functools import partial
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,19 +39,14 @@ from grasp_core.forces.balance import RESIDUAL, Balance, needed_friction
 from grasp_core.forces.cone_forces import least_norm_in_cones
 from grasp_core.forces.least_friction import lower_friction
 from grasp_core.solvers.nearest_point import least_distance
+from grasp_core.solvers.qp import QuadraticProgram, minimize
 from grasp_core.values import Grasp
 
-REQUESTED = 1e-8
-MAX_ITERATIONS = 300
-"""Most iterations of ProxQP: feasible programs of this size take about twenty; infeasible ones
-would go on for minutes."""
 REGULAR = 1e-3
 """Weight of the forces' own size that keeps the least-friction programs strictly convex."""
 IMPROVEMENT = 1e-2
 """The iteration ends when the coefficient falls by less than this share."""
 MAX_ROUNDS = 20
-ACTIVE = (1e-6, 1e-5, 1e-7, 1e-8)
-"""Slacks below which a constraint may count as active, tried in turn."""
 LEAST_CHARGE = 1e-3
 """Weight of the forces' own size against the imbalance in `closest_forces`."""
 
@@ -318,63 +311,10 @@ def _solve(P: Array, q: Array, rows: Array, balance: Balance, *, balanced: bool)
 
     The variables are its forces, and perhaps a last one that is free.
     """
-    solver = _qpsolvers()
     forces = balance.G.shape[1]
     lower, upper = np.full(len(q), -np.inf), np.full(len(q), np.inf)
     # (2) as bounds on every third variable, (1) as equations unless its residual is the objective
     lower[0:forces:3], upper[0:forces:3] = balance.least, balance.largest
-    map_of_all = np.hstack([balance.G, np.zeros((6, len(q) - forces))])
-    equations = (map_of_all, -balance.W[0]) if balanced else (None, None)
-    program = solver.Problem(P, q, rows, np.zeros(len(rows)), *equations, lb=lower, ub=upper)
-    answer = solver.solve_problem(
-        program, solver="proxqp", eps_abs=REQUESTED, max_iter=MAX_ITERATIONS,
-        primal_infeasibility_solving=balanced,
-    )  # fmt: skip
-    if answer.x is None or not np.isfinite(answer.x).all():
-        return None
-    return _polished(program, np.asarray(answer.x, dtype=np.float64))
-
-
-@cache
-def _qpsolvers() -> Any:
-    module: Any = importlib.import_module("qpsolvers")
-    if "proxqp" not in module.available_solvers:
-        raise SolverError(
-            "ProxQP cannot be loaded; it needs the package proxsuite and the system library "
-            "libgomp (on Debian: apt-get install libgomp1)"
-        )
-    return module
-
-
-def _polished(program: Any, x: Array) -> Array:
-    """Return the exact optimum on the constraints active at x, if it is feasible and as good as x.
-
-    The solver stops anywhere within its tolerance, at a point that depends on where its numbers
-    lie in memory. The conditions of optimality on the active constraints are linear equations
-    with one answer.
-    """
-    P, q, C, d, A, b = _as_rows(program)
-    for slack in ACTIVE:
-        active = d - C @ x < slack
-        E, e = np.vstack([A, C[active]]), np.concatenate([b, d[active]])
-        conditions = np.block([[P, E.T], [E, np.zeros((len(e), len(e)))]])
-        targets = np.concatenate([-q, e])
-        solved = np.linalg.lstsq(conditions, targets, rcond=None)[0]
-        exact = np.asarray(solved, dtype=np.float64)[: len(q)]
-        unmet = float(np.abs(conditions @ solved - targets).max())
-        outside = float((C @ exact - d).max())
-        worse = float(0.5 * (exact @ P @ exact - x @ P @ x) + q @ (exact - x))
-        if max(unmet, outside, worse) < RESIDUAL:
-            return exact
-    return x
-
-
-def _as_rows(program: Any) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """Return P, q, then C x <= d with the bounds among the rows, then A x = b."""
-    n = len(program.q)
-    above, below = np.isfinite(program.ub), np.isfinite(program.lb)
-    C = np.vstack([program.G, np.eye(n)[above], -np.eye(n)[below]])
-    d = np.concatenate([program.h, program.ub[above], -program.lb[below]])
-    none = program.A is None
-    A, b = (np.empty((0, n)), np.empty(0)) if none else (program.A, program.b)
-    return program.P, program.q, C, d, A, b
+    map_of_all = np.hstack([balance.G, np.zeros((len(balance.G), len(q) - forces))])
+    equations = (map_of_all, -balance.W[0]) if balanced else (map_of_all[:0], np.empty(0))
+    return minimize(QuadraticProgram(P, q, rows, np.zeros(len(rows)), *equations, lower, upper))
