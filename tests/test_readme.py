@@ -32,7 +32,6 @@ def test_the_example_prints_what_it_says():
 
 
 def test_every_command_is_described():
-
     assert len(get_args(Command)) >= 9
     for command in get_args(Command):
         assert f"`graspproof {command.__name__.lower()}" in COMMANDS
@@ -79,7 +78,7 @@ def set_up(tmp_path, **kind):
     """Exit code of the set-up script on such a machine, and the calls that it made."""
     calls = machine(tmp_path / "programs", **kind)
     environment = os.environ | {"PATH": f"{calls.parent}:{os.environ['PATH']}"}
-    done = subprocess.run(["sh", SETUP, "env", "-e", ".[test]"], cwd=tmp_path, env=environment,
+    done = subprocess.run(["/bin/sh", SETUP, "env", "-e", ".[test]"], cwd=tmp_path, env=environment,
                           capture_output=True, text=True, check=False)  # fmt: skip
     return done.returncode, calls.read_text().splitlines()
 
@@ -112,7 +111,7 @@ def test_the_script_installs_nothing_for_others_than_root(tmp_path):
 
 @pytest.mark.parametrize("given", [[], ["env"]])
 def test_the_script_says_how_to_use_it(tmp_path, given):
-    done = subprocess.run(["sh", SETUP, *given], cwd=tmp_path, capture_output=True, text=True,
+    done = subprocess.run(["/bin/sh", SETUP, *given], cwd=tmp_path, capture_output=True, text=True,
                           check=False)  # fmt: skip
     assert done.returncode != 0
     assert "usage: sh .ci/setup FOLDER PIP-ARGUMENT..." in done.stderr
