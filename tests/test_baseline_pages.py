@@ -1,4 +1,4 @@
-"""What the README and docs/baselines.md say about baselines, done as they say it."""
+"""What docs/baselines.md says, done as it says it."""
 
 import dataclasses
 import math
@@ -19,8 +19,10 @@ from sim_validate.simulation.noise import Noise
 from tests.sim_validate.plugin.project import run_pytest
 
 ROOT = Path(__file__).parent.parent
-PAGE = (ROOT / "docs" / "baselines.md").read_text()
-README = re.search(r"## Baselines\n(.*?)\n## ", (ROOT / "README.md").read_text(), re.DOTALL)[1]
+BEFORE, FIRST_STEPS, AFTER = re.fullmatch(
+    r"(.*\n)## First steps\n(.*?\n)(## .*)", (ROOT / "docs" / "baselines.md").read_text(), re.DOTALL
+).groups()
+PAGE = BEFORE + AFTER
 
 
 def block(text, language):
@@ -30,9 +32,9 @@ def block(text, language):
 
 @pytest.fixture
 def project(tmp_path, monkeypatch):
-    """A folder in which the README's commands were run."""
+    """A folder in which the commands of the first steps were run."""
     monkeypatch.chdir(tmp_path)
-    lines = block(README, "sh").splitlines()
+    lines = block(FIRST_STEPS, "sh").splitlines()
     assert len(lines) == 3
     for line in lines:
         assert main([*shlex.split(line)[1:], "-q"]) == Exit.GOOD
@@ -40,10 +42,10 @@ def project(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_readme_in_a_project_of_somebody_else(project):
+def test_the_first_steps_in_a_project_of_somebody_else(project):
     assert (project / "results.xml").is_file()
-    (project / "wedge.grasps.toml").write_text(block(README, "toml"))
-    (project / "test_mine.py").write_text(block(README, "py"))
+    (project / "wedge.grasps.toml").write_text(block(FIRST_STEPS, "toml"))
+    (project / "test_mine.py").write_text(block(FIRST_STEPS, "py"))
     code, said = run_pytest(project, "--grasp-bless", "wedge.grasps.toml")
     assert code == 0, said
     assert (project / "wedge.baseline.json").is_file()
