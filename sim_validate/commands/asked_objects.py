@@ -15,7 +15,7 @@ from sim_validate.cli.console import Reporter
 
 
 def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
-    """A mesh file, or a built-in object when the name has no mesh ending."""
+    """Load a mesh file, or a built-in object if the name has no mesh ending."""
     path = Path(name)
     if path.suffix.lower().lstrip(".") in FORMATS or path.is_file():
         given = mesh.limits
@@ -45,7 +45,7 @@ def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
 
 
 def object_to_plan(name: str, planning: flag_groups.Planning, reporter: Reporter) -> Polyhedron:
-    """The object, once all that is asked for fits it.
+    """Load the object and check that the planning flags fit it.
 
     Raises:
         InputError: The object or a setting is refused.
@@ -78,7 +78,7 @@ def _check_optimize(planning: flag_groups.Planning) -> None:
 
 
 def asked_finger(planning: flag_groups.Planning) -> Finger | None:
-    """The fingers whose free lines are to be planned, if any."""
+    """The fingers whose free lines are planned, or None if no flag asks for them."""
     if planning.approach_m is None:
         if planning.finger_radius_m is not None and not planning.optimize:
             raise InputError(
