@@ -58,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
         if "" in arguments:
-            said = "a word of the command line is empty, as of a variable that is not set"
+            said = "an argument is empty, perhaps from a variable that is not set"
             raise FlagsError(f"{said}; leave it out, or give a value")
         flags = with_config(arguments, COMMANDS)
     except InputError as error:

@@ -48,7 +48,7 @@ def baseline_from_json(text: str, path: str) -> Baseline:
 def _from_text(text: str) -> Baseline:
     record = object_of(text, "baseline")
     if "grasps_file" not in record:
-        raise InputError("is no baseline, which `graspproof baseline record` writes")
+        raise InputError("is not a baseline; `graspproof baseline record` writes one")
     check_schema(record, SCHEMA)
     del record["schema"]
     # an empty list is refused, because it would check nothing
@@ -93,4 +93,4 @@ def check_writable(path: Path) -> None:
         InputError: The path holds something else.
     """
     if path.exists() and MARK not in read_text(path):
-        raise InputError(f"{path}: is no baseline, and will not be overwritten")
+        raise InputError(f"{path}: is not a baseline, and will not be overwritten")

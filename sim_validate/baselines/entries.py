@@ -68,11 +68,13 @@ class Entry:
     def __post_init__(self) -> None:
         """Refuse an entry that contradicts itself."""
         if self.held == bool(self.not_held):
-            raise ValueError(f"outcome {self.outcome.value}, but not held are {self.not_held}")
+            raise ValueError(
+                f"outcome is {self.outcome.value}, but wrenches not held are {self.not_held}"
+            )
         if self.controls_let_go > self.controls or len(self.not_held) > self.wrenches:
-            raise ValueError("more ended in some way than there were")
+            raise ValueError("more wrenches or controls ended in some way than were tried")
         if any(number >= self.noisy_trials for number in (*self.noisy_not_held, *self.noisy_close)):
-            raise ValueError("there were not so many repeats with noise")
+            raise ValueError("a number is not below the number of repeats with noise")
 
     @property
     def held(self) -> bool:

@@ -67,7 +67,7 @@ def _read(path: Path, known: set[str]) -> list[str]:
         raise InputError(f"--config {error}") from error
     for name in settings:
         if name.replace("-", "_") not in known:
-            said = f"--config {path}: {place([name])}: there is no such flag; keys are long flags"
+            said = f"--config {path}: {place([name])}: unknown flag; keys are long flags"
             raise FlagsError(said)
     try:
         return flags_from(settings)

@@ -57,7 +57,7 @@ class MeshLimits:
     """How large a mesh may be, and what reading its file may cost."""
 
     max_mesh_bytes: Count = USUAL_MESH.max_bytes
-    """Largest size of a mesh file that is read."""
+    """Largest size of a mesh file that is read [bytes]."""
     max_triangles: Count = USUAL_MESH.max_triangles
     """Largest number of triangles of a mesh."""
     max_faces: Count = USUAL_MESH.max_faces

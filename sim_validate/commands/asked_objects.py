@@ -55,7 +55,7 @@ def object_to_plan(name: str, planning: flag_groups.Planning, reporter: Reporter
     _check_optimize(planning)
     if planning.regions and planning.share_faces_m is not None:
         raise InputError(
-            "--regions would let fingers that share a face meet; leave it or --share-faces-m out"
+            "--regions would let fingers that share a face meet; leave one of them out"
         )
     body = load_object(name, planning.mesh)
     if planning.optimize and body.patches:
@@ -73,7 +73,7 @@ def _check_optimize(planning: flag_groups.Planning) -> None:
     if planning.optimize and any(kept):
         raise InputError(
             "--optimize moves contacts without regard to --edge-clearance-m, --share-faces-m and "
-            "--approach-m; leave it out, or them"
+            "--approach-m; leave out --optimize or these"
         )
 
 

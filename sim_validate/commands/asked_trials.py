@@ -31,7 +31,7 @@ def noise_of(given: flag_groups.Repeats) -> Noise:
     """
     plain = flag_groups.Repeats()
     if not given.trials and given != plain:
-        raise FlagsError("--noise-... is for repeats: give --trials, too")
+        raise FlagsError("--noise-... sets the noise of repeats: give --trials too")
     return Noise(
         shift=given.noise_shift,
         turn_deg=given.noise_turn_deg,

@@ -113,5 +113,5 @@ def _concluded(checks: Mapping[str, bool], reporter: Reporter) -> int:
             "will refuse to certify anything; install the versions of .ci/constraints.txt"
         )
     else:
-        reporter.warn("solvers or simulation give wrong answers: install the package anew")
+        reporter.warn("solvers or simulation give wrong answers: reinstall the package")
     return Exit.INTERNAL

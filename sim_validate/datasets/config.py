@@ -105,7 +105,7 @@ class DatasetConfig:
                 f"families: expected some of {', '.join(METHODS)}, got {shown(unknown[0])}"
             )
         if self.contacts and len(self.objects) > 1:
-            raise InputError("objects: expected the one that the contacts are on")
+            raise InputError("objects: expected only the object that the contacts are on")
         self._check_words_and_counts()
 
     def _check_words_and_counts(self) -> None:

@@ -121,7 +121,7 @@ def contacts_text(data: bytes) -> str:
     names = arrays.get(NAMES, np.arange(len(points)))
     if names.ndim != 1 or not len(points) == len(normals) == len(names):
         raise InputError(
-            f"expected arrays of one length, got {points.shape}, {normals.shape} and {names.shape}"
+            f"expected arrays of equal length, got {points.shape}, {normals.shape}, {names.shape}"
         )
     if not (np.isfinite(points).all() and np.isfinite(normals).all()):
         raise InputError(f"{POINTS} and {NORMALS}: expected finite numbers")

@@ -123,5 +123,5 @@ def manifest_from_json(text: str) -> Manifest:
     for i, each in enumerate(found.files):
         require_inside(each.path, place(["files", i, "path"]))
     if len({each.path for each in found.files}) < len(found.files):
-        raise InputError("files: a path is there twice")
+        raise InputError("files: a path is listed twice")
     return found

@@ -47,7 +47,7 @@ class Selection:
                 found += 1
                 yield row
             if found != each.rows:
-                raise InputError(f"{each.path}: {found} rows, listed are {each.rows}")
+                raise InputError(f"{each.path}: {found} rows, but the manifest lists {each.rows}")
 
     def _whole(self, each: Listed) -> Path:
         """Path of a file, once it matches the manifest's hash; page checksums miss some bytes."""
@@ -57,7 +57,7 @@ class Selection:
         found = listed(self.folder, path)
         if (found.bytes, found.sha256) != (each.bytes, each.sha256):
             raise InputError(
-                f"{path}: damaged, it is not what was written; see `graspproof dataset verify`"
+                f"{path}: damaged, differs from what was written; see `graspproof dataset verify`"
             )
         return path
 

@@ -65,7 +65,7 @@ def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[
     listed = sorted(rows, key=lambda row: _key(name, row))
     for one, other in itertools.pairwise(listed):
         if _key(name, one) == _key(name, other):
-            raise InputError(f"{name}: two rows are called {_key(name, one)}")
+            raise InputError(f"{name}: two rows have the key {_key(name, one)}")
     schema = _schema(name).with_metadata(dict(sorted(about.items())))
     columns = [[_cell(row.get(column.name)) for row in listed] for column in TABLES[name]]
     try:
@@ -321,7 +321,7 @@ def _pyarrow() -> Any:
         return importlib.import_module("pyarrow")
     except ImportError as error:
         raise InputError(
-            "datasets are Parquet files, which take pyarrow: pip install 'graspproof[dataset]'"
+            "datasets are Parquet files, which need pyarrow: pip install 'graspproof[dataset]'"
         ) from error
 
 

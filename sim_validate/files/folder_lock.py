@@ -54,7 +54,7 @@ def _make(folder: Path) -> list[Path]:
             stream.write(b"0")
     except (FileExistsError, NotADirectoryError) as error:
         raise InputError(
-            f"{error.filename}: is there, and no folder; give another --out"
+            f"{error.filename}: exists and is not a folder; give another --out"
         ) from error
     except OSError as error:
         raise InputError(

@@ -91,10 +91,10 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> NDAr
             raise InputError(f"{name}: expected numbers or text, got {shown(str(dtype))}")
         size = math.prod(shape) * dtype.itemsize
         if min(shape, default=0) < 0 or size > member.file_size:
-            raise InputError(f"{name}: its shape {shown(str(shape))} is not that of its numbers")
+            raise InputError(f"{name}: its shape {shown(str(shape))} does not fit its numbers")
         held = stream.read(size)
         if len(held) < size or stream.read(1):
-            raise InputError(f"{name}: has not as many numbers as its shape {shape}")
+            raise InputError(f"{name}: does not have as many numbers as its shape {shape} needs")
     array = np.ndarray(shape, dtype, held, order="F" if by_columns else "C")
     _check_letters(array, name)
     return array
@@ -107,4 +107,4 @@ def _check_letters(array: NDArray[Any], name: str) -> None:
     codes = np.frombuffer(array.tobytes(), array.dtype.str[0].replace("|", "=") + "u4")
     halves = (codes >= FIRST_HALF) & (codes <= LAST_HALF)
     if codes.max() > LARGEST_LETTER or halves.any():
-        raise InputError(f"{name}: holds text that is none")
+        raise InputError(f"{name}: holds codes that are no letters; write it again")

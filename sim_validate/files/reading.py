@@ -88,9 +88,8 @@ def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
     held = io.BytesIO()
     with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():
-            member = zipfile.ZipInfo(
-                f"{name}.npy"
-            )  # of no date, so that equal arrays give equal files
+            # A member made this way has a fixed date, so that equal arrays give equal files.
+            member = zipfile.ZipInfo(f"{name}.npy")
             with archive.open(member, "w") as stream:
                 np.lib.format.write_array(stream, array, allow_pickle=False)
     return write_parts(path, [held.getvalue()])
@@ -104,7 +103,7 @@ def whole_folder(folder: Path) -> Generator[Path]:
         InputError: The folder exists and is not empty.
     """
     if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
-        raise InputError(f"{folder}: is there, and no empty folder; give another --out")
+        raise InputError(f"{folder}: exists and is not an empty folder; give another --out")
     named = folder.resolve()
     named.parent.mkdir(parents=True, exist_ok=True)
     temporary = Path(tempfile.mkdtemp(dir=named.parent, prefix=".unfinished-"))

@@ -56,7 +56,7 @@ def require_report_folder(folder: Path) -> None:
         InputError: The folder holds other things.
     """
     if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():
-        raise InputError(f"{folder}: is there, and holds no report; give another --out")
+        raise InputError(f"{folder}: exists and holds no report; give another --out")
 
 
 def remove_report(folder: Path) -> None:

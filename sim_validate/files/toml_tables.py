@@ -43,13 +43,15 @@ def tables_of_toml(text: str) -> dict[str, Any]:
         InputError: The text is not TOML, or holds a value that no setting can have.
     """
     if LONG_KEY.search(ASIDE.sub(lambda found: "q" if found[0][0] != "#" else "", text)):
-        raise InputError(f"not TOML that is read here: a key of more than {DEEPEST} parts")
+        raise InputError(f"not TOML that can be read here: a key has more than {DEEPEST} parts")
     try:
         found = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"not TOML: {_printable(str(error))}") from error
     except RecursionError as error:
-        raise InputError("not TOML that is read here: values are too deep inside others") from error
+        raise InputError(
+            "not TOML that can be read here: too many tables or lists inside others"
+        ) from error
     except ValueError as error:  # numbers of thousands of digits, days that do not exist
         raise InputError(f"not TOML: {_printable(str(error))}") from error
     check_values(found)

@@ -159,5 +159,5 @@ def _imported(module: str, extra: str) -> Any:
         return importlib.import_module(module)
     except ImportError as error:
         raise InputError(
-            f"--engine {extra} takes {module}: pip install 'graspproof[{extra}]'"
+            f"--engine {extra} needs {module}: pip install 'graspproof[{extra}]'"
         ) from error

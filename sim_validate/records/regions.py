@@ -215,7 +215,7 @@ def _region(name: str, polygon: Array, normal: Array, scale: float) -> ContactRe
         with np.errstate(invalid="ignore", divide="ignore"):  # edges without length divide by zero
             return ContactRegion("certified", polygon, _inscribed(polygon, normal, scale))
     except SolverError as error:
-        raise InputError(f"{name}: its corners are those of no convex polygon") from error
+        raise InputError(f"{name}: its corners do not form a convex polygon") from error
 
 
 def _inscribed(polygon: Array, normal: Array, scale: float) -> float:

@@ -58,7 +58,7 @@ def setup_from_tables(tables: Mapping[str, Any], setup: Setup, path: str) -> Set
     """
     for name, given in tables.items():
         if name not in OF_USERS or not isinstance(given, dict):
-            raise InputError(f"{path}: tables are {', '.join(OF_USERS)}; got {shown(name)}")
+            raise InputError(f"{path}: expected tables {', '.join(OF_USERS)}, got {shown(name)}")
         table = cast("dict[str, Any]", given)
         filled = _filled(path, name, getattr(setup, name), table)
         try:

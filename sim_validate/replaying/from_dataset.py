@@ -27,9 +27,7 @@ def from_dataset(folder: Path, wanted: Wanted) -> Recorded:
     row = next((row for row in chosen.rows("grasps") if row["grasp_id"] == name), None)
     if row is None or row["outcome"] == NOT_TRIED:
         there = some(row["grasp_id"] for row in islice(chosen.rows("grasps"), NAMED))
-        raise InputError(
-            f"{folder}: {name} is no grasp of it that was tried; there is {there}, ..."
-        )
+        raise InputError(f"{folder}: {name} is not among its tried grasps; it has {there}, ...")
     config = chosen.config()
     contacts = [
         Contact(point, normal)

@@ -21,10 +21,10 @@ def grasps_behind(path: Path, content_sha256: str, friction: float) -> SavedGras
         InputError: The grasps are missing, or belong to another object.
     """
     if not path.is_file():
-        raise InputError(f"{path}: the grasps are not there; name their file with --grasps")
+        raise InputError(f"{path}: this file of grasps is missing; name it with --grasps")
     saved = read_grasps(path)
     if saved.body.content_sha256 != content_sha256:
-        raise InputError(f"{path}: its object is another one than that of the file to replay")
+        raise InputError(f"{path}: its object is not that of the file to replay")
     return SavedGrasps(saved.body, friction, saved.seed, saved.grasps, saved.finger)
 
 

@@ -61,9 +61,7 @@ def recorded_in(source: Path, wanted: Wanted) -> Recorded:
     if "object" in record and "grasps" in record:
         saved = read_grasps(path)
         if wanted.trial is not None:
-            raise InputError(
-                f"{path}: says nothing of repeats with noise: give verdicts or a baseline"
-            )
+            raise InputError(f"{path}: records no repeats with noise: give verdicts or a baseline")
         agenda = Agenda(seed=saved.seed)
         return of_grasp(path, saved, setup_for(saved, None), agenda, wanted)
     raise InputError(

@@ -87,7 +87,7 @@ def runs_in(folder: Path) -> tuple[RunFolder, ...]:
     found = [path for path in inside if (path / GRASPS).is_file()]
     if not found:
         raise InputError(
-            f"{folder}: has no {GRASPS}, nor has a folder in it; "
+            f"{folder}: has no {GRASPS}, and neither has a folder in it; "
             f"`graspproof run OBJECT --out {folder}` writes one"
         )
     own = found[0] == folder
@@ -124,7 +124,7 @@ def _by_id(path: Path, records: Sequence[Record], saved: SavedGrasps) -> Mapping
             )
     found = {each["id"]: each for each in records}
     if len(found) < len(records):
-        raise InputError(f"{path}: a grasp is there twice; make the file anew, or remove it")
+        raise InputError(f"{path}: a grasp is listed twice; write the file again, or remove it")
     return found
 
 

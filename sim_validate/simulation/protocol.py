@@ -138,7 +138,7 @@ def _check(numbers: Mapping[str, Any]) -> None:
                 value, partial(number, name=name, above=0.0, below=1.0), name, "shares"
             )
             if not (shares and _rising(shares)):
-                raise InputError(f"{name} must be rising shares below 1, at least one, got {value}")
+                raise InputError(f"{name} must be one or more rising shares below 1, got {value}")
         elif name == "rounds":
             whole(value, name, least=1, most=MOST_ROUNDS)
         else:

@@ -26,8 +26,8 @@ try:
     from mujoco import batch as mujoco_batch  # noqa: TID251
 except (ImportError, RuntimeError, AttributeError, OSError) as error:
     raise InputError(  # importing mujoco looks for graphics, which nothing here needs
-        f"MuJoCo cannot be imported ({error}); is MUJOCO_GL set to graphics that are not here? "
-        "Unset it, or install the package anew"
+        f"MuJoCo cannot be imported ({error}); is MUJOCO_GL set to graphics that are missing? "
+        "Unset it, or reinstall the package"
     ) from error
 
 CHUNK = 5

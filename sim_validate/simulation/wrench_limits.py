@@ -87,7 +87,8 @@ def _onset(trace: Trace, shares: Array, threshold: float) -> SimulatedLimit | No
     roots = np.cbrt([moved[first - 1], threshold, moved[first]])
     at = before + (after - before) * (roots[1] - roots[0]) / (roots[2] - roots[0])
     later = np.flatnonzero(moved >= LATER * threshold)
-    # Twice the time has passed at eight times the displacement, so the limit lies as far before.
+    # Twice the time since the limit has passed at eight times the displacement, so the limit lies
+    # as far before the first reading as the second lies after it.
     lower = 2.0 * before - shares[later[0]] if later.size else shares[0]
     return SimulatedLimit(lower=float(lower), upper=float(after), share=float(at))
 

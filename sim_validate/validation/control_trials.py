@@ -127,8 +127,8 @@ def control_case(
 
 def _hopeless(body: Polyhedron, control: Control, setup: Setup) -> list[tuple[str, Array]]:
     """The separating wrench, and no wrench at all where the bare squeeze cannot be balanced."""
-    # The certificate is a linear function of wrenches. With torques measured in object radii, the
-    # wrench that it opposes most has the function's coefficients times the scale squared.
+    # The separating wrench is a linear function of wrenches. With torques measured in object
+    # radii its coefficients are times the scale; the wrench along them is times it once more.
     scale = np.array([1.0] * 3 + [body.radius] * 3)
     facing = -control.separating_wrench(body.center_of_mass) * scale**2
     size = setup.hold.control_load * setup.fingers.max_normal_force_n

@@ -1,8 +1,8 @@
 """Negative controls: contact sets made from a grasp that are proved not to be force-closed.
 
-A validator that cannot say no proves nothing. Each control carries the certificate that it is open,
-and the wrench that this certificate separates is the first load it is tested with: no contact force
-within the cones can oppose that wrench, whatever the fingers do.
+A validator that cannot say no proves nothing. Each control carries the certificate that it is open.
+The certificate's separating wrench is the first load that the control is tested with: no contact
+force within the cones can oppose it, whatever the fingers do.
 """
 
 import math

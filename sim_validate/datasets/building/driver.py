@@ -112,12 +112,12 @@ def _succeeded(future: "Future[None]", task: Task, engine: Engine) -> bool:
         if task.staging.finished(task.unit):
             return True
         raise WorkerError(
-            f"{task.staging.folder}: a unit was done, but its rows are not here; --out must be on "
-            "a file system that driver and workers share"
+            f"{task.staging.folder}: a unit is finished, but its rows are missing; --out must be "
+            "on a file system that driver and workers share"
         )
     if type(error).__name__ in engine.ended:
         return False
     if isinstance(error, WorkerError | OSError | KeyboardInterrupt):
         raise error
     name = type(error).__name__
-    raise WorkerError(f"a worker cannot do units: {name}: {error}") from error
+    raise WorkerError(f"a worker cannot compute units: {name}: {error}") from error

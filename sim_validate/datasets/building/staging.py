@@ -89,7 +89,7 @@ class Staging:
         self._put(unit, {}, {"reason": reason})
 
     def result(self, unit: WorkUnit) -> Finished | str:
-        """Look up a unit that has an answer: where its rows are, or why it has none.
+        """Look up the result of a unit: its object and split, or why it has no rows.
 
         Raises:
             InputError: The record of the unit is damaged.
@@ -98,7 +98,9 @@ class Staging:
         if record.reason is not None:
             return record.reason
         if record.object_id is None or record.split is None:
-            raise InputError(f"{self._of(unit) / RECORD}: neither rows nor a reason; build again")
+            raise InputError(
+                f"{self._of(unit) / RECORD}: records neither rows nor a reason; build again"
+            )
         return Finished(unit, record.object_id, record.split)
 
     def done(self, unit: WorkUnit) -> bool:

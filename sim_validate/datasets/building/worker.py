@@ -96,7 +96,7 @@ def _check_worker(task: Task) -> None:
             )
     if not task.staging.folder.is_dir():
         raise WorkerError(
-            f"{task.staging.folder}: a worker does not see this folder; --out must be on a file "
+            f"{task.staging.folder}: a worker cannot see this folder; --out must be on a file "
             "system that driver and workers share"
         )
 

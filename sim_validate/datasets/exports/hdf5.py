@@ -60,5 +60,5 @@ def _h5py() -> Any:
         return importlib.import_module("h5py")
     except ImportError as error:
         raise InputError(
-            "HDF5 files take h5py: pip install 'graspproof[hdf5]'; the other formats do without"
+            "HDF5 files need h5py: pip install 'graspproof[hdf5]'; the other formats do not"
         ) from error

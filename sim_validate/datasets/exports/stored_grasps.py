@@ -54,7 +54,9 @@ def grasped_objects(chosen: Selection) -> Iterator[GraspedObject]:
     planned = (row for row in chosen.rows("grasps") if is_grasp(row))
     for object_id, rows in groupby(planned, key=lambda row: row["object_id"]):
         if object_id not in names:
-            raise InputError(f"{chosen.folder}: {object_id} has grasps, but is no object")
+            raise InputError(
+                f"{chosen.folder}: {object_id} has grasps, but is not among the objects"
+            )
         body = stored_body(chosen.folder, object_id, names[object_id], faces)
         yield GraspedObject(object_id, body, tuple(map(_grasp, rows)))
 

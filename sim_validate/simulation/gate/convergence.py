@@ -83,15 +83,14 @@ def _lightly_held_box(case: Case, friction: float) -> Rig:
     body = case.body("box")
     _, width, height = np.ptp(body.vertices, axis=0)
     shift = 0.5 * friction * height
+    # The side fingers stand off centre, because symmetry hides faults.
     contacts = [
         *(Contact(np.array([s * shift, 0.0, s * height / 2]), np.array([0.0, 0.0, -s]))
           for s in (-1.0, 1.0)),
         *(Contact(np.array([0.13 * height, s * width / 2, 0.07 * height]), np.array([0.0, -s, 0.0]))
           for s in (-1.0, 1.0)),
     ]  # fmt: skip
-    normals = np.array(
-        [contact.normal for contact in contacts]
-    )  # off centre: symmetry hides faults
+    normals = np.array([contact.normal for contact in contacts])
     pushes = np.array([1.0, 1.0, LIGHT, LIGHT])[:, None] * normals
     pushes[:2, 0] = friction * np.array([1.0, -1.0])
     largest = PUSH * case.setup.fingers.max_normal_force_n

@@ -194,7 +194,7 @@ def test_what_a_dataset_would_overwrite_in_a_folder_of_another_is_refused(tmp_pa
     path = tmp_path / "mine" / name
     path.parent.mkdir(parents=True)
     path.write_text("mine")
-    with pytest.raises(gc.InputError, match="not of this dataset"):
+    with pytest.raises(gc.InputError, match="not part of this dataset"):
         build(CONFIG, tmp_path / "mine", Here(), silent)
     assert path.read_text() == "mine"
 

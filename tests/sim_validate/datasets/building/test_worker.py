@@ -74,7 +74,7 @@ def test_rows_that_do_not_arrive_end_the_run(staging):
         def submit(self, function, given):
             return super().submit(function, dataclasses.replace(given, work=lambda *_: None))
 
-    with pytest.raises(WorkerError, match="its rows are not here"):
+    with pytest.raises(WorkerError, match="its rows are missing"):
         drive(units_of(CONFIG), staging, Elsewhere(), silent)
 
 
