@@ -50,7 +50,7 @@ def tables_of_toml(text: str) -> dict[str, Any]:
         raise InputError(f"not TOML: {_printable(str(error))}") from error
     except RecursionError as error:
         raise InputError(
-            "not TOML that can be read here: too many tables or lists inside others"
+            "not TOML that can be read here: values are too deep inside others"
         ) from error
     except ValueError as error:  # numbers of thousands of digits, days that do not exist
         raise InputError(f"not TOML: {_printable(str(error))}") from error

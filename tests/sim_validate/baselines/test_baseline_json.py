@@ -65,8 +65,14 @@ def with_entry(**changed):
         (with_entry(limit_n=float("inf")), "grasps\\[0\\].limit_n"),
         (with_entry(mismatches=True), "grasps\\[0\\].mismatches: expected a whole number"),
         (with_entry(outcome="holds"), "grasps\\[0\\].outcome: expected 'held'"),
-        (with_entry(outcome="slipped"), "grasps\\[0\\]: .*outcome slipped, but not held are"),
-        (with_entry(not_held=["lift"]), "grasps\\[0\\]: .*outcome held, but not held are"),
+        (
+            with_entry(outcome="slipped"),
+            "grasps\\[0\\]: .*outcome is slipped, but wrenches not held are",
+        ),
+        (
+            with_entry(not_held=["lift"]),
+            "grasps\\[0\\]: .*outcome is held, but wrenches not held are",
+        ),
         (
             with_entry(controls_let_go=9),
             "grasps\\[0\\]: .*more wrenches or controls ended in some way than were tried",

@@ -232,7 +232,7 @@ def test_a_finished_dataset_that_is_damaged_is_not_taken_for_one(copy):
 
 def test_a_folder_that_cannot_be_made_is_said(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(gc.InputError, match=r"file: is there, and no folder"):
+    with pytest.raises(gc.InputError, match=r"file: exists and is not a folder"):
         build(CONFIG, tmp_path / "file", Here(), silent)
 
 
