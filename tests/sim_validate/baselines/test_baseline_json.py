@@ -67,11 +67,11 @@ def with_entry(**changed):
         (with_entry(outcome="holds"), "grasps\\[0\\].outcome: expected 'held'"),
         (
             with_entry(outcome="slipped"),
-            "grasps\\[0\\]: .*outcome is slipped, but wrenches not held are",
+            "grasps\\[0\\]: .*outcome is slipped, but wrenches not",
         ),
         (
             with_entry(not_held=["lift"]),
-            "grasps\\[0\\]: .*outcome is held, but wrenches not held are",
+            "grasps\\[0\\]: .*outcome is held, but wrenches not",
         ),
         (
             with_entry(controls_let_go=9),

@@ -183,7 +183,7 @@ def test_folders_of_something_else_are_refused(copy, tmp_path):
         build(dataclasses.replace(CONFIG, limit=3), copy, Here(), silent)
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("all my work")
-    with pytest.raises(gc.InputError, match=r"thesis\.tex: is there"):
+    with pytest.raises(gc.InputError, match=r"thesis\.tex: exists"):
         build(CONFIG, tmp_path / "mine", Here(), silent)
     with pytest.raises(gc.InputError, match="no dataset"):
         verify(tmp_path / "mine")
