@@ -1,4 +1,4 @@
-"""A grasp becomes a MuJoCo scene; the built-in example objects.
+"""Turn grasps into MuJoCo scenes, and make the built-in example objects.
 
 Names are imported on first use; the stub beside this file says where from.
 """

@@ -1,9 +1,9 @@
 """The built-in example objects, made from coordinates and booleans, sized for a hand.
 
-All are about a decimetre across, in metres, with their own frame near the middle. They
-range from the regular solids, where results are known in closed form, to the parts that
-make planners stumble: boxes and prisms without spanning quadruples, an elongated bar
-without concurrent grasps, and non-convex parts with holes, notches and handles.
+All are about a decimetre across, in metres, with their own frame near the middle. They range from
+the regular solids, where results are known in closed form, to parts that make planners stumble:
+boxes and prisms without spanning quadruples, an elongated bar without concurrent grasps, and
+non-convex parts with holes, notches and handles.
 """
 
 import difflib
@@ -21,15 +21,16 @@ from grasp_core.objects.booleans import Solid, extrusion, hull
 from grasp_core.objects.polyhedron import Polyhedron
 
 DIGITS = 14
-"""Coordinates are rounded before solids are made of them: the last digit of a cosine depends on the
-processor, and where rounding decides, the order of faces depends on the last digit."""
+"""Number of digits to which coordinates are rounded before solids are made of them. The last digit
+of a cosine depends on the processor, and where rounding decides, the order of faces depends on that
+digit."""
 GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
 RANDOM_NAME = re.compile(r"random-(\d{1,3})-(\d{1,9})", re.ASCII)
 RANDOM_FACES = range(4, 201)
 
 
 def example_names() -> tuple[str, ...]:
-    """Names that `example_object` knows; `random-FACES-SEED` stands for a family."""
+    """Names that `example_object` accepts; `random-FACES-SEED` stands for a family of objects."""
     return (*OBJECTS, "random-FACES-SEED")
 
 
@@ -37,11 +38,11 @@ def example_object(name: str) -> Polyhedron:
     """Build an example object.
 
     Args:
-        name: One of `example_names`, for instance "wedge" or "random-20-7". Underscores
-            count as hyphens.
+        name: A name from `example_names`, for instance "wedge" or "random-20-7". Underscores count
+            as hyphens.
 
     Raises:
-        InputError: There is no such object; the message suggests near names.
+        InputError: The name is unknown; the message suggests near names.
     """
     text(name, "name")
     key = name.strip().lower().replace("_", "-")
@@ -175,7 +176,7 @@ def _mug() -> Solid:
 
 
 def _random(faces: int, seed: int) -> Solid:
-    """Planes tangent to a random ellipsoid in random directions, none of them redundant."""
+    """Random planes tangent to a random ellipsoid, none of them redundant."""
     rng = np.random.default_rng([faces, seed])
     stretch = rng.uniform(0.7, 1.3, 3)
     while True:
@@ -187,8 +188,8 @@ def _random(faces: int, seed: int) -> Solid:
 
 
 LEAST_POLAR_OFFSET = 0.25
-"""A polar facet nearer to the origin would put a corner four radii away: such slivers of
-objects are drawn again."""
+"""Least distance of a polar facet from the origin. A nearer one would put a corner more than four
+radii away; such slivers of objects are drawn again."""
 
 
 def _least_offset(solid: Solid) -> float:
@@ -197,7 +198,7 @@ def _least_offset(solid: Solid) -> float:
 
 
 def _facet_signs(solid: Solid) -> Array:
-    """+1 for triangles whose outer side is away from the origin."""
+    """The sign for each triangle, +1 where its outer side faces away from the origin."""
     return np.sign(np.linalg.det(solid.vertices[solid.triangles]))
 
 

@@ -1,10 +1,10 @@
 """How fingertips are built and driven, and whether four of them find room at their contacts.
 
-A fingertip is a sphere that touches its face at the contact, so its centre is p - r n. Two of
-them overlap from the radius on at which their centres are 2 r apart, a quadratic equation. One
-meets the object elsewhere from the radius on at which a further surface point q is as near to
-its centre as p is: r = |q - p|^2 / (2 (p - q).n). The nearest q is found by shrinking: the point
-nearest to the centre of too large a sphere gives a smaller one, until no point is inside.
+A fingertip is a sphere that touches its face at the contact, so its centre is p - r n. Two of them
+overlap from the radius on at which their centres are 2 r apart, which is a quadratic equation. One
+meets the object elsewhere from the radius on at which a further surface point q is as near to its
+centre as p is: r = |q - p|^2 / (2 (p - q).n). The nearest q is found by shrinking: the point
+nearest to the centre of too large a sphere gives a smaller sphere, until no point is inside.
 """
 
 import math
@@ -26,14 +26,14 @@ Drive: TypeAlias = Literal["servo", "rigid"]
 TIP_RADIUS = 0.1
 """Fingertip radius that is used where it fits, in object radii."""
 LEAST_TIP_RADIUS = 1e-3
-"""Smaller fingertips are not tried, in object radii."""
+"""Smallest fingertip radius that is tried, in object radii."""
 ROOM = 0.95
-"""Radius relative to the largest that fits, where the usual one does not."""
+"""Fingertip radius relative to the largest that fits, where the usual one does not."""
 TOUCHING = 1e-6
-"""Overlap that does not count, in fingertip radii."""
+"""Largest overlap that is ignored, in fingertip radii."""
 MAX_SHRINKING = 100
 FACING = 1e-9
-"""4 - |m|^2 below this is rounding: the normals are opposite."""
+"""Value of 4 - |m|^2 below which the difference is rounding, and the normals are opposite."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,23 +41,24 @@ class FingerSettings:
     """How fingertips are built and driven; what is None is chosen to suit the grasp.
 
     Raises:
-        InputError: A number is not from 1e-9 to 1e9, or a choice is none.
+        InputError: A number is out of range (1e-9 to 1e9), or a choice is unknown.
     """
 
     max_normal_force_n: float = 10.0
-    """Limit of each finger's push."""
+    """Largest normal force of each finger [N]."""
     radius_m: float | None = None
-    """A tenth of the object's radius, or what fits, if None."""
+    """Radius of the fingertips [m]; if None, a tenth of the object's radius, or what fits."""
     mass_kg: float | None = None
     stiffness_n_per_m: float | None = None
-    """Of the servos."""
+    """Stiffness of the servos [N/m]."""
     approach: tuple[float, float, float] | None = None
-    """Direction in which all fingers move in from their start; if None the one that was planned for
-    each, or its normal."""
+    """Direction in which all fingers move in from their start. If None, each finger takes the
+    direction that was planned for it, or its normal."""
     drive: Drive = "servo"
-    """Rigid fingertips stay where they are put."""
+    """How fingertips are held: servos push them, rigid ones stay where they are put."""
     indentation: float = 0.0
-    """How far a fingertip is put into its face, in grasp sizes, if more than just touching."""
+    """Depth to which a fingertip is put into its face, in grasp sizes, if more than just
+    touching."""
 
     def __post_init__(self) -> None:
         positive(self.max_normal_force_n, "max_normal_force_n")
@@ -73,11 +74,11 @@ class FingerSettings:
 
 
 def fitting_radius(body: Polyhedron, positions: Array, normals: Array) -> float:
-    """A fingertip radius at which nothing overlaps, if one that is large enough exists [m].
+    """Choose a fingertip radius at which nothing overlaps, if a large enough one exists [m].
 
     Args:
         body: The object.
-        positions: Contacts, (k, 3) [m].
+        positions: Contact points, (k, 3) [m].
         normals: Unit vectors into the object, (k, 3).
     """
     usual = TIP_RADIUS * body.radius
@@ -89,16 +90,16 @@ def fitting_radius(body: Polyhedron, positions: Array, normals: Array) -> float:
 
 
 def clashes(body: Polyhedron, positions: Array, normals: Array, radius: float) -> tuple[str, ...]:
-    """What fingertips of a radius overlap: each other, or the object beside their contact.
+    """List what fingertips of a radius overlap: each other, or the object beside their contact.
 
     Args:
         body: The object.
-        positions: Contacts, (k, 3) [m].
+        positions: Contact points, (k, 3) [m].
         normals: Unit vectors into the object, (k, 3).
-        radius: [m]
+        radius: Fingertip radius [m].
 
     Returns:
-        A sentence for each overlap.
+        One sentence for each overlap.
     """
     least = radius * (1.0 - TOUCHING)
     found = [
@@ -116,7 +117,8 @@ def clashes(body: Polyhedron, positions: Array, normals: Array, radius: float) -
 def _largest_apart(positions: Array, normals: Array) -> float:
     """Radius up to which no two fingertips overlap: |d - r m| = 2 r for the closest pair.
 
-    The positive root of (4 - m.m) r^2 + 2 (d.m) r = d.d; none for fingers that face each other.
+    It is the positive root of (4 - m.m) r^2 + 2 (d.m) r = d.d. Two fingers that face each other
+    have none, and do not limit it.
     """
     largest = math.inf
     for i, j in combinations(range(len(positions)), 2):
@@ -131,17 +133,18 @@ def _largest_apart(positions: Array, normals: Array) -> float:
 
 
 def _largest_clear(body: Polyhedron, positions: Array, normals: Array, start: float) -> Array:
-    """Radius of each fingertip, up to `start`, up to which it meets no other part, (k,)."""
+    """Radius up to which each fingertip meets nothing beside its contact, at most `start`, (k,)."""
     return np.array(
         [_clear_radius(body, *contact, start) for contact in zip(positions, normals, strict=True)]
     )
 
 
 def _clear_radius(body: Polyhedron, position: Array, normal: Array, start: float) -> float:
-    """Radius of one fingertip, up to `start`, up to which it meets nothing beside its contact.
+    """Radius up to which one fingertip meets nothing beside its contact, at most `start`.
 
-    Contacts may be a little below their own faces: positions in files are rounded. The surface of
-    a curved patch does not count where it is touched: fingers are thought to touch its plane.
+    Contacts may be a little below their own faces, because positions in files are rounded. The
+    surface of a curved patch does not count where it is touched: a finger is taken to touch its
+    plane.
     """
     slack, radius = ON_FACE * body.radius, start
     triangles = _triangles_near(body, position, normal, start)
@@ -156,7 +159,10 @@ def _clear_radius(body: Polyhedron, position: Array, normal: Array, start: float
 
 
 def _triangles_near(body: Polyhedron, position: Array, normal: Array, radius: float) -> Indices:
-    """Triangles that a fingertip up to a radius may meet, (t, 3): smaller ones are inside it."""
+    """Triangles that a fingertip of up to a radius may meet, (t, 3).
+
+    Spheres of smaller radius at the same contact lie inside the largest one.
+    """
     face = face_under(body, Contact(position, normal)) if body.patches else None
     keep = np.ones(len(body.triangles), dtype=np.bool_)
     if face is not None:

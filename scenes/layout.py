@@ -1,12 +1,11 @@
-"""Contacts on an object -> where everything stands in the scene, as plain numbers.
+"""Contacts on an object -> positions, masses and drives of a scene, as plain numbers.
 
-The world frame is the object's frame moved to its centre of mass: T_world_object is the
-translation by minus the centre of mass. Lengths and forces are true to the object and the
-user. Masses are not: a quasi-static test asks whether forces balance, and similar grasps
-should behave alike, so all of the dynamics is scaled by the size of the grasp, which is the
-lever of the contacts about the axis they are closest to. Object and fingers get the mass
-that the largest normal force moves by that lever in a fixed time, centred between the
-contacts, and the servos the stiffness that keeps such a lever stable.
+The world frame is the object's frame moved to its centre of mass: T_world_object is the translation
+by minus the centre of mass. Lengths and forces are the true ones. Masses are not: a quasi-static
+test asks whether forces balance, and similar grasps should behave alike, so all of the dynamics is
+scaled by the size of the grasp, which is the lever of the contacts about the axis they are closest
+to. Object and fingers get the mass that the largest normal force moves by that lever in a fixed
+time, centred between the contacts. The servos get the stiffness that keeps such a lever stable.
 """
 
 import math
@@ -26,27 +25,28 @@ from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings, fitting_radius
 
 RESPONSE_TIME_S = 0.07
-"""Square root of mass x grasp size / largest normal force: 1 kg for 10 N and 5 cm, where the
-settings were measured."""
+"""Square root of mass x grasp size / largest normal force [s]. It gives 1 kg for 10 N and 5 cm,
+where the settings were measured."""
 STIFFNESS = 5.0
-"""Servo stiffness in largest normal forces per grasp size: below 1 a force-controlled grasp
-is unstable, above 50 the servo fights the planned forces."""
+"""Servo stiffness in largest normal forces per grasp size. Below 1 a force-controlled grasp is
+unstable, above 50 the servo works against the planned forces."""
 LEAST_SIZE = 0.01
 """Smallest grasp size in object radii, for contacts that are nearly on one line."""
 SQUEEZE = 0.6
-"""Largest normal force of the gentle grasp, in largest normal forces."""
+"""Largest normal force in the gentle grasp, relative to the largest that fingers can apply."""
 PAD_HALF_WIDTH = 0.2
 PAD_DEPTH = 0.1
-"""Pad size, in object radii."""
+"""Thickness of a pad, in object radii; `PAD_HALF_WIDTH` is in the same unit."""
 FLAT = 1e-6
-"""Share added to all moments of inertia: those of coplanar contacts are the limit of what a
-body can have, and rounding must not pass it."""
+"""Share of the largest moment of inertia that is added to all of them. Those of coplanar contacts
+are the limit of what a body can have, and rounding must not pass it."""
 TOUCH = 1e-9
-"""How deep fingertips start in their faces at least, in grasp sizes: a ten-thousandth of the finest
-threshold. If they just touched, rounding would decide which of them press in the first step, and
-the blows of the others, a step later, tilt lightly held objects by up to 1e-4 in long steps."""
+"""Least depth of fingertips in their faces at the start, in grasp sizes: a ten-thousandth of the
+finest threshold. If they just touched, rounding would decide which of them press in the first step,
+and the blows of the others, a step later, tilt lightly held objects by up to 1e-4 in long steps."""
 RETREAT = 0.5
-"""Distance of approach, in grasp sizes: from much farther the fingers would arrive too fast."""
+"""Distance from which fingers approach, in grasp sizes; from much farther they would arrive too
+fast."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +61,7 @@ class FingerDrive:
     rigid: bool
     """Whether fingertips stay where they are put, whatever the numbers of the servos."""
     indentation_m: float
-    """How far a fingertip is put into its face at first."""
+    """Depth of a fingertip in its face at the start [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,26 +74,27 @@ class Layout:
     triangles: Indices
     """(t, 3)"""
     radius_m: float
-    """Largest distance of the object's surface from its centre of mass."""
+    """Largest distance of the object's surface from its centre of mass [m]."""
     center: Array
     """Mean of the contacts, where the simulated mass is, (3,) [m]."""
     grasp_size_m: float
-    """Lever of the contacts about the axis through `center` that they are closest to."""
+    """Lever of the contacts about the axis through `center` that they are closest to [m]."""
     mass_kg: float
     inertia_kg_m2: Array
-    """About `center`, along the world axes, (3, 3)."""
+    """Inertia about `center`, along the world axes, (3, 3) [kg m^2]."""
     contacts: Array
-    """(k, 3) [m]"""
+    """Contact points, (k, 3) [m]."""
     frames: Array
     """Columns (inward normal, tangent, tangent) of each contact, (k, 3, 3)."""
     borders: tuple[tuple[Array, ...], ...]
-    """Convex pieces of the face of each contact, (n, 3) each [m]; none if it is on no face."""
+    """Convex pieces of the face of each contact, (n, 3) each [m]; empty for a contact on no
+    face."""
     friction: float
     drive: FingerDrive
     squeeze: Array
     """Forces of a gentle grasp, balanced where possible, in the contact frames, (k, 3) [N]."""
     approach: Array
-    """Where fingers come from, relative to their contacts, (k, 3) [m]."""
+    """Starting points of the fingers, relative to their contacts, (k, 3) [m]."""
 
     @property
     def squeeze_forces(self) -> Array:
@@ -115,13 +116,14 @@ def arrange(
 ) -> Layout:
     """Place object, fingertips and drives for a grasp.
 
-    Contacts are rounded to nine digits of the object's radius: closing fingers strike and rebound,
-    which turns the last digits of a number, which are others on another machine, into motions of a
-    visible size. What follows from contacts is plain arithmetic, the same everywhere.
+    Contacts are rounded to nine digits of the object's radius. Closing fingers strike and rebound,
+    which turns differences in the last digits of a number, such as those between machines, into
+    visible motions. What follows from the rounded contacts is plain arithmetic, the same
+    everywhere.
 
     Args:
         body: The object.
-        grasp: A grasp, or contacts from elsewhere.
+        grasp: A grasp, or contacts of any origin.
         friction: Coulomb coefficient at every contact.
         fingers: How fingertips are built and driven.
 
@@ -158,7 +160,7 @@ def arrange(
 
 
 def _rounded_units(vectors: Array) -> Array:
-    """Unit vectors (k, 3) of rounded ones, by operations that are the same on every machine."""
+    """Round vectors (k, 3) and scale them to unit length, in the same way on every machine."""
     x, y, z = to_digits(vectors).T
     return np.column_stack([x, y, z]) / np.sqrt(x * x + y * y + z * z)[:, None]
 
@@ -201,7 +203,7 @@ def grasp_size(positions: Array) -> float:
     """Root mean square distance of contacts from the axis they are closest to [m].
 
     Args:
-        positions: (k, 3) [m].
+        positions: Contact points, (k, 3) [m].
     """
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
     lever = np.linalg.norm(spread[1:]) / math.sqrt(len(positions))
@@ -215,8 +217,8 @@ def _to_digits(value: float) -> float:
 def _inertia(mass: float, positions: Array, size: float) -> Array:
     """A quarter of the inertia of the mass shared between the contacts, (3, 3) [kg m^2].
 
-    About the axis that the contacts are closest to it is mass (size / 2)^2; about the others it
-    grows with their levers. The same about all axes would let long grasps spring loose.
+    About the axis that the contacts are closest to, it is mass (size / 2)^2; about the others it
+    grows with their levers. An equal inertia about all axes would let long grasps spring loose.
     """
     arms = positions - positions.mean(axis=0)
     second = arms.T @ arms / len(arms)
@@ -228,9 +230,10 @@ def _inertia(mass: float, positions: Array, size: float) -> Array:
 
 
 def _pushes(positions: Array, normals: Array, friction: float) -> Array:
-    """Forces in the contact frames, (k, 3), that hold the object still if any do.
+    """Forces in the contact frames, (k, 3), that balance if the contacts are in force closure.
 
-    The largest normal part is one. Contacts that are not in force closure just push.
+    The largest normal part is one. Contacts that are not in force closure just push along their
+    normals.
     """
     try:
         forces = force_closure(positions, normals, friction).forces

@@ -1,15 +1,15 @@
-"""Layout -> MJCF text: self-contained, every setting written out, every number in full.
+"""Layout -> MJCF text: self-contained, with every setting and all digits of every number.
 
-The text is written here rather than by MuJoCo's own writer, which leaves out what equals a
-default (defaults move between releases) and rounds numbers. The object's mesh is for the
-eye. Contact happens between each fingertip and its own pad: a box on the object whose top
-is flush with the face at the contact, visible to that one finger only, so that normals are
-exact on any object, convex or not. A convex object's own mesh can stand in for the pads, as a
-check that they are where its surface is.
+This module writes the text itself. MuJoCo's own writer leaves out what equals a default (defaults
+change between releases) and rounds numbers. The object's mesh is only shown. Contact happens
+between each fingertip and its own pad: a box on the object whose top is flush with the face at the
+contact and which only this finger can touch, so that normals are exact on any object, convex or
+not. A convex object's own mesh can stand in for the pads, as a check that they are where its
+surface is.
 
-Fingers are spheres on three slides along (normal, tangent, tangent), each with a position
-servo: `ctrl = f / kp` makes it push with force f at its zero position, and the servo on the
-normal is limited to the largest normal force. Rigid fingers have neither slides nor servos.
+Fingers are spheres on three slides along (normal, tangent, tangent), each with a position servo:
+`ctrl = f / kp` makes it push with force f at its zero position, and the servo on the normal is
+limited to the largest normal force. Rigid fingers have neither slides nor servos.
 """
 
 import math
@@ -36,7 +36,7 @@ from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
 from scenes.physics import PhysicsSettings
 
 Surface = Literal["pads", "mesh"]
-"""What fingertips touch: a pad each, or the convex hull of the object's mesh."""
+"""What fingertips touch: one pad each, or the convex hull of the object's mesh."""
 FEWEST_CONTACTS = 2
 AXES = ("normal", "tangent1", "tangent2")
 
@@ -64,15 +64,14 @@ def build_scene(
 
     Args:
         body: The object.
-        grasp: A grasp, or contacts from elsewhere.
+        grasp: A grasp, or contacts of any origin.
         friction: Coulomb coefficient at every contact.
         fingers: How fingertips are built and driven.
         physics: Simulation settings.
         surface: What fingertips touch; `mesh` is for convex objects.
 
     Raises:
-        InputError: A number is out of range, or the mesh of an object that is not convex is to be
-            touched.
+        InputError: A number is out of range, or `surface` is `mesh` and the object is not convex.
     """
     check_body(body)
     one_of(surface, get_args(Surface), "surface")
@@ -101,14 +100,14 @@ def write_scene(scene: Scene, path: str | Path) -> Path:
     """Write the scene's text to a file and return its path.
 
     Raises:
-        InputError: There is no scene, or no path.
+        InputError: `scene` is not a scene, or `path` is not a path.
     """
     instance(scene, Scene, "scene", "build_scene makes one")
     return write_parts(path_of(path, "path"), [scene.xml.encode()])
 
 
 def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads") -> str:
-    """The MJCF text of a layout: the same text for the same layout."""
+    """The MJCF text of a layout; equal layouts give equal texts."""
     root = ElementTree.Element("mujoco", model=_plain(layout.name))
     _add(root, "compiler", {"angle": "radian", "autolimits": "false", "inertiafromgeom": "false"})
     option = _add(root, "option", physics.options())
@@ -225,11 +224,11 @@ def _servos(actuators: ElementTree.Element, layout: Layout, finger: int) -> None
 
 
 def _keyframes(root: ElementTree.Element, layout: Layout) -> None:
-    """Where fingers are, and what their servos are told.
+    """Add keyframes: positions of the fingers, and commands of their servos.
 
-    `pregrasp`: away from the object, and kept there. `approach`: at the same place, but told to
-    squeeze gently, so that they come in. `grasp`: touching, told to squeeze gently. `squeeze`:
-    touching, told to squeeze in the same way as hard as the largest push allows.
+    `pregrasp`: the fingers stay away from the object. `approach`: they start at the same place, but
+    squeeze gently, so that they come in. `grasp`: they touch and squeeze gently. `squeeze`: they
+    touch and squeeze in the same proportions, as hard as the largest push allows.
     """
     fingers = len(layout.contacts)
     home = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], np.zeros(3 * fingers)])
@@ -250,7 +249,7 @@ def _keyframes(root: ElementTree.Element, layout: Layout) -> None:
 def quaternion(rotation: Array) -> Array:
     """Unit quaternion (w, x, y, z) of a rotation matrix, (4,), with its largest part positive.
 
-    The rows below are 4 q_i q for each part q_i of the quaternion q; the one of the largest part
+    The rows below are 4 q_i q for each part q_i of the quaternion q; the row of the largest part
     has the most digits.
     """
     (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
@@ -274,7 +273,7 @@ def _add(
 
 
 def _text(value: object) -> str:
-    """A number in full precision, a sequence with blanks between."""
+    """Write a number in full precision, or a sequence with blanks between its numbers."""
     if isinstance(value, str):
         return value
     return " ".join(repr(number) for number in np.asarray(value).ravel().tolist())

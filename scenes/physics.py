@@ -1,10 +1,10 @@
-"""Every MuJoCo setting a scene is simulated with; all of them are written into the scene.
+"""Every MuJoCo setting that a scene is simulated with; all of them are written into the scene.
 
-The defaults are the ones measured to reproduce Coulomb friction to about 0.1 %: elliptic
-cones (pyramids are up to 29 % too weak along their diagonals), the `discrete` integrator
-(hard contacts slip falsely under the others at ordinary tolerances), a high ratio of
-friction to normal impedance (resting contacts otherwise creep), hard and constant contact
-impedance, and a dense Jacobian (the sparse Newton solver of MuJoCo 4.0.0 has a bug).
+The defaults were measured to reproduce Coulomb friction to about 0.1 %: elliptic cones (pyramids
+are up to 29 % too weak along their diagonals), the `discrete` integrator (hard contacts slip
+falsely under the others at ordinary tolerances), a high ratio of friction to normal impedance
+(resting contacts otherwise creep), hard and constant contact impedance, and a dense Jacobian (the
+sparse Newton solver of MuJoCo 4.0.0 has a bug).
 """
 
 from dataclasses import asdict, dataclass
@@ -19,20 +19,20 @@ class PhysicsSettings:
     """Options of the simulation, named as in MJCF.
 
     Raises:
-        InputError: A number is out of its range, or a word is none that MuJoCo knows.
+        InputError: A number is out of its range, or MuJoCo does not know a word.
     """
 
     timestep: float = 0.002
-    """From 1e-5 to 0.005 [s]: with twice as long steps objects let go 40 % above their critical
-    friction, and only some of the known cases show it."""
+    """Length of a step, from 1e-5 to 0.005 [s]. With steps twice as long, objects let go 40 % above
+    their critical friction, and only some of the known cases show it."""
     integrator: str = "discrete"
     cone: str = "elliptic"
     solver: str = "Newton"
     jacobian: str = "dense"
     impratio: float = 1000.0
     tolerance: float = 1e-16
-    """Of the solver, absolute in squares of accelerations, which are a millionth as large on an
-    object a thousandth as large: 1e-12 slips falsely at a millimetre."""
+    """Tolerance of the solver, absolute in squares of accelerations. These are a millionth as large
+    on an object a thousandth as large: 1e-12 slips falsely at a millimetre."""
     iterations: int = 100
     ls_iterations: int = 50
     ls_tolerance: float = 0.01
@@ -52,13 +52,14 @@ class PhysicsSettings:
     solref: tuple[float, float] = (0.004, 1.0)
     solimp: tuple[float, float, float, float, float] = (0.99, 0.99, 0.001, 0.5, 2.0)
     condim: int = 3
-    """Three: a hard fingertip transmits no torsion."""
+    """Kind of contact; 3 is a hard fingertip, which transmits no torsion."""
     margin: float = 0.0
     gap: float = 0.0
     autoreset: bool = False
-    """After a blow-up MuJoCo would silently return to the start, which looks perfectly stable."""
+    """Whether MuJoCo resets after a blow-up: it then silently returns to the start, which looks
+    perfectly stable."""
     diagexact: bool = False
-    """Contact impedances from the exact inertia that each contact sees."""
+    """Whether contact impedances use the exact inertia that each contact sees."""
 
     def __post_init__(self) -> None:
         for name, words in WORDS.items():
@@ -75,7 +76,7 @@ class PhysicsSettings:
             raise InputError(f"condim must be one of {CONTACT_DIMENSIONS}, got {self.condim}")
 
     def options(self) -> dict[str, float | int | str | tuple[float, ...]]:
-        """What goes into MJCF's `option` element."""
+        """Attributes of MJCF's `option` element."""
         elsewhere = (*CONTACT_SETTINGS, *CHOSEN_FLAGS)
         return {name: value for name, value in asdict(self).items() if name not in elsewhere}
 
@@ -86,7 +87,7 @@ class PhysicsSettings:
         return {name: "enable" if name in on else "disable" for name in names}
 
     def contact(self) -> dict[str, float | int | str | tuple[float, ...]]:
-        """What goes onto each geom that makes contact."""
+        """Attributes of each geom that makes contact."""
         return {
             "condim": self.condim,
             "solref": self.solref,
@@ -126,7 +127,8 @@ RANGES = {
     "margin": (0.0, 1.0),
     "gap": (0.0, 1.0),
 }
-"""Where numbers must lie: shorter steps take hours, longer ones fewer than a hold has phases."""
+"""Least and largest value of each number: shorter steps take hours, longer ones are fewer than a
+hold has phases."""
 VECTORS = {
     "gravity": (3, 1e4),
     "wind": (3, 1e4),
@@ -134,7 +136,7 @@ VECTORS = {
     "solref": (2, LARGEST),
     "solimp": (5, LARGEST),
 }
-"""How many numbers, and the largest size of one."""
+"""Number of components of each vector, and the largest size of a component."""
 CONTACT_SETTINGS = ("solref", "solimp", "condim", "margin", "gap")
 CHOSEN_FLAGS = ("autoreset", "diagexact")
 ENABLED_FLAGS = (
@@ -145,4 +147,4 @@ ENABLED_FLAGS = (
 UNUSED_FLAGS = (
     "override", "energy", "fwdinv", "invdiscrete", "sleep", "ipc", "speculative",
 )  # fmt: skip
-"""Off by default and kept off; a sleeping body would hide drift."""
+"""Flags that are off by default and stay off; a sleeping body would hide drift."""

@@ -1,4 +1,4 @@
-"""Simulate, judge, and compare with what the analysis predicts.
+"""Simulate grasps, judge them, and compare them with what the analysis predicts.
 
 Names are imported on first use; the stub beside this file says where from.
 """

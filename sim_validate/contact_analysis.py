@@ -1,6 +1,6 @@
 """Contacts to numbers: closure, critical friction, quality and wrench limits.
 
-A question that cannot be decided leaves its reason; the others are answered all the same.
+A question that cannot be decided leaves its reason; all others are still answered.
 """
 
 from collections.abc import Callable, Iterable
@@ -24,7 +24,8 @@ from grasp_core.records.contacts_json import ContactSet
 from grasp_core.solvers.ties import first_best
 
 MOST_EDGES = 10_000
-"""Of all pyramids of a grasp together: their hull in six dimensions takes ten seconds then."""
+"""Largest number of edges of all pyramids of a grasp together; their hull in six dimensions then
+takes ten seconds."""
 
 Answer = TypeVar("Answer")
 Checked = TypeVar("Checked", ClosureCertificate, FrictionInterval)
@@ -41,19 +42,19 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What is asked about contacts."""
+    """The questions about contacts, with their settings."""
 
     max_normal_force: float
-    """Of each contact [N]."""
+    """Largest normal force of each contact [N]."""
     wrenches: tuple[Wrench, ...] = ()
     """External wrenches (force, torque) [N, N m], torque about each grasp's centre."""
     edges: int = 8
-    """Of the pyramids that stand for friction cones in metrics defined by them."""
+    """Number of edges of the pyramids that stand for friction cones in metrics defined by them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """Both sides of a quality [N], and whether they were proved in plain arithmetic."""
+    """Lower and upper bound of a quality [N], and whether plain arithmetic proved them."""
 
     lower: float
     upper: float
@@ -66,8 +67,8 @@ class Resisted:
 
     limit: WrenchLimit
     forces: Array | None
-    """Of least norm, in pyramids inscribed in the friction cones, (k, 3) [N]; None if there are
-    none, which may also be so for a limit just above 1."""
+    """The balancing forces of least norm, in pyramids inscribed in the friction cones, (k, 3) [N];
+    None if there are none, which may happen for a limit just above 1."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,9 +77,9 @@ class Analysis:
 
     contacts: ContactSet
     certificate: ClosureCertificate | None
-    """Checked again in plain arithmetic."""
+    """The certificate of closure, checked again in plain arithmetic."""
     friction_interval: FrictionInterval | None
-    """Of the least common friction for closure; checked again in rational arithmetic."""
+    """Interval of the least common friction for closure, checked again in rational arithmetic."""
     l1: Bounds | None
     linf: Bounds | None
     min_weight: float | None
@@ -87,22 +88,22 @@ class Analysis:
     weakest_axis: WrenchLimit | None
     """The weakest of the twelve axis wrenches."""
     everywhere: float | None
-    """Every wrench of unit size is resisted up to at least this multiple."""
+    """Multiple up to which every wrench of unit size is resisted."""
     wrenches: tuple[Resisted | None, ...]
-    """In the order asked."""
+    """The wrenches in the order asked."""
     undecided: dict[str, str]
-    """Reason by name of what could not be decided."""
+    """Why a question could not be decided, by its name."""
 
     @property
     def outcome(self) -> Outcome:
-        """The answer on closure."""
+        """The answer about closure."""
         if self.certificate is None:
             return Outcome.UNDECIDED
         return Outcome.CLOSED if self.certificate.closed else Outcome.OPEN
 
     @property
     def critical_friction(self) -> float | None:
-        """Common coefficient that suffices; infinite if none does."""
+        """Common coefficient that suffices for closure; infinite if none does."""
         found = self.friction_interval
         return None if found is None else found.critical_friction
 

@@ -42,22 +42,23 @@ ACTIONS: dict[type[Any], str] = {
     command_flags.Objects: "objects:list_objects",
     command_flags.Doctor: "doctor:check_installation",
 }
-"""By name, as planning must not wait for a simulator to be imported."""
+"""Module and function of each command. They are names, because planning must not wait for a
+simulator to be imported."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command.
 
     Args:
-        argv: Arguments without the program's name; those of the process when None.
+        argv: Arguments without the program's name; None for those of the process.
 
     Returns:
-        An exit code, see `Exit`.
+        An exit code; see `Exit`.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
         if "" in arguments:
-            said = "a word of the command line is empty, as of a variable that is not set"
+            said = "an argument is empty, perhaps from a variable that is not set"
             raise FlagsError(f"{said}; leave it out, or give a value")
         flags = with_config(arguments, COMMANDS)
     except InputError as error:

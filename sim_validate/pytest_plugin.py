@@ -1,4 +1,4 @@
-"""A pytest plugin: grasps of `*.grasps.toml` files as tests, and `assert_stable` for those in code.
+"""A pytest plugin: `*.grasps.toml` files become tests, and `assert_stable` checks one grasp.
 
 Nothing but pytest is imported until such a file, the fixtures or the marker are used.
 """
@@ -22,9 +22,9 @@ MARKER = (
     "test with each grasp of a grasps.json, or planned for an object, as its fixture `grasp_case`"
 )
 LINES = pytest.StashKey[list[dict[str, Any]]]()
-"""What became of grasps: in one phase of a test, and in the whole run."""
+"""Lines of the report about grasps, kept for one phase of a test and for the whole run."""
 TRAVELS = "_graspproof"
-"""Attribute of reports that has the same."""
+"""Name of the attribute that carries these lines on pytest's reports between processes."""
 
 
 class UnstableError(AssertionError):
@@ -32,7 +32,7 @@ class UnstableError(AssertionError):
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the plugin's options."""
+    """Add the plugin's options to pytest."""
     group = parser.getgroup("graspproof", "stability of grasps")
     group.addoption(
         "--grasp-bless",
@@ -47,14 +47,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Make the marker known."""
+    """Register the marker and collect the lines of all tests."""
     config.addinivalue_line("markers", MARKER)
     config.stash[LINES] = []
     config.pluginmanager.register(_Collecting(config))
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    """Take files of grasps for tests."""
+    """Collect `*.grasps.toml` files as tests."""
     if not file_path.name.endswith(ENDING):
         return None
     kind: Any = GraspsFile  # pytest leaves the types of its constructors open
@@ -83,7 +83,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 def pytest_runtest_makereport(
     item: pytest.Item,
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Give what became of grasps to the report, which travels between processes."""
+    """Attach the lines about grasps to the report, which is sent between processes."""
     report = yield
     if lines := item.stash.get(LINES, None):
         setattr(report, TRAVELS, lines)
@@ -93,7 +93,7 @@ def pytest_runtest_makereport(
 
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Write the report, where all that was tested has come together."""
+    """Write the report in the process that collected the results of all others."""
     folder = session.config.getoption("--grasp-report")
     if folder is None or hasattr(session.config, "workerinput"):
         return
@@ -103,17 +103,17 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 
 class _Collecting:
-    """Brings together what became of grasps in all tests."""
+    """Collects the lines about grasps from all tests."""
 
     def __init__(self, config: pytest.Config) -> None:
         self._lines = config.stash[LINES]
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Take what a test, here or in another process, has to say."""
+        """Take the lines of one test, run here or in another process."""
         self._lines += getattr(report, TRAVELS, [])
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        """Say which tests were not of a mesh file, but of a copy of it."""
+        """List the tests that used a copy of a mesh instead of its file."""
         notes = sorted({line["mesh_note"] for line in self._lines if line["mesh_note"]})
         if notes:
             terminalreporter.section("meshes of grasps")
@@ -122,10 +122,10 @@ class _Collecting:
 
 
 class GraspsFile(pytest.File):
-    """Grasps that must stay as they were."""
+    """A file of grasps that must stay as they were."""
 
     def collect(self) -> Iterator[pytest.Item]:
-        """A test for each grasp; a single one where a baseline is to be written."""
+        """Yield a test for each grasp, or a single one if a baseline is to be written."""
         from grasp_core.errors import GraspError
         from sim_validate.baselines.suite_toml import suite_from_toml
 
@@ -146,7 +146,7 @@ class _SuiteItem(pytest.Item):
         self.suite = suite
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """What is wrong, without a traceback through ours."""
+        """Show what is wrong, without a traceback through the plugin's own code."""
         from grasp_core.errors import GraspError
 
         if isinstance(excinfo.value, UnstableError | GraspError):
@@ -154,15 +154,15 @@ class _SuiteItem(pytest.Item):
         return super().repr_failure(excinfo, style)
 
     def reportinfo(self) -> tuple[Path, None, str]:
-        """Where a test is, and what it is called."""
+        """The file of a test, and its name."""
         return self.path, None, f"{self.path.name}: {self.name}"
 
 
 class GraspItem(_SuiteItem):
-    """One grasp, simulated and compared with its baseline."""
+    """The test of one grasp, simulated and compared with its baseline."""
 
     def runtest(self) -> None:
-        """Fail where the grasp is worse, missing or new, or cannot be compared."""
+        """Fail if the grasp is worse, missing or new, or cannot be compared."""
         from grasp_core.errors import GraspError
         from sim_validate.baselines.compare import Status, failing
         from sim_validate.baselines.entries import plain
@@ -191,10 +191,10 @@ class GraspItem(_SuiteItem):
 
 
 class BlessItem(_SuiteItem):
-    """All grasps of a file, simulated to make a baseline."""
+    """The test that simulates all grasps of a file and makes them its baseline."""
 
     def runtest(self) -> None:
-        """Write the baseline."""
+        """Simulate all grasps and write the baseline."""
         from sim_validate.baselines.entries import plain
 
         found = self.suite.bless()
@@ -220,15 +220,15 @@ def assert_stable(
 
         Args:
             case: A `grasp_case`; or the object, a grasp on its faces, and the friction.
-            friction: Coulomb coefficient, in place of the case's, or .5.
+            friction: Coulomb coefficient; None for the case's own, or 0.5.
             asked: Fields of `Demands`: `wrenches` to hold as they are, `trials` with `noise`,
                 `min_pass_rate` of them, `min_margin` of the friction over the critical one,
                 `random_wrenches`, `seed`, `setup`.
 
         Raises:
             UnstableError: A wrench was not held, a control was, the analysis is contradicted, or
-                less is reached than is asked for.
-            InputError: The grasp or what is asked for is refused.
+                less is reached than `asked` demands.
+            InputError: The grasp or `asked` is refused.
         """
         from sim_validate.baselines.demands import checked, demands_of
         from sim_validate.baselines.entries import entry_of, plain
@@ -254,7 +254,7 @@ def _note(
     item: pytest.Item, grasp: str, status: str, why: str, entries: "Entries" = (None, None),
     source: "Source | None" = None,
 ) -> None:  # fmt: skip
-    """Remember what became of a grasp in a test, with its entries before and after."""
+    """Remember the outcome of a grasp in a test, with its entries before and after."""
     line: dict[str, Any] = {
         "test": item.nodeid, "grasp": grasp, "status": status, "why": why,
         "before": entries[0], "after": entries[1], "mesh_file": None, "mesh_note": "",

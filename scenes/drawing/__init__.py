@@ -1,4 +1,4 @@
 """What does a grasp or a motion look like?
 
-Objects, grasps and motions come in. Pictures and clips go out.
+This room turns objects, grasps and motions into pictures and clips.
 """

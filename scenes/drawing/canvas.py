@@ -1,10 +1,10 @@
-"""The door to matplotlib: figures, their files, and polygons in them.
+"""The only module that uses matplotlib: figures, their files, and polygons in them.
 
 Figures are made without `pyplot`, so that none outlives its use and no display is looked for.
 """
 
 # pyright: basic
-# matplotlib's types at their door.
+# Matplotlib's types are incomplete; only this module sees them.
 
 import importlib
 import io
@@ -28,7 +28,7 @@ Made = TypeVar("Made")
 
 FORMATS = ("png", "svg", "pdf", "webp", "jpg")
 LETTERS = 9.0
-"""Of text in figures [points]."""
+"""Size of text in figures [points]."""
 STYLE = {
     "font.size": LETTERS, "font.family": "DejaVu Sans", "axes.spines.top": False,
     "axes.spines.right": False, "axes.edgecolor": INK, "axes.labelcolor": INK, "text.color": INK,
@@ -37,20 +37,20 @@ STYLE = {
     "lines.linewidth": 1.4, "hatch.linewidth": 0.8,
 }  # fmt: skip
 INTERVALS = 4
-"""Between ticks of an axis; ticks are what takes longest to draw."""
+"""Largest number of intervals between ticks of an axis; ticks are the slowest part of drawing."""
 DOTS_PER_INCH = 100.0
 OPTIONS: dict[str, dict[str, Any]] = {
     "webp": {"quality": 70, "method": 3},
     "jpg": {"quality": 90},
 }
-"""How pictures are packed: lines keep their colours, files stay small."""
+"""How pictures are compressed: lines keep their colours, files stay small."""
 
 
 def _part(name: str) -> Any:
-    """A module of matplotlib.
+    """Import a module of matplotlib.
 
-    No display is looked for, so that a user's choice of one is none of its business; nor is where
-    it keeps its notes on fonts, for which it finds another place by itself.
+    The import must not look for a display, so a user's choice of a backend is hidden from it. Its
+    warning about where it caches fonts is hidden too, because it finds another place by itself.
     """
     backend, logger = os.environ.pop("MPLBACKEND", None), logging.getLogger("matplotlib")
     level = logger.level
@@ -64,7 +64,7 @@ def _part(name: str) -> Any:
 
 
 def in_style(make: Callable[Given, Made]) -> Callable[Given, Made]:
-    """A function that makes figures, in the style of all figures here, whatever users have set."""
+    """Decorate a function that makes figures, so that users' own style settings do not matter."""
 
     @wraps(make)
     def styled(*args: Given.args, **kwargs: Given.kwargs) -> Made:
@@ -77,7 +77,7 @@ def in_style(make: Callable[Given, Made]) -> Callable[Given, Made]:
 
 @dataclass(frozen=True, slots=True)
 class Around:
-    """Room around the panels of a figure, as shares of it, and between them, of a panel."""
+    """Margins around the panels of a figure and between them, as shares of figure and panel."""
 
     left: float = 0.075
     right: float = 0.01
@@ -87,13 +87,13 @@ class Around:
 
 
 def new_figure(width_in: float, height_in: float) -> Any:
-    """An empty figure of a size in inches."""
+    """Make an empty figure of a size in inches."""
     figure: Any = _part("figure")
     return figure.Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout=None)
 
 
 def panels(figure: Any, count: int, *, around: Around = Around()) -> list[Any]:
-    """Axes side by side, where a figure says: to find room for labels would take as long again."""
+    """Make axes side by side at given places; searching room for labels would double the time."""
     room = {"left": around.left, "right": 1.0 - around.right, "bottom": around.below,
             "top": 1.0 - around.above, "wspace": around.between}  # fmt: skip
     found = list(figure.subplots(1, count, squeeze=False, gridspec_kw=room)[0])
@@ -103,7 +103,7 @@ def panels(figure: Any, count: int, *, around: Around = Around()) -> list[Any]:
 
 
 def entitle(axes: Any, title: str) -> None:
-    """Give axes a title, at a fixed place: to look for a free one takes as long as all the rest."""
+    """Give axes a title at a fixed place; searching a free one takes as long as all the rest."""
     axes.set_title(title, fontsize=LETTERS, y=1.0)
 
 
@@ -111,7 +111,7 @@ def add_polygons(
     axes: Any, polygons: Sequence[Array], colours: Sequence[tuple[float, ...]],
     smooth: Sequence[bool],
 ) -> None:  # fmt: skip
-    """Filled polygons, in the order given."""
+    """Add filled polygons to axes, in the order given."""
     collections: Any = _part("collections")
     axes.add_collection(
         collections.PolyCollection(
@@ -122,24 +122,24 @@ def add_polygons(
 
 
 def legend_patch(colour: str, label: str, opacity: float = 1.0) -> Any:
-    """A coloured box for a legend."""
+    """Make a coloured box for a legend."""
     patches: Any = _part("patches")
     return patches.Patch(facecolor=colour, alpha=opacity, edgecolor="none", label=label)
 
 
 def legend_line(colour: str, label: str, *, style: str = "-", marker: str = "") -> Any:
-    """A line or a marker for a legend."""
+    """Make a line or a marker for a legend."""
     lines: Any = _part("lines")
     return lines.Line2D([], [], color=colour, linestyle=style, marker=marker, label=label)
 
 
 @in_style
 def encoded(figure: Any, form: str) -> bytes:
-    """A figure as the bytes of a file, the same for the same figure.
+    """Encode a figure as the bytes of a file; equal figures give equal bytes.
 
     Args:
-        figure: From `new_figure`.
-        form: One of `FORMATS`.
+        figure: A figure from `new_figure`.
+        form: A format from `FORMATS`.
     """
     stream = io.BytesIO()
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
@@ -154,11 +154,11 @@ def write_frames(
     """Write an animated picture.
 
     Args:
-        figure: From `new_figure`.
-        draw: Draws one frame into the figure.
-        count: How many frames there are.
+        figure: A figure from `new_figure`.
+        draw: Draws the frame of a given number into the figure.
+        count: Number of frames.
         rate: Frames per second.
-        path: Of the file, gif or webp.
+        path: File to write, gif or webp.
     """
     animation: Any = _part("animation")
     writer = animation.PillowWriter(fps=rate)
@@ -173,7 +173,7 @@ def write_figure(figure: Any, path: Path) -> Path:
     """Write a figure to a file whose ending says the format.
 
     Raises:
-        InputError: The ending is none of the known ones.
+        InputError: The ending is unknown.
     """
     return write_parts(path, [encoded(figure, format_of(path))])
 
@@ -182,7 +182,7 @@ def format_of(path: Path) -> str:
     """The format that the ending of a picture's name says.
 
     Raises:
-        InputError: It is none of the known ones.
+        InputError: The ending is unknown.
     """
     form = path.suffix.lower().removeprefix(".").replace("jpeg", "jpg")
     if form not in FORMATS:

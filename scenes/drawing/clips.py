@@ -1,8 +1,8 @@
-"""What moved in a scene -> a clip, drawn in a process of its own, where graphics are available.
+"""Motion of a scene -> a clip, drawn in a process of its own, where graphics are available.
 
-Motions of a grasp that holds are micrometres: they can be shown larger than they are. Since the
-first sample, shifts and turns of the object about the point between the contacts, and the slides
-of the fingertips, are multiplied by one factor, so that who moves with whom stays visible.
+The motions of a grasp that holds are micrometres, so they can be shown magnified. Shifts and turns
+of the object about the point between the contacts, and slides of the fingertips, are counted from
+the first sample and multiplied by one factor, so that one still sees which parts move together.
 """
 
 import importlib
@@ -26,19 +26,21 @@ from scenes.mjcf import Scene
 
 FORMATS = (".gif", ".webp")
 ANGLES_DEG = (-50.0, 25.0)
-"""Where the camera is, if not told otherwise: azimuth and elevation."""
+"""Azimuth and elevation of the camera by default [deg]."""
 SIZE = (480, 360)
-"""Of the picture [pixels]."""
+"""Width and height of the picture [pixels]."""
 RATE = 25.0
 """Frames per second."""
 NEARER = 0.9
-"""Fingertips may come so much nearer to the border of the picture than the object."""
+"""Share of the farthest reach of the fingertips that the picture must show; they may come nearer to
+its border than the object."""
 RIGID = 7
-"""Numbers of a scene whose fingertips do not slide: the pose of the object."""
+"""Numbers in each row of joint positions of a scene with rigid fingertips: the pose of the
+object."""
 VISIBLE = 0.1
-"""Motion that is easily seen, in grasp sizes."""
+"""Size of a motion that is easily seen, in grasp sizes."""
 MOST = 1000.0
-"""Times that motions are multiplied."""
+"""Largest factor by which motions are multiplied."""
 PATIENCE_S = 300.0
 
 
@@ -49,20 +51,20 @@ class GraphicsError(GraspError):
 def write_clip(
     scene: Scene, joints: Array, path: Path, caption: str, *, angles_deg: ArrayLike = ANGLES_DEG
 ) -> Path:
-    """Draw what moved in a scene, a frame for each sample.
+    """Draw the motion of a scene, one frame for each sample.
 
     Args:
-        scene: What was simulated.
+        scene: The simulated scene.
         joints: Position and quaternion of the object's frame, then the slides of the fingertips
             along the axes of their contacts, (n, 7 + 3k) [m].
-        path: Of the file to write, gif or webp.
-        caption: Written into the picture.
-        angles_deg: Azimuth and elevation of the camera as seen from the object, (2,) or for each
-            frame, (n, 2).
+        path: File to write, gif or webp.
+        caption: Text written into the picture.
+        angles_deg: Azimuth and elevation of the camera as seen from the object, (2,), or (n, 2) to
+            give them for each frame.
 
     Raises:
-        InputError: The file's name ends otherwise.
-        GraphicsError: No graphics library draws here; the message has its words.
+        InputError: The file's name does not end in gif or webp.
+        GraphicsError: No graphics library draws here; the message quotes it.
     """
     require_clip(path)
     with tempfile.TemporaryDirectory() as folder:
@@ -81,7 +83,7 @@ def write_clip(
 
 
 def _reach(scene: Scene, joints: Array) -> float:
-    """How far from the object's centre there is something to see [m]."""
+    """The distance from the object's centre up to which there is something to see [m]."""
     layout = scene.layout
     slides = np.zeros((1, len(layout.contacts), 3))
     if joints.shape[1] > RIGID:
@@ -92,20 +94,20 @@ def _reach(scene: Scene, joints: Array) -> float:
 
 
 def require_clip(path: Path) -> None:
-    """That a file is to be a clip.
+    """Refuse a file name that is not a clip's.
 
     Raises:
-        InputError: Its name ends otherwise.
+        InputError: The name does not end in gif or webp.
     """
     if path.suffix.lower() not in FORMATS:
         raise InputError(f"{path}: clips end in {' or '.join(FORMATS)}")
 
 
 def available_graphics() -> str:
-    """What MuJoCo's renderer can draw with here.
+    """The graphics library that MuJoCo's renderer can draw with here.
 
     Raises:
-        GraphicsError: Nothing; the message says what was tried.
+        GraphicsError: No library works; the message says what was tried.
     """
     said = list[str]()
     for graphics in _graphics():
@@ -117,7 +119,7 @@ def available_graphics() -> str:
 
 
 def remedy() -> str:
-    """What would help where there are no graphics."""
+    """Advice for a machine without graphics."""
     if (chosen := os.environ.get("MUJOCO_GL")) is not None:
         return f"MUJOCO_GL is set to {chosen!r}: unset it to have others tried"
     return "install libegl1 or libosmesa6, or use a display"
@@ -131,7 +133,7 @@ def has_display() -> bool:
 
 
 def _graphics() -> Iterator[str]:
-    """What MuJoCo may draw with, in the order to try."""
+    """Graphics libraries that MuJoCo may draw with, in the order to try."""
     chosen = os.environ.get("MUJOCO_GL")
     if chosen is not None:
         yield chosen
@@ -142,13 +144,13 @@ def _graphics() -> Iterator[str]:
 
 
 def _drawn(job: Path, out: Path, graphics: str) -> str:
-    """Draw in another process; what went wrong, empty if nothing."""
+    """Draw in another process; return what went wrong, or an empty text."""
     trouble = _run_frames(graphics, [str(job), str(out)])
     return trouble or ("" if out.is_file() else f"{graphics}: nothing was drawn")
 
 
 def _run_frames(graphics: str, arguments: list[str]) -> str:
-    """Run the program that draws, or without arguments sees whether it could; what went wrong."""
+    """Run the drawing program, or only try it if there are no arguments; return what went wrong."""
     program = str(Path(__file__).with_name("frames.py"))
     command = [sys.executable, "-P", program, *arguments]
     settings = {**os.environ, "MUJOCO_GL": graphics}
@@ -165,15 +167,15 @@ def _run_frames(graphics: str, arguments: list[str]) -> str:
 
 
 def magnified(joints: Array, scene: Scene) -> tuple[Array, float]:
-    """Motions made large enough to be seen.
+    """Magnify motions until they can be seen.
 
     Args:
-        joints: As for `write_clip`, (n, 7 + 3k).
-        scene: Where they come from.
+        joints: Joint positions as for `write_clip`, (n, 7 + 3k).
+        scene: The scene that moved.
 
     Returns:
-        The same from the planned pose on, with every motion since the first sample multiplied,
-        and by how much: one significant digit, at least 1.
+        Joint positions that begin at the planned pose, with every motion since the first sample
+        multiplied, and the factor: a number of one significant digit, at least 1.
     """
     center, size = scene.layout.center, scene.layout.grasp_size_m
     rotation: Any = importlib.import_module("scipy.spatial.transform").Rotation

@@ -1,9 +1,9 @@
-"""What is drawn of a grasp, after the figures of the paper.
+"""The shapes that show a grasp, after the figures of the paper.
 
-The object is glass. On its outside fingers are long bars; on its inside, at each contact, is the
-friction cone and in it the cone of forces that the construction used. Lines of force run through
+The object is glass. Outside of it, fingers are long bars. Inside of it, each contact has its
+friction cone and in this the cone of forces that the construction used. Lines of force run through
 the focus points; a pencil also shows the plane of each pair, a regulus the surface of its lines.
-Pictures and turnable pages draw what is listed here.
+Pictures and turnable pages draw these shapes.
 """
 
 import math
@@ -20,35 +20,34 @@ from scenes.drawing.ruled_surfaces import between, rulings
 from scenes.drawing.shapes import Shape, closed, cone_rim, cone_sides, tube
 
 BAR_LENGTH, BAR_RADIUS = 0.75, 0.05
-"""Of a finger, in object radii."""
+"""Length and radius of a finger's bar, in object radii."""
 CONE_LENGTH = 0.42
-"""Of a cone's sides, in object radii."""
+"""Length of a cone's sides, in object radii."""
 BEYOND = 0.2
-"""How far lines go on behind the points that they are drawn for, in object radii."""
+"""Length by which lines go on behind the points that they are drawn for, in object radii."""
 REACH = 0.95
-"""How far from the object's centre the surface of a regulus is drawn, in object radii."""
+"""Distance from the object's centre up to which a regulus's surface is drawn, in object radii."""
 FARTHEST = 4.0
-"""Length of a line of force at most, and how far foci of planes that are drawn are from the centre,
-in object radii; the foci of built-in objects are within three."""
+"""Largest length of a line of force, and largest distance from the centre of foci whose planes are
+drawn, in object radii; the foci of built-in objects are within three."""
 SLACK_RAD = 1e-6
-"""By which a force cone may seem to stick out of its friction cone."""
+"""Angle by which rounding may let a force cone stick out of its friction cone [rad]."""
 POLYGON = 3
-"""Corners of the smallest region that can be shaded."""
+"""Least number of corners of a region that can be shaded."""
 MOST_TRIANGLES = 2500
-"""Of the glass: finer surfaces are drawn coarser."""
+"""Largest number of triangles of the glass; finer surfaces are drawn coarser."""
 
 
 def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, ...]:
-    """Everything that is drawn of a grasp.
+    """List everything that is drawn of a grasp.
 
     Args:
         body: The object.
-        grasp: On it.
+        grasp: A grasp on the faces of `body`.
         friction: Coulomb coefficient of the friction cones.
 
     Returns:
-        Shapes in the object's frame. Force cones that are wider than this friction allows are left
-        out.
+        Shapes in the object's frame, without force cones wider than this friction allows.
 
     Raises:
         InputError: The friction is not positive, or the grasp is not on this object.
@@ -63,7 +62,7 @@ def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, 
 
 
 def glass(body: Polyhedron) -> tuple[Shape, ...]:
-    """The object: its surface, and the borders of its faces."""
+    """The surface of the object, and the borders of its faces."""
     loops = [loop for face in body.faces for loop in (face.polygon, *face.holes)]
     return (
         Shape("object", polygons=_panes(body)),
@@ -72,7 +71,7 @@ def glass(body: Polyhedron) -> tuple[Shape, ...]:
 
 
 def _panes(body: Polyhedron) -> tuple[Array, ...]:
-    """Pieces of planar faces, or the triangles of a curved surface."""
+    """The pieces of planar faces, or the triangles of a curved surface."""
     if body.patches is None:
         return tuple(piece for face in body.faces for piece in face.pieces)
     fine = len(body.triangles) > MOST_TRIANGLES
@@ -80,10 +79,10 @@ def _panes(body: Polyhedron) -> tuple[Array, ...]:
 
 
 def _coarse(body: Polyhedron) -> Array:
-    """Triangles between the middles of cells of a grid, (t, 3, 3) [m]: what they join stays joined.
+    """Simplify a surface on a grid, without tearing it apart, (t, 3, 3) [m].
 
-    Each vertex moves to the middle of those in its cell; triangles inside one cell or along two
-    are gone.
+    Each vertex moves to the mean of the vertices in its cell. Triangles that then have no area are
+    dropped.
     """
     cells = math.sqrt(MOST_TRIANGLES) / 2.0
     low = body.vertices.min(axis=0)
@@ -123,7 +122,7 @@ def _finger(body: Polyhedron, grasp: Grasp, finger: int, half_angle: float) -> l
 
 
 def _family(body: Polyhedron, grasp: Grasp) -> list[Shape]:
-    """Lines of force, and what shows that they are of the grasp's family."""
+    """Lines of force, and the shapes that show the grasp's family."""
     if grasp.family == "regulus":
         return _regulus(body, grasp)
     beyond = BEYOND * body.radius
@@ -140,7 +139,7 @@ def _family(body: Polyhedron, grasp: Grasp) -> list[Shape]:
 
 
 def _regulus(body: Polyhedron, grasp: Grasp) -> list[Shape]:
-    """Lines along the witness forces, and the surface that they rule."""
+    """Lines along the witness forces, and the surface that they lie on."""
     reach, beyond = REACH * body.radius, BEYOND * body.radius
     ways = grasp.witness.directions
     ruled = rulings(grasp.positions, ways, body.center_of_mass, reach)
@@ -153,7 +152,7 @@ def _regulus(body: Polyhedron, grasp: Grasp) -> list[Shape]:
 
 
 def _planes(grasp: Grasp, beyond: float) -> list[Shape]:
-    """The plane of each pair of a pencil; both hold the line through the foci."""
+    """The planes of both pairs of a pencil; each holds the line through the foci."""
     one, two = grasp.focus_points
     along = beyond * _unit(two - one)
     ends = np.array([one - along, two + along])

@@ -1,12 +1,12 @@
-"""A scene and what moved in it -> an animated picture; a program of its own.
+"""A scene and its motion -> an animated picture; a program of its own.
 
-Run as `python -P frames.py JOB.npz OUT`, by `scenes.drawing.clips` only: which graphics MuJoCo uses
-is chosen when it is first imported, and a driver that is broken may end the whole process. Without
-arguments it draws an empty scene, to see whether it can.
+Only `scenes.drawing.clips` runs it, as `python -P frames.py JOB.npz OUT`. It is a process of its
+own because MuJoCo chooses its graphics when it is first imported, and a broken driver may end the
+whole process. Without arguments it draws an empty scene, to try whether that works.
 """
 
 # pyright: basic, reportAttributeAccessIssue=false
-# MuJoCo and Pillow at their door.
+# MuJoCo and Pillow have incomplete types; only this module sees them here.
 
 import sys
 from pathlib import Path
@@ -16,15 +16,15 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont  # noqa: TID251
 
 DISTANCE = 3.2
-"""Of the camera, in radii of what is seen."""
+"""Distance of the camera, in radii of what is seen."""
 SKY, AMBIENT, DIFFUSE = (0.93, 0.95, 0.97), 0.45, 0.45
-"""Colour of the background, and of the light from the camera."""
+"""Colour of the background, and strengths of the ambient light and of the light from the camera."""
 INK, LETTERS = (30, 30, 40), 18
 """Colour and height of the caption's letters [pixels]."""
 
 
 def main(job: str, out: str) -> None:
-    """Draw every row of joint positions."""
+    """Draw one frame for every row of joint positions."""
     given = np.load(job, allow_pickle=False)
     model = _lit(str(given["xml"]))
     for finger, colour in enumerate(given["colours"]):
@@ -40,7 +40,8 @@ def main(job: str, out: str) -> None:
     frames = []
     with mujoco.Renderer(model, height, width) as renderer:
         for joints, (azimuth, elevation) in zip(given["joints"], given["angles"], strict=True):
-            camera.azimuth, camera.elevation = azimuth + 180.0, -elevation  # of its line of sight
+            # MuJoCo's angles are those of the line of sight
+            camera.azimuth, camera.elevation = azimuth + 180.0, -elevation
             data.qpos[:] = joints
             mujoco.mj_kinematics(model, data)
             renderer.update_scene(data, camera)
@@ -55,7 +56,7 @@ def main(job: str, out: str) -> None:
 
 
 def try_out() -> None:
-    """Draw an empty scene."""
+    """Draw an empty scene, which fails where there are no graphics."""
     model = mujoco.MjModel.from_xml_string("<mujoco/>")
     with mujoco.Renderer(model, 8, 8) as renderer:
         data = mujoco.MjData(model)
@@ -65,7 +66,7 @@ def try_out() -> None:
 
 
 def _lit(xml: str) -> mujoco.MjModel:
-    """A scene in daylight."""
+    """Compile a scene with a bright sky and light."""
     spec = mujoco.MjSpec.from_string(xml)
     spec.add_texture(
         name="sky",

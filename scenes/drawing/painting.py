@@ -1,7 +1,7 @@
 """Shapes as seen from a view -> flat coloured polygons, the farthest first.
 
-Lines and points become polygons, too, so that one order by depth holds for everything: a finger
-in front of a line of force hides it, glass in front of it does not.
+Lines and points become polygons, too, so that one order by depth holds for everything: a finger in
+front of a line of force hides it, glass in front of the line does not.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,15 +15,15 @@ from scenes.drawing.shapes import SIDES, Shape
 from scenes.drawing.views import View
 
 LIGHT = np.array([-0.4, 0.7, 0.6]) / np.linalg.norm([-0.4, 0.7, 0.6])
-"""Where it comes from: left, above, before."""
+"""Direction towards the light: left, above, in front; (right, up, towards the viewer)."""
 DARKEST = 0.55
-"""Of a shaded side, as a share of its colour."""
+"""Brightness of a side that faces away from the light, as a share of its colour."""
 DASHES = 24
-"""Parts, every other one drawn, of a line as long as the picture is wide."""
+"""Number of parts, every other one drawn, of a dashed line as long as the picture is wide."""
 SEAMS = 0.5
-"""Opacity of polygons up to which smooth borders of neighbours would show as lines."""
+"""Opacity up to which polygons get hard borders, because smooth ones would show as lines."""
 PIECES = 12
-"""Parts of a whole line of that length, each with its own depth."""
+"""Number of parts of a solid line as long as the picture is wide, each with its own depth."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,18 +31,18 @@ class Patch:
     """One flat polygon of a picture."""
 
     polygon: Array
-    """(k, 2) [m]"""
+    """Corners in the picture, (k, 2) [m]."""
     nearness: float
-    """[m]"""
+    """Position along the line of sight, larger if nearer [m]."""
     colour: tuple[float, float, float, float]
-    """Red, green, blue, opacity."""
+    """Red, green, blue and opacity, from 0 to 1."""
     smooth: bool
-    """Whether its border is drawn smoothly; neighbours that share a border are not, as it would
-    show."""
+    """Whether the polygon's border is smoothed; it is not where neighbours share a border, which
+    would then show."""
 
 
 def painted(shapes: Iterable[Shape], view: View, width: float) -> tuple[Patch, ...]:
-    """Polygons of a picture so wide [m], in the order to draw them."""
+    """The polygons of a picture of a given width [m], in the order to draw them."""
     patches = [patch for shape in shapes for patch in _patches(shape, view, width)]
     return tuple(sorted(patches, key=lambda patch: patch.nearness))
 
@@ -59,6 +59,7 @@ def _patches(shape: Shape, view: View, width: float) -> Iterator[Patch]:
         (place,), (near,) = view.seen(point[None])
         angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
         around = 0.005 * look.dot * width * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        # A dot is drawn in front of what it marks.
         yield Patch(place + around, float(near) + 0.02 * width, solid, smooth=True)
 
 
@@ -70,7 +71,7 @@ def _filled(polygon: Array, look: Look, colour: tuple[float, float, float], view
 
 
 def _brightness(polygon: Array, view: View) -> float:
-    """Of a flat side, from `DARKEST` to 1: as it faces the light, seen from either side."""
+    """Brightness of a flat side, from `DARKEST` to 1, by its visible side's angle to the light."""
     normal = view.axes @ np.cross(polygon[1] - polygon[0], polygon[2] - polygon[1])
     length = float(np.linalg.norm(normal))
     if length == 0.0:
@@ -97,7 +98,7 @@ def _line(
 
 
 def _spans(length: float, look: Look) -> Sequence[tuple[float, float]]:
-    """Which parts of a line are drawn, each from one share of its length to another."""
+    """The parts of a line that are drawn, each as two shares of its length."""
     if look.dashed:
         count = 2 * max(round(0.5 * DASHES * length), 1) + 1
         return [(part / count, (part + 1) / count) for part in range(0, count, 2)]

@@ -1,4 +1,4 @@
-"""Colours of what is drawn: those of Okabe and Ito, which the colour-blind can tell apart.
+"""Colours of drawings, after Okabe and Ito, which colour-blind people can tell apart.
 
 Source: Okabe & Ito, "Color Universal Design", 2008.
 """
@@ -8,23 +8,23 @@ from dataclasses import dataclass
 from scenes.drawing.shapes import Role, Shape
 
 FINGERS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7")
-"""Of each finger and all that is its own: its cones, region, line of force, curves."""
+"""Colour of each finger and all that belongs to it: its cones, region, line of force, curves."""
 INK, GLASS, FOCUS, SURFACE = "#30363d", "#8296ab", "#D55E00", "#0072B2"
 GOOD, BAD, NEUTRAL = "#0072B2", "#D55E00", "#767c85"
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How what plays a role is drawn."""
+    """How shapes of one role are drawn."""
 
     fill: float = 0.0
     """Opacity of polygons, from 0 to 1."""
     line: float = 0.0
     """Width of lines, in hundredths of the picture's width."""
     dot: float = 0.0
-    """Diameter of points, in the same unit."""
+    """Diameter of points, in hundredths of the picture's width."""
     opacity: float = 1.0
-    """Of lines and points."""
+    """Opacity of lines and points."""
     shaded: bool = False
     """Whether polygons are darker where they face away from the light."""
     dashed: bool = False
@@ -55,6 +55,6 @@ def colour_of(shape: Shape) -> str:
 
 
 def rgb(colour: str) -> tuple[float, float, float]:
-    """Parts of a colour #rrggbb, from 0 to 1."""
+    """Red, green and blue of a colour #rrggbb, from 0 to 1."""
     red, green, blue = (int(colour[at : at + 2], 16) / 255.0 for at in (1, 3, 5))
     return red, green, blue

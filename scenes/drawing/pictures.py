@@ -33,11 +33,11 @@ SIDE_IN = 5.0
 LEGEND_IN = 0.5
 """Height of the legend [inches]."""
 MARGIN = 0.04
-"""Around what is drawn, as a share of the picture."""
+"""Margin around what is drawn, as a share of the picture."""
 FARTHEST = 2.0
-"""Points farther from the centre than so many object radii may be cut off."""
+"""Distance from the centre beyond which points may be cut off, in object radii."""
 NUMBER_BEYOND = 0.12
-"""How far a finger's number is from the end of its bar, in object radii."""
+"""Distance of a finger's number from the end of its bar, in object radii."""
 EXPLAINED: tuple[Role, ...] = (
     "finger", "friction cone", "force cone", "region", "line of force", "focus", "plane",
     "ruled surface",
@@ -56,14 +56,14 @@ def write_picture(
 
     Args:
         body: The object.
-        grasp: On it.
-        path: Of the picture; its ending (png, svg, pdf, webp, jpg) says the format.
-        friction: Coulomb coefficient, of the friction cones.
-        view: From where it is seen; from where it is seen best if None.
+        grasp: A grasp on the faces of `body`.
+        path: Path of the picture; its ending (png, svg, pdf, webp, jpg) says the format.
+        friction: Coulomb coefficient of the friction cones.
+        view: The view to draw from; None chooses the best one.
 
     Raises:
-        InputError: The ending is none of the known ones, the grasp is none of the body, or the
-            friction is out of range.
+        InputError: The ending is unknown, the grasp does not lie on the body, or the friction is
+            out of range.
     """
     path = path_of(path, "path")
     format_of(path)
@@ -76,10 +76,10 @@ def grasp_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
     legend: bool = True,
 ) -> Any:  # fmt: skip
-    """The picture of a grasp: a matplotlib figure.
+    """Draw a grasp as in the paper, as a matplotlib figure.
 
     Raises:
-        InputError: The grasp is none of the body, or the friction is out of range.
+        InputError: The grasp does not lie on the body, or the friction is out of range.
     """
     check_drawn(body, grasp, friction, view)
     switch(legend, "legend")
@@ -97,8 +97,8 @@ def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | No
     """Refuse what cannot be drawn.
 
     Raises:
-        InputError: The grasp is none of the body, the friction is out of range, or there is no
-            such view.
+        InputError: The grasp does not lie on the body, the friction is out of range, or `view` is
+            no view.
     """
     check_on_faces(body, grasp)
     coefficient(friction)
@@ -107,7 +107,7 @@ def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | No
 
 
 def empty_picture(*, legend: bool = False) -> tuple[Any, Any]:
-    """A figure for a grasp and perhaps a legend, and its axes."""
+    """Make a figure for a grasp, perhaps with a legend, and its axes."""
     figure = new_figure(SIDE_IN, SIDE_IN + (LEGEND_IN if legend else 0.0))
     below = LEGEND_IN / (SIDE_IN + LEGEND_IN) if legend else 0.0
     (axes,) = panels(figure, 1, around=Around(0.0, 0.0, below, 0.0))
@@ -120,15 +120,15 @@ def draw_grasp(
     """Draw a grasp into square axes.
 
     Args:
-        axes: Of matplotlib.
+        axes: Axes of a matplotlib figure.
         body: The object.
-        grasp: On it.
-        friction: Coulomb coefficient, of the friction cones.
-        view: From where it is seen.
+        grasp: A grasp on the faces of `body`.
+        friction: Coulomb coefficient of the friction cones.
+        view: The view to draw from.
         steady: Whether the scale is the same for all views.
 
     Returns:
-        What was drawn.
+        The shapes that were drawn.
     """
     shapes = drawing_of(body, grasp, friction)
     numbers = number_places(body, grasp)
@@ -152,7 +152,7 @@ def draw_grasp(
 
 
 def number_places(body: Polyhedron, grasp: Grasp) -> Array:
-    """Where the fingers' numbers are: behind the ends of their bars, (4, 3) [m]."""
+    """Places of the fingers' numbers, behind the ends of their bars, (4, 3) [m]."""
     ways = grasp.normals if grasp.approach_directions is None else grasp.approach_directions
     return grasp.positions - (BAR_LENGTH + NUMBER_BEYOND) * body.radius * ways
 
@@ -160,7 +160,7 @@ def number_places(body: Polyhedron, grasp: Grasp) -> Array:
 def _frame(
     shapes: Sequence[Shape], numbers: Array, body: Polyhedron, view: View | None
 ) -> tuple[Array, Array]:
-    """Corners of a square around what is to be seen from one view, or any, (2,) each [m]."""
+    """Corners of a square around all that is seen, from one view or from any, (2,) each [m]."""
     points = np.vstack([extent_of(shapes), numbers])
     distances = np.linalg.norm(points - body.center_of_mass, axis=1)
     near = distances <= FARTHEST * body.radius
@@ -175,7 +175,7 @@ def _frame(
 
 
 def _legend(shapes: Sequence[Shape]) -> list[Any]:
-    """What the roles look like that occur."""
+    """Legend entries for the roles that occur."""
     found = {shape.role: shape for shape in reversed(shapes)}
     handles = list[Any]()
     for role in EXPLAINED:

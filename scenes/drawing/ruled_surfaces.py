@@ -1,9 +1,9 @@
 """The surface on which the lines of force of a regulus lie.
 
-Three pairwise skew lines are met by one line through each point of the first: the intersection of
-the planes that this point spans with the other two. These transversals sweep a hyperboloid of one
-sheet, and every line that depends on the three, such as the fourth line of force, meets all of them
-and so lies on it, too (Sudsang & Ponce 1995, section 2.2).
+Take three pairwise skew lines. Through each point of the first, exactly one line meets the other
+two: the intersection of the planes that the point spans with them. These transversals sweep a
+hyperboloid of one sheet. Every line that depends linearly on the three, such as the fourth line of
+force, meets all of them, and so lies on it too (Sudsang & Ponce 1995, section 2.2).
 """
 
 import math
@@ -16,20 +16,21 @@ from grasp_core.arrays import Array
 
 RULINGS = 40
 PARALLEL = 1e-9
-"""Shortest way of a transversal whose direction is known."""
+"""Least length of the cross product that gives a transversal's direction, relative to the squared
+reach."""
 
 
 def rulings(points: Array, directions: Array, center: Array, reach: float) -> tuple[Array, ...]:
     """Segments of the transversals of three lines, inside a ball.
 
     Args:
-        points: One on each line, (k, 3) [m]; the first three lines count.
-        directions: Unit vectors along them, (k, 3).
-        center: Of the ball, (3,) [m].
-        reach: Its radius [m].
+        points: A point on each line, (k, 3) [m]; only the first three lines count.
+        directions: Unit vectors along the lines, (k, 3).
+        center: Centre of the ball, (3,) [m].
+        reach: Radius of the ball [m].
 
     Returns:
-        Ends of each segment, (2, 3) [m], neighbours next to each other.
+        Ends of each segment, (2, 3) [m], with neighbouring segments next to each other.
     """
     segments = list[Array]()
     for along in np.linspace(-reach, reach, RULINGS):
@@ -43,7 +44,7 @@ def rulings(points: Array, directions: Array, center: Array, reach: float) -> tu
 
 
 def _inside(start: Array, way: Array, center: Array, reach: float) -> list[Array]:
-    """The part of a line inside a ball, if any."""
+    """The part of a line inside a ball, as a list that is empty if there is none."""
     middle = float((center - start) @ way)
     room = reach**2 - float(np.linalg.norm(center - start - middle * way)) ** 2
     if room <= 0.0:

@@ -1,4 +1,4 @@
-"""Things to draw: flat polygons, lines and points in space, each with the role it plays."""
+"""Shapes to draw: flat polygons, lines and points in space, each with the role it plays."""
 
 import math
 from collections.abc import Iterable
@@ -15,18 +15,18 @@ Role: TypeAlias = Literal[
     "plane", "ruled surface", "contact",
 ]  # fmt: skip
 SIDES = 20
-"""Of what is round."""
+"""Number of corners of the polygons that stand for circles."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
-    """One thing to draw."""
+    """One thing to draw, in the object's frame."""
 
     role: Role
     finger: int | None = None
-    """Whose it is."""
+    """The finger that the shape belongs to, if any."""
     polygons: tuple[Array, ...] = ()
-    """Flat, or nearly so, corners in order, each (k, 3) [m]."""
+    """Flat or nearly flat polygons, corners in order, each (k, 3) [m]."""
     lines: tuple[Array, ...] = ()
     """Polylines, each (k, 3) [m]."""
     points: Array | None = None
@@ -40,7 +40,7 @@ class Shape:
             object.__setattr__(self, "points", frozen(self.points, (None, 3), "points"))
 
     def vertices(self) -> Array:
-        """All of its points, (n, 3) [m]."""
+        """All points of the shape, (n, 3) [m]."""
         alone = [] if self.points is None else [self.points]
         return np.vstack([np.empty((0, 3)), *self.polygons, *self.lines, *alone])
 
@@ -51,12 +51,13 @@ def extent_of(shapes: Iterable[Shape]) -> Array:
 
 
 def closed(loop: Array) -> Array:
-    """The border of a polygon as a line, (k + 1, 3)."""
+    """Close the border of a polygon as a line, (k + 1, 3)."""
     return np.vstack([loop, loop[:1]])
 
 
 def ring(center: Array, axis: Array, radius: float) -> Array:
     """Points of a circle around a unit axis, (SIDES, 3)."""
+    # The axis of the frame that is farthest from the circle's axis gives a safe cross product.
     side = np.cross(axis, np.eye(3)[first_best(-np.abs(axis), SAME_SHARE)])
     side /= np.linalg.norm(side)
     angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
@@ -65,7 +66,7 @@ def ring(center: Array, axis: Array, radius: float) -> Array:
 
 
 def tube(start: Array, end: Array, radius: float) -> tuple[Array, ...]:
-    """Sides and lids of a round bar between two points."""
+    """Sides and ends of a round bar between two points."""
     axis = (end - start) / np.linalg.norm(end - start)
     low, high = ring(start, axis, radius), ring(end, axis, radius)
     sides = [np.array([low[i - 1], low[i], high[i], high[i - 1]]) for i in range(SIDES)]
@@ -73,7 +74,7 @@ def tube(start: Array, end: Array, radius: float) -> tuple[Array, ...]:
 
 
 def cone_rim(tip: Array, axis: Array, half_angle: float, length: float) -> Array:
-    """The circle in which a cone ends whose sides are so long, (SIDES, 3)."""
+    """The circle in which a cone ends whose sides have a given length, (SIDES, 3)."""
     height = length * math.cos(half_angle)
     return ring(tip + height * axis, axis, length * math.sin(half_angle))
 

@@ -1,4 +1,4 @@
-"""A grasp's picture, turning once around: a clip that needs no graphics library."""
+"""A clip of a grasp's picture that turns once around; it needs no graphics library."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from scenes.drawing.pictures import draw_grasp, empty_picture
 from scenes.drawing.views import View
 
 FRAMES, RATE = 48, 12.0
-"""Of one turn; frames per second."""
+"""Frames in one turn, and frames per second."""
 ELEVATION_DEG = 25.0
 
 
@@ -20,12 +20,12 @@ def write_turning_clip(body: Polyhedron, grasp: Grasp, path: Path, friction: flo
 
     Args:
         body: The object.
-        grasp: On it.
-        path: Of the file to write, gif or webp.
-        friction: Coulomb coefficient, of the friction cones.
+        grasp: A grasp on the faces of `body`.
+        path: File to write, gif or webp.
+        friction: Coulomb coefficient of the friction cones.
 
     Raises:
-        InputError: The file's name ends otherwise.
+        InputError: The file's name does not end in gif or webp.
     """
     require_clip(path)
     figure, axes = empty_picture()

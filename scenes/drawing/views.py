@@ -1,4 +1,4 @@
-"""Where a camera stands, and from where a grasp is seen best."""
+"""Where a camera stands, and the view that shows a grasp best."""
 
 import math
 from dataclasses import dataclass
@@ -13,27 +13,27 @@ from grasp_core.solvers.ties import first_best
 from grasp_core.values import Grasp
 
 DISTANCE = 9.0
-"""Of the camera, in object radii: some perspective, little distortion."""
+"""Distance of the camera, in object radii: some perspective, little distortion."""
 AZIMUTHS, ELEVATIONS = range(5, 360, 10), (18, 28, 40)
-"""Views to choose from [deg]."""
+"""Azimuths and elevations of the views to choose from [deg]."""
 EDGE_ON = 0.12
-"""Cosine below which a face is seen as a line."""
+"""Cosine of the angle to the line of sight below which a face is seen as a line."""
 SAME_MERIT = 1e-6
-"""Views whose merits differ by less are equally good: the first one counts."""
+"""Difference of merit below which two views are equally good; then the first one counts."""
 FORESHORTENED = 0.8
 """Cosine above which a finger points at the viewer."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """A camera that looks at a point, z of the object's frame upwards."""
+    """A camera that looks at a point, with z of the object's frame upwards."""
 
     axes: Array
-    """Right, up and towards the viewer, (3, 3), rows."""
+    """Unit vectors to the right, up and towards the viewer, (3, 3), rows."""
     center: Array
-    """What it looks at, (3,) [m]."""
+    """The point that the camera looks at, (3,) [m]."""
     distance: float
-    """From there [m]."""
+    """Distance of the camera from that point [m]."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axes", frozen(self.axes, (3, 3), "axes"))
@@ -42,14 +42,14 @@ class View:
 
     @classmethod
     def of_angles(cls, azimuth_deg: float, elevation_deg: float, body: Polyhedron) -> Self:
-        """A camera around an object, by its direction from there."""
+        """Place a camera around an object, by its direction as seen from the object."""
         number(azimuth_deg, "azimuth_deg")
         number(elevation_deg, "elevation_deg")
         axes = _axes(math.radians(azimuth_deg), math.radians(elevation_deg))
         return cls(axes, body.center_of_mass, DISTANCE * body.radius)
 
     def seen(self, points: Array) -> tuple[Array, Array]:
-        """Where points (n, 3) are in the picture, (n, 2) [m], and how near, (n,) [m]."""
+        """Project points (n, 3): places in the picture, (n, 2) [m], and nearness, (n,) [m]."""
         turned = (points - self.center) @ self.axes.T
         nearness = turned[:, 2]
         scale = self.distance / np.maximum(self.distance - nearness, 0.1 * self.distance)
@@ -65,7 +65,7 @@ def _axes(azimuth: float, elevation: float) -> Array:
 
 
 def best_view(body: Polyhedron, grasp: Grasp) -> View:
-    """The view with contacts and fingers apart, no finger end on, few faces seen as lines."""
+    """Choose a view with contacts and fingers apart, no finger end on, few faces seen as lines."""
     outward = -grasp.normals if grasp.approach_directions is None else -grasp.approach_directions
     ends = grasp.positions + body.radius * outward
     areas = np.array([face.area for face in body.faces])
@@ -85,6 +85,6 @@ def best_view(body: Polyhedron, grasp: Grasp) -> View:
 
 
 def _least_gap(points: Array) -> float:
-    """Smallest distance between any two of several points, (n, 2) [m]."""
+    """Smallest distance between any two of several points (n, 2) [m]."""
     gaps = np.linalg.norm(points[:, None] - points[None], axis=2)
     return float(gaps[np.triu_indices(len(points), 1)].min())

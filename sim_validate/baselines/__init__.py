@@ -1,5 +1,5 @@
 """Is a grasp as stable as it was?
 
-A recorded baseline and fresh verdicts come in. Differences go out, each explained, and whether they
-break what was demanded.
+This room compares fresh verdicts with a recorded baseline. It explains each difference, and says
+whether it breaks what was demanded.
 """

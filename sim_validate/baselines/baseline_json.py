@@ -1,4 +1,4 @@
-"""Baselines <-> JSON that is read in reviews: a header, then a line for each grasp, sorted."""
+"""Baselines <-> JSON that people read in reviews: a header, then one line per grasp, sorted."""
 
 import json
 from dataclasses import asdict, fields
@@ -14,11 +14,11 @@ from sim_validate.files.reading import read_text, write_text
 
 SCHEMA = 1
 MARK = '"grasps_file"'
-"""What only baselines have."""
+"""Text that every baseline has, and no other file."""
 
 
 def baseline_to_json(baseline: Baseline) -> str:
-    """The text of a baseline: the same for the same verdicts."""
+    """The text of a baseline; equal verdicts give equal texts."""
     header = {
         "schema": SCHEMA,
         **{each.name: getattr(baseline, each.name) for each in fields(Baseline)},
@@ -30,14 +30,14 @@ def baseline_to_json(baseline: Baseline) -> str:
 
 
 def baseline_from_json(text: str, path: str) -> Baseline:
-    """Read a baseline.
+    """Parse the text of a baseline.
 
     Args:
-        text: Of the file.
-        path: Of the file, for messages.
+        text: Text of the file.
+        path: Path of the file, for messages.
 
     Raises:
-        InputError: It is no baseline of this version; the message names the field.
+        InputError: The text is no baseline of this version; the message names the field.
     """
     try:
         return _from_text(text)
@@ -48,10 +48,11 @@ def baseline_from_json(text: str, path: str) -> Baseline:
 def _from_text(text: str) -> Baseline:
     record = object_of(text, "baseline")
     if "grasps_file" not in record:
-        raise InputError("is no baseline, which `graspproof baseline record` writes")
+        raise InputError("is not a baseline; `graspproof baseline record` writes one")
     check_schema(record, SCHEMA)
     del record["schema"]
-    record["entries"] = record.pop("grasps", None) or None  # a file with none checks nothing
+    # an empty list is refused, because it would check nothing
+    record["entries"] = record.pop("grasps", None) or None
     try:
         found = TypeAdapter(Baseline).validate_json(json.dumps(record))
     except ValidationError as error:
@@ -67,10 +68,10 @@ def _from_text(text: str) -> Baseline:
 
 
 def read_baseline(path: Path) -> Baseline:
-    """The baseline of a file.
+    """Read the baseline in a file.
 
     Raises:
-        InputError: It is missing or refused.
+        InputError: The file is missing or refused.
     """
     return baseline_from_json(read_text(path), str(path))
 
@@ -79,17 +80,17 @@ def write_baseline(path: Path, baseline: Baseline) -> None:
     """Write a baseline to a new file, or over another baseline.
 
     Raises:
-        InputError: The file is something else.
+        InputError: The path holds something else than a baseline.
     """
     check_writable(path)
     write_text(path, baseline_to_json(baseline))
 
 
 def check_writable(path: Path) -> None:
-    """Refuse a path at which something else than a baseline is, of whatever version.
+    """Refuse a path that holds something else than a baseline of any version.
 
     Raises:
-        InputError: Something is.
+        InputError: The path holds something else.
     """
     if path.exists() and MARK not in read_text(path):
-        raise InputError(f"{path}: is no baseline, and will not be overwritten")
+        raise InputError(f"{path}: is not a baseline, and will not be overwritten")

@@ -1,4 +1,4 @@
-"""A baseline and the grasps of now -> what became of them."""
+"""A baseline and the present grasps -> how each grasp has changed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -13,16 +13,16 @@ from sim_validate.validation.grasp_verdict import Verdict
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Checked:
-    """What became of the grasps of a baseline."""
+    """How the grasps of a baseline have changed."""
 
     findings: tuple[Finding, ...]
     measured: Measured
     how: str
-    """How they were compared, in words."""
+    """How results were compared, in words."""
 
     @property
     def verdicts(self) -> Mapping[str, Verdict]:
-        """By grasp, of those that could be simulated."""
+        """Verdicts on the grasps that could be simulated, by id."""
         return self.measured.verdicts
 
 
@@ -30,18 +30,18 @@ def check(
     before: Baseline, saved: SavedGrasps, where: str, how: tuple[Setup, Agenda],
     processors: int, report: Report,
 ) -> Checked:  # fmt: skip
-    """Simulate grasps again and compare.
+    """Simulate grasps again and compare them with a baseline.
 
     Args:
         before: The baseline.
-        saved: The grasps of now.
-        where: They are, from the baseline's folder.
-        how: Trials are simulated, and which ones.
-        processors: How many to use; nothing depends on it.
-        report: Told how many grasps are done.
+        saved: The present grasps.
+        where: Path of the grasps from the baseline's folder.
+        how: How trials are simulated, and which ones.
+        processors: Number of processors to use; no result depends on it.
+        report: Called with (done, total) after each grasp.
 
     Raises:
-        InputError: There is no grasp.
+        InputError: The file holds no grasp.
         UnfaithfulError: The simulator fails the gate.
     """
     setup, agenda = with_planned_fingers(how[0], before, saved), how[1]
@@ -56,7 +56,7 @@ def check(
 def check_one(
     before: Baseline, saved: SavedGrasps, where: str, how: tuple[Setup, Agenda], name: str
 ) -> Checked:
-    """The same for one grasp, by its id."""
+    """Simulate one grasp again, by its id, and compare it with a baseline."""
     limited = saved.grasps[: before.limit]
     one = tuple(grasp for grasp in limited if grasp.id == name)
     kept = replace(before, entries=tuple(e for e in before.entries if e.id == name), limit=None)
@@ -68,4 +68,4 @@ def check_one(
 
 
 def silent(_: int, __: int) -> None:
-    """Nobody is told."""
+    """Ignore a report of progress."""

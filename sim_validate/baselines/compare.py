@@ -1,9 +1,10 @@
-"""Two baselines -> what became of each grasp: the same, better, worse, or not to be compared.
+"""Two baselines -> how each grasp has changed: the same, better, worse, or not comparable.
 
 With the same versions, on processors that round alike, results are the same, and every difference
-counts. With the same versions they differ by rounding, which the searches of the simulation turn
-into steps of theirs. Otherwise verdicts must be the same, but for grasps close to their critical
-friction, which a trifle may decide, and numbers may differ within wider bands.
+counts. With the same versions and other rounding, results differ by rounding, which the searches of
+the simulation enlarge to their step size. With other versions verdicts must be the same, except for
+grasps so close to their critical friction that tiny changes decide, and numbers may differ within
+wider bands.
 """
 
 from collections.abc import Iterator, Mapping
@@ -17,34 +18,34 @@ from sim_validate.baselines.entries import Baseline, Entry
 from sim_validate.simulation.hold_verdict import LET_GO, Outcome
 
 DECISIVE = ("graspproof", "mujoco", "machine")
-"""Versions of which others may change any result."""
+"""Components whose version may change any result."""
 ASIDE = ("python",)
-"""Versions that change none."""
+"""Components whose version changes no result."""
 
 
 class Status(StrEnum):
-    """What became of a grasp."""
+    """How a grasp has changed."""
 
     SAME = "same"
     WITHIN = "within bands"
     """Numbers differ as other versions or processors make them differ."""
     GREY = "grey zone"
-    """Another verdict, on a grasp that is too close to its critical friction to tell."""
+    """The verdict differs, on a grasp that is too close to its critical friction to tell."""
     IMPROVED = "improved"
     REGRESSED = "regressed"
     NOT_COMPARABLE = "not comparable"
-    """Another object, other contacts or settings: there is nothing to compare."""
+    """The object, the contacts or the settings are others, so there is nothing to compare."""
     MISSING = "missing"
-    """In the baseline, but not among the grasps."""
+    """The grasp is in the baseline, but not among the present grasps."""
     NEW = "new"
-    """Among the grasps, but not in the baseline."""
+    """The grasp is among the present grasps, but not in the baseline."""
 
 
 FAILED = (Status.REGRESSED, Status.MISSING, Status.NEW)
 
 
 def failing(*, strict: bool) -> tuple[Status, ...]:
-    """What fails a check, beside what cannot be compared; if strict, what is better, too."""
+    """Statuses that fail a check, beside "not comparable"; strict checks add "improved"."""
     return (*FAILED, Status.IMPROVED) if strict else FAILED
 
 
@@ -52,14 +53,15 @@ EXACT = Bands(
     predicted=1e-9, simulated=1e-9, least=0.0, displacement_m=1e-12, rotation_rad=1e-12,
     grey=0.0, exact=True,
 )  # fmt: skip
-"""With the same versions and rounding: what is lost in writing numbers down."""
+"""Bands for the same versions and rounding: only the rounding of written numbers."""
 ROUNDING = Bands(
     predicted=1e-6, simulated=5e-3, least=1e-7, displacement_m=1e-6, rotation_rad=1e-5,
     grey=1e-4, exact=True,
 )  # fmt: skip
-"""With the same versions: with linear algebra for another processor, or without compiled loops, no
-verdict of sixty grasps changed, predicted limits were the same to nine digits, critical frictions
-to 5e-9, motions of some 1e-8 m to .6 %, and what is sought by halving to two steps of .13 %."""
+"""Bands for the same versions with other rounding. With linear algebra for another processor, or
+without compiled loops, no verdict of sixty grasps changed. Predicted limits agreed to nine digits,
+critical frictions to 5e-9, motions of some 1e-8 m to .6 %, and results of bisection to two steps of
+.13 %."""
 OTHER_VERSIONS = Bands(
     predicted=0.05, simulated=0.05, least=1e-7, displacement_m=2e-4, rotation_rad=radians(0.2),
     grey=0.02, exact=False,
@@ -68,20 +70,20 @@ OTHER_VERSIONS = Bands(
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What became of one grasp."""
+    """How one grasp has changed."""
 
     id: str
     status: Status
     reasons: tuple[str, ...] = ()
-    """Why, in words."""
+    """Reasons for the status, in words."""
     differences: tuple[str, ...] = ()
-    """Everything that is not as it was, in words."""
+    """Every difference, in words."""
     before: Entry | None = None
     after: Entry | None = None
 
 
 def bands_between(before: Baseline, after: Baseline) -> tuple[Bands, str]:
-    """How far results may differ, and because of what, in words."""
+    """The bands within which results may differ, and why these bands, in words."""
     names = sorted({*before.versions, *after.versions} - {*ASIDE})
     others = [
         f"{name} {before.versions.get(name)} -> {after.versions.get(name)}"
@@ -100,12 +102,12 @@ def bands_between(before: Baseline, after: Baseline) -> tuple[Bands, str]:
 def compare(
     before: Baseline, after: Baseline, refused: Mapping[str, str] | None = None
 ) -> tuple[Finding, ...]:
-    """What became of each grasp, sorted by id.
+    """Compare each grasp of two baselines, sorted by id.
 
     Args:
         before: The baseline.
-        after: What was measured now.
-        refused: Why grasps could not be simulated, by id.
+        after: The baseline measured now.
+        refused: Reasons why grasps could not be simulated, by id.
     """
     refused = refused or {}
     bands, _ = bands_between(before, after)
@@ -133,7 +135,7 @@ def compare(
 
 
 def _changed(before: Baseline, after: Baseline) -> Iterator[str]:
-    """Why two baselines cannot be compared."""
+    """Yield the reasons why two baselines cannot be compared."""
     if before.content_sha256 != after.content_sha256:
         same = before.object == after.object
         named = f"{before.object} has changed" if same else f"{before.object} -> {after.object}"
@@ -185,7 +187,7 @@ def _status(counting: list[Difference], *, grey: bool, same: bool) -> Status:
 
 
 def _is_grey(one: Entry, other: Entry, friction: float, bands: Bands) -> bool:
-    """Whether wrenches that were held are let go, or the other way round, on the brink."""
+    """Whether a grasp close to its critical friction was held and is not now, or the reverse."""
     brink = abs(friction - one.critical_friction) <= bands.grey * friction
     decided = all(entry.outcome in (Outcome.HELD, *LET_GO) for entry in (one, other))
     return brink and decided and one.held != other.held

@@ -16,16 +16,16 @@ from sim_validate.validation.validation import validate
 
 @dataclass(frozen=True, slots=True)
 class Demands:
-    """What a grasp is tried with, beside the usual wrenches and controls, and must reach.
+    """Trials of a grasp beside the usual wrenches and controls, and what it must reach.
 
     Raises:
-        InputError: A number is none, or out of its range, or a share of no repeats is asked for.
+        InputError: A number is missing or out of range, or a share of no repeats is asked for.
     """
 
     wrenches: Sequence[NamedWrench] = ()
-    """To hold as they are."""
+    """Wrenches to hold as they are."""
     trials: int = 0
-    """Repeats with noise."""
+    """Number of repeats with noise."""
     noise: Noise = field(default_factory=Noise)
     min_pass_rate: float = 0.0
     """Least share of repeats that must hold."""
@@ -49,10 +49,10 @@ class Demands:
 
 
 def demands_of(asked: Mapping[str, Any]) -> Demands:
-    """What a test asks for by name.
+    """Build the demands that a test names.
 
     Raises:
-        InputError: There is no such demand, or its value is refused.
+        InputError: A demand is unknown, or its value is refused.
     """
     known = [each.name for each in fields(Demands)]
     for name in asked:
@@ -66,10 +66,10 @@ def checked(case: GraspCase, demands: Demands) -> tuple[Verdict, str]:
 
     Args:
         case: The grasp on its object, and the friction.
-        demands: What it must reach.
+        demands: What the grasp must reach.
 
     Returns:
-        The verdict, and what is wrong, empty if nothing is.
+        The verdict, and what is wrong in words, empty if nothing is.
 
     Raises:
         InputError: The grasp or a setting is refused.
@@ -90,7 +90,7 @@ def checked(case: GraspCase, demands: Demands) -> tuple[Verdict, str]:
 
 
 def _lacking(verdict: Verdict, demands: Demands) -> Iterator[str]:
-    """What is less than asked for."""
+    """Yield the demands that are not met."""
     found = verdict.robustness
     if found is not None and found.held < demands.min_pass_rate * len(found.trials):
         lower, upper = found.interval

@@ -1,4 +1,4 @@
-"""What is not as it was in the verdict on a grasp, whether it counts, and whether it is worse."""
+"""Differences between two verdicts on a grasp: which count, and which are worse."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,38 +11,39 @@ class Bands:
     """How far results may differ."""
 
     predicted: float
-    """Of critical frictions and limits by analysis, relative to the baseline's."""
+    """Band of critical frictions and limits by analysis, relative to the baseline's."""
     simulated: float
-    """Of those in simulation."""
+    """Band of critical frictions and limits in simulation, relative to the baseline's."""
     least: float
-    """Differences of any of these that never count: critical frictions are proved to 1e-7."""
+    """Differences of critical frictions and limits that never count; critical frictions are proved
+    to 1e-7."""
     displacement_m: float
     rotation_rad: float
     grey: float
-    """Grasps whose critical friction is closer to the friction than this, relative to it, may
-    change their verdict."""
+    """Relative distance of the friction from the critical one within which a grasp may change its
+    verdict."""
     exact: bool
-    """Whether the same repeats with noise must hold; else those with a load close to the limit
-    may not."""
+    """Whether the same repeats with noise must hold; otherwise repeats with a load close to the
+    limit may change."""
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One of them."""
+    """One difference between two verdicts."""
 
     text: str
     worse: bool
     counts: bool = True
     of_holding: bool = False
-    """Whether it comes with wrenches that are held or not, and with nothing else."""
+    """Whether the difference follows from wrenches that are now held or no longer held."""
 
 
 def differences(one: Entry, other: Entry, bands: Bands) -> tuple[Difference, ...]:
-    """All of them.
+    """Every difference between two verdicts.
 
     Args:
-        one: Of the baseline.
-        other: Of now.
+        one: The baseline's entry.
+        other: The entry of now.
         bands: How far numbers may differ without counting.
     """
     return (
@@ -84,7 +85,7 @@ def _of_controls(one: Entry, other: Entry) -> Iterator[Difference]:
 
 
 def _of_numbers(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]:
-    """A larger number is worse, but for limits."""
+    """Compare the numbers; a larger number is worse, except for limits."""
     rows = (
         ("critical_friction", bands.predicted, bands.least, 1.0),
         ("simulated_critical_friction", bands.simulated, bands.least, 1.0),
@@ -112,7 +113,7 @@ def _per_cent(change: float, before: float) -> str:
 
 
 def _of_repeats(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]:
-    """The draws are the same, so each repeat is compared with itself."""
+    """Compare each repeat with itself, as the draws of noise are the same."""
     if one.noisy_trials != other.noisy_trials:
         text = f"repeats with noise: {one.noisy_trials} -> {other.noisy_trials}"
         yield Difference(text, worse=other.noisy_trials < one.noisy_trials)

@@ -1,4 +1,4 @@
-"""What is kept of verdicts, to compare later ones with: a header, and an entry for each grasp."""
+"""What a baseline keeps of verdicts, to compare later ones: a header, and one entry per grasp."""
 
 import json
 import math
@@ -18,12 +18,12 @@ from sim_validate.validation.grasp_verdict import Verdict
 from sim_validate.validation.wrench_verdict import WrenchVerdict
 
 DIGITS = 12
-"""Of numbers that are kept."""
+"""Number of digits that are kept of a number."""
 NUMBERS = (
     "critical_friction", "simulated_critical_friction", "limit_n", "simulated_limit_n",
     "displacement_m", "rotation_rad",
 )  # fmt: skip
-"""What is measured."""
+"""Names of the fields that are measured."""
 STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 Count = Annotated[int, Field(ge=0)]
 Size = Annotated[float, Field(ge=0.0)]
@@ -31,48 +31,50 @@ Size = Annotated[float, Field(ge=0.0)]
 
 @dataclass(frozen=True, slots=True, config=STRICT)
 class Entry:
-    """What is kept of the verdict on one grasp; what could not be measured is None."""
+    """What a baseline keeps of the verdict on one grasp; None for what was not measurable."""
 
     id: str
     contacts_sha256: str
-    """Of positions and normals, in finger order."""
+    """Hash of positions and normals, in finger order."""
     outcome: Outcome
     """`held`, or how the first wrench that was not held ended."""
     wrenches: Count
-    """How many there were."""
+    """Number of wrenches."""
     not_held: tuple[str, ...]
-    """Names of those that were not held, in order."""
+    """Names of the wrenches that were not held, in order."""
     controls: Count
-    """How many negative controls there were."""
+    """Number of negative controls."""
     controls_let_go: Count
-    """How many of them ended as they must."""
+    """Number of negative controls that were let go, as they must be."""
     mismatches: Count
-    """In how many ways simulation contradicts the analysis."""
+    """Number of ways in which simulation contradicts the analysis."""
     critical_friction: Size
     simulated_critical_friction: Size | None
     limit_n: Size
-    """Largest multiple of the weakest wrench that is resisted, by analysis: its size [N], torques
-    over the object's radius."""
+    """Size of the largest resisted wrench along the weakest one, by analysis [N]; torques are
+    divided by the object's radius."""
     simulated_limit_n: Size | None
-    """The same in simulation."""
+    """Size of the largest resisted wrench along the weakest one, in simulation [N]."""
     displacement_m: Size | None
-    """Largest motion of the object in any trial."""
+    """Largest motion of the object in any trial [m]."""
     rotation_rad: Size | None
     noisy_trials: Count
-    """Repeats with noise."""
+    """Number of repeats with noise."""
     noisy_not_held: tuple[Count, ...]
-    """Numbers of those that were not held."""
+    """Numbers of the repeats that were not held."""
     noisy_close: tuple[Count, ...]
-    """Numbers of those with a load that is within a trifle of what can be resisted."""
+    """Numbers of the repeats with a load very close to the largest that can be resisted."""
 
     def __post_init__(self) -> None:
-        """Refuse what contradicts itself."""
+        """Refuse an entry that contradicts itself."""
         if self.held == bool(self.not_held):
-            raise ValueError(f"outcome {self.outcome.value}, but not held are {self.not_held}")
+            raise ValueError(
+                f"outcome is {self.outcome.value}, but wrenches not held are {self.not_held}"
+            )
         if self.controls_let_go > self.controls or len(self.not_held) > self.wrenches:
-            raise ValueError("more ended in some way than there were")
+            raise ValueError("more wrenches or controls ended in some way than were tried")
         if any(number >= self.noisy_trials for number in (*self.noisy_not_held, *self.noisy_close)):
-            raise ValueError("there were not so many repeats with noise")
+            raise ValueError("a number is not below the number of repeats with noise")
 
     @property
     def held(self) -> bool:
@@ -81,7 +83,7 @@ class Entry:
 
     @property
     def noisy_held(self) -> int:
-        """How many repeats with noise held."""
+        """Number of repeats with noise that held."""
         return self.noisy_trials - len(self.noisy_not_held)
 
 
@@ -90,22 +92,22 @@ class Baseline:
     """Verdicts on the grasps of one object, and all that they depend on."""
 
     grasps_file: str
-    """Where the grasps are, from the baseline's folder."""
+    """Path of the grasps from the baseline's folder."""
     limit: Annotated[int, Field(ge=1)] | None
-    """How many of them, the first ones; None for all."""
+    """Number of grasps, the first ones of the file; None for all."""
     object: str
     content_sha256: str
-    """Of the object's mesh."""
+    """Hash of the object's mesh."""
     friction: Size
     planned_radius_m: Size | None
-    """Of the fingertips that the grasps were planned for, if for any."""
+    """Radius of the fingertips that the grasps were planned for, if any [m]."""
     settings: Mapping[str, Any]
-    """How trials were simulated, and which."""
+    """How trials were simulated, and which ones."""
     versions: Mapping[str, str]
     arithmetic: str
-    """A hash of how the process rounds that measured them."""
+    """Hash of how the processor rounds that measured them."""
     entries: tuple[Entry, ...]
-    """Sorted by id."""
+    """Entries sorted by id."""
 
     def __post_init__(self) -> None:
         """Refuse two entries of one grasp."""
@@ -114,17 +116,17 @@ class Baseline:
 
 
 def plain(entry: Entry | None) -> dict[str, Any] | None:
-    """An entry as plain values, which travel between processes and into any file."""
+    """An entry as plain values, which can be sent between processes and written into any file."""
     return None if entry is None else json.loads(json.dumps(asdict(entry), allow_nan=False))
 
 
 def entry_of(grasp: Grasp, verdict: Verdict, radius_m: float) -> Entry:
-    """What is kept of a verdict.
+    """Make the entry of a verdict.
 
     Args:
         grasp: The grasp.
         verdict: What simulation says about it.
-        radius_m: Of the object.
+        radius_m: Radius of the object [m].
     """
     weakest = next(trial for trial in verdict.wrenches if trial.name == WEAKEST)
     predicted, simulated = _limits(weakest, radius_m)
@@ -156,14 +158,14 @@ def entry_of(grasp: Grasp, verdict: Verdict, radius_m: float) -> Entry:
 
 
 def _rounded(value: float | None) -> float | None:
-    """To the digits that are kept; None for what no file can hold."""
+    """Round a number to the digits that are kept; None for what no file can hold."""
     if value is None or not math.isfinite(value):
         return None
     return float(f"{value:.{DIGITS}g}")
 
 
 def _limits(trial: WrenchVerdict, radius_m: float) -> tuple[float, float | None]:
-    """The size of the largest wrench along a trial's, by analysis and in simulation."""
+    """Size of the largest wrench along a trial's, by analysis and in simulation [N]."""
     scaled = trial.wrench / np.array([1.0] * 3 + [radius_m] * 3)
     predicted = trial.predicted_limit * float(np.linalg.norm(scaled))
     found = trial.simulated_limit

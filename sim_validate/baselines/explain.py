@@ -1,4 +1,4 @@
-"""A grasp that is not as stable as it must be, in words: what was, what is, and how to see it."""
+"""Explaining in words why a grasp is not as stable as it must be, and how to see it."""
 
 import shlex
 from collections.abc import Iterator
@@ -11,13 +11,13 @@ from sim_validate.validation.wrench_verdict import WrenchVerdict
 
 
 def explained(finding: Finding, verdict: Verdict | None, files: tuple[Path, Path], how: str) -> str:
-    """What became of a grasp: predicted, simulated, baseline, and the commands to go on with.
+    """Explain how a grasp has changed: prediction, simulation, baseline, and commands to run next.
 
     Args:
-        finding: What became of it.
-        verdict: The one of now, if it could be simulated.
-        files: The baseline and the grasps.
-        how: They were compared, in words.
+        finding: How the grasp has changed.
+        verdict: The verdict of now, if the grasp could be simulated.
+        files: Paths of the baseline and the grasps.
+        how: How results were compared, in words.
     """
     lines = [f"{finding.id}: {finding.status.value}", *(f"  {why}" for why in finding.reasons)]
     lines += [f"  {text}" for text in finding.differences if text not in finding.reasons]

@@ -1,4 +1,4 @@
-"""Grasps that a marked test is run with: those of a file, or planned on the spot."""
+"""The grasps that a marked test is run with: read from a file, or planned on the spot."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,7 +14,7 @@ from sim_validate.baselines.source_file import Source, source_of
 from sim_validate.records.grasps import read_grasps
 
 FRICTION = 0.5
-"""Unless another is given."""
+"""Friction of cases that give none."""
 SETTINGS = ("object", "friction", "limit", "families", "cones", "seed", "unit")
 
 
@@ -30,14 +30,14 @@ class GraspCase:
 
 
 def case_of(given: Sequence[Any], friction: float | None) -> GraspCase:
-    """A case from what a test gives: one, or an object, a grasp, and perhaps the friction.
+    """Make a case from a test's arguments: a case, or an object, a grasp, and perhaps the friction.
 
     Args:
-        given: In that order.
-        friction: In place of the case's own.
+        given: A case, or these things in that order.
+        friction: Friction in place of the case's own.
 
     Raises:
-        InputError: It is something else.
+        InputError: The arguments are something else.
     """
     kinds: list[type[Any]] = [type(each) for each in given]
     if kinds == [GraspCase]:
@@ -53,13 +53,13 @@ def case_of(given: Sequence[Any], friction: float | None) -> GraspCase:
 
 
 def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) -> list[GraspCase]:
-    """The grasps of a marker.
+    """Read or plan the grasps of a marker.
 
     Args:
-        folder: Paths start there.
-        args: A grasps.json; grasps are planned if there is none.
-        settings: `object` (a mesh file or a built-in object), `unit`, and what `plan` takes; with a
-            file `friction` alone.
+        folder: Folder in which relative paths start.
+        args: Path of a grasps.json; if empty, grasps are planned.
+        settings: `object` (a mesh file or a built-in object), `unit`, and the arguments of `plan`;
+            with a file, `friction` alone.
 
     Raises:
         InputError: A setting is unknown, missing or refused, there is no grasp, or the mesh file
@@ -103,7 +103,7 @@ def _planned(body: Polyhedron, wanted: Mapping[str, Any]) -> Sequence[Grasp]:
 
 
 def _body(folder: Path, wanted: dict[str, Any]) -> Polyhedron:
-    """The object, whose settings are taken out of what is wanted."""
+    """Load the object, and remove its settings from what is wanted."""
     name, unit = wanted.pop("object", None), wanted.pop("unit", "m")
     if not isinstance(name, str):
         raise InputError("@pytest.mark.grasp needs a grasps.json, or object=...")

@@ -8,12 +8,12 @@ from sim_validate.baselines.compare import Finding, Status, failing
 
 
 def junit_text(name: str, findings: Iterable[Finding], *, strict: bool) -> str:
-    """The text of a JUnit file with a case for each grasp.
+    """Write a JUnit file with a case for each grasp.
 
     Args:
-        name: Of the suite.
-        findings: What became of each grasp.
-        strict: Whether what is better fails, too.
+        name: Name of the suite.
+        findings: How each grasp has changed.
+        strict: Whether improved grasps fail, too.
     """
     listed = list(findings)
     suite = ElementTree.Element("testsuite", name=_printable(name), tests=str(len(listed)))
@@ -38,5 +38,5 @@ def junit_text(name: str, findings: Iterable[Finding], *, strict: bool) -> str:
 
 
 def _printable(text: str) -> str:
-    """Text without what XML cannot hold."""
+    """Replace letters that XML cannot hold."""
     return "".join(letter if letter.isprintable() else " " for letter in text)

@@ -17,7 +17,7 @@ from sim_validate.validation.grasp_verdict import Verdict
 from sim_validate.validation.jobs import Job, verdict_of, with_threads
 
 Report = Callable[[int, int], None]
-"""Told how many grasps are done, and of how many."""
+"""Function that is called with (done, total) after each grasp."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,11 +25,11 @@ class Measured:
     """Verdicts on the grasps of a file, and what a baseline keeps of them."""
 
     baseline: Baseline
-    """Without the grasps that could not be simulated."""
+    """Baseline without the grasps that could not be simulated."""
     verdicts: Mapping[str, Verdict]
-    """By grasp."""
+    """Verdicts by the ids of their grasps."""
     refused: Mapping[str, str]
-    """Why grasps could not be simulated."""
+    """Reasons why grasps could not be simulated, by id."""
 
 
 def measured(
@@ -40,14 +40,14 @@ def measured(
 
     Args:
         saved: The grasps.
-        about: Where they are, from the baseline's folder, and how many of them are chosen.
+        about: Path of the grasps from the baseline's folder, and how many of them are chosen.
         setup: How trials are simulated.
-        agenda: Which ones.
-        processors: How many to use; nothing depends on it.
-        report: Told how many grasps are done.
+        agenda: Which trials to run.
+        processors: Number of processors to use; no result depends on it.
+        report: Called with (done, total) after each grasp.
 
     Raises:
-        InputError: There is no grasp.
+        InputError: The file holds no grasp.
         UnfaithfulError: The simulator fails the gate.
     """
     chosen = saved.grasps[: about[1]]
@@ -98,7 +98,7 @@ def _try(job: Job) -> Verdict | str:
 
 
 def complete(found: Measured) -> Baseline:
-    """What was measured, as a new baseline.
+    """The baseline of a measurement, if it is complete.
 
     Raises:
         InputError: A grasp could not be simulated.
@@ -109,9 +109,9 @@ def complete(found: Measured) -> Baseline:
 
 
 def with_planned_fingers(setup: Setup, before: Baseline, saved: SavedGrasps) -> Setup:
-    """A baseline's setup, with the fingertips that the grasps are planned for now.
+    """Put the fingertips that the grasps are planned for now into a baseline's setup.
 
-    A radius of the baseline's own, which was not the planned one, stays.
+    A radius that was not the planned one when the baseline was recorded stays.
     """
     if setup.fingers.radius_m != before.planned_radius_m:
         return setup

@@ -29,7 +29,7 @@ Count = Annotated[int, Field(ge=0)]
 
 
 class _Settings(BaseModel):
-    """What a file keeps."""
+    """The settings in a baseline's file."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -44,7 +44,7 @@ class _Settings(BaseModel):
 
 
 def settings_of(setup: Setup, agenda: Agenda) -> dict[str, Any]:
-    """How trials are simulated and which ones, as a baseline's file has it."""
+    """Write a setup and an agenda as a baseline's file keeps them."""
     settings = {
         "setup": tables_of(setup),
         "surface": setup.surface,
@@ -59,11 +59,11 @@ def settings_of(setup: Setup, agenda: Agenda) -> dict[str, Any]:
 
 
 def of_settings(settings: Mapping[str, Any], path: str) -> tuple[Setup, Agenda]:
-    """The setup and agenda that a baseline keeps.
+    """Read the setup and agenda that a baseline keeps.
 
     Args:
-        settings: As `settings_of` gives them.
-        path: Where they come from, for messages.
+        settings: Settings as `settings_of` writes them.
+        path: Path that they come from, for messages.
 
     Raises:
         InputError: A setting is missing, unknown or refused.
@@ -88,10 +88,10 @@ def of_settings(settings: Mapping[str, Any], path: str) -> tuple[Setup, Agenda]:
 
 
 def noise_from_table(given: Mapping[str, Any]) -> Noise:
-    """Noise with some of its fields given.
+    """Build noise from some of its fields.
 
     Raises:
-        InputError: There is no such field, or its value is refused.
+        InputError: A field is unknown, or its value is refused.
     """
     known = [each.name for each in fields(Noise)]
     for name, value in given.items():
@@ -103,7 +103,7 @@ def noise_from_table(given: Mapping[str, Any]) -> Noise:
 
 
 def setup_for(saved: SavedGrasps, path: Path | None) -> Setup:
-    """How grasps are simulated: with the fingertips they were planned for, as a file has it.
+    """Build the setup of grasps: with their planned fingertips, then with the settings of a file.
 
     Raises:
         InputError: The file is missing or refused.

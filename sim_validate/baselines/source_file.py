@@ -1,9 +1,9 @@
 """Is the mesh in a `grasps.json` still that of the file it was planned from?
 
-Grasps are tested on the mesh that their file holds. A part that has been changed since would pass
-unseen, so its mesh file is looked for, and a changed one is refused. It is the same if its bytes
-are those that were planned from, or if it gives the same solid in some unit: comments, line ends
-and the order of vertices do not count.
+Grasps are tested on the mesh that their file holds, so a part that has been changed since would
+pass unnoticed. Therefore its mesh file is searched, and a changed one is refused. The file counts
+as unchanged if its bytes are those that were planned from, or if it gives the same solid in some
+unit: comments, line ends and the order of vertices do not count.
 """
 
 import hashlib
@@ -19,7 +19,7 @@ from sim_validate.files.reading import read_bytes
 
 
 class ChangedPartError(InputError):
-    """The mesh file is not that which the grasps were planned from."""
+    """The mesh file is not the one that the grasps were planned from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,9 +27,10 @@ class Source:
     """The mesh file that grasps were planned from."""
 
     file: Path | None = None
-    """Whose mesh is the tested one; None if there is none, or it was not found."""
+    """Path of the file, whose mesh is the tested one; None if there is none, or it was not
+    found."""
     note: str = ""
-    """What to know about the test if it was not found; empty if there is nothing to say."""
+    """Note about the test if the file was not found; empty if there is nothing to say."""
 
 
 def source_of(
@@ -39,12 +40,12 @@ def source_of(
 
     Args:
         saved: The grasps.
-        grasps: Their file, for messages; its folder is searched first.
-        folders: More of those in which a mesh file with the object's name is searched.
-        named: The mesh file, if the user says which; nothing else is looked at then.
+        grasps: Path of the file of grasps, for messages; its folder is searched first.
+        folders: Further folders in which a mesh file with the object's name is searched.
+        named: The mesh file if the user names it; then nothing else is searched.
 
     Raises:
-        ChangedPartError: There are such files, and none holds the mesh that the grasps are on.
+        ChangedPartError: Mesh files were found, but none holds the mesh that the grasps are on.
         InputError: The named file is missing, or the grasps were not planned from a file.
     """
     body = saved.body
@@ -73,7 +74,7 @@ def source_of(
 
 
 def _beside(name: str, folders: Iterable[Path]) -> list[Path]:
-    """Mesh files of a name, sorted within their folders."""
+    """Mesh files with a given name, sorted within their folders."""
     unique = {folder.resolve(): folder for folder in folders}
     return [
         path
@@ -84,7 +85,7 @@ def _beside(name: str, folders: Iterable[Path]) -> list[Path]:
 
 
 def _entries(folder: Path) -> list[Path]:
-    """What is in a folder, sorted; nothing where it is not there yet, or may not be looked into."""
+    """Sorted contents of a folder; none if it does not exist or cannot be read."""
     try:
         return sorted(folder.iterdir())
     except OSError:
@@ -92,14 +93,14 @@ def _entries(folder: Path) -> list[Path]:
 
 
 def _is_source(path: Path, body: Polyhedron) -> bool:
-    """Whether a file is the one that a body is from, or holds the same solid in some unit."""
+    """Whether a file is the one that a body was read from, or holds the same solid in some unit."""
     if hashlib.sha256(read_bytes(path)).hexdigest() == body.source_sha256:
         return True
     return any(_content(path, unit, body) == body.content_sha256 for unit in UNITS_M)
 
 
 def _content(path: Path, unit: str, body: Polyhedron) -> str:
-    """The hash of a file's solid; empty if it is none in this unit."""
+    """Hash of a file's solid; empty if the file is no solid in this unit."""
     faces = "planar" if body.patches is None else "patches"
     try:
         read = load_polyhedron(path, unit=unit, faces=faces, patches=body.patches, limits=RECORDED)

@@ -31,26 +31,27 @@ KINDS: Mapping[str, type] = {
     "grasps": str, "object": str, "baseline": str, "strict": bool, "setup": str, "wrenches": str,
     "limits": str, "random_wrenches": int, "trials": int, "noise": dict, "seed": int,
 }  # fmt: skip
-"""Settings of the file, and what they are."""
+"""Settings of the file, with their types."""
 WORDS = {str: "text", bool: "true or false", int: "a whole number", dict: "a table"}
 PATHS = ("grasps", "object", "baseline", "setup", "wrenches")
 DIRECT = ("limits", "random_wrenches", "trials", "seed")
-"""Fields of an agenda as the file has them."""
+"""Fields of an agenda that the file sets directly."""
 
 
 @dataclass(frozen=True)
 class Suite:
-    """Grasps that must stay as they were; settings that are None are the baseline's."""
+    """Grasps that must stay as they were; a setting that is None is the baseline's."""
 
     path: Path
-    """Of the file that says so."""
+    """Path of the suite's own file."""
     grasps: Path
-    """A grasps.json."""
+    """Path of a grasps.json."""
     baseline: Path
     object: Path | None = None
-    """The mesh file that the grasps were planned from; one of its name beside them if not given."""
+    """The mesh file that the grasps were planned from; if None, one of the object's name beside
+    them."""
     strict: bool = False
-    """Whether what is better fails, too."""
+    """Whether improved grasps fail, too."""
     setup: Path | None = None
     """TOML file of simulation settings."""
     wrenches: Path | None = None
@@ -59,34 +60,34 @@ class Suite:
     """How limits are found in simulation."""
     random_wrenches: int | None = None
     trials: int | None = None
-    """Repeats with noise."""
+    """Number of repeats with noise."""
     noise: Noise | None = None
     seed: int | None = None
 
     @cached_property
     def saved(self) -> SavedGrasps:
-        """The grasps.
+        """Read the grasps.
 
         Raises:
-            InputError: Their file is missing or refused.
+            InputError: The file of grasps is missing or refused.
         """
         return read_grasps(self.grasps)
 
     @cached_property
     def source(self) -> Source:
-        """The mesh file that the grasps were planned from, if it is there.
+        """Find the mesh file that the grasps were planned from, if it is there.
 
         Raises:
-            InputError: It has changed since, or a file is refused.
+            InputError: The mesh has changed since, or a file is refused.
         """
         return source_of(self.saved, self.grasps, [self.path.parent], self.object)
 
     @cached_property
     def kept(self) -> Baseline:
-        """The baseline.
+        """Read the baseline.
 
         Raises:
-            InputError: It is missing or refused.
+            InputError: The baseline is missing or refused.
         """
         if not self.baseline.is_file():
             raise InputError(f"{self.baseline}: there is no baseline yet: pytest --grasp-bless")
@@ -94,7 +95,7 @@ class Suite:
 
     @property
     def ids(self) -> list[str]:
-        """Of all grasps, in the file or in the baseline.
+        """Ids of all grasps, in the file or in the baseline.
 
         Raises:
             InputError: A file is missing or refused.
@@ -109,7 +110,7 @@ class Suite:
         return seen_from(self.baseline, self.grasps)
 
     def tested(self, name: str) -> Checked:
-        """What became of one grasp, simulated with the baseline's settings and those of the file.
+        """Simulate one grasp with the baseline's settings and those of the file, and compare it.
 
         Raises:
             InputError: A file is refused, or the part has changed.
@@ -138,10 +139,10 @@ class Suite:
         return found
 
     def _kept_if_any(self) -> Baseline | None:
-        """The baseline that is to be written anew.
+        """The baseline that will be overwritten, if there is one.
 
         Raises:
-            InputError: It is refused.
+            InputError: The baseline is refused.
         """
         try:
             return self.kept if self.baseline.is_file() else None
@@ -149,7 +150,7 @@ class Suite:
             raise InputError(f"{error}; remove the file to begin a new baseline") from error
 
     def _settings(self, before: Baseline | None) -> tuple[Setup, Agenda]:
-        """The baseline's, or the usual ones, with those of the file in their place."""
+        """The baseline's settings or the default ones, replaced by those that the file gives."""
         if before is None:
             setup, agenda = setup_for(self.saved, None), Agenda(seed=self.saved.seed)
         else:
@@ -170,13 +171,13 @@ def suite_from_toml(path: Path) -> Suite:
     """Read which grasps must stay as they were; paths in the file start at its folder.
 
     Raises:
-        InputError: It is not such a file; the message names the setting.
+        InputError: The file is invalid; the message names the setting.
     """
     return suite_from_tables(read_tables(path), path)
 
 
 def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
-    """The same from what the file says.
+    """Build a suite from the settings of a file.
 
     Raises:
         InputError: A setting is unknown, missing or refused.

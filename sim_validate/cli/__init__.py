@@ -1,4 +1,5 @@
-"""What can be said on the command line, and what is answered?
+"""Which flags does the command line take, and what does it answer?
 
-Arguments and config files come in. Checked flags, exit codes and console output go out.
+This room turns arguments and config files into checked flags, and results into console output and
+exit codes.
 """

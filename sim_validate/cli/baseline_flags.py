@@ -14,10 +14,10 @@ from sim_validate.parallel.processes import available_cores
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """Simulate grasps and keep what came of it, as a file for the repository."""
+    """Simulate grasps and keep the results as a file for the repository."""
 
     grasps: Positional[Path]
-    """A grasps.json."""
+    """The grasps.json to simulate."""
     out: Annotated[Path, arg(aliases=("-o",))]
     """The baseline to write."""
     limit: Count | None = None
@@ -27,12 +27,12 @@ class Record:
     wrenches: Path | None = None
     """JSON file of wrenches to hold beside the usual ones (see docs/files.md)."""
     random_wrenches: Annotated[int, at_least(0, up_to=MOST_RANDOM_WRENCHES)] = 0
-    """Also hold so many random wrenches."""
+    """Number of random wrenches to hold as well."""
     limits: Literal["none", "ramp", "bisection"] = "none"
     """Also find the largest multiple of each wrench in simulation."""
     repeats: OmitArgPrefixes[Repeats] = field(default_factory=Repeats)
     seed: Seed | None = None
-    """For everything random; the one planned with if not given."""
+    """Seed of everything random; the one planned with if not given."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
@@ -40,18 +40,18 @@ class Record:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Simulate the grasps of a baseline again and say what became of each."""
+    """Simulate the grasps of a baseline again and report what changed for each."""
 
     baseline: Positional[Path]
-    """The baseline."""
+    """The baseline file to check."""
     grasps: Path | None = None
-    """A grasps.json in place of the one the baseline names."""
+    """A grasps.json to use in place of the one the baseline names."""
     setup: Path | None = None
-    """TOML file of simulation settings in place of those the baseline keeps."""
+    """TOML file of simulation settings to use in place of those the baseline keeps."""
     strict: bool = False
-    """Fail where something is better, too."""
+    """Also fail where something is better."""
     bless: bool = False
-    """Write what was measured over the baseline, whatever it is."""
+    """Write the new results over the baseline, whatever they are."""
     junit: Path | None = None
     """Also write a JUnit file, with a case for each grasp."""
     jobs: Count = field(default_factory=available_cores)
@@ -70,5 +70,5 @@ class Baseline:
 
     @property
     def speech(self) -> Speech:
-        """How much to say."""
+        """How much the command prints."""
         return self.action.speech

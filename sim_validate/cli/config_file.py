@@ -1,4 +1,4 @@
-"""Settings of a TOML file as flags on the command line."""
+"""Settings of a TOML file, turned into flags on the command line."""
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
@@ -10,7 +10,7 @@ from grasp_core.files.strict_json import place
 from sim_validate.cli.flag_bounds import FlagsError
 
 COMMAND_WORDS = {"dataset": 2, "baseline": 2}
-"""Of how many words a command consists, where it is not one."""
+"""Number of words in the name of a command, where it is not one."""
 
 
 def with_config(arguments: list[str], commands: Mapping[str, type]) -> list[str]:
@@ -21,8 +21,8 @@ def with_config(arguments: list[str], commands: Mapping[str, type]) -> list[str]
         commands: Classes of flags, by the names of commands.
 
     Raises:
-        FlagsError: There is no file after the flag, or the file names a flag that there is not.
-        InputError: There is no such file, or it is not TOML.
+        FlagsError: The flag has no file after it, or the file names an unknown flag.
+        InputError: The file is missing, or it is not TOML.
     """
     words = [part for word in arguments for part in _split_config(word)]
     if "--config" not in words:
@@ -37,10 +37,10 @@ def with_config(arguments: list[str], commands: Mapping[str, type]) -> list[str]
 
 
 def flags_from(settings: dict[str, Any]) -> list[str]:
-    """Words of a command line that say the same as settings by name.
+    """Turn named settings into the words of an equivalent command line.
 
     Raises:
-        InputError: One is a table.
+        InputError: A value is a table.
     """
     for name, value in settings.items():
         if any(isinstance(part, dict) for item in _items(value) for part in _items(item)):
@@ -49,7 +49,7 @@ def flags_from(settings: dict[str, Any]) -> list[str]:
 
 
 def flag_names(kind: Any) -> set[str]:
-    """What a command's flags are called in files: all fields of its class and of those inside."""
+    """Names of a command's flags in files: all fields of its class and of the classes inside."""
     if not is_dataclass(kind):
         return set[str]().union(*(flag_names(part) for part in get_args(kind)))
     names = {field.name for field in fields(kind)}
@@ -57,8 +57,9 @@ def flag_names(kind: Any) -> set[str]:
 
 
 def _read(path: Path, known: set[str]) -> list[str]:
-    """Words of a command line from a file of settings."""
-    from sim_validate.files.toml_tables import read_tables  # only where there is such a file
+    """Read a file of settings as words of a command line."""
+    # imported only when there is a file to read
+    from sim_validate.files.toml_tables import read_tables
 
     try:
         settings = read_tables(path)
@@ -66,7 +67,7 @@ def _read(path: Path, known: set[str]) -> list[str]:
         raise InputError(f"--config {error}") from error
     for name in settings:
         if name.replace("-", "_") not in known:
-            said = f"--config {path}: {place([name])}: there is no such flag; keys are long flags"
+            said = f"--config {path}: {place([name])}: unknown flag; keys are long flags"
             raise FlagsError(said)
     try:
         return flags_from(settings)
@@ -75,7 +76,7 @@ def _read(path: Path, known: set[str]) -> list[str]:
 
 
 def _split_config(word: str) -> list[str]:
-    """`--config=FILE` as two words."""
+    """Split `--config=FILE` into two words."""
     return word.split("=", 1) if word.startswith("--config=") else [word]
 
 

@@ -1,4 +1,4 @@
-"""What people see: results on standard output, everything else on standard error."""
+"""Console output: results on standard output, everything else on standard error."""
 
 import json
 import sys
@@ -23,23 +23,23 @@ from rich.text import Text
 from sim_validate.parallel import interrupts
 
 PLAIN_EVERY_S = 5.0
-"""Without a terminal, progress is a line this often."""
+"""Time between two lines of progress where there is no terminal [s]."""
 EARLIEST = 0.02
-"""Share of the work after which it is worth saying how long the rest takes."""
+"""Share of the work from which on an estimate of the remaining time is shown."""
 
 
 def printable(text: str) -> str:
-    """Text without control characters, so that a file's name cannot steer the terminal."""
+    """Replace control characters, so that a file's name cannot steer the terminal."""
     return "".join(c if c.isprintable() else "?" for c in text)
 
 
 TABLE_ROWS = 20
-"""Longer tables are cut; files and documents have everything."""
+"""Largest number of rows shown in a table; files and JSON documents have all of them."""
 
 
 @dataclass(slots=True)
 class Reporter:
-    """Where a command writes; `json_only` keeps standard output for one JSON document."""
+    """Writes a command's output; `json_only` keeps standard output for one JSON document."""
 
     quiet: bool = False
     verbose: bool = False
@@ -48,27 +48,27 @@ class Reporter:
     err: Console = field(default_factory=lambda: Console(stderr=True, highlight=False))
 
     def say(self, text: str) -> None:
-        """A line for people: on standard output, or on standard error beside JSON."""
+        """Print a line of results: on standard output, or with JSON on standard error."""
         if not self.quiet:
             console = self.err if self.json_only else self.out
             console.print(Text(printable(text)), soft_wrap=True)
 
     def detail(self, text: str) -> None:
-        """A line only with --verbose."""
+        """Print a line only with --verbose."""
         if self.verbose:
             self.err.print(Text(printable(text)), soft_wrap=True)
 
     def warn(self, text: str) -> None:
-        """A line on standard error, even when quiet."""
+        """Print a line on standard error, even when quiet."""
         self.err.print(Text(printable(text)), soft_wrap=True)
 
     def document(self, value: object) -> None:
-        """The one JSON document of a command run with --json."""
+        """Print the one JSON document of a command run with --json."""
         if self.json_only:
             sys.stdout.write(json.dumps(value, allow_nan=False, indent=1) + "\n")
 
     def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """A table for people."""
+        """Print a table beside the lines of results."""
         if self.quiet:
             return
         table = Table(
@@ -87,12 +87,12 @@ class Reporter:
         (self.err if self.json_only else self.out).print(table)
 
     def progress(self, title: str) -> "Steps":
-        """Progress of something long: a bar on a terminal, plain lines elsewhere."""
+        """Show progress of long work: a bar on a terminal, plain lines elsewhere."""
         return Steps(title, self.err, shown=not self.quiet)
 
 
 class Steps:
-    """Counts steps done; use as a context manager."""
+    """Counts the steps that are done; it is used as a context manager."""
 
     def __init__(self, title: str, console: Console, *, shown: bool) -> None:
         self.title, self.console, self.shown = title, console, shown
@@ -120,7 +120,7 @@ class Steps:
             self.bar.stop()
 
     def update(self, done: int, total: int, note: str = "") -> None:
-        """Say how far things are; an interrupt that was swallowed is raised here."""
+        """Show the progress; an interrupt that was swallowed is raised here."""
         interrupts.check()
         if self.bar is not None:
             title = f"{self.title} {note}" if note else self.title
@@ -135,6 +135,6 @@ class Steps:
 
 
 def say_cut(count: int, reporter: Reporter) -> None:
-    """Say how many rows a table has not shown."""
+    """Say how many rows a table left out."""
     if count > TABLE_ROWS:
         reporter.say(f"... and {count - TABLE_ROWS} more")

@@ -1,4 +1,4 @@
-"""Examples that `--help` shows below what it says of a command."""
+"""Examples that `--help` shows below the description of a command."""
 
 EXAMPLES: dict[str, tuple[str, ...]] = {
     "run": (
@@ -50,12 +50,12 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "baseline record": ("baseline record grasps.json -o wedge.baseline.json",),
     "baseline check": ("baseline check wedge.baseline.json --junit results.xml",),
 }
-"""By the words of the command, without the program's name."""
+"""Examples by the words of the command, without the program's name."""
 HELP = {"-h", "--help"}
 
 
 def examples_for(arguments: list[str]) -> str:
-    """What to show where help on a command was asked for; nothing elsewhere."""
+    """Examples of a command if its help was asked for, else nothing."""
     if not HELP & set(arguments):
         return ""
     shown = next((EXAMPLES[" ".join(arguments[:words])] for words in (2, 1)

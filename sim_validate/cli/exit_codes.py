@@ -1,4 +1,4 @@
-"""What a command exits with, and what it says about an error."""
+"""The exit code of a command, and the message of an error."""
 
 from enum import IntEnum
 
@@ -11,7 +11,7 @@ class Exit(IntEnum):
 
     GOOD = 0
     NEGATIVE = 1
-    """It ran, and a verdict is negative."""
+    """The command ran, and a verdict is negative."""
     USAGE = 2
     INTERNAL = 3
     INPUT = 4
@@ -23,7 +23,7 @@ class Exit(IntEnum):
 
 
 def reason_of(error: GraspError | OSError) -> str:
-    """What an error says to people, with the file it is about."""
+    """The message of an error for people, with the file it is about."""
     if isinstance(error, OSError):
         return f"{error.filename or 'output'}: {error.strerror or error}"
     return str(error)

@@ -15,13 +15,13 @@ class FlagsError(InputError):
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """What a value must be; to be put into a type: `Annotated[int, at_least(1)]`."""
+    """A condition on a value, written into a type: `Annotated[int, at_least(1)]`."""
 
     says: str
     holds: Callable[[Any], bool]
 
     def __repr__(self) -> str:
-        """What messages about types show."""
+        """The text that messages about types show."""
         return self.says
 
 
@@ -29,23 +29,23 @@ FINITE = Bound("must be finite", math.isfinite)
 
 
 def more_than(least: float, *, up_to: float = math.inf) -> Bound:
-    """Numbers above one, up to and with another."""
+    """Bound for numbers above `least`, up to and including `up_to`."""
     return Bound(f"must be more than {least:g}{_end(up_to)}", lambda value: least < value <= up_to)
 
 
 def at_least(least: float, *, up_to: float = math.inf) -> Bound:
-    """Numbers from one to another, both with them."""
+    """Bound for numbers from `least` to `up_to`, both included."""
     return Bound(f"must be at least {least:g}{_end(up_to)}", lambda value: least <= value <= up_to)
 
 
 def ends_in(*endings: str) -> Bound:
-    """Paths of files whose names end in one of these, in whatever case."""
+    """Bound for paths of files whose names end in one of `endings`, in upper or lower case."""
     says = f"must end in {', '.join(endings[:-1])} or {endings[-1]}"
     return Bound(says, lambda path: path.suffix.lower() in endings)
 
 
 def not_zero(least: float, most: float) -> Bound:
-    """Vectors, by the size of their largest part."""
+    """Bound for vectors by the size of their largest part."""
     says = f"must not be zero: the largest part is from {least:g} to {most:g}"
     return Bound(says, lambda vector: least <= max(abs(part) for part in vector) <= most)
 
@@ -55,7 +55,7 @@ def _end(up_to: float) -> str:
 
 
 def check(flags: object) -> None:
-    """Check the flags of a command, and those of its groups.
+    """Check the flags of a command and of its groups against their bounds.
 
     Raises:
         InputError: A value is refused; the message names the flag.
@@ -71,7 +71,7 @@ def check(flags: object) -> None:
 
 
 def _bounded(kind: Any, value: Any) -> Iterator[tuple[Bound, Any]]:
-    """The bounds in a type, each with the part of a value that it is for."""
+    """Yield the bounds in a type, each with the part of a value that it is for."""
     inner = get_args(kind)
     if value is None:
         return

@@ -42,14 +42,14 @@ RuleName = Literal["5cm-15deg", "contact-remains", "2cm", "3cm", "six-forces"]
 
 @dataclass(frozen=True, slots=True)
 class Speech:
-    """How much to say, and in which form."""
+    """How much to print, and in which form."""
 
     json: bool = False
     """Print one JSON document on standard output, everything else on standard error."""
     quiet: Annotated[bool, arg(aliases=["-q"])] = False
-    """Say nothing but errors."""
+    """Print nothing but errors."""
     verbose: Annotated[bool, arg(aliases=["-v"])] = False
-    """Say more."""
+    """Print more, and show where an internal error happened."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,43 +57,44 @@ class MeshLimits:
     """How large a mesh may be, and what reading its file may cost."""
 
     max_mesh_bytes: Count = USUAL_MESH.max_bytes
-    """Larger mesh files are refused."""
+    """Largest size of a mesh file that is read [bytes]."""
     max_triangles: Count = USUAL_MESH.max_triangles
-    """Meshes of more are refused."""
+    """Largest number of triangles of a mesh."""
     max_faces: Count = USUAL_MESH.max_faces
-    """Objects of more planar faces are refused."""
+    """Largest number of planar faces of an object."""
     max_parts: Count = USUAL_MESH.max_parts
-    """Surfaces of more separate parts are refused."""
+    """Largest number of separate parts of a surface."""
     max_mesh_seconds: Positive = USUAL_MESH.max_seconds
-    """Of a processor, for reading a mesh file."""
+    """Processor time for reading a mesh file [s]."""
     max_mesh_memory_mib: Count = USUAL_MESH.max_memory_mib
-    """For reading a mesh file."""
+    """Memory for reading a mesh file [MiB]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """How a mesh file is to be read."""
+    """How a mesh file is read."""
 
     unit: Literal["m", "cm", "mm", "in"] = "m"
-    """What one unit in a mesh file is."""
+    """Length of one unit in a mesh file."""
     faces: Literal["auto", "planar", "patches"] = "auto"
     """Exact planar faces, or nearly flat patches of a curved or scanned surface, which may have
     holes; auto takes patches where there are more than 200 planar faces."""
     patches: Annotated[int, at_least(4, up_to=200)] = 20
-    """So many patches at most, those with the largest discs."""
+    """Keep at most this many patches, those with the largest inscribed discs."""
     patch_spread_deg: Annotated[float, more_than(0.0, up_to=45.0)] = 10.0
-    """Largest angle between the surface and a patch's plane [deg]; friction loses it."""
+    """Largest angle between the surface and a patch's plane [deg]; the friction angle shrinks by
+    it."""
     patch_depth: Annotated[float, more_than(0.0, up_to=0.1)] = 0.01
     """Largest distance of the surface from a patch's plane, relative to the object's extent."""
     center_of_mass_m: Annotated[Point | None, arg(metavar="X Y Z")] = None
-    """In the file's frame, in metres; that of uniform density if not given, or of the convex hull
-    where the surface has holes."""
+    """Centre of mass in the file's frame, in metres. If not given, it is that of uniform density,
+    or of the convex hull where the surface has holes."""
     limits: OmitArgPrefixes[MeshLimits] = MeshLimits()
 
 
 @dataclass(frozen=True, slots=True)
 class Planning:
-    """What to plan."""
+    """Which grasps to plan."""
 
     mesh: OmitArgPrefixes[Mesh] = Mesh()
     friction: Friction = 0.5
@@ -102,18 +103,19 @@ class Planning:
     """Half-angle of the friction cones to plan with [deg]; the friction angle if not given."""
     family: UseAppendAction[tuple[Literal["concurrent", "pencil", "regulus", "free"], ...]] = ()
     """Construction to try, may be repeated; all if not given. `free` looks for grasps of any type
-    on the faces that the others leave over, and proves for those without that there is none, or
-    says that it is undecided."""
+    on the faces that the others leave over. For faces without a grasp it proves that there is none,
+    or says that it is undecided."""
     cones: Literal["normal", "tilted"] = "tilted"
-    """Force cones to construct with: those around the normals as in the paper, or leaning ones too,
-    which serve boxes, prisms and any friction."""
+    """Force cones to construct with: only those around the normals as in the paper, or tilted ones
+    too, which serve boxes, prisms and any friction."""
     limit: Count | None = None
-    """Keep at most this many grasps, the best ones; None for all."""
+    """Keep at most this many grasps, the best ones; None keeps all."""
     rank_by: Literal["radius", "friction-margin", "ferrari-canny", "diverse"] = "radius"
-    """Which are the best: the largest discs, of each family in turn; the least critical friction;
-    the largest quality; or each next one the farthest from those before it."""
+    """Which grasps are best: those with the largest discs, of each family in turn; with the least
+    critical friction; with the largest quality; or each next one the farthest from those before
+    it."""
     cells: Count = 1
-    """Into how many parts the free method may cut the four faces where it is undecided."""
+    """Number of parts into which the free method may cut the four faces where it is undecided."""
     complete: bool = False
     """Cut the faces that stay undecided until each is decided."""
     approach_m: Positive | None = None
@@ -122,36 +124,37 @@ class Planning:
     edge_clearance_m: NotNegative = 0.0
     """How far contacts and their regions stay from the edges of their faces [m]."""
     share_faces_m: NotNegative | None = None
-    """Let two fingers stand on one face, at least so far apart [m]."""
+    """Let two fingers stand on one face, at least this far apart [m]."""
     optimize: bool = False
     """Move the contacts of each grasp on their faces to raise its Ferrari-Canny quality."""
     regions: bool = False
-    """Certify regions around the contacts of each grasp by proofs of their own, as the command
-    `regions` does, after the grasps are chosen; they replace those of its construction where the
-    discs in them around all contacts are larger."""
+    """After the grasps are chosen, certify regions around their contacts by separate proofs, as the
+    command `regions` does. They replace the regions of the construction where the discs in them
+    around all contacts are larger."""
     finger_radius_m: Positive | None = None
-    """Radius of the fingertips that --approach-m lets come [m], and with --optimize how far moved
-    contacts stay from edges, or half the radius of the largest disc in a face if that is less. If
+    """Radius of the fingertips that --approach-m lets come [m]. With --optimize, moved contacts
+    stay this far from edges, or half the radius of the largest disc in a face if that is less. If
     not given, they stay a twentieth of the object's radius from edges, or as far as planned."""
     ceiling: Count | None = None
     """With --optimize: also prove an upper bound of the quality of all contacts on the same faces
-    that are as clear of edges, cut into so many parts at most."""
+    that are as far from edges, cut into at most this many parts."""
     seed: Seed = 0
-    """For everything random."""
+    """Seed of everything random."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fingers:
-    """How fingertips are built; what is not given suits the grasp."""
+    """How fingertips are built; what is not given is chosen to suit the grasp."""
 
     max_normal_force: Usual = 10.0
-    """Limit of each finger's push [N]."""
+    """Largest normal force of each finger [N]."""
     fingertip_radius_m: Usual | None = None
-    """What was planned for, or a tenth of the object's radius, or what fits, if not given."""
+    """Radius of the fingertips; if not given, the one planned for, or a tenth of the object's
+    radius, or what fits [m]."""
     fingertip_mass_kg: Usual | None = None
-    """So that similar grasps behave alike if not given, as the stiffness."""
+    """Mass of a fingertip; if not given, it is chosen so that similar grasps behave alike [kg]."""
     stiffness_n_per_m: Usual | None = None
-    """Of the servos that drive a fingertip."""
+    """Stiffness of the servos that drive a fingertip; chosen like the mass if not given [N/m]."""
     approach: Annotated[Direction | None, arg(metavar="X Y Z")] = None
     """Direction in which fingers arrive in the scene's keyframe; if not given, as planned or along
     the normals."""
@@ -162,26 +165,27 @@ class Repeats:
     """Whether to repeat with noise, and how much: standard deviations of normal distributions."""
 
     trials: Annotated[int, at_least(0, up_to=MOST_TRIALS)] = 0
-    """Also repeat all holds so many times with noise, and say how often the grasp held."""
+    """Number of times to repeat all holds with noise, to see how often the grasp holds."""
     noise_shift: Annotated[float, at_least(0.0, up_to=1.0)] = 0.01
-    """Of the object's position along each axis, in object radii."""
+    """Noise of the object's position along each axis, in object radii."""
     noise_turn_deg: Annotated[float, at_least(0.0, up_to=45.0)] = 1.0
-    """Of its orientation about each axis."""
+    """Noise of the object's orientation about each axis [deg]."""
     noise_normal_deg: Annotated[float, at_least(0.0, up_to=45.0)] = 1.0
-    """Of the surface's normal at each contact."""
+    """Noise of the surface's normal at each contact [deg]."""
     noise_friction: Annotated[float, at_least(0.0, up_to=1.0)] = 0.05
-    """Of the friction, relative to it."""
+    """Noise of the friction, relative to it."""
     noise_mass: Annotated[float, at_least(0.0, up_to=1.0)] = 0.05
-    """Of the mass, and with it of every load, relative to them."""
+    """Noise of the mass, and with it of every load, relative to them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Testing:
-    """What to simulate, and how."""
+    """Which trials to simulate, and how."""
 
     fingers: OmitArgPrefixes[Fingers] = Fingers()
     random_wrenches: Annotated[int, at_least(0, up_to=MOST_RANDOM_WRENCHES)] = 0
-    """Also hold so many random wrenches, each at a share of what the analysis says is resisted."""
+    """Number of random wrenches to hold as well, each at a share of what the analysis says is
+    resisted."""
     wrenches: Path | None = None
     """A file of wrenches to hold as they are (see docs/files.md)."""
     weight_n: Usual | None = None
@@ -191,7 +195,7 @@ class Testing:
     limits: Literal["none", "ramp", "bisection"] = "none"
     """Also find the largest multiple of each wrench in simulation."""
     independent: bool = False
-    """Also try rigid fingertips, a fixed squeeze and the first instant, which know nothing of the
+    """Also try rigid fingertips, a fixed squeeze and the first instant, none of which uses the
     planned forces."""
     also_judge_by: UseAppendAction[tuple[RuleName, ...]] = ()
     """Show what the acceptance rule of another tool makes of the same trials; may be repeated."""
@@ -199,10 +203,10 @@ class Testing:
     traces: bool = False
     """With --out: also write how each contact moved over time."""
     surface: Literal["pads", "mesh"] = "pads"
-    """What fingertips touch: a pad each, exact on any object, or a convex object's own mesh."""
+    """What fingertips touch: one pad each, exact on any object, or a convex object's own mesh."""
     setup: Path | None = None
     """A TOML file with settings of the simulation (see docs/files.md)."""
     timeout_s: Positive = 600.0
-    """Stop trials of one contact set that take longer."""
+    """Time after which the trials of one contact set are stopped [s]."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes; results do not depend on it."""

@@ -1,4 +1,4 @@
-"""Flags of the commands that show what there is: pictures of grasps, reports of runs.
+"""Flags of the commands that show results: pictures of grasps, reports of runs.
 
 Nothing heavy is imported here, so that help and usage errors answer at once.
 """
@@ -28,26 +28,26 @@ class View:
     friction: Friction | None = None
     """Coulomb coefficient; the one planned for if not given."""
     picture: Annotated[Path, ends_in(*PICTURES)] | None = None
-    """Write the picture as in the paper (png, svg, pdf, webp, jpg)."""
+    """Write the grasp as a picture like the paper's (png, svg, pdf, webp, jpg)."""
     page: Annotated[Path, ends_in(*PAGES)] | None = None
     """Write a page on which the grasp can be turned (html)."""
     clip: Annotated[Path, ends_in(*CLIPS)] | None = None
-    """Write a clip (webp, gif): fingers closing, rendered by MuJoCo; without graphics, the picture
-    turning."""
+    """Write a clip (webp, gif) of the fingers closing, rendered by MuJoCo; without graphics it
+    shows the picture turning."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """Write what a run has found as pages that open in a browser, without any network."""
+    """Write the results of a run as pages that open in a browser, without any network."""
 
     folder: Positional[Path]
-    """Of a run, with its grasps.json; or of several, in folders."""
+    """Folder of a run, with its grasps.json; or a folder of such folders."""
     limit: Count | None = None
-    """Draw only so many grasps per run, those with bad news before others; all if not given."""
+    """Draw only this many grasps per run, those with problems before others; all if not given."""
     clips: Annotated[int, at_least(0)] = 0
-    """Also film a trial of so many grasps per run, those with bad news first, where graphics
-    are available."""
+    """Number of grasps per run of which a trial is filmed, those with problems first, where
+    graphics are available."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)

@@ -1,8 +1,8 @@
 """Standard output and error that do not stop the work when nobody reads them.
 
-A reader that leaves (`| head`) gets no more, and the command goes on: what it writes to files, and
-its exit code, do not depend on who looks on. Results that standard output cannot take are an
-error; messages that standard error cannot take are not.
+If a reader leaves (`| head`), it gets no more, and the command goes on: the files it writes and its
+exit code do not depend on who reads. Results that standard output cannot take are an error;
+messages that standard error cannot take are not.
 """
 
 import io
@@ -12,7 +12,7 @@ from typing import TextIO
 
 
 class _Read(io.FileIO):
-    """A stream for results, until its reader leaves."""
+    """A stream for results that drops what is written after its reader left."""
 
     def write(self, data: object, /) -> int:
         try:
@@ -22,7 +22,7 @@ class _Read(io.FileIO):
 
 
 class _Told(io.FileIO):
-    """A stream for messages, as far as it takes them."""
+    """A stream for messages that drops what it cannot write."""
 
     def write(self, data: object, /) -> int:
         try:
@@ -32,31 +32,31 @@ class _Told(io.FileIO):
 
 
 def steady() -> None:
-    """Make the standard streams of this process such ones; missing ones are let be."""
+    """Replace the standard streams of this process by such streams; missing ones stay missing."""
     sys.stdout = _over(sys.stdout, _Read)
     sys.stderr = _over(sys.stderr, _Told)
 
 
 def _over(stream: TextIO, kind: type[io.FileIO]) -> TextIO:
-    if not isinstance(stream, io.TextIOWrapper):  # closed, or somebody's own
+    if not isinstance(stream, io.TextIOWrapper):  # closed, or another program's own stream
         return stream
     buffered = io.BufferedWriter(kind(stream.fileno(), "w", closefd=False))
     return io.TextIOWrapper(
         buffered,
         encoding=stream.encoding,
-        errors="backslashreplace",  # a name that the terminal's letters cannot say
+        errors="backslashreplace",  # a name may have letters that the terminal's encoding lacks
         line_buffering=stream.line_buffering,
         write_through=stream.write_through,
     )
 
 
 def end() -> None:
-    """Let go of standard output, whose failure has been told, before the interpreter looks at it.
+    """Drop standard output if it fails, before the interpreter flushes it.
 
-    Python would end with a code and a message of its own.
+    The failure has been reported by then; Python would add a message and an exit code of its own.
     """
     with suppress(OSError):
-        if sys.stdout is not None:  # pyright: ignore[reportUnnecessaryComparison] - a closed one is
+        if sys.stdout is not None:  # pyright: ignore[reportUnnecessaryComparison] - may be closed
             sys.stdout.flush()
             return
     sys.stdout = None

@@ -1,4 +1,5 @@
 """What does each command do?
 
-Flags come in, one class a command. Files, tables on the console and an exit code go out.
+Each command takes an instance of its class of flags. It writes files and tables on the console, and
+returns an exit code.
 """

@@ -1,4 +1,4 @@
-"""The command that judges contacts from elsewhere: from a file to a document, tables, exit code."""
+"""The command `analyze`: it judges contacts of any origin and prints a document and tables."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -19,13 +19,13 @@ from sim_validate.records.analysis_json import analyses_to_document, summary
 
 DIGITS = 7
 STEP = 10.0**-DIGITS
-"""The ends of an interval are printed in steps of as much as they are reproducible to."""
+"""The step in which both ends of an interval are printed; to this they are reproducible."""
 UNKNOWN = "?"
-"""Stands in tables for what could not be decided."""
+"""The word in tables for what could not be decided."""
 
 
 def analyze_file(command: command_flags.Analyze, reporter: Reporter) -> int:
-    """Analyse the grasps of a file, and tell what is known even when interrupted."""
+    """Analyse the grasps of a file; results so far are shown even when interrupted."""
     sets = _read(command)
     check_edges(sets, command.edges)
     question = Question(command.max_normal_force, command.wrench, command.edges)
@@ -79,7 +79,7 @@ def _show(analyses: Sequence[Analysis], reporter: Reporter) -> None:
 
 
 def _say_measures(contacts: ContactSet, reporter: Reporter) -> None:
-    """The choices that are the same for all grasps of a file."""
+    """Say which centre and torque scale were used; they are the same for all grasps of a file."""
     centers = {
         "file": "the center_m of the file",
         "mean contact": "the mean contact (no center_m given)",
@@ -98,7 +98,7 @@ def _say_measures(contacts: ContactSet, reporter: Reporter) -> None:
 
 
 def _facts(found: Analysis) -> list[tuple[str, str]]:
-    """Everything about one grasp, for people."""
+    """All facts about one grasp, as rows of a table."""
     certificate = found.certificate
     rows = [("contacts", str(len(found.contacts.positions))), ("closed", _closed(found))]
     if certificate is not None:
@@ -164,7 +164,7 @@ def _friction(critical: float | None) -> str:
 
 
 def _ends(found: FrictionInterval | None) -> str:
-    """A proved interval with both ends rounded outwards, so that what is printed is proved too."""
+    """Print a proved interval, both ends rounded outwards, so that the printed one holds too."""
     if found is None:
         return UNKNOWN
     lower, upper = np.array([np.floor(found.lower / STEP), np.ceil(found.upper / STEP)]) * STEP
@@ -179,7 +179,7 @@ def _bounds(found: Bounds | None) -> str:
 
 
 def _number(value: float | None, digits: int = 6) -> str:
-    """A number without minus zero."""
+    """Print a number, without minus zero."""
     return UNKNOWN if value is None else f"{value + 0.0:.{digits}g}"
 
 

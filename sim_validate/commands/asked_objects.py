@@ -15,7 +15,7 @@ from sim_validate.cli.console import Reporter
 
 
 def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
-    """A mesh file, or a built-in object when the name has no mesh ending."""
+    """Load a mesh file, or a built-in object if the name has no mesh ending."""
     path = Path(name)
     if path.suffix.lower().lstrip(".") in FORMATS or path.is_file():
         given = mesh.limits
@@ -45,7 +45,7 @@ def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
 
 
 def object_to_plan(name: str, planning: flag_groups.Planning, reporter: Reporter) -> Polyhedron:
-    """The object, once all that is asked for fits it.
+    """Load the object and check that the planning flags fit it.
 
     Raises:
         InputError: The object or a setting is refused.
@@ -55,7 +55,7 @@ def object_to_plan(name: str, planning: flag_groups.Planning, reporter: Reporter
     _check_optimize(planning)
     if planning.regions and planning.share_faces_m is not None:
         raise InputError(
-            "--regions would let fingers that share a face meet; leave it or --share-faces-m out"
+            "--regions would let fingers that share a face meet; leave one of them out"
         )
     body = load_object(name, planning.mesh)
     if planning.optimize and body.patches:
@@ -73,12 +73,12 @@ def _check_optimize(planning: flag_groups.Planning) -> None:
     if planning.optimize and any(kept):
         raise InputError(
             "--optimize moves contacts without regard to --edge-clearance-m, --share-faces-m and "
-            "--approach-m; leave it out, or them"
+            "--approach-m; leave out --optimize or these"
         )
 
 
 def asked_finger(planning: flag_groups.Planning) -> Finger | None:
-    """The fingers whose free lines are to be planned, if any."""
+    """The fingers whose free lines are planned, or None if no flag asks for them."""
     if planning.approach_m is None:
         if planning.finger_radius_m is not None and not planning.optimize:
             raise InputError(

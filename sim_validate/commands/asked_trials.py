@@ -13,7 +13,7 @@ from sim_validate.simulation.setup import Agenda, Setup, with_planned_radius
 
 
 def finger_settings(given: flag_groups.Fingers) -> FingerSettings:
-    """What the flags say about fingertips."""
+    """Fingertip settings from the flags."""
     return FingerSettings(
         max_normal_force_n=given.max_normal_force,
         radius_m=given.fingertip_radius_m,
@@ -24,14 +24,14 @@ def finger_settings(given: flag_groups.Fingers) -> FingerSettings:
 
 
 def noise_of(given: flag_groups.Repeats) -> Noise:
-    """What the flags say about noise.
+    """Noise settings from the flags.
 
     Raises:
-        InputError: There is noise, but no repeat to put it on.
+        InputError: Flags set the noise, but ask for no repeat to add it to.
     """
     plain = flag_groups.Repeats()
     if not given.trials and given != plain:
-        raise FlagsError("--noise-... is for repeats: give --trials, too")
+        raise FlagsError("--noise-... sets the noise of repeats: give --trials too")
     return Noise(
         shift=given.noise_shift,
         turn_deg=given.noise_turn_deg,
@@ -44,12 +44,12 @@ def noise_of(given: flag_groups.Repeats) -> Noise:
 def prepared(
     testing: flag_groups.Testing, planned: Finger | None, seed: int, folder: Path | None
 ) -> tuple[Setup, Agenda]:
-    """What the flags and files say about trials, checked before anything runs.
+    """Build the setup and the agenda from flags and files, checked before anything runs.
 
     Args:
         testing: The flags.
-        planned: Fingers that the grasps are planned for.
-        seed: Seed of what is drawn.
+        planned: The fingers that the grasps are planned for.
+        seed: Seed of everything random.
         folder: Where results go, if anywhere.
 
     Raises:
@@ -59,7 +59,7 @@ def prepared(
 
 
 def _setup(testing: flag_groups.Testing, planned: Finger | None) -> Setup:
-    """How the flags, and then a file, say trials are simulated."""
+    """Build the setup from the flags, then from the setup file, which overrides them."""
     setup = Setup(
         fingers=with_planned_radius(finger_settings(testing.fingers), planned),
         surface=testing.surface,
@@ -69,7 +69,7 @@ def _setup(testing: flag_groups.Testing, planned: Finger | None) -> Setup:
 
 
 def _agenda(testing: flag_groups.Testing, seed: int, folder: Path | None) -> Agenda:
-    """Which trials the flags ask for."""
+    """Build the agenda that the flags ask for."""
     if testing.down and testing.weight_n is None:
         raise FlagsError("--down is a direction of the weight: give --weight-n too")
     if testing.traces and folder is None:

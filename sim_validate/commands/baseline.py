@@ -1,4 +1,4 @@
-"""The commands about baselines: to record one, and to check whether stability has changed."""
+"""The commands `baseline record` and `baseline check`: they notice when stability changes."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from sim_validate.simulation.setup import Agenda
 
 
 def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
-    """Write a baseline."""
+    """Simulate grasps and write their baseline."""
     check_writable(command.out)
     saved = read_grasps(command.grasps)
     source = source_of(saved, command.grasps, [command.out.parent])
@@ -48,7 +48,7 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
 
 
 def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
-    """Say what became of the grasps of a baseline."""
+    """Simulate the grasps of a baseline again and report how each differs."""
     before = read_baseline(command.baseline)
     path = command.grasps or command.baseline.parent / before.grasps_file
     saved = read_grasps(path)
@@ -98,7 +98,7 @@ def _show(done: Checked, reporter: Reporter) -> None:
 
 
 def _why(finding: Finding) -> str:
-    """The reasons; then, where they are not what differs, that."""
+    """The reasons of a finding, then the differences that are not among them."""
     more = [text for text in finding.differences if text not in finding.reasons]
     return "; ".join([*finding.reasons, *more])
 

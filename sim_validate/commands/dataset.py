@@ -1,4 +1,4 @@
-"""The commands about datasets: to make one, to go on making it, to check and to export it."""
+"""The commands about datasets: to make one or resume making it, to check and to export it."""
 
 from contextlib import AbstractContextManager
 from dataclasses import asdict, fields, replace
@@ -24,17 +24,17 @@ from sim_validate.parallel.clusters import dask_workers, ray_workers
 from sim_validate.parallel.processes import local_processes
 
 FRICTION = 0.5
-"""Planned and tried at unless told otherwise."""
+"""Friction to plan and try at where no flag gives one."""
 MEGABYTE = 2**20
 
 
 def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:
-    """Make a dataset."""
+    """Make a dataset, or resume making it."""
     return _build(_asked(command), command.out, command.work, reporter)
 
 
 def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:
-    """Judge grasps of other tools."""
+    """Judge the grasps of another tool and write them as a dataset."""
     config = DatasetConfig(
         objects=(command.object,),
         contacts=str(command.contacts),
@@ -61,7 +61,7 @@ def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter:
 
 
 def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:
-    """Where units are done.
+    """Start the engine that computes units.
 
     Raises:
         InputError: The engine is not installed, or there is no cluster.
@@ -75,7 +75,7 @@ def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:
 
 
 def verify_dataset(command: dataset_flags.Verify, reporter: Reporter) -> int:
-    """Check a dataset."""
+    """Check a dataset and list its faults."""
     sample = Sample(command.share, command.seed) if command.share > 0.0 else None
     faults = verify(command.dataset, sample)
     for fault in faults[:TABLE_ROWS]:
@@ -102,7 +102,7 @@ def export_dataset(command: dataset_flags.Export, reporter: Reporter) -> int:
 
 
 def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
-    """Say what the description will lack, before the work begins: it cannot be given later."""
+    """Warn before the work about what the description will lack: it cannot be added later."""
     missing = missing_fields(config)
     if missing and not reporter.quiet:
         given = ", ".join(f"--{setting}" for setting in missing.values())
@@ -113,7 +113,7 @@ def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
 
 
 def _asked(command: dataset_flags.Build) -> DatasetConfig:
-    """What a TOML file or the flags say a dataset is made of.
+    """Read from a TOML file or from the flags what a dataset is made of.
 
     Raises:
         InputError: A setting or the file is refused, or there are flags beside a file.
@@ -135,21 +135,21 @@ def _asked(command: dataset_flags.Build) -> DatasetConfig:
 
 
 def _settings(settings: dataset_flags.Settings) -> dict[str, Any]:
-    """Settings by the names of the configuration."""
+    """The settings by the names that the configuration has for them."""
     given = {each.name: getattr(settings, each.name) for each in fields(settings)}
     return {"frictions": given.pop("friction") or (FRICTION,), **given}
 
 
 def is_mesh(path: Path) -> bool:
-    """Whether a file of a folder is taken for a mesh: by its ending, hidden ones not."""
+    """Whether a file of a folder counts as a mesh: its ending fits, and it is not hidden."""
     return path.suffix.lower()[1:] in FORMATS and not path.name.startswith(".")
 
 
 def _listed(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Objects by name; folders stand for the mesh files in them.
+    """Names of objects, with folders replaced by the mesh files in them.
 
     Raises:
-        InputError: A folder holds none.
+        InputError: A folder holds no mesh file.
     """
     found: list[str] = []
     if not names:

@@ -1,4 +1,4 @@
-"""The command that checks an installation, and says what to do about what it lacks."""
+"""The command `doctor`: it checks an installation, and says how to repair it."""
 
 import math
 import os
@@ -26,11 +26,11 @@ from sim_validate.simulation.setup import Setup
 from sim_validate.validation.validation import validate
 
 AS_PLANNED = 2.0 * KEPT
-"""How far a planned radius may be from the closed form: programs give up half of that."""
+"""Relative tolerance of a planned radius against the closed form; programs give up half of it."""
 USUAL_KERNEL = "grasp_core.solvers.lp_kernel"
-"""If this can be compiled, all can."""
+"""A kernel to try; if it can be compiled, all can."""
 GATE = "gate: "
-"""What the names of its checks begin with."""
+"""Prefix of the names of the gate's checks."""
 
 
 def check_installation(_: command_flags.Doctor, reporter: Reporter) -> int:
@@ -58,7 +58,7 @@ def check_installation(_: command_flags.Doctor, reporter: Reporter) -> int:
 
 
 def _checks(body: Polyhedron, grasp: Grasp, gate: Gate) -> Mapping[str, bool]:
-    """What must be so, and whether it is."""
+    """Every check by its name, and whether it passed."""
     verdict = validate(body, grasp) if gate.passed else None
     cone = math.tan(grasp.force_cones[0].half_angle) * math.cos(math.pi / PYRAMID_SIDES)
     return {
@@ -78,7 +78,7 @@ def _state(passed: bool) -> str:
 
 
 def _machine() -> Mapping[str, str]:
-    """What this machine offers, and what to do about what it does not."""
+    """What this machine offers, and what to do where something is missing."""
     try:
         graphics = f"MuJoCo draws with {available_graphics() or 'its default'}"
     except GraphicsError as error:
@@ -102,7 +102,7 @@ def _machine() -> Mapping[str, str]:
 
 
 def _concluded(checks: Mapping[str, bool], reporter: Reporter) -> int:
-    """Say what the checks amount to."""
+    """Report the result of all checks, and return the exit code."""
     failed = [name for name, passed in checks.items() if not passed]
     if not failed:
         reporter.say("all checks passed: plans and verdicts of this installation can be relied on")
@@ -113,5 +113,5 @@ def _concluded(checks: Mapping[str, bool], reporter: Reporter) -> int:
             "will refuse to certify anything; install the versions of .ci/constraints.txt"
         )
     else:
-        reporter.warn("solvers or simulation give wrong answers: install the package anew")
+        reporter.warn("solvers or simulation give wrong answers: reinstall the package")
     return Exit.INTERNAL

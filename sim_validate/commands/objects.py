@@ -1,4 +1,4 @@
-"""The commands about objects: what one is as a polyhedron, and which are built in."""
+"""The commands `inspect` and `objects`: an object as a polyhedron, and the built-in objects."""
 
 import math
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked_objects import load_object
 
 WIDTH = 20
-"""Of the column that says what a fact is about, in characters."""
+"""Width of the column with the names of facts, in characters."""
 
 
 def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
@@ -50,7 +50,7 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
 
 
 def _in_words(body: Polyhedron, spanning: int | None) -> Iterator[tuple[str, str]]:
-    """The facts for people: what, and how much of it."""
+    """The facts for people: the name of each, and its value in words."""
     yield "mesh", f"{len(body.vertices)} vertices, {len(body.triangles)} triangles"
     if body.patches is None:
         holed = sum(bool(face.holes) for face in body.faces)
@@ -77,7 +77,7 @@ def _in_words(body: Polyhedron, spanning: int | None) -> Iterator[tuple[str, str
 
 
 def list_objects(_: command_flags.Objects, reporter: Reporter) -> int:
-    """Name the built-in objects."""
+    """List the names of the built-in objects."""
     names = example_names()
     reporter.document({"objects": list(names)})
     if not reporter.json_only:

@@ -1,4 +1,4 @@
-"""The command that plans: from an object to certified grasps, a file and tables."""
+"""The command `plan`: from an object to certified grasps, a file and tables."""
 
 import math
 import re
@@ -30,7 +30,7 @@ from sim_validate.records.regions import write_regions
 def plan_object(
     body: Polyhedron, planning: flag_groups.Planning, jobs: int, reporter: Reporter
 ) -> tuple[Plan, tuple[Moved, ...]]:
-    """The grasps of an object, moved if that is asked for, and how they were moved.
+    """Plan the grasps of an object and, if asked for, improve them.
 
     Raises:
         InputError: A setting is refused.
@@ -68,7 +68,7 @@ def with_regions(
     body: Polyhedron, found: Plan, planning: flag_groups.Planning, folder: Path | None, jobs: int,
     reporter: Reporter,
 ) -> Plan:  # fmt: skip
-    """The plan with certified regions, where that is asked for; proofs go to the folder."""
+    """Certify regions of a plan's grasps if asked for, and write their proofs to the folder."""
     if not (planning.regions and found.grasps):
         return found
     asked = Asked(found.friction, clearance=planning.edge_clearance_m)
@@ -88,7 +88,7 @@ def with_regions(
 
 
 def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
-    """Plan, write the grasps, and show the best."""
+    """Plan, write the grasps, and show the best ones."""
     body = object_to_plan(command.object, command.planning, reporter)
     with alone_in(command.out):
         found, moves = plan_object(body, command.planning, command.jobs, reporter)
@@ -120,7 +120,7 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
 
 
 def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
-    """What was tried, and how it ended."""
+    """Say what was tried, and how it ended."""
     counts = found.counts
     reporter.say(
         f"{body.name}: {counts.faces} faces, {counts.quadruples} face quadruples, "
@@ -153,7 +153,7 @@ def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
 
 
 def _whoever(why: str) -> str:
-    """A reason without the numbers of the fingers."""
+    """Replace the numbers of fingers in a reason, so that equal reasons can be counted together."""
     why = re.sub(r"fingertips \d+ and \d+", "two fingertips", why)
     return re.sub(r"(finger(?:tip)?) \d+", r"a \1", why)
 
@@ -163,7 +163,7 @@ def _listed(faces: FaceQuadruple) -> str:
 
 
 def show_gains(moves: Sequence[Moved], reporter: Reporter) -> None:
-    """Tell how the quality changed: grasp by grasp, then how the gains are distributed."""
+    """Show how the quality changed, grasp by grasp and as percentiles."""
     rows = [
         (move.id, f"{move.before[0]:.4f}", f"{move.after[0]:.4f}", f"{move.gain:.3f}",
          "" if move.ceiling is None else f"{move.ceiling:.4f}")

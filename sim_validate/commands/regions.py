@@ -1,4 +1,4 @@
-"""The command that certifies independent regions for grasps of a file."""
+"""The command `regions`: it certifies independent regions for the grasps of a file."""
 
 from collections import Counter
 from collections.abc import Mapping

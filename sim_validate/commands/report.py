@@ -1,4 +1,4 @@
-"""The command that writes a report of a run."""
+"""The command `report`: it writes the pages of a run."""
 
 from sim_validate.cli import showing_flags
 from sim_validate.cli.console import Reporter
@@ -9,7 +9,7 @@ from sim_validate.reports.run_folder import folder_of
 
 
 def report_folder(command: showing_flags.Report, reporter: Reporter) -> int:
-    """Write the pages of a run."""
+    """Write the pages of a run, and print where they are."""
     at = command.out or folder_of(command.folder)
     with alone_in(at if command.out or at.is_dir() else None):
         report = shown_report(command, reporter)

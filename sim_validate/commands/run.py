@@ -1,4 +1,4 @@
-"""The command that plans and simulates: from an object to grasps, scenes and verdicts."""
+"""The command `run`: it plans on an object, simulates the grasps and writes everything."""
 
 import re
 from pathlib import Path
@@ -27,13 +27,14 @@ from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.setup import Agenda, Setup
 
 RESULTS = Path("graspproof-out")
-"""Where results go, a folder for each object, if not told otherwise."""
+"""Folder that holds a folder of results for each object if --out is not given."""
 HASHED = 8
-"""Digits of a hash that tell objects apart whose names look alike."""
+"""Number of digits of a hash that tell apart objects whose names look alike."""
 NAMED = 60
-"""Characters of a name that its folder has: with four bytes each, as many as file systems take."""
+"""Largest number of characters of a name in its folder's name; with four bytes each they still fit
+the limit of file systems."""
 REPORTED = 200
-"""Most grasps that a run draws by itself, in a minute; `report` draws all."""
+"""Largest number of grasps that a run draws by itself, in about a minute; `report` draws all."""
 
 
 def run_object(command: command_flags.Run, reporter: Reporter) -> int:
@@ -82,7 +83,7 @@ def _run_in(
 
 
 def _report(folder: Path, jobs: int, reporter: Reporter) -> None:
-    """Show the results as pages; what has been found stands without them, too."""
+    """Write the results as pages; if that fails, the results stand all the same."""
     try:
         shown_report(Report(folder, limit=REPORTED, jobs=jobs), reporter)
     except (GraspError, OSError) as error:
@@ -90,6 +91,6 @@ def _report(folder: Path, jobs: int, reporter: Reporter) -> None:
 
 
 def _folder_name(body: Polyhedron) -> str:
-    """A file name that is one plain part of a path; of names that are not, with a hash."""
+    """A file name that is one plain part of a path; a changed name gets a hash added."""
     plain = re.sub(r"[^\w-]+", "_", body.name)[:NAMED] or "object"
     return plain if plain == body.name else f"{plain}-{body.content_sha256[:HASHED]}"

@@ -1,4 +1,4 @@
-"""The command that writes grasps as scenes."""
+"""The command `scene`: it writes grasps as MuJoCo scenes."""
 
 from grasp_core.errors import InputError
 from scenes.mjcf import build_scene

@@ -1,4 +1,4 @@
-"""The commands that simulate: grasps on the bench, verdicts to files and tables."""
+"""The command `validate`: it simulates grasps and writes verdicts to files and tables."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -89,7 +89,8 @@ def _show(
 ) -> None:
     rows: list[tuple[str, ...]] = []
     for grasp, verdict in zip(grasps[:TABLE_ROWS], verdicts, strict=False):
-        worst = np.max([trial.hold.displacement_m for trial in verdict.wrenches])  # NaN if one is
+        # the maximum is NaN if one is
+        worst = np.max([trial.hold.displacement_m for trial in verdict.wrenches])
         let_go = sum(control.failed for control in verdict.controls)
         friction = verdict.critical_friction
         rows.append(
@@ -128,13 +129,13 @@ def _show(
 
 
 def _limit_range(verdict: Verdict) -> str:
-    """Simulated over predicted limits: the least and the largest."""
+    """Least and largest simulated limit, relative to the predicted limits."""
     shares = [trial.simulated_limit.share for trial in verdict.wrenches if trial.simulated_limit]
     return f"{min(shares):.3f}-{max(shares):.3f}" if shares else "-"
 
 
 def _show_bounds(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
-    """What was found without planned forces, if asked for."""
+    """Show what was found without planned forces, if asked for."""
     rows: list[tuple[str, ...]] = []
     for verdict in verdicts[:TABLE_ROWS]:
         if (found := verdict.bounds) is None:
@@ -151,7 +152,7 @@ def _show_bounds(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
 
 
 def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
-    """How often grasps held with noise, if asked for."""
+    """Show how often grasps held with noise, if asked for."""
     rows: list[tuple[str, ...]] = []
     for verdict in verdicts[:TABLE_ROWS]:
         if (found := verdict.robustness) is None:
@@ -169,7 +170,7 @@ def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
 
 
 def _show_rules(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
-    """How many grasps and controls the rules of other tools accept, if asked for."""
+    """Show how many grasps and controls the rules of other tools accept, if asked for."""
     names = verdicts[0].agenda.rules if verdicts else ()
     controls = [control for verdict in verdicts for control in verdict.controls]
     rows = [
@@ -190,7 +191,7 @@ def _expected(trial: WrenchVerdict) -> str:
 
 
 def _surprises(verdicts: Sequence[Verdict]) -> Iterable[str]:
-    """What did not end as it should, a line each."""
+    """Lines about the trials that did not end as they should."""
     lines = [
         f"{verdict.id}: {trial.name}: {trial.hold.outcome.value}{_expected(trial)}: "
         f"{trial.hold.reason}"

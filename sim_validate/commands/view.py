@@ -1,4 +1,4 @@
-"""The command that shows one grasp: in MuJoCo's viewer, or in files."""
+"""The command `view`: it shows one grasp in MuJoCo's viewer, or in files."""
 
 import subprocess
 import sys
@@ -27,13 +27,13 @@ from sim_validate.reports.turntable import turntable_page
 from sim_validate.simulation.setup import with_planned_radius
 
 COMING, RESTING = 60, 20
-"""Frames in which fingers come in, and stay."""
+"""Number of frames in which fingers come in, and in which they then stay."""
 SWING_DEG, ELEVATION_DEG = 120.0, 25.0
-"""How far the camera goes around meanwhile, and how high it is."""
+"""Angle by which the camera goes around meanwhile, and its elevation."""
 
 
 def view_grasp(command: showing_flags.View, reporter: Reporter) -> int:
-    """Show a grasp."""
+    """Show a grasp in a window, or write it to the files that are asked for."""
     path = command.grasps / GRASPS if command.grasps.is_dir() else command.grasps
     saved = read_grasps(path)
     if not saved.grasps:
@@ -113,7 +113,7 @@ def write_closing_clip(scene: Scene, grasp: Grasp, path: Path) -> Path:
 
 
 def closing(scene: Scene) -> Array:
-    """Joint positions while fingertips come in along their ways, and then stay, (n, 7 + 3k)."""
+    """Joint positions while fingertips come in along their lines and then stay, (n, 7 + 3k)."""
     layout = scene.layout
     away = np.einsum("kij,ki->kj", layout.frames, layout.approach).ravel()
     left = np.linspace(1.0, 0.0, COMING) ** 2

@@ -1,5 +1,6 @@
 """What is a dataset of grasps?
 
-Many objects and several frictions come in, by a configuration. Tables of objects, grasps and trials
-go out; `building` makes them, `verifying` checks them, `describing` and `exports` tell others.
+A configuration names many objects and several frictions; the tables of a dataset hold objects,
+grasps and trials. `building` makes them, `verifying` checks them, `describing` documents them for
+people and catalogues, and `exports` writes them for other programs.
 """

@@ -1,7 +1,7 @@
 """The tables of a dataset: every column with its type, unit and meaning.
 
-Names end in their unit; geometry is in the object's own frame, in float64, with normals into the
-object and torques about its centre of mass, as everywhere here. What could not be measured is null.
+Names end in their unit. Geometry is in the object's own frame, in float64, with normals into the
+object and torques about its centre of mass. What could not be measured is null.
 """
 
 from dataclasses import dataclass
@@ -16,14 +16,14 @@ ExportFormat: TypeAlias = Literal["csv", "jsonl", "npz", "hdf5", "isaac", "mjcf"
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column."""
+    """One column of a table."""
 
     name: str
     kind: Kind
     meaning: str
     unit: str = ""
     shape: tuple[int, ...] = ()
-    """Of each cell; () for a plain value."""
+    """Shape of each cell; () for a plain value."""
 
 
 OBJECTS = (
@@ -87,9 +87,9 @@ TABLES: dict[Name, tuple[Column, ...]] = {"objects": OBJECTS, "grasps": GRASPS, 
 KEYS: dict[Name, tuple[str, ...]] = {
     "objects": ("object_id",), "grasps": ("object_id", "grasp_id"), "trials": ("grasp_id", "trial"),
 }  # fmt: skip
-"""What rows are sorted by, and unique in."""
+"""Columns by which the rows of a table are sorted, and in which they are unique."""
 REFERENCES: dict[tuple[Name, str], tuple[Name, str]] = {
     ("grasps", "object_id"): ("objects", "object_id"),
     ("trials", "grasp_id"): ("grasps", "grasp_id"),
 }
-"""Columns whose cells name a row of another table, and the column that has the name there."""
+"""Columns whose cells name a row of another table, with the column that holds the name there."""

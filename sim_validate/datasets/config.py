@@ -1,7 +1,7 @@
-"""What a dataset is made of: a TOML file or flags -> one checked value, and back to TOML.
+"""The configuration of a dataset: a TOML file or flags -> one checked value, and back to TOML.
 
-Everything that decides a row is here, so the hash of the resolved text, with the hashes of the
-meshes and the versions, names what a dataset can hold.
+Everything that decides a row is here. So the hash of the resolved text, together with the hashes of
+the meshes and the versions, identifies what a dataset can hold.
 """
 
 import hashlib
@@ -28,17 +28,17 @@ KINDS: dict[str, tuple[str, ...]] = {
     "cones": get_args(ConeKind),
     "limits": get_args(LimitsKind),
 }
-"""Settings that are one of some words."""
+"""Settings that take one of a few words, with these words."""
 LEAST = {"limit": 1, "random_wrenches": 0, "seed": 0}
-"""Settings that are whole numbers, and from where on."""
+"""Settings that are whole numbers, with their least values."""
 MOST = {"limit": 10**9, "random_wrenches": MOST_RANDOM_WRENCHES, "seed": 2**63 - 1}
-"""And up to where."""
+"""Largest values of the settings that are whole numbers."""
 SWITCHES = ("scenes", "outward")
 """Settings that are true or false."""
 CREDITS = ("title", "license", "creator", "url", "published")
-"""Settings for people."""
+"""Settings that inform people and decide no row."""
 LISTS: dict[str, type[str] | type[float]] = {"objects": str, "frictions": float, "families": str}
-"""Settings that are lists, and of what."""
+"""Settings that are lists, with the type of their items."""
 WORDS: dict[type, str] = {
     str: "text", float: "numbers", int: "a whole number", bool: "true or false",
 }  # fmt: skip
@@ -61,14 +61,14 @@ class DatasetConfig:
     """Largest number of grasps of each object, friction and family."""
     cones: ConeKind = "tilted"
     unit: str = "m"
-    """What one unit in a mesh file is."""
+    """Length of one unit in a mesh file."""
     faces: FaceKind = "auto"
     limits: LimitsKind = "none"
     """How the largest multiples of wrenches are found in simulation."""
     random_wrenches: int = 0
-    """Held beside the usual ones."""
+    """Number of random wrenches that are held beside the usual ones."""
     seed: int = 0
-    """For everything random."""
+    """Seed of everything random."""
     contacts: str = ""
     """A file of contacts on the one object, judged in place of planning."""
     outward: bool = False
@@ -76,15 +76,17 @@ class DatasetConfig:
     scenes: bool = False
     """Whether each grasp is also written as a MuJoCo scene."""
     title: str = "four-finger grasps"
-    """What the dataset is called; this and what follows is for its card, and decides no row."""
+    """Title of the dataset. The title and the settings below are for its card, and decide no
+    row."""
     license: str = ""
-    """Of the dataset, such as `CC-BY-4.0`."""
+    """Licence of the dataset, such as `CC-BY-4.0`."""
     creator: str = ""
-    """Who made it."""
+    """Who made the dataset."""
     url: str = ""
-    """Where it is to be found."""
+    """Address where the dataset will be found."""
     published: str = ""
-    """When, such as `2026-11-22`; no clock is asked, so that the same is made again."""
+    """Date of publication, such as `2026-11-22`. It is a setting, because a clock would make every
+    build differ."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frictions", tuple(map(float, self.frictions)))
@@ -103,7 +105,7 @@ class DatasetConfig:
                 f"families: expected some of {', '.join(METHODS)}, got {shown(unknown[0])}"
             )
         if self.contacts and len(self.objects) > 1:
-            raise InputError("objects: expected the one that the contacts are on")
+            raise InputError("objects: expected only the object that the contacts are on")
         self._check_words_and_counts()
 
     def _check_words_and_counts(self) -> None:
@@ -123,12 +125,12 @@ class DatasetConfig:
 
     @property
     def sha256(self) -> str:
-        """Of the resolved text."""
+        """SHA-256 of the resolved text."""
         return hashlib.sha256(config_to_toml(self).encode()).hexdigest()
 
 
 def config_from_toml(path: Path) -> DatasetConfig:
-    """Read a configuration.
+    """Read a configuration from a file.
 
     Raises:
         InputError: The file cannot be read, is not TOML, or a setting is unknown or refused.
@@ -141,7 +143,7 @@ def config_from_toml(path: Path) -> DatasetConfig:
 
 
 def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
-    """A configuration from settings by name, of the types that TOML has.
+    """Build a configuration from named settings with the types that TOML has.
 
     Raises:
         InputError: A setting is unknown, missing, of another type, or refused.
@@ -155,7 +157,7 @@ def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
 
 
 def _typed(name: str, value: Any) -> Any:
-    """A setting of the type it has in the configuration."""
+    """A setting, checked and converted to the type it has in the configuration."""
     kinds = {**LISTS, **dict.fromkeys(LEAST, int), **dict.fromkeys(SWITCHES, bool)}
     wanted = kinds.get(name, str)
     if name not in LISTS:
@@ -178,7 +180,7 @@ def _is(value: object, wanted: type) -> bool:
 
 
 def _is_date(text: str) -> bool:
-    """Whether a text is a day in the one form that all readers know."""
+    """Whether a text is a day as YYYY-MM-DD, the form that all readers know."""
     try:
         return date.fromisoformat(text).isoformat() == text
     except ValueError:
@@ -186,7 +188,7 @@ def _is_date(text: str) -> bool:
 
 
 def config_to_toml(config: DatasetConfig) -> str:
-    """The resolved text: every setting, in the order of the class; the same for equal values."""
+    """Write every setting in the order of the class; equal configurations give equal texts."""
     return "".join(
         f"{each.name} = {_as_toml(getattr(config, each.name))}\n" for each in fields(config)
     )
@@ -203,12 +205,12 @@ def _as_toml(value: object) -> str:
 
 
 def quoted(text: str) -> str:
-    """A text as a basic string of TOML, which YAML reads alike: printable, on one line."""
+    """Write a text as a basic string of TOML, which YAML reads alike: printable, on one line."""
     return '"' + "".join(map(_escaped, text)) + '"'
 
 
 def _escaped(letter: str) -> str:
-    """A letter of such a string."""
+    """Write a letter inside such a string, escaped if necessary."""
     if letter in '"\\':
         return "\\" + letter
     return letter if letter.isprintable() else f"\\U{ord(letter):08x}"

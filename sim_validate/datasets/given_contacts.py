@@ -1,4 +1,4 @@
-"""Contacts of other tools, from a JSON or npz file; every four of them are one grasp to judge."""
+"""Contacts of other tools, from a JSON or npz file; each set of four is one grasp to judge."""
 
 import hashlib
 import json
@@ -18,25 +18,27 @@ from sim_validate.files.npz import arrays_of
 from sim_validate.files.reading import read_bytes, text_of
 
 POINTS, NORMALS, NAMES = "contact_points_m", "contact_normals", "grasp_id"
-"""Arrays of an npz file: (n, 4, 3) [m], (n, 4, 3), and perhaps names, (n,)."""
+"""Names of the arrays of an npz file: points (n, 4, 3) [m], normals (n, 4, 3), and perhaps names
+(n,)."""
 NO_FRICTION = 1.0
-"""Stands where a file need not state one: a dataset's configuration does."""
+"""Friction for files that state none; it is never used, because a dataset's configuration has its
+own."""
 
 Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class GivenGrasp:
-    """Four contacts as someone gives them, in the object's frame."""
+    """Four contacts as another tool gives them, in the object's frame."""
 
     id: str
-    """Ours, fit for the name of a file."""
+    """Name given here, which a file can have."""
     name: str
-    """What the file calls it."""
+    """Name that the file gives it."""
     points: tuple[Triple, ...]
-    """[m]"""
+    """Contact points, (4, 3) [m]."""
     normals: tuple[Triple, ...]
-    """Unit vectors into the object."""
+    """Unit vectors into the object, (4, 3)."""
 
 
 def read_given(path: Path, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
@@ -47,7 +49,8 @@ def read_given(path: Path, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
         outward: Whether normals in the file point out of the object.
 
     Raises:
-        InputError: The file cannot be read, or is not of this form; the message names the field.
+        InputError: The file cannot be read, or does not have this form; the message names the
+            field.
     """
     try:
         data = read_bytes(path)
@@ -58,7 +61,7 @@ def read_given(path: Path, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
 
 
 def given_text(given: Sequence[GivenGrasp]) -> str:
-    """A contacts file of the same grasps, normals into the object."""
+    """Write a contacts file of the same grasps, with normals into the object."""
     grasps = [
         {
             "id": grasp.name,
@@ -73,19 +76,20 @@ def given_text(given: Sequence[GivenGrasp]) -> str:
 
 
 def given_sha256(given: Sequence[GivenGrasp]) -> str:
-    """A hash of names and numbers."""
+    """Hash the names and numbers of given grasps."""
     return hashlib.sha256(json.dumps([astuple(grasp) for grasp in given]).encode()).hexdigest()
 
 
 def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
-    """Contacts to judge, from the text of a contacts file.
+    """Parse contacts to judge, from the text of a contacts file.
 
     Raises:
-        InputError: It is none of four contacts each without friction; the message names the field.
+        InputError: The text is not a contacts file with four contacts per grasp and no friction;
+            the message names the field.
     """
     sets = contact_sets_from_json(text, Overrides(NO_FRICTION, outward=outward))
     stated = value_of(text)
-    planned = "schema" in stated  # by us, and judged at any friction
+    planned = "schema" in stated  # graspproof planned these, and they may be judged at any friction
     own = any((each.friction != NO_FRICTION).any() for each in sets)
     if not planned and ("friction" in stated or own):
         raise InputError("friction: expected none in the file; a dataset has its own frictions")
@@ -99,10 +103,10 @@ def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ..
 
 
 def contacts_text(data: bytes) -> str:
-    """A contacts file with the arrays of the bytes of an npz file.
+    """Turn the bytes of an npz file into the text of a contacts file.
 
     Raises:
-        InputError: They are none, or not of such arrays.
+        InputError: The bytes are not an npz file with such arrays.
     """
     arrays = arrays_of(data, (POINTS, NORMALS, NAMES))
     for name in (POINTS, NORMALS):
@@ -117,7 +121,7 @@ def contacts_text(data: bytes) -> str:
     names = arrays.get(NAMES, np.arange(len(points)))
     if names.ndim != 1 or not len(points) == len(normals) == len(names):
         raise InputError(
-            f"expected arrays of one length, got {points.shape}, {normals.shape} and {names.shape}"
+            f"expected arrays of equal length, got {points.shape}, {normals.shape}, {names.shape}"
         )
     if not (np.isfinite(points).all() and np.isfinite(normals).all()):
         raise InputError(f"{POINTS} and {NORMALS}: expected finite numbers")

@@ -1,7 +1,7 @@
-"""The manifest of a dataset: what files there are, and what made them; written last.
+"""The manifest of a dataset: its files, and the versions that made them; written last.
 
-A folder without one is no dataset yet. It does not know when or on how many processes it was
-made: the same configuration, meshes and versions give the same bytes.
+A folder without a manifest is no dataset yet. The manifest does not say when or with how many
+processes the dataset was made: equal configuration, meshes and versions give equal bytes.
 """
 
 import hashlib
@@ -31,13 +31,13 @@ class Listed:
     """One file of a dataset."""
 
     path: str
-    """In the dataset's folder."""
+    """Path in the dataset's folder."""
     bytes: Count
     sha256: str
     table: Name | None = None
-    """That it is a part of, if of any."""
+    """Table that the file is a part of, if any."""
     split: str | None = None
-    """That its rows are of."""
+    """Split that its rows belong to, if any."""
     rows: Count | None = None
 
 
@@ -47,20 +47,20 @@ class Manifest:
 
     config_sha256: str
     versions: dict[str, str]
-    """Of packages, of the interpreter, and the hash of our own code."""
+    """Versions of the packages and of the interpreter, and the hash of this project's code."""
     arithmetic: str
-    """A hash of how the driver's processor rounds."""
+    """Hash of how the driver's processor rounds."""
     units: Count
-    """Objects at frictions that were asked for; given grasps in parts."""
+    """Number of objects at frictions that were asked for; many given grasps count in parts."""
     units_sha256: str
-    """Of the names of all units, which depend on all that decides rows."""
+    """Hash of the names of all units, which depend on everything that decides rows."""
     quarantined: Count
-    """Of them, those that were left out."""
+    """Number of units that were left out."""
     files: tuple[Listed, ...]
     schema: int = SCHEMA
 
     def rows(self) -> dict[Name, int]:
-        """How many rows each table has."""
+        """The number of rows of each table."""
         return {name: sum(each.rows or 0 for each in self.of_table(name)) for name in TABLES}
 
     def of_table(self, name: Name) -> tuple[Listed, ...]:
@@ -69,7 +69,7 @@ class Manifest:
 
 
 def listed(folder: Path, path: Path) -> Listed:
-    """A file as the manifest has it."""
+    """Describe a file as the manifest lists it."""
     digest, size = hashlib.sha256(), 0
     with path.open("rb") as stream:
         while part := stream.read(2**20):
@@ -79,12 +79,12 @@ def listed(folder: Path, path: Path) -> Listed:
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> Path:
-    """Make a folder a dataset."""
+    """Write the manifest, which makes a folder a dataset."""
     return write_text(folder / MANIFEST, manifest_to_json(manifest))
 
 
 def manifest_to_json(manifest: Manifest) -> str:
-    """The text of a manifest: the same for the same files."""
+    """The text of a manifest; equal manifests give equal texts."""
     record = asdict(manifest)
     record["files"] = [
         {name: value for name, value in asdict(each).items() if value is not None}
@@ -94,10 +94,10 @@ def manifest_to_json(manifest: Manifest) -> str:
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """The manifest of a dataset.
+    """Read the manifest of a dataset.
 
     Raises:
-        InputError: There is none, or it is not as this version writes them.
+        InputError: The folder has none, or it is not as this version writes them.
     """
     path = folder / MANIFEST
     if not path.is_file():
@@ -110,10 +110,10 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def manifest_from_json(text: str) -> Manifest:
-    """The manifest that a text is.
+    """Parse the text of a manifest.
 
     Raises:
-        InputError: It is not as this version writes them; the message names the field.
+        InputError: The text is not as this version writes it; the message names the field.
     """
     object_of(text, MANIFEST, schema=SCHEMA)
     try:
@@ -123,5 +123,5 @@ def manifest_from_json(text: str) -> Manifest:
     for i, each in enumerate(found.files):
         require_inside(each.path, place(["files", i, "path"]))
     if len({each.path for each in found.files}) < len(found.files):
-        raise InputError("files: a path is there twice")
+        raise InputError("files: a path is listed twice")
     return found

@@ -1,4 +1,4 @@
-"""Canonical meshes of a dataset: a file in metres that gives back exactly the same solid."""
+"""Canonical meshes of a dataset: a file in metres that reads back as exactly the same solid."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,27 +15,27 @@ FOLDER = "meshes"
 
 
 def mesh_text(body: Polyhedron) -> str:
-    """An OBJ file of a solid; every number reads back as it is [m]."""
+    """Write a solid as an OBJ file; every number reads back unchanged [m]."""
     points = [f"v {x!r} {y!r} {z!r}\n" for x, y, z in body.vertices.tolist()]
     triangles = [f"f {i} {j} {k}\n" for i, j, k in (body.triangles + 1).tolist()]
     return "".join(points + triangles)
 
 
 def mesh_path(folder: Path, object_id: str) -> Path:
-    """Where a dataset keeps the mesh of an object.
+    """Path of an object's mesh in a dataset.
 
     Raises:
-        InputError: The object has no name that a file may have.
+        InputError: The object's name cannot be that of a file.
     """
     return path_inside(folder, f"{FOLDER}/{object_id}.obj")
 
 
 def stored_surface(folder: Path, object_id: str) -> tuple[Array, Indices]:
-    """Vertices (n, 3) [m] and triangles (t, 3) of an object of a dataset.
+    """Read the vertices (n, 3) [m] and triangles (t, 3) of an object of a dataset.
 
     Raises:
         MeshError: The mesh is missing, or cannot be read.
-        InputError: It is another object's.
+        InputError: The mesh is another object's.
     """
     path = mesh_path(folder, object_id)
     vertices, triangles, _ = read_triangles(path, DEFAULT_LIMITS)
@@ -45,17 +45,17 @@ def stored_surface(folder: Path, object_id: str) -> tuple[Array, Indices]:
 
 
 def stored_body(folder: Path, object_id: str, name: str, faces: FaceKind) -> Polyhedron:
-    """An object of a dataset, from its canonical mesh.
+    """Read an object of a dataset from its canonical mesh.
 
     Args:
-        folder: Of the dataset.
-        object_id: Its hash.
-        name: What to call it.
-        faces: How its faces were found.
+        folder: Folder of the dataset.
+        object_id: Hash of the object's mesh.
+        name: Name to give the object.
+        faces: How the object's faces were found.
 
     Raises:
-        MeshError: The mesh is missing, or no solid.
-        InputError: It is another object's.
+        MeshError: The mesh is missing, or is no solid.
+        InputError: The mesh is another object's.
     """
     path = mesh_path(folder, object_id)
     body = load_polyhedron(path, faces=faces)

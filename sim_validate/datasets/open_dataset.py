@@ -1,4 +1,4 @@
-"""A finished dataset, or one split of it: its tables as arrays, and what is known of its making."""
+"""Reading a finished dataset, or one split of it: tables as arrays, and how they were made."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,22 +24,22 @@ class Selection:
     split: str | None
 
     def paths(self, name: Name) -> list[Path]:
-        """The files of a table, each whole.
+        """Paths of a table's files, each checked to be whole.
 
         Raises:
-            InputError: One is missing, or not what was written.
+            InputError: A file is missing, or not as it was written.
         """
         return [self._whole(each) for each in self._listed(name)]
 
     def counts(self) -> dict[Name, int]:
-        """How many rows each table has."""
+        """The number of rows of each table."""
         return {name: sum(each.rows or 0 for each in self._listed(name)) for name in TABLES}
 
     def rows(self, name: Name) -> Iterator[dict[str, Any]]:
-        """The rows of a table, not all in memory.
+        """Yield the rows of a table without holding all of them in memory.
 
         Raises:
-            InputError: A file is damaged, or has not as many rows as the manifest says.
+            InputError: A file is damaged, or its number of rows differs from the manifest's.
         """
         for each in self._listed(name):
             found = 0
@@ -47,17 +47,17 @@ class Selection:
                 found += 1
                 yield row
             if found != each.rows:
-                raise InputError(f"{each.path}: {found} rows, listed are {each.rows}")
+                raise InputError(f"{each.path}: {found} rows, but the manifest lists {each.rows}")
 
     def _whole(self, each: Listed) -> Path:
-        """A file with the manifest's hash: page checksums do not cover all of it."""
+        """Path of a file, once it matches the manifest's hash; page checksums miss some bytes."""
         path = path_inside(self.folder, each.path)
         if not path.is_file():
             raise InputError(f"{path}: missing; see `graspproof dataset verify`")
         found = listed(self.folder, path)
         if (found.bytes, found.sha256) != (each.bytes, each.sha256):
             raise InputError(
-                f"{path}: damaged, it is not what was written; see `graspproof dataset verify`"
+                f"{path}: damaged, differs from what was written; see `graspproof dataset verify`"
             )
         return path
 
@@ -65,18 +65,18 @@ class Selection:
         return [each for each in self.manifest.of_table(name) if self.split in (None, each.split)]
 
     def config(self) -> DatasetConfig:
-        """What the dataset was made of.
+        """Read the configuration of the dataset.
 
         Raises:
-            InputError: Its config.toml is damaged.
+            InputError: The dataset's config.toml is damaged.
         """
         return config_from_toml(self.folder / "config.toml")
 
     def facts(self) -> dict[str, str]:
-        """What made the dataset, and what people are to know, by name.
+        """The versions and settings that made the dataset, and its credits, by name.
 
         Raises:
-            InputError: Its config.toml is damaged.
+            InputError: The dataset's config.toml is damaged.
         """
         config, manifest = self.config(), self.manifest
         stated = {name: str(getattr(config, name)) for name in CREDITS}
@@ -90,14 +90,14 @@ class Selection:
 
 
 def select(folder: Path, split: str | None = None) -> Selection:
-    """A dataset or a part of it.
+    """Open a dataset or one of its splits.
 
     Args:
-        folder: Of the dataset.
+        folder: Folder of the dataset.
         split: `train`, `validation` or `test`; everything if not given.
 
     Raises:
-        InputError: There is no such split, or no finished dataset.
+        InputError: The split is unknown, or there is no finished dataset.
     """
     splits = [name for name, _ in SPLITS]
     if split is not None:
@@ -106,18 +106,18 @@ def select(folder: Path, split: str | None = None) -> Selection:
 
 
 def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Columns]:
-    """The tables of a dataset, each a dictionary of its columns.
+    """Read the tables of a dataset, each as a dictionary of its columns.
 
     Args:
-        folder: Of the dataset.
+        folder: Folder of the dataset.
         split: `train`, `validation` or `test`; everything if not given.
 
     Returns:
-        By table and column, arrays with a row per row: contact points, say, are (n, 4, 3) [m].
-        Missing numbers are NaN, or -1 in columns of whole numbers; missing text is None.
+        Arrays by table and column, with one entry per row: contact points, for example, are (n, 4,
+        3) [m]. Missing numbers are NaN, or -1 in columns of whole numbers; missing text is None.
 
     Raises:
-        InputError: There is no such split, no finished dataset, or a file is damaged.
+        InputError: The split is unknown, there is no finished dataset, or a file is damaged.
     """
     chosen = select(path_of(folder, "folder"), split)
     return {name: read_columns(chosen.paths(name), name) for name in TABLES}

@@ -1,7 +1,7 @@
-"""Rows <-> Parquet files that are the same for the same rows; the door to pyarrow.
+"""Rows <-> Parquet files, equal for equal rows; the only module that uses pyarrow.
 
-Every page carries a checksum, which reading asks for: without it a flipped bit is read without
-complaint. Units and meanings are in the metadata of the columns.
+Every page carries a checksum, and reading checks it: without that, a flipped bit goes unnoticed.
+Units and meanings are in the metadata of the columns.
 """
 
 import importlib
@@ -27,11 +27,12 @@ TYPES = {"text": "string", "bool": "bool_", "int": "int64", "float": "float64"}
 MISSING: Mapping[str, float] = {"float": math.nan, "int": -1}
 """What stands for null in arrays."""
 GROUP_ROWS = 20_000
-"""Rows that are written at a time, some tens of megabytes in memory."""
+"""Number of rows that are written at a time, some tens of megabytes in memory."""
 FILE_ROWS = 500_000
-"""A file has at least so many rows before the next one is begun, about 100 MB of grasps."""
+"""Number of rows at which a file is ended and the next one begun, about 100 MB of grasps."""
 MOST_ROWS, MOST_GROUP_BYTES = 10_000_000, 2**30
-"""What is read of one file, and at a time: twenty times what is written."""
+"""Largest number of rows of a file, and of bytes in a group, that are read: twenty times what is
+written."""
 PAGES: Mapping[str, Any] = {
     "compression": "zstd",
     "write_page_checksum": True,
@@ -40,7 +41,7 @@ PAGES: Mapping[str, Any] = {
 
 
 def require_pyarrow() -> None:
-    """Check that tables can be written and read here.
+    """Check that tables can be written and read on this machine.
 
     Raises:
         InputError: pyarrow is not installed.
@@ -49,12 +50,13 @@ def require_pyarrow() -> None:
 
 
 def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[str, str]) -> bytes:
-    """The file of one table.
+    """Encode one table as the bytes of a file.
 
     Args:
-        name: Of the table.
-        rows: By column; what is missing or not a number is null. Sorted here by the table's key.
-        about: What the file is to say of itself: text by name.
+        name: Name of the table.
+        rows: Rows as cells by column. Missing cells and numbers that are not finite become null.
+            The rows are sorted here by the table's key.
+        about: Metadata of the file: text by name.
 
     Raises:
         InputError: Two rows have the same key, or a cell is not of its column's type.
@@ -63,7 +65,7 @@ def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[
     listed = sorted(rows, key=lambda row: _key(name, row))
     for one, other in itertools.pairwise(listed):
         if _key(name, one) == _key(name, other):
-            raise InputError(f"{name}: two rows are called {_key(name, one)}")
+            raise InputError(f"{name}: two rows have the key {_key(name, one)}")
     schema = _schema(name).with_metadata(dict(sorted(about.items())))
     columns = [[_cell(row.get(column.name)) for row in listed] for column in TABLES[name]]
     try:
@@ -78,29 +80,29 @@ def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[
 
 
 def as_read(name: Name, rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Rows as they come back from a file: sorted, with null for what is no number."""
+    """The rows as they come back from a file: sorted, with null for numbers that are not finite."""
     held = _pyarrow().BufferReader(parquet_bytes(name, rows, {}))
     return _parquet().ParquetFile(held).read().to_pylist()
 
 
 def read_rows(path: Path, name: Name | None = None) -> list[dict[str, Any]]:
-    """The rows of a file, all checksums checked.
+    """Read the rows of a file and check all of its checksums.
 
     Raises:
-        InputError: It is no file of a table, or damaged.
+        InputError: The file is not that of a table, or is damaged.
     """
     return _read(path, name).to_pylist()
 
 
 def each_row(path: Path, name: Name | None = None) -> Iterator[dict[str, Any]]:
-    """The rows of a file one by one, not all in memory; otherwise as `read_rows`.
+    """Yield the rows of a file as `read_rows` does, without holding all of them in memory.
 
     Args:
-        path: Of the file.
-        name: Of its table; any if not given.
+        path: Path of the file.
+        name: Name of its table; any table if None.
 
     Raises:
-        InputError: It is no file of a table, or damaged.
+        InputError: The file is not that of a table, or is damaged.
     """
     with _opened(path, name) as file:
         for part in file.iter_batches(GROUP_ROWS):
@@ -114,10 +116,10 @@ def _read(path: Path, name: Name | None = None) -> Any:
 
 @contextmanager
 def _opened(path: Path, name: Name | None = None) -> Generator[Any]:
-    """A file of one of the tables, whose damage is an error of ours.
+    """Open a file of one of the tables; any damage is raised as an `InputError`.
 
     Raises:
-        InputError: It is no such file, has other columns, or is damaged.
+        InputError: The file is not that of a table, has other columns, or is damaged.
     """
     arrow, parquet = _pyarrow(), _parquet()
     try:
@@ -125,7 +127,8 @@ def _opened(path: Path, name: Name | None = None) -> Generator[Any]:
             _check_columns(path, file.schema_arrow, list(TABLES) if name is None else [name])
             _check_size(path, file.metadata)
             yield file
-    except (OSError, ValueError, arrow.ArrowException) as error:  # names that are no text, too
+    # ValueError: also for names that are not valid text
+    except (OSError, ValueError, arrow.ArrowException) as error:
         said = shown(" ".join(str(error).split()))
         raise InputError(f"{path}: cannot be read, or is damaged ({said})") from error
 
@@ -142,7 +145,7 @@ def _check_columns(path: Path, came: Any, names: Sequence[Name]) -> None:
 
 
 def _check_size(path: Path, claimed: Any) -> None:
-    """Refuse what would not fit into memory, before anything is read."""
+    """Refuse a file that would not fit into memory, before anything is read."""
     groups = [claimed.row_group(i) for i in range(claimed.num_row_groups)]
     rows, largest = claimed.num_rows, max((each.total_byte_size for each in groups), default=0)
     if not 0 <= rows <= MOST_ROWS or not 0 <= largest <= MOST_GROUP_BYTES:
@@ -154,7 +157,7 @@ def _check_size(path: Path, claimed: Any) -> None:
 
 @dataclass(frozen=True, slots=True)
 class WrittenTable:
-    """A file of a table."""
+    """A finished file of a table."""
 
     name: Name
     split: str
@@ -163,10 +166,10 @@ class WrittenTable:
 
 
 class TableFiles:
-    """Files of tables as they grow, for each table and split one after another.
+    """Writes the files of all tables, one after another for each table and split.
 
-    Rows are kept back until there are enough for a group of rows, so memory does not grow. To be
-    used in a `with` block, at whose end no file is open, whatever happens.
+    Rows are kept back until there are enough for a group of rows, so memory does not grow. Use it
+    in a `with` block; at its end no file is open, whatever happens.
     """
 
     def __init__(self, folder: Path, about: Mapping[str, str]) -> None:
@@ -182,7 +185,7 @@ class TableFiles:
             part.abandon()
 
     def add(self, name: Name, split: str, paths: Iterable[Path]) -> None:
-        """Add the rows of some files, whose keys come after all that were added before.
+        """Add the rows of some files; their keys must come after all that were added before.
 
         Raises:
             InputError: A file is damaged, or two rows have the same key.
@@ -198,7 +201,7 @@ class TableFiles:
         part.add(table.replace_schema_metadata(self._about))
 
     def close(self) -> list[WrittenTable]:
-        """Write what waits, and name the files."""
+        """Write the rows that wait, and list the files."""
         return [
             WrittenTable(name, split, path, rows)
             for (name, split), part in sorted(self._parts.items())
@@ -207,7 +210,7 @@ class TableFiles:
 
 
 class _Part:
-    """The files of one table and split."""
+    """Writes the files of one table and split."""
 
     def __init__(self, folder: Path, split: str) -> None:
         self._folder, self._split = folder, split
@@ -256,17 +259,17 @@ class _Part:
             self._writer = self._stream = None
 
     def abandon(self) -> None:
-        """Close what is open, for example because the disk is full."""
+        """Close the open file after a failure such as a full disk."""
         if self._stream is not None:
             with suppress(OSError):
                 self._stream.close()
 
 
 def read_columns(paths: Sequence[Path], name: Name) -> Columns:
-    """The columns of a table's files, one after another, as arrays (rows, ..).
+    """Read the columns of a table's files, one after another, as arrays (rows, ..).
 
-    Numbers that are null are NaN in columns of floats, and -1 in columns of whole numbers; text and
-    truth values are objects, None where they are null.
+    Null is NaN in columns of floats, and -1 in columns of whole numbers. Text and truth values are
+    objects, with None for null.
 
     Raises:
         InputError: A file is damaged.
@@ -292,7 +295,7 @@ def _key(name: Name, row: Mapping[str, Any]) -> tuple[Any, ...]:
 
 
 def _cell(value: Any) -> Any:
-    """A value with null for each number that is none."""
+    """Replace every number that is not finite by None."""
     if isinstance(value, Sequence) and not isinstance(value, str):
         return [_cell(part) for part in value]  # pyright: ignore[reportUnknownVariableType]
     return None if isinstance(value, float) and not math.isfinite(value) else value
@@ -318,7 +321,7 @@ def _pyarrow() -> Any:
         return importlib.import_module("pyarrow")
     except ImportError as error:
         raise InputError(
-            "datasets are Parquet files, which take pyarrow: pip install 'graspproof[dataset]'"
+            "datasets are Parquet files, which need pyarrow: pip install 'graspproof[dataset]'"
         ) from error
 
 

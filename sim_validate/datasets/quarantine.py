@@ -18,15 +18,15 @@ class LeftOut(BaseModel):
     source_sha256: str
     friction: float
     given: list[str]
-    """Ids of the given grasps that are missing, if it is of some."""
+    """Ids of the given grasps that are missing, if the unit is about given grasps."""
     reason: str
 
 
 def read_left_out(path: Path) -> list[LeftOut]:
-    """The units of a file.
+    """Read the units of a file.
 
     Raises:
-        InputError: It cannot be read, or a line is not such a one; the message names line and key.
+        InputError: The file cannot be read, or a line is invalid; the message names line and key.
     """
     text = read_text(path)
     try:
@@ -36,10 +36,10 @@ def read_left_out(path: Path) -> list[LeftOut]:
 
 
 def left_out_from(text: str) -> list[LeftOut]:
-    """The units of a text.
+    """Parse the units of a text.
 
     Raises:
-        InputError: A line is not such a one.
+        InputError: A line is invalid.
     """
     lines = text.removesuffix("\n").split("\n") if text else []
     return [_read(line, number) for number, line in enumerate(lines, start=1)]

@@ -21,22 +21,24 @@ from sim_validate.validation.wrench_verdict import WrenchVerdict
 Row: TypeAlias = Mapping[str, Any]
 Rows: TypeAlias = Mapping[Name, tuple[Row, ...]]
 SPLITS = (("test", 0.1), ("validation", 0.2), ("train", 1.0))
-"""Up to which share of all hashes an object is in each."""
+"""Upper ends of each split's share of hashes: an object is in the first split that its hash is
+below."""
 GIVEN = "given"
-"""Label of grasps that come from elsewhere."""
+"""Label of grasps that another tool made."""
 NOT_TRIED = "not_tried"
-"""Outcome of those that cannot be tried: their `note` says why, and nothing is claimed of them."""
+"""Outcome of given grasps that cannot be tried: their `note` says why, and no cell claims anything
+else about them."""
 SHORT = 16
-"""Digits of an object's hash in the names of its grasps."""
+"""Number of digits of an object's hash in the names of its grasps."""
 
 
 def id_beginning(object_id: str, friction: float) -> str:
-    """What the names of all grasps of a unit begin with."""
+    """Beginning of the names of all grasps of a unit."""
     return f"{object_id[:SHORT]}-{friction}-"
 
 
 def split_of(object_id: str, seed: int) -> str:
-    """In which part of the dataset an object is: by its hash, so that more objects move none."""
+    """The split of an object: it depends on its hash, so that more objects move none."""
     digest = hashlib.sha256(f"{seed} {object_id}".encode()).digest()
     share = int.from_bytes(digest[:8], "big") / 2.0**64
     return next(name for name, upto in SPLITS if share < upto)
@@ -61,7 +63,7 @@ def object_row(body: Polyhedron, unit: WorkUnit) -> Row:
 
 @dataclass(slots=True)
 class GraspRows:
-    """Rows of one object at one friction as they grow."""
+    """Rows of one object at one friction, while they are made."""
 
     body: Polyhedron
     unit: WorkUnit
@@ -69,7 +71,7 @@ class GraspRows:
     trials: list[Row] = field(default_factory=list[Row])
 
     def add(self, grasp: Grasp, verdict: Verdict) -> None:
-        """Write down a planned grasp, its negative controls, and the trials of all."""
+        """Add the rows of a planned grasp, its negative controls, and the trials of all."""
         about = {
             "label": "grasp",
             "family": grasp.family,
@@ -78,19 +80,20 @@ class GraspRows:
         self._add_closed(grasp, verdict, about)
 
     def add_given(self, given: GivenGrasp, grasp: Grasp, verdict: Verdict, moved_m: float) -> None:
-        """Write down a given grasp that is force-closed, with the same."""
+        """Add the rows of a force-closed given grasp, its negative controls, and all trials."""
         about: dict[str, Any] = {"name": given.name, "label": GIVEN, "moved_m": moved_m}
         if self.body.patches is not None:
-            about["faces"] = None  # those of the contacts are the grasp's own
+            # on curved surfaces the contacts' faces are made for this grasp alone
+            about["faces"] = None
         self._add_closed(grasp, verdict, about)
 
     def add_open(self, given: GivenGrasp, verdict: ControlVerdict, moved_m: float) -> None:
-        """Write down a given grasp that is not force-closed, tried as controls are."""
+        """Add the rows of a given grasp that is not force-closed, which is tried as a control."""
         about = {"name": given.name, "label": GIVEN, "control_of": None, "moved_m": moved_m}
         self._add_refuted(self.name(given.id), verdict, about)
 
     def add_untried(self, given: GivenGrasp, why: str) -> None:
-        """Write down a given grasp that cannot be tried."""
+        """Add the row of a given grasp that cannot be tried."""
         contacts = [
             Contact(np.array(point), np.array(normal))
             for point, normal in zip(given.points, given.normals, strict=True)
@@ -157,7 +160,7 @@ class GraspRows:
         self._add_trials(name, verdict.tried, lambda _: {})
 
     def name(self, grasp: str) -> str:
-        """What a grasp is called in the whole dataset."""
+        """Name of a grasp in the whole dataset."""
         return id_beginning(self.body.content_sha256, self.unit.friction) + grasp
 
     def _common(self, name: str, contacts: Iterable[Contact]) -> dict[str, Any]:
@@ -199,7 +202,7 @@ def _wrench_row(trial: WrenchVerdict) -> dict[str, Any]:
 
 
 def _for_fingers(values: Iterable[Any], missing: Any) -> list[Any]:
-    """A value for each of four fingers: controls may have fewer."""
+    """Pad a list to four fingers: controls may have fewer."""
     listed = list(values)
     return listed + [missing] * (FINGERS - len(listed))
 

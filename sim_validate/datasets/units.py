@@ -1,8 +1,8 @@
-"""A configuration -> work units, each of which can be done anywhere, in any order.
+"""A configuration -> work units, each of which can be computed anywhere, in any order.
 
 A unit is one object at one friction. Its name is a hash of all that decides its rows: the bytes of
-the mesh, the configuration, the versions of the packages, and our own code. So results of an
-earlier run count exactly if they would come out the same.
+the mesh, the configuration, the versions of the packages, and this project's own code. So results
+of an earlier run count exactly if they would come out the same.
 """
 
 import hashlib
@@ -25,14 +25,14 @@ from sim_validate.datasets.given_contacts import GivenGrasp, given_sha256, read_
 
 CHUNK = 2**20
 PART = 25
-"""Given grasps of one unit, half a minute's work."""
+"""Largest number of given grasps of one unit, half a minute's work."""
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 APART = ("objects", "frictions", "contacts", "outward", *CREDITS)
 """Settings that each unit has for itself, or that decide no row."""
 
 
 class WorkerError(GraspError):
-    """A worker cannot do units for its driver."""
+    """A worker cannot compute units for its driver."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,17 +42,17 @@ class WorkUnit:
     object: str
     """A mesh file as it was given, or the name of a built-in object."""
     path: Path | None
-    """Where the mesh file is, from the root; None for built-in objects."""
+    """Absolute path of the mesh file; None for built-in objects."""
     source_sha256: str
-    """Of the mesh file's bytes, or of the built-in object's mesh."""
+    """Hash of the mesh file's bytes, or of the built-in object's mesh."""
     friction: float
     config: DatasetConfig
     given: tuple[GivenGrasp, ...] = ()
-    """Grasps to judge; where there are none, grasps are planned."""
+    """Grasps to judge; if there are none, grasps are planned."""
 
     @property
     def id(self) -> str:
-        """Sixteen bytes in hexadecimal digits; the same wherever the mesh file lies."""
+        """Name of the unit: 32 hexadecimal digits, the same wherever the mesh file lies."""
         settings = shared_settings(self.config)
         given = given_sha256(self.given)
         own = sorted(provenance().items())
@@ -61,15 +61,15 @@ class WorkUnit:
 
 
 def units_sha256(units: Iterable[WorkUnit]) -> str:
-    """A hash of the names of units: two are equal only if all rows come out the same."""
+    """A hash of the names of units; two are equal only if all rows come out the same."""
     return hashlib.sha256("".join(sorted(unit.id for unit in units)).encode()).hexdigest()
 
 
 @cache
 def provenance() -> Mapping[str, str]:
-    """Versions of all packages, and the hash of our own code.
+    """Versions of all packages, and the hash of this project's own code.
 
-    Results depend on nothing else, but for how processors of a kind round.
+    Results depend on nothing else but how the processor rounds.
     """
     digest = hashlib.sha256()
     for package in PACKAGES:
@@ -82,18 +82,17 @@ def provenance() -> Mapping[str, str]:
 
 
 def shared_settings(config: DatasetConfig) -> dict[str, object]:
-    """What decides the rows of every unit: all but which objects and frictions there are."""
+    """The settings that decide the rows of every unit, such as the seed, but no objects."""
     return {
         each.name: getattr(config, each.name) for each in fields(config) if each.name not in APART
     }
 
 
 def units_of(config: DatasetConfig) -> list[WorkUnit]:
-    """All units, sorted by their names.
+    """Split a configuration into all its units, sorted by their names.
 
     Raises:
-        InputError: An object is neither a file that can be read nor built in, or the contacts are
-            refused.
+        InputError: An object is neither a readable file nor built in, or the contacts are refused.
     """
     hashes = {name: _source_sha256(name) for name in config.objects}
     paths = {name: Path(name).resolve() if is_mesh_file(name) else None for name in hashes}
@@ -112,7 +111,7 @@ def of_unit(config: DatasetConfig, name: str, friction: float) -> DatasetConfig:
 
 
 def _parts(config: DatasetConfig) -> list[tuple[GivenGrasp, ...]]:
-    """Given grasps, some for each unit; none where grasps are planned."""
+    """Given grasps in parts, one for each unit; a single empty part where grasps are planned."""
     if not config.contacts:
         return [()]
     given = read_given(Path(config.contacts), outward=config.outward)
@@ -120,11 +119,11 @@ def _parts(config: DatasetConfig) -> list[tuple[GivenGrasp, ...]]:
 
 
 def body_of(unit: WorkUnit) -> Polyhedron:
-    """The object of a unit.
+    """Load the object of a unit.
 
     Raises:
-        MeshError: Its mesh is no solid.
-        WorkerError: Its file is not there, or not the one that the unit is about.
+        MeshError: The mesh is no solid.
+        WorkerError: The file is missing, or not the one that the unit is about.
     """
     if unit.path is None:
         return example_object(unit.object)
@@ -136,7 +135,7 @@ def body_of(unit: WorkUnit) -> Polyhedron:
 
 
 def is_mesh_file(name: str) -> bool:
-    """Whether an object is a file, by its ending or because it is there; else it is built in."""
+    """Whether an object is a file, by its ending or because it exists; else it is built in."""
     path = Path(name)
     return path.suffix.lower().lstrip(".") in FORMATS or path.is_file()
 

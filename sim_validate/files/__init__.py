@@ -1,4 +1,5 @@
 """How are bytes, text, tables and folders read and written?
 
-Paths and arrays come in. Text, arrays and locked folders go out; no grasp is known here.
+This room reads and writes text, arrays and locked folders by their paths; it knows nothing about
+grasps.
 """

@@ -1,6 +1,6 @@
-"""A folder for results, to which one command at a time writes.
+"""A folder for results, to which only one command at a time writes.
 
-The folder itself is locked, with no file for it: the lock ends with the process, however it ends.
+The folder itself is locked, without a lock file: the lock ends with the process, however that ends.
 """
 
 import errno
@@ -17,19 +17,19 @@ from sim_validate.files.stale_results import CHARTS, CLIPS, GRASPS, PICTURES, RE
 
 PAGES = ("", GRASPS, PICTURES, CHARTS, CLIPS)
 PARTS = ("scenes", "traces", "proofs", *PAGES, *(f"{REPORT}/{part}" for part in PAGES))
-"""Where in their folder commands write."""
+"""Subfolders into which commands write."""
 
 
 @contextmanager
 def alone_in(folder: Path | None) -> Generator[None]:
-    """Keep others out of a folder, made where needed, and free it of what killed ones left half.
+    """Lock a folder, make it if needed, and remove unfinished files of killed commands.
 
-    To be entered before work begins, so that a folder that takes no files is refused at once, and
-    not after the work. Without a folder there is nothing to do.
+    Enter this context before work begins, so that a folder that takes no files is refused at once,
+    and not after the work. Without a folder it does nothing.
 
     Raises:
-        InputError: There cannot be such a folder, no file can be written there, or another command
-            is at work in it.
+        InputError: The folder cannot be made, no file can be written there, or another command is
+            at work in it.
     """
     if folder is None:
         yield
@@ -40,13 +40,13 @@ def alone_in(folder: Path | None) -> Generator[None]:
         try:
             yield
         finally:
-            with suppress(OSError):  # one holds something
+            with suppress(OSError):  # a folder that holds something stays
                 for path in made:
                     path.rmdir()
 
 
 def _make(folder: Path) -> list[Path]:
-    """Make the folder, see that files can be written there, and say which folders are new."""
+    """Make the folder, check that files can be written there, and list the new folders."""
     try:
         missing = [path for path in (folder, *folder.parents) if not path.exists()]
         folder.mkdir(parents=True, exist_ok=True)
@@ -54,7 +54,7 @@ def _make(folder: Path) -> list[Path]:
             stream.write(b"0")
     except (FileExistsError, NotADirectoryError) as error:
         raise InputError(
-            f"{error.filename}: is there, and no folder; give another --out"
+            f"{error.filename}: exists and is not a folder; give another --out"
         ) from error
     except OSError as error:
         raise InputError(
@@ -65,7 +65,7 @@ def _make(folder: Path) -> list[Path]:
 
 @contextmanager
 def _locked(folder: Path) -> Generator[list[Path]]:
-    """Make the folder and lock it; the folders that are new."""
+    """Make the folder and lock it; yield the folders that are new."""
     handle, made = _taken(folder)
     try:
         yield made
@@ -74,13 +74,16 @@ def _locked(folder: Path) -> Generator[list[Path]]:
 
 
 def _taken(folder: Path) -> tuple[int, list[Path]]:
-    """An open, locked folder, which is the one of that name, and the folders that are new."""
+    """Open and lock the folder of a given name, and list the folders that are new.
+
+    The loop repeats if another command removes the folder between the two steps.
+    """
     made = list[Path]()
     while True:
         made += _make(folder)
         try:
             handle = os.open(folder, os.O_RDONLY)
-        except FileNotFoundError:  # who had made it has just taken it away
+        except FileNotFoundError:  # the command that had made it has just removed it
             continue
         try:
             _lock(handle, folder)
@@ -100,4 +103,4 @@ def _lock(handle: int, folder: Path) -> None:
             raise InputError(
                 f"{folder}: another command is at work in it; wait for it, or give another --out"
             ) from error
-        # else the file system has no locks, and who shares it must know what they do
+        # otherwise the file system has no locks, and its users must take care

@@ -1,7 +1,7 @@
-"""The bytes of an npz file -> arrays, each refused before anything large is made of it.
+"""The bytes of an npz file -> arrays, each checked before anything large is allocated.
 
-An archive may claim any size, hold names twice, or members whose headers lie; only arrays of
-numbers, truth values and text are read, as many bytes as their shapes need and no more.
+An archive may claim any size, hold a name twice, or have members with wrong headers. Only arrays of
+numbers, truth values and text are read, with exactly as many bytes as their shapes need.
 """
 
 import io
@@ -19,23 +19,23 @@ from grasp_core.files.strict_json import shown
 from sim_validate.files.reading import read_bytes
 
 MOST_BYTES = 256 * 2**20
-"""Of all arrays of a file."""
+"""Largest size of all arrays of a file."""
 MOST_MEMBERS = 256
 MOST_HEADER = 10_000
-"""Letters of an array's header, as numpy takes them."""
+"""Largest number of letters in an array's header, the limit that numpy sets."""
 KINDS = "biufU"
-"""Of what arrays may be: truth values, numbers, text."""
+"""Kinds of arrays that are read: truth values, numbers, text."""
 BEGINNING, ENDING = b"PK\x03\x04", ".npy"
-"""Of an archive, and of the names in it."""
+"""First bytes of an archive, and ending of the names in it."""
 LARGEST_LETTER, FIRST_HALF, LAST_HALF = 0x10FFFF, 0xD800, 0xDFFF
-"""Codes of letters, and of halves of letters, which are none."""
+"""Largest code of a letter, and the range of surrogates, which are halves of letters."""
 
 
 def read_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[Any]]:
-    """Arrays of an npz file, those that are there; nothing in it is run.
+    """Read the named arrays of an npz file that exist; nothing in the file is executed.
 
     Raises:
-        InputError: It cannot be read, is too large, or holds anything but plain arrays.
+        InputError: The file cannot be read, is too large, or holds anything but plain arrays.
     """
     data = read_bytes(path, MOST_BYTES)
     try:
@@ -45,10 +45,10 @@ def read_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[Any]]:
 
 
 def arrays_of(data: bytes, names: Collection[str]) -> dict[str, NDArray[Any]]:
-    """The same from the bytes of a file.
+    """Read the named arrays that exist from the bytes of an npz file.
 
     Raises:
-        InputError: It is too large, or holds anything but plain arrays.
+        InputError: The file is too large, or holds anything but plain arrays.
     """
     if not data.startswith(BEGINNING):
         raise InputError("cannot be read as npz (it does not begin as archives do)")
@@ -62,12 +62,12 @@ def arrays_of(data: bytes, names: Collection[str]) -> dict[str, NDArray[Any]]:
             }
     except InputError:
         raise
-    except Exception as error:  # whatever a foreign file makes zipfile and numpy raise
+    except Exception as error:  # a damaged file can make zipfile and numpy raise anything
         raise InputError(f"cannot be read as npz ({shown(str(error))}); write it again") from error
 
 
 def _checked(listed: list[zipfile.ZipInfo]) -> dict[str, zipfile.ZipInfo]:
-    """The members of an archive by name, refused for what they claim."""
+    """Index the members of an archive by name, and refuse what they claim if it is too much."""
     if len(listed) > MOST_MEMBERS:
         raise InputError(f"{len(listed)} members; an npz file has up to {MOST_MEMBERS} arrays")
     claimed = sum(each.file_size for each in listed)
@@ -91,20 +91,20 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> NDAr
             raise InputError(f"{name}: expected numbers or text, got {shown(str(dtype))}")
         size = math.prod(shape) * dtype.itemsize
         if min(shape, default=0) < 0 or size > member.file_size:
-            raise InputError(f"{name}: its shape {shown(str(shape))} is not that of its numbers")
+            raise InputError(f"{name}: its shape {shown(str(shape))} does not fit its numbers")
         held = stream.read(size)
         if len(held) < size or stream.read(1):
-            raise InputError(f"{name}: has not as many numbers as its shape {shape}")
+            raise InputError(f"{name}: does not have as many numbers as its shape {shape} needs")
     array = np.ndarray(shape, dtype, held, order="F" if by_columns else "C")
     _check_letters(array, name)
     return array
 
 
 def _check_letters(array: NDArray[Any], name: str) -> None:
-    """Refuse text with letters that there are not, which numpy would hand on."""
+    """Refuse text with codes that are no letters, which numpy would pass on."""
     if array.dtype.kind != "U" or not array.size or not array.dtype.itemsize:
         return
     codes = np.frombuffer(array.tobytes(), array.dtype.str[0].replace("|", "=") + "u4")
     halves = (codes >= FIRST_HALF) & (codes <= LAST_HALF)
     if codes.max() > LARGEST_LETTER or halves.any():
-        raise InputError(f"{name}: holds text that is none")
+        raise InputError(f"{name}: holds codes that are no letters; write it again")

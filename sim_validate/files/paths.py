@@ -6,18 +6,18 @@ from grasp_core.errors import InputError
 from grasp_core.files.strict_json import shown
 
 LONGEST = 500
-"""Letters of a path in a file."""
+"""Largest number of letters of a path in a file."""
 
 
 def require_inside(name: object, field: str) -> str:
-    """A relative path without ways up.
+    """Check that a path is relative and has no `..`.
 
     Args:
-        name: As a file has it, with slashes.
-        field: Where it stands, for messages.
+        name: The path as a file has it, with slashes.
+        field: Field of the file that holds the path, for messages.
 
     Raises:
-        InputError: It is none, or leads elsewhere.
+        InputError: The value is no path, or leads out of the folder.
     """
     if not isinstance(name, str) or not name or len(name) > LONGEST:
         raise InputError(f"{field}: expected the path of a file, got {shown(name)}")
@@ -28,10 +28,10 @@ def require_inside(name: object, field: str) -> str:
 
 
 def path_inside(folder: Path, name: str) -> Path:
-    """The path of a file in a folder, out of which no link leads.
+    """The path of a file in a folder, checked that no link leads out of the folder.
 
     Raises:
-        InputError: It leads elsewhere.
+        InputError: The path leads out of the folder.
     """
     path = folder / require_inside(name, "path")
     if not path.resolve().is_relative_to(folder.resolve()):

@@ -1,4 +1,4 @@
-"""Files in and out: whole or not at all."""
+"""Reading bounded files, and writing files that are complete or absent."""
 
 import io
 import shutil
@@ -17,7 +17,7 @@ from grasp_core.files.whole_files import bounded_bytes, write_parts
 
 MAX_TEXT_BYTES = 256 * 2**20
 MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
-"""Byte order marks, of UTF-8 and of UTF-16."""
+"""Byte order marks of UTF-8 and UTF-16."""
 
 
 class NotTextError(InputError):
@@ -25,10 +25,10 @@ class NotTextError(InputError):
 
 
 def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
-    """The bytes of a regular file: never of a pipe or a device, which may have no end.
+    """Read a regular file; a pipe or a device, which may have no end, is refused.
 
     Raises:
-        InputError: It cannot be read, is no regular file, or is larger than `most` bytes.
+        InputError: The file cannot be read, is no regular file, or is larger than `most` bytes.
     """
     try:
         data = bounded_bytes(path, most)
@@ -40,10 +40,10 @@ def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
 
 
 def read_text(path: Path, most: int = MAX_TEXT_BYTES) -> str:
-    """The text of a file.
+    """Read the text of a file.
 
     Raises:
-        InputError: It cannot be read, is too large, or is not UTF-8.
+        InputError: The file cannot be read, is too large, or is not UTF-8.
     """
     try:
         return text_of(read_bytes(path, most))
@@ -52,10 +52,10 @@ def read_text(path: Path, most: int = MAX_TEXT_BYTES) -> str:
 
 
 def text_of(data: bytes) -> str:
-    """The text that a file's bytes are; pairs of line breaks are one.
+    """Decode the bytes of a file; line ends of Windows become plain ones.
 
     Raises:
-        NotTextError: They are not UTF-8.
+        NotTextError: The bytes are not UTF-8.
     """
     if data.startswith(MARKS):
         raise NotTextError("begins with a byte order mark; save it as UTF-8 without one")
@@ -69,28 +69,27 @@ def text_of(data: bytes) -> str:
 
 
 def write_text(path: Path, text: str) -> Path:
-    """Write a file by renaming a complete one into place; folders are made as needed."""
+    """Write text by renaming a complete file into place; folders are made as needed."""
     return write_parts(path, [text.encode()])
 
 
 def write_bytes(path: Path, data: bytes) -> Path:
-    """As `write_text`."""
+    """Write bytes by renaming a complete file into place; folders are made as needed."""
     return write_parts(path, [data])
 
 
 def write_lines(path: Path, lines: Iterable[str]) -> Path:
-    """As `write_text`, of lines that are not all in memory; each ends with its line break."""
+    """Write lines as `write_text` does, one at a time; each ends with its own line break."""
     return write_parts(path, (line.encode() for line in lines))
 
 
 def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
-    """Write arrays by name, compressed, as `numpy.load` reads them."""
+    """Write named arrays, compressed, as `numpy.load` reads them."""
     held = io.BytesIO()
     with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():
-            member = zipfile.ZipInfo(
-                f"{name}.npy"
-            )  # of no date, so that equal arrays give equal files
+            # A member made this way has a fixed date, so that equal arrays give equal files.
+            member = zipfile.ZipInfo(f"{name}.npy")
             with archive.open(member, "w") as stream:
                 np.lib.format.write_array(stream, array, allow_pickle=False)
     return write_parts(path, [held.getvalue()])
@@ -98,13 +97,13 @@ def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
 
 @contextmanager
 def whole_folder(folder: Path) -> Generator[Path]:
-    """A place to write to, which becomes the folder when everything is written, and else goes.
+    """Yield a temporary folder that becomes `folder` on success, and is removed on failure.
 
     Raises:
-        InputError: The folder is there and not empty.
+        InputError: The folder exists and is not empty.
     """
     if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
-        raise InputError(f"{folder}: is there, and no empty folder; give another --out")
+        raise InputError(f"{folder}: exists and is not an empty folder; give another --out")
     named = folder.resolve()
     named.parent.mkdir(parents=True, exist_ok=True)
     temporary = Path(tempfile.mkdtemp(dir=named.parent, prefix=".unfinished-"))

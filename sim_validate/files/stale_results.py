@@ -1,7 +1,7 @@
-"""What earlier commands have told in a folder, removed before others tell it anew.
+"""Removing the results of earlier commands from a folder before new ones are written.
 
-What contradicts new results goes before they come, so that whatever ends a command, a folder holds
-no mixture; files of other names are left alone.
+Results that would contradict new ones are removed first, so that a folder holds no mixture,
+whatever ends a command. Files of other names are left alone.
 """
 
 import re
@@ -17,11 +17,11 @@ FIDELITY = "fidelity.svg"
 PICTURES, CHARTS, CLIPS = "pictures", "charts", "clips"
 MARK = ".graspproof-report"
 ID = re.compile(r"[cprf](-\d+){4}[\w-]*", re.ASCII)
-"""Of a grasp, as plans call them."""
+"""Pattern of a grasp's id, as plans name grasps."""
 
 
 def remove_results(folder: Path) -> None:
-    """Remove grasps and all that was told of them."""
+    """Remove grasps and all results about them."""
     remove_verdicts(folder)
     remove_regions(folder)
     _remove([*_of_grasps(folder / "scenes", ".xml"), folder / "grasps.json"])
@@ -40,7 +40,7 @@ def remove_regions(folder: Path) -> None:
 
 
 def _of_grasps(folder: Path, suffix: str) -> list[Path]:
-    """Files in a folder that are called after grasps."""
+    """Files in a folder that are named after grasps."""
     return [path for path in folder.glob(f"*{suffix}") if ID.fullmatch(path.stem)]
 
 
@@ -50,17 +50,17 @@ def _remove(paths: Iterable[Path]) -> None:
 
 
 def require_report_folder(folder: Path) -> None:
-    """That pages may be written into a folder: there is nothing in it, or a report.
+    """Refuse to write pages into a folder that is neither empty nor a report.
 
     Raises:
-        InputError: It holds other things.
+        InputError: The folder holds other things.
     """
     if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():
-        raise InputError(f"{folder}: is there, and holds no report; give another --out")
+        raise InputError(f"{folder}: exists and holds no report; give another --out")
 
 
 def remove_report(folder: Path) -> None:
-    """Remove a report, if there is one, and nothing else; its mark last."""
+    """Remove a report, if there is one, and nothing else; its mark is removed last."""
     if not (folder / MARK).is_file():
         return
     remove_pages(folder)
@@ -70,7 +70,7 @@ def remove_report(folder: Path) -> None:
 
 
 def remove_pages(folder: Path) -> None:
-    """Remove the pages of a report, the first one first; its mark stays."""
+    """Remove the pages of a report, the first page first; its mark stays."""
     _remove(
         chain(
             (folder / name for name in (INDEX, FIDELITY, *STATIC)),

@@ -10,23 +10,24 @@ from grasp_core.files.strict_json import DEEPEST, check_values
 from sim_validate.files.reading import read_text
 
 MOST_LETTERS = 2**20
-"""Settings are short."""
+"""Largest number of letters of a file of settings, which are short."""
 ASIDE = re.compile(
     r'''"""(?:[^\\]|\\.)*?(?:"""|\\?\Z)|"(?:[^"\\\n]|\\.)*(?:"|\n|\\?\Z)|'''
     r"""'''.*?(?:'''|\Z)|'[^'\n]*(?:'|\n|\Z)|\#[^\n]*""",
     re.DOTALL,
 )
-"""Text in quotes, and comments, each up to its end or that of the line or file."""
+"""Pattern of quoted texts and comments, each up to its end or that of the line or file."""
 LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
-"""`a.b.c` of many parts, for which tomllib takes time that grows with the cube of their number: two
-minutes for a hundred kilobytes."""
+"""Pattern of a key `a.b.c` with too many parts. The time of tomllib grows with the cube of their
+number: two minutes for a hundred kilobytes."""
 
 
 def read_tables(path: Path) -> dict[str, Any]:
-    """The tables of a TOML file.
+    """Read the tables of a TOML file.
 
     Raises:
-        InputError: It cannot be read, or is not TOML; the message names the file and the line.
+        InputError: The file cannot be read, or is not TOML; the message names the file and the
+            line.
     """
     text = read_text(path, MOST_LETTERS)
     try:
@@ -36,20 +37,22 @@ def read_tables(path: Path) -> dict[str, Any]:
 
 
 def tables_of_toml(text: str) -> dict[str, Any]:
-    """The tables of a TOML text.
+    """Parse the tables of a TOML text.
 
     Raises:
-        InputError: It is not TOML, or holds what no setting is.
+        InputError: The text is not TOML, or holds a value that no setting can have.
     """
     if LONG_KEY.search(ASIDE.sub(lambda found: "q" if found[0][0] != "#" else "", text)):
-        raise InputError(f"not TOML that is read here: a key of more than {DEEPEST} parts")
+        raise InputError(f"not TOML that can be read here: a key has more than {DEEPEST} parts")
     try:
         found = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"not TOML: {_printable(str(error))}") from error
     except RecursionError as error:
-        raise InputError("not TOML that is read here: values are too deep inside others") from error
-    except ValueError as error:  # numbers of thousands of digits, days that there are not
+        raise InputError(
+            "not TOML that can be read here: values are too deep inside others"
+        ) from error
+    except ValueError as error:  # numbers of thousands of digits, days that do not exist
         raise InputError(f"not TOML: {_printable(str(error))}") from error
     check_values(found)
     return found

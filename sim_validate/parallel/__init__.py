@@ -1,5 +1,5 @@
 """How is work spread over processes and machines, and interrupted?
 
-A function and its units of work come in. Results go out in order, the same for any number of
-processes.
+This room calls a function on many units of work. It returns results in order, the same for any
+number of processes.
 """

@@ -33,7 +33,7 @@ class Asked:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Task:
-    """One grasp, as it travels to a worker."""
+    """One grasp, as it is sent to a worker."""
 
     body: Polyhedron
     grasp: Grasp
@@ -48,7 +48,7 @@ def certified(
 
     Args:
         body: The object.
-        grasps: Grasps of it.
+        grasps: Grasps on the faces of `body`.
         asked: How regions are certified.
         jobs: Largest number of processes.
         progress: Called with (done, total) after each grasp.
@@ -75,7 +75,7 @@ def _certify(task: _Task) -> CertifiedRegions | str:
 
 
 def wider(grasp: Grasp, proved: CertifiedRegions | str) -> Grasp:
-    """A grasp with certified regions where their discs around its contacts are larger."""
+    """Give a grasp its certified regions if their discs around its contacts are larger."""
     if isinstance(proved, str):
         return grasp
     radius = min(
@@ -90,7 +90,7 @@ def wider(grasp: Grasp, proved: CertifiedRegions | str) -> Grasp:
 
 
 def _room(polygon: Array, point: Array, normal: Array) -> float:
-    """How far a point is inside of a convex polygon (c, 3), across its plane or not [m]."""
+    """Distance of a point from the nearest edge of a convex polygon (c, 3), in its plane [m]."""
     edges = np.roll(polygon, -1, axis=0) - polygon
     inward = np.cross(normal, edges)
     inward /= np.linalg.norm(inward, axis=1, keepdims=True)

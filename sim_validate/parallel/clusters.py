@@ -1,7 +1,7 @@
-"""Work units on a Ray or Dask cluster, or on one started here; the door to both.
+"""Work units on a Ray or Dask cluster, which may be started here; the only user of both.
 
-Neither repeats a unit by itself: who gives up on a unit, and when, is decided in one place for all
-engines. Ray without `address`, and Dask likewise, start workers on this machine and stop them.
+Neither cluster repeats a unit by itself, because one place decides for all engines when to give up
+on a unit. Without `address`, Ray and Dask start workers on this machine and stop them afterwards.
 """
 
 import importlib
@@ -19,19 +19,20 @@ Unit = TypeVar("Unit")
 Result = TypeVar("Result")
 
 OBJECT_STORE_BYTES = 200 * 2**20
-"""Of a Ray started here; units and their rows go through files."""
+"""Size of the object store of a Ray started here; units and their rows go through files."""
 
 RAY_SETTINGS = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
-"""Nothing is told to anybody, and no GPU is hidden from what else runs here."""
+"""Settings under which Ray sends no usage statistics, and hides no GPU from other programs here."""
 
 ANY_PORT = "127.0.0.1:0"
-"""Where a Dask scheduler started here shows its state: to this machine, at a port that is free."""
+"""Address at which a Dask scheduler started here shows its state: for this machine only, at any
+free port."""
 ANSWER_S = 10.0
-"""How long a scheduler may take to answer [s]."""
+"""Time that a scheduler may take to answer [s]."""
 
 
 class RayCluster:
-    """Workers of a Ray cluster."""
+    """The workers of a Ray cluster."""
 
     ended = ("WorkerCrashedError", "OutOfMemoryError", "LocalRayletDiedError", "NodeDiedError")
 
@@ -41,14 +42,14 @@ class RayCluster:
         self._remote: dict[Callable[..., Any], Any] = {}
 
     def submit(self, function: Callable[[Unit], Result], unit: Unit, /) -> "Future[Result]":
-        """Have a function called; its future fails where the worker ends."""
+        """Call a function on a worker; its future fails if the worker ends."""
         if function not in self._remote:
             self._remote[function] = self._ray.remote(max_retries=0, num_cpus=1)(function)
         return self._remote[function].remote(unit).future()
 
 
 class DaskCluster:
-    """Workers of a Dask cluster."""
+    """The workers of a Dask cluster."""
 
     ended = ("KilledWorker",)
 
@@ -57,22 +58,22 @@ class DaskCluster:
         self._executor = client.get_executor(pure=False, retries=0)
 
     def submit(self, function: Callable[[Unit], Result], unit: Unit, /) -> "Future[Result]":
-        """Have a function called; its future fails where the worker ends."""
+        """Call a function on a worker; its future fails if the worker ends."""
         return self._executor.submit(function, unit)
 
 
 @contextmanager
 def ray_workers(workers: int, address: str | None) -> Generator[RayCluster]:
-    """Workers of a Ray cluster.
+    """Start or join a Ray cluster.
 
     Args:
-        workers: How many to start here, if no address is given.
-        address: Of a cluster that runs, such as `auto` or `ray://head:10001`.
+        workers: Number of workers to start here, if no address is given.
+        address: Address of a running cluster, such as `auto` or `ray://head:10001`.
 
     Raises:
         InputError: Ray is not installed, or there is no cluster.
     """
-    os.environ.update(dict(RAY_SETTINGS) | dict(os.environ))  # before Ray is imported
+    os.environ.update(dict(RAY_SETTINGS) | dict(os.environ))  # Ray reads these when it is imported
     ray = _imported("ray", "ray")
     quiet = {"log_to_driver": False, "configure_logging": False}
     here = {
@@ -94,10 +95,10 @@ def ray_workers(workers: int, address: str | None) -> Generator[RayCluster]:
 
 
 def _require_listener(address: str) -> None:
-    """Refuse a host and port where nothing listens: Ray itself asks again for minutes.
+    """Refuse a host and port where nothing listens, because Ray itself retries for minutes.
 
     Raises:
-        InputError: Nothing does; `auto` and such are left to Ray.
+        InputError: Nothing listens there; addresses such as `auto` are left to Ray.
     """
     host, colon, port = address.split("://")[-1].rpartition(":")
     if not (colon and port.isdigit()):
@@ -110,12 +111,12 @@ def _require_listener(address: str) -> None:
 
 @contextmanager
 def dask_workers(workers: int, address: str | None) -> Generator[DaskCluster]:
-    """Workers of a Dask cluster.
+    """Start or join a Dask cluster.
 
     Args:
-        workers: How many to start here, if no address is given.
-        address: Of a scheduler that runs, such as `tcp://head:8786`, or a scheduler file. Its
-            workers must have one thread each: limits of time end a whole process.
+        workers: Number of workers to start here, if no address is given.
+        address: Address of a running scheduler, such as `tcp://head:8786`, or a scheduler file. Its
+            workers must have one thread each, because limits of time end a whole process.
 
     Raises:
         InputError: Dask is not installed, there is no scheduler, or a worker has several threads.
@@ -158,5 +159,5 @@ def _imported(module: str, extra: str) -> Any:
         return importlib.import_module(module)
     except ImportError as error:
         raise InputError(
-            f"--engine {extra} takes {module}: pip install 'graspproof[{extra}]'"
+            f"--engine {extra} needs {module}: pip install 'graspproof[{extra}]'"
         ) from error

@@ -1,4 +1,4 @@
-"""Grasps of a plan moved to better contacts on their faces, in parallel, with what that gained."""
+"""Moving the grasps of a plan to better contacts on their faces, in parallel."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,13 +14,13 @@ from grasp_core.values import Grasp
 from sim_validate.parallel.processes import each
 
 SAME_CONTACTS = 0.01
-"""Contacts closer than this, in object radii, are the same optimum: searches end some
+"""Distance below which contacts are the same optimum, in object radii; searches end some
 thousandths from it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Task:
-    """One grasp to move, as it travels to a worker."""
+    """One grasp to move, as it is sent to a worker."""
 
     body: Polyhedron
     grasp: Grasp
@@ -28,16 +28,16 @@ class _Task:
     finger_radius: float | None
     seed: int
     parts: int | None
-    """How many parts of the faces to bound; None for no bound."""
+    """Number of parts of the faces for the bound; None for no bound."""
 
 
 def improved(
     body: Polyhedron, found: Plan, *, finger_radius: float | None, parts: int | None, jobs: int,
     progress: Callable[[int, int, str], None],
 ) -> tuple[Plan, tuple[Moved, ...]]:  # fmt: skip
-    """The plan with its grasps moved, best quality first, and how each one changed.
+    """Move the grasps of a plan; return the plan, best quality first, and how each grasp changed.
 
-    The plan keeps one of several grasps that end at the same contacts.
+    The plan keeps only one of several grasps that end at the same contacts.
 
     Args:
         body: The object.

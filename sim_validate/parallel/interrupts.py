@@ -1,7 +1,7 @@
-"""Interrupts that are not lost: what a library swallows is raised again at the next step.
+"""Interrupts that are not lost: one that a library swallows is raised again at the next step.
 
 Python raises `KeyboardInterrupt` wherever the program is. Some compiled libraries clear errors that
-are not theirs there, and the program would run on. A request to end (SIGTERM) is such an interrupt.
+are not their own, and the program would run on. A request to end (SIGTERM) counts as an interrupt.
 """
 
 import signal
@@ -19,7 +19,7 @@ _noted = threading.Event()
 
 @contextmanager
 def noted() -> Generator[None, None, None]:
-    """Note interrupts beside raising them, as long as the context lasts."""
+    """Record interrupts, beside raising them, as long as the context lasts."""
     if threading.current_thread() is not threading.main_thread():
         yield  # Python handles signals in its main thread only
         return
@@ -35,7 +35,7 @@ def noted() -> Generator[None, None, None]:
 
 
 def _but_interrupts(tell: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Tell of errors that cannot be raised where they are, but of no interrupts: they are noted."""
+    """Report errors that cannot be raised where they occur; interrupts are recorded instead."""
     return lambda error: None if error.exc_type is KeyboardInterrupt else tell(error)
 
 
@@ -45,10 +45,10 @@ def _note(_: int, __: FrameType | None) -> None:
 
 
 def check() -> None:
-    """Raise an interrupt that was noted, for where it may have been swallowed.
+    """Raise an interrupt that was recorded, where a library may have swallowed it.
 
     Raises:
-        KeyboardInterrupt: There was one.
+        KeyboardInterrupt: An interrupt was recorded.
     """
     if _noted.is_set():
         _noted.clear()

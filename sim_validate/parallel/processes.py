@@ -1,4 +1,4 @@
-"""Work units on one or more processes of this machine, in order or one by one; the door to pebble.
+"""Work units on processes of this machine, in order or one by one; the only user of pebble.
 
 Results do not depend on the number of processes: a unit sees only its own arguments.
 """
@@ -15,35 +15,36 @@ Unit = TypeVar("Unit")
 Result = TypeVar("Result")
 
 SHARE = Path("/sys/fs/cgroup/cpu.max")
-"""Where Linux says how much of its processors a container may use: microseconds, of how many."""
+"""File in which Linux says how much of its processors a container may use: microseconds of use, per
+how many."""
 UNITS_PER_PROCESS = 8
-"""A process takes about a second to start, as long as eight validations: with fewer units for
-each, starting it does not pay."""
+"""Number of units per process from which on a further process pays: it takes about a second to
+start, as long as eight validations."""
 
 
 def available_cores() -> int:
-    """Cores that this process may use; of a container that is given a share, that share."""
+    """Number of cores that this process may use, limited by the share that its container has."""
     own = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     try:
         share, period = SHARE.read_text().split()
         return max(1, min(own or 1, int(share) // int(period)))
-    except (OSError, ValueError):  # no container, or one without a limit
+    except (OSError, ValueError):  # not in a container, or in one without a limit
         return own or 1
 
 
 def processes(units: int, jobs: int) -> int:
-    """How many processes so many units are worth, at least one."""
+    """Number of processes that pays for a number of units, at least one."""
     return max(1, min(jobs, units // UNITS_PER_PROCESS))
 
 
 def each(
     function: Callable[[Unit], Result], units: Sequence[Unit], *, jobs: int
 ) -> Iterator[Result]:
-    """Results of a function on each unit, in order, as they become ready.
+    """Yield the results of a function on each unit, in order, as they become ready.
 
     Args:
-        function: Importable by name; must not depend on anything but its argument.
-        units: What to do.
+        function: A function that can be imported by name and depends only on its argument.
+        units: The arguments, one for each call.
         jobs: Largest number of processes.
     """
     workers = processes(len(units), jobs)
@@ -59,7 +60,7 @@ def each(
 
 
 class Processes:
-    """Processes of this machine that do single tasks."""
+    """Processes of this machine that compute single tasks."""
 
     ended = ("ProcessExpired",)
 
@@ -68,13 +69,13 @@ class Processes:
         self._pool = pool
 
     def submit(self, function: Callable[[Unit], Result], unit: Unit, /) -> "Future[Result]":
-        """Have a function called; its future fails where the process ends."""
+        """Call a function in a process; its future fails if the process ends."""
         return self._pool.schedule(function, args=[unit])
 
 
 @contextmanager
 def local_processes(workers: int) -> Generator[Processes]:
-    """Processes of this machine, stopped afterwards, whatever they do."""
+    """Start processes on this machine, and stop them at the end, whatever they do."""
     with _pool(workers) as pool:
         yield Processes(pool, workers)
 

@@ -1,5 +1,5 @@
-"""What is in each file that is written or read?
+"""What does each file hold that is written or read?
 
-Verdicts, regions, setups and wrenches come in, or the text of their files. Text goes out, or
-checked values: one module a format, its schema included.
+One module per format turns verdicts, regions, setups or wrenches into text, or text into checked
+values. Its schema is part of it.
 """

@@ -1,4 +1,4 @@
-"""Analyses -> one JSON document, with units in the keys; wrenches are about each grasp's centre."""
+"""Analyses -> one JSON document with units in the keys; wrenches are about each grasp's centre."""
 
 import math
 from collections import Counter
@@ -15,12 +15,12 @@ from sim_validate.contact_analysis import Analysis, Bounds, Outcome, Question, R
 def analyses_to_document(
     source: str, question: Question, analyses: Sequence[Analysis], *, complete: bool
 ) -> dict[str, object]:
-    """The document of a file's grasps: the same for the same analyses.
+    """The document of a file's grasps; equal analyses give equal documents.
 
     Args:
-        source: What the contacts were read from.
-        question: What was asked.
-        analyses: One per grasp.
+        source: The name of the file that the contacts were read from.
+        question: The questions that were asked.
+        analyses: One analysis per grasp.
         complete: Whether every grasp of the file was analysed.
     """
     return {
@@ -35,7 +35,7 @@ def analyses_to_document(
 
 
 def summary(analyses: Sequence[Analysis]) -> dict[str, int]:
-    """How many grasps there were, and how many of each outcome."""
+    """Count the grasps, and the grasps of each outcome."""
     counts = Counter(analysis.outcome for analysis in analyses)
     return {"grasps": len(analyses)} | {outcome.value: counts[outcome] for outcome in Outcome}
 
@@ -97,7 +97,7 @@ def _resisted_record(found: Resisted | None) -> dict[str, object] | None:
 
 
 def _number(value: float | None) -> float | None:
-    """A number as JSON has it: null where it is unknown or infinite, and no minus zero."""
+    """A number for JSON: None where it is unknown or infinite, and no minus zero."""
     return None if value is None or not math.isfinite(value) else value + 0.0
 
 

@@ -1,4 +1,4 @@
-"""Reading a file of grasps, so that a refusal names the file."""
+"""Reading a file of grasps, with the file's name in every refusal."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -9,14 +9,14 @@ from grasp_core.values import Grasp
 from sim_validate.files.reading import read_text
 
 NAMED = 5
-"""Names that a message lists."""
+"""Largest number of names that a message lists."""
 
 
 def read_grasps(path: Path) -> SavedGrasps:
-    """The grasps of a `grasps.json`.
+    """Read the grasps of a `grasps.json`.
 
     Raises:
-        InputError: The file is missing, or is no such file; the message names it and the field.
+        InputError: The file is missing or invalid; the message names the file and the field.
     """
     text = read_text(path)
     try:
@@ -26,10 +26,11 @@ def read_grasps(path: Path) -> SavedGrasps:
 
 
 def grasp_with_id(path: Path, saved: SavedGrasps, wanted: str | None) -> Grasp:
-    """The grasp that is wanted; where there is only one it need not be named.
+    """Find the grasp with an id; the only grasp of a file needs none.
 
     Raises:
-        InputError: It is not there; the message, which begins with the path, lists some that are.
+        InputError: The grasp is not there; the message begins with the path and lists some that
+            are.
     """
     if wanted is None and len(saved.grasps) == 1:
         return saved.grasps[0]

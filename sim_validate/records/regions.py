@@ -1,4 +1,4 @@
-"""Certified regions in files: a proof per grasp, and one document for all."""
+"""Certified regions in files: one proof per grasp, and one document for all."""
 
 import hashlib
 import json
@@ -35,11 +35,11 @@ SHAPES: Mapping[str, tuple[int | None, ...]] = {
     "open_radius_m": (),
     **dict.fromkeys((*POLYGONS, *BORDERS), (None, 3)),
 }  # fmt: skip
-"""Of the arrays of a proof."""
+"""Shapes of the arrays of a proof, None for any length."""
 MOST_CORNERS = 1000
-"""Of a region's polygon in a file."""
+"""Largest number of corners of a region's polygon in a file."""
 SMALLEST_SCALE, LARGEST = 1e-6, 1e6
-"""Of proofs: of what lengths are relative to, and of any length [m]."""
+"""Least and largest length that proofs are relative to, and largest length in a proof [m]."""
 
 
 def write_regions(
@@ -48,16 +48,16 @@ def write_regions(
     asked: Asked,
     found: Iterable[Found],
 ) -> Mapping[str, Any]:
-    """Write proofs as they come, and then what was found; nothing where there is no folder.
+    """Write each proof as it comes, then the document; without a folder nothing is written.
 
     Args:
-        folder: For regions.json and the proofs.
+        folder: Folder for regions.json and the proofs, or None.
         body: The object.
         asked: How regions were certified.
         found: Each grasp with its regions.
 
     Returns:
-        What is in regions.json.
+        The content of regions.json.
     """
     records = [_record(grasp, proved, body, folder) for grasp, proved in found]
     document = {
@@ -80,7 +80,7 @@ def write_regions(
 def _record(
     grasp: Grasp, proved: CertifiedRegions | str, body: Polyhedron, folder: Path | None
 ) -> Mapping[str, Any]:
-    """What is told of a grasp; its proof is written, or one of before is removed."""
+    """The record of one grasp; its proof is written, or an earlier proof is removed."""
     named = {
         "id": grasp.id,
         "contacts_sha256": contacts_sha256(grasp.contacts),
@@ -127,7 +127,7 @@ def area_of(region: ContactRegion) -> float:
 def proof_arrays(
     proved: CertifiedRegions, grasp: Grasp, body: Polyhedron
 ) -> dict[str, NDArray[Any]]:
-    """Regions and their proof as arrays by name."""
+    """The regions of a grasp and their proof, as arrays by name."""
     cover, choice, wrench = proved.cover, proved.open_choice, proved.open_wrench
     polygons = [region.polygon for region in proved.regions]
     return {
@@ -152,10 +152,10 @@ def proof_arrays(
 
 
 def read_regions(path: str | Path) -> CertifiedRegions:
-    """Regions and their proof from a file that `graspproof regions` has written; not yet verified.
+    """Read regions and their proof, as `graspproof regions` writes them; nothing is verified yet.
 
     Raises:
-        InputError: The file is not such a one.
+        InputError: The file is not the proof of a grasp's regions.
     """
     path = path_of(path, "path")
     try:
@@ -165,14 +165,14 @@ def read_regions(path: str | Path) -> CertifiedRegions:
 
 
 def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
-    """The same from arrays by name.
+    """Build regions and their proof from arrays by name; nothing is verified yet.
 
     Raises:
-        InputError: One is missing, or of another shape.
+        InputError: An array is missing, or has another shape.
     """
     if missing := [name for name in SHAPES if name not in kept]:
         raise InputError(f"no array {missing[0]}; `graspproof regions` writes it")
-    limit = kept["open_radius_m"]  # infinite where nothing was found
+    limit = kept["open_radius_m"]  # infinite where no open choice was found
     finite = {
         **kept,
         "open_radius_m": np.where(np.isposinf(limit), 0.0, limit)
@@ -212,10 +212,10 @@ def _region(name: str, polygon: Array, normal: Array, scale: float) -> ContactRe
             f"{name}: expected {FEWEST_CORNERS} to {MOST_CORNERS} corners within {LARGEST:g} m"
         )
     try:
-        with np.errstate(invalid="ignore", divide="ignore"):  # edges without length have no answer
+        with np.errstate(invalid="ignore", divide="ignore"):  # edges without length divide by zero
             return ContactRegion("certified", polygon, _inscribed(polygon, normal, scale))
     except SolverError as error:
-        raise InputError(f"{name}: its corners are those of no convex polygon") from error
+        raise InputError(f"{name}: its corners do not form a convex polygon") from error
 
 
 def _inscribed(polygon: Array, normal: Array, scale: float) -> float:

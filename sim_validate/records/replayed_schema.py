@@ -12,7 +12,7 @@ Count = Annotated[int, Field(ge=0)]
 
 
 class _Record(BaseModel):
-    """Fields that are not needed are left alone."""
+    """A record whose unknown fields are ignored, because a replay does not need them."""
 
     model_config = ConfigDict(frozen=True, extra="ignore", strict=True)
 
@@ -55,7 +55,7 @@ class _Settings(_Record):
 
 
 class VerdictToReplay(_Record):
-    """One verdict."""
+    """One verdict of the file."""
 
     id: str
     contacts_sha256: str
@@ -66,7 +66,7 @@ class VerdictToReplay(_Record):
 
 
 class VerdictsToReplay(_Record):
-    """What `validate` writes."""
+    """The content of `verdicts.json`, as `validate` writes it."""
 
     object: _Object
     friction: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]

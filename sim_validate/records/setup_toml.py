@@ -1,4 +1,4 @@
-"""A setup in TOML: tables `physics`, `fingers`, `hold`, `limit`, `friction`, any part of each."""
+"""A setup in TOML: tables `physics`, `fingers`, `hold`, `limit`, `friction`, all optional."""
 
 import json
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, Lim
 from sim_validate.simulation.setup import Setup
 
 OURS = ("drive", "indentation")
-"""Fields of the fingers that trials set themselves."""
+"""Fields of the fingers that trials set themselves, so that no file may."""
 OF_USERS = {
     table: tuple(field.name for field in fields(kind) if field.name not in OURS)
     for table, kind in (
@@ -29,47 +29,47 @@ OF_USERS = {
         ("friction", FrictionProtocol),
     )
 }
-"""What a file may set, by table."""
+"""The fields that a file may set, by table."""
 
 
 def setup_from_file(path: Path, setup: Setup) -> Setup:
-    """The setup, with the numbers of a file in place of its own.
+    """Replace numbers of a setup by those of a file.
 
     Args:
         path: A TOML file.
-        setup: What holds where the file says nothing.
+        setup: The setup whose numbers stay where the file has none.
 
     Raises:
-        InputError: It is not such a file; the message names the field.
+        InputError: The file is missing or invalid; the message names the field.
     """
     return setup_from_tables(read_tables(path), setup, str(path))
 
 
 def setup_from_tables(tables: Mapping[str, Any], setup: Setup, path: str) -> Setup:
-    """The setup, with the numbers of tables in place of its own.
+    """Replace numbers of a setup by those of tables.
 
     Args:
-        tables: Settings by table.
-        setup: What holds where they say nothing.
-        path: Where they come from, for messages.
+        tables: The settings by table.
+        setup: The setup whose numbers stay where the tables have none.
+        path: Where the tables come from, for messages.
 
     Raises:
-        InputError: There is no such setting, or its value is refused.
+        InputError: A setting is unknown, or its value is refused.
     """
     for name, given in tables.items():
         if name not in OF_USERS or not isinstance(given, dict):
-            raise InputError(f"{path}: tables are {', '.join(OF_USERS)}; got {shown(name)}")
+            raise InputError(f"{path}: expected tables {', '.join(OF_USERS)}, got {shown(name)}")
         table = cast("dict[str, Any]", given)
         filled = _filled(path, name, getattr(setup, name), table)
         try:
             setup = replace(setup, **{name: filled})
-        except InputError as error:  # of a part that suits no prediction
+        except InputError as error:  # a part may be valid, but not fit the predictions
             raise InputError(f"{path}: [{name}] {error}") from error
     return setup
 
 
 def tables_of(setup: Setup) -> dict[str, dict[str, Any]]:
-    """What a file would say to have this setup."""
+    """The tables of a file that would give this setup."""
     return {
         table: {name: getattr(getattr(setup, table), name) for name in names}
         for table, names in OF_USERS.items()
@@ -77,7 +77,7 @@ def tables_of(setup: Setup) -> dict[str, dict[str, Any]]:
 
 
 def _filled(path: str, table: str, values: Any, given: dict[str, Any]) -> Any:
-    """A frozen value with some of its fields replaced, each checked against its type."""
+    """Replace some fields of a frozen value, each checked against its type."""
     for name in given:
         if name not in OF_USERS[table]:
             raise InputError(
@@ -89,7 +89,7 @@ def _filled(path: str, table: str, values: Any, given: dict[str, Any]) -> Any:
         checked: Any = TypeAdapter(kind).validate_json(text, strict=True)
     except ValidationError as error:
         raise InputError(f"{path}: [{table}] {complaint(error, kind)}") from error
-    except InputError as error:  # of the value's own checks
+    except InputError as error:  # raised by the value's own checks
         raise InputError(f"{path}: [{table}] {error}") from error
     return checked
 

@@ -24,13 +24,13 @@ SCHEMA = 1
 def verdicts_to_json(
     body: Polyhedron, friction: float, verdicts: Iterable[Verdict], gate: Gate, *, complete: bool
 ) -> str:
-    """The text of `verdicts.json`: the same for the same verdicts.
+    """The text of `verdicts.json`; equal verdicts give equal texts.
 
     Args:
         body: The object.
         friction: Coulomb coefficient tested.
         verdicts: One per grasp.
-        gate: What the simulator made of known cases.
+        gate: The checks of the simulator.
         complete: Whether every grasp of the plan was tested.
     """
     listed = list(verdicts)
@@ -51,7 +51,7 @@ def verdicts_to_json(
 
 
 def gate_record(gate: Gate) -> dict[str, object]:
-    """The gate's figures."""
+    """The record of the gate's checks."""
     return {
         "passed": gate.passed,
         "mujoco": gate.mujoco,
@@ -60,7 +60,7 @@ def gate_record(gate: Gate) -> dict[str, object]:
 
 
 def finite(value: Any) -> Any:
-    """The same tree with null for numbers that JSON does not have: what could not be measured."""
+    """Replace numbers that JSON lacks (NaN, infinity) by null throughout a tree."""
     if isinstance(value, dict):
         return {name: finite(part) for name, part in cast("dict[str, Any]", value).items()}
     if isinstance(value, list | tuple):
@@ -69,7 +69,7 @@ def finite(value: Any) -> Any:
 
 
 def summary(verdicts: Iterable[Verdict]) -> dict[str, int]:
-    """How many grasps and controls there were, how many of each held, and what was contradicted."""
+    """Count grasps and controls, how many of each held or let go, and the contradictions."""
     listed = list(verdicts)
     controls = [control for verdict in listed for control in verdict.controls]
     return {
@@ -193,7 +193,7 @@ def _settings(verdict: Verdict) -> dict[str, object]:
 
 
 def trace_arrays(verdict: Verdict) -> dict[str, Array]:
-    """How every contact moved over time in the trials of a grasp: arrays by trial and quantity."""
+    """Motion of every contact in the trials of a grasp: arrays by trial and quantity."""
     fields = ("times_s", "displacements_m", "shifts_m", "rotations_rad", "slips_m", "gaps_m")
     kept: Sequence[tuple[str, Any]] = [
         *((trial.name, trial.trace) for trial in verdict.wrenches if trial.trace is not None),

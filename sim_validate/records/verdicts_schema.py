@@ -1,4 +1,4 @@
-"""The fields of `verdicts.json` and `regions.json` that reports speak of, with their types."""
+"""The fields of `verdicts.json` and `regions.json` that reports use, with their types."""
 
 from typing import Annotated, Literal
 
@@ -14,7 +14,7 @@ Count = Annotated[int, Field(ge=0)]
 
 
 class _Record(BaseModel):
-    """Fields that are not spoken of are kept as they are."""
+    """A record that keeps fields without a declared type as they are."""
 
     model_config = ConfigDict(frozen=True, extra="allow", strict=True)
 
@@ -96,7 +96,7 @@ class _Verdict(_Record):
 
 
 class VerdictsFile(_Record):
-    """What `validate` writes."""
+    """The content of `verdicts.json`, as `validate` writes it."""
 
     schema_: Literal[1] = Field(alias="schema")
     object: _Object
@@ -114,7 +114,7 @@ class _Region(_Record):
 
 class _Proof(_Record):
     file: Annotated[str, Field(pattern=r"^proofs/[A-Za-z0-9][A-Za-z0-9_-]{0,99}\.npz$")]
-    """In the same folder."""
+    """Path of the proof, relative to the folder of the document."""
 
 
 class _GraspRegions(_Record):
@@ -127,7 +127,7 @@ class _GraspRegions(_Record):
 
 
 class RegionsFile(_Record):
-    """What `regions` writes."""
+    """The content of `regions.json`, as `regions` writes it."""
 
     schema_: Literal[3] = Field(alias="schema")
     object: _Object

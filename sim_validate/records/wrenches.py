@@ -1,9 +1,9 @@
-"""A task's wrenches in JSON: what a grasp must hold, as they are.
+"""A task's wrenches in JSON, which a grasp must hold as they are.
 
     {"wrenches": [{"name": "lift", "force_n": [0, 0, -3], "torque_n_m": [0, 0, 0]}, ...]}
 
-Torques are about the centre of mass; forces and torques in the object's frame. A torque may be
-left out.
+Torques are about the centre of mass; forces and torques are in the object's frame. A torque may be
+left out, which means zero.
 """
 
 from pathlib import Path
@@ -38,10 +38,10 @@ class _WrenchFile(BaseModel):
 
 
 def wrenches_from_file(path: Path) -> tuple[NamedWrench, ...]:
-    """The wrenches of a file.
+    """Read the wrenches of a file.
 
     Raises:
-        InputError: It is not such a file, or a wrench is refused.
+        InputError: The file is missing or invalid, or a wrench is refused.
     """
     text = read_text(path)
     try:
@@ -51,10 +51,10 @@ def wrenches_from_file(path: Path) -> tuple[NamedWrench, ...]:
 
 
 def wrenches_from_json(text: str) -> tuple[NamedWrench, ...]:
-    """The wrenches of the text of a file.
+    """Parse the wrenches in the text of a file.
 
     Raises:
-        InputError: It is not such a text, or a wrench is refused; the message names the field.
+        InputError: The text is invalid, or a wrench is refused; the message names the field.
     """
     given = record_of(_WrenchFile, text, "wrench file", nulls=False).wrenches
     names = set[str]()
@@ -76,11 +76,11 @@ def _named(given: _Given, number: int) -> NamedWrench:
 def weights(
     weight_n: float, downs: tuple[tuple[float, float, float], ...]
 ) -> tuple[NamedWrench, ...]:
-    """The object's weight at its centre of mass, for each direction of gravity.
+    """The object's weight at its centre of mass, as one wrench for each direction of gravity.
 
     Args:
-        weight_n: [N]
-        downs: Directions, of any length; along and against each axis if there are none.
+        weight_n: The weight [N].
+        downs: Directions of gravity, of any length; if there are none, along and against each axis.
     """
     ways = [np.array(down) for down in downs] or [*np.eye(3), *-np.eye(3)]
     return tuple(

@@ -1,5 +1,5 @@
 """What moved in one recorded trial?
 
-A verdict, a grasp or a dataset row comes in. The trial goes out, simulated again, with its motion
-sample by sample.
+This room takes a verdict, a grasp or a row of a dataset, simulates its trial again, and returns the
+motion sample by sample.
 """

@@ -15,10 +15,10 @@ from sim_validate.simulation.setup import Agenda, Setup
 
 
 def from_dataset(folder: Path, wanted: Wanted) -> Recorded:
-    """What the tables of a dataset say about a grasp or a control.
+    """Read a grasp or a control from the tables of a dataset.
 
     Raises:
-        InputError: It is damaged, or has no such row.
+        InputError: The dataset is damaged, or has no such row.
     """
     chosen = select(folder)
     if wanted.grasp is None or wanted.trial is not None or wanted.grasps is not None:
@@ -27,9 +27,7 @@ def from_dataset(folder: Path, wanted: Wanted) -> Recorded:
     row = next((row for row in chosen.rows("grasps") if row["grasp_id"] == name), None)
     if row is None or row["outcome"] == NOT_TRIED:
         there = some(row["grasp_id"] for row in islice(chosen.rows("grasps"), NAMED))
-        raise InputError(
-            f"{folder}: {name} is no grasp of it that was tried; there is {there}, ..."
-        )
+        raise InputError(f"{folder}: {name} is not among its tried grasps; it has {there}, ...")
     config = chosen.config()
     contacts = [
         Contact(point, normal)
@@ -38,7 +36,7 @@ def from_dataset(folder: Path, wanted: Wanted) -> Recorded:
     ]
     source = _source_name(chosen, row["object_id"])
     body = stored_body(folder, row["object_id"], source, config.faces)
-    if row["label"] == GIVEN:  # on curved surfaces such contacts have faces of their own
+    if row["label"] == GIVEN:  # on curved surfaces given contacts have faces of their own
         body = seat(body, row["contact_points_m"], row["contact_normals"]).body
     return Recorded(
         name=name,

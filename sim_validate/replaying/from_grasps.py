@@ -15,23 +15,23 @@ from sim_validate.validation.controls import negative_controls
 
 
 def grasps_behind(path: Path, content_sha256: str, friction: float) -> SavedGrasps:
-    """The grasps behind a file, at the friction that they were tried at.
+    """Read the grasps behind a file, at the friction that they were tried at.
 
     Raises:
-        InputError: They are missing, or of another object.
+        InputError: The grasps are missing, or belong to another object.
     """
     if not path.is_file():
-        raise InputError(f"{path}: the grasps are not there; name their file with --grasps")
+        raise InputError(f"{path}: this file of grasps is missing; name it with --grasps")
     saved = read_grasps(path)
     if saved.body.content_sha256 != content_sha256:
-        raise InputError(f"{path}: its object is another one than that of the file to replay")
+        raise InputError(f"{path}: its object is not that of the file to replay")
     return SavedGrasps(saved.body, friction, saved.seed, saved.grasps, saved.finger)
 
 
 def of_grasp(
     path: Path, saved: SavedGrasps, setup: Setup, agenda: Agenda, wanted: Wanted
 ) -> Recorded:
-    """A grasp of a file, or a control made from it."""
+    """Choose a grasp of a file, or a control made from it."""
     grasp = grasp_with_id(path, saved, wanted.grasp)
     found = Recorded(
         grasp.id, saved.body, grasp.contacts, saved.friction, setup, agenda,
@@ -65,7 +65,7 @@ def require_contacts(path: Path, grasp: Grasp, known: str) -> None:
     """Refuse a grasp whose contacts are not those that a file is about.
 
     Raises:
-        InputError: Their hash is another one than the file's.
+        InputError: The hash of the contacts is not the file's.
     """
     if contacts_sha256(grasp.contacts) != known:
         raise InputError(f"{path}: is about other contacts of {grasp.id} than the grasps have now")
@@ -75,7 +75,7 @@ def require_repeat(path: Path, trial: int, trials: int) -> None:
     """Refuse the number of a repeat with noise that a file does not have.
 
     Raises:
-        InputError: There were fewer.
+        InputError: The file has fewer repeats.
     """
     if trial >= trials:
         said = f"they are 0 to {trials - 1}" if trials else "there were none (--trials)"

@@ -28,15 +28,15 @@ GRASPS = "grasps.json"
 
 
 def from_verdicts(path: Path, text: str, wanted: Wanted) -> Recorded:
-    """What verdicts say about a grasp, a control or a repeat.
+    """Read a grasp, a control or a repeat from verdicts.
 
     Args:
-        path: Of the file, for messages; the grasps are beside it unless others are wanted.
-        text: What the file holds.
-        wanted: Which contact set.
+        path: Path of the file, for messages; the grasps are beside it unless `wanted` names others.
+        text: Text of the file.
+        wanted: Which contact set to read.
 
     Raises:
-        InputError: It is not what `validate` writes, or does not hold what is wanted.
+        InputError: The file is not what `validate` writes, or does not hold what is wanted.
     """
     try:
         record = record_of(VerdictsToReplay, text, "verdicts.json", schema=SCHEMA).model_dump()
@@ -54,16 +54,16 @@ def from_verdicts(path: Path, text: str, wanted: Wanted) -> Recorded:
 def of_verdict(
     path: Path, saved: SavedGrasps, verdict: Mapping[str, Any], wanted: Wanted
 ) -> Recorded:
-    """What one verdict says.
+    """Read a contact set from one verdict.
 
     Args:
-        path: Of its file, for messages.
-        saved: The grasps that it is among.
+        path: Path of its file, for messages.
+        saved: The grasps that it belongs to.
         verdict: An entry of the file.
-        wanted: Which contact set, with the grasp's id.
+        wanted: Which contact set to read, with the grasp's id.
 
     Raises:
-        InputError: It is about other contacts, or does not hold what is wanted.
+        InputError: The verdict is about other contacts, or does not hold what is wanted.
     """
     grasp = grasp_with_id(path, saved, wanted.grasp)
     require_contacts(path, grasp, verdict["contacts_sha256"])
@@ -73,7 +73,7 @@ def of_verdict(
 
 
 def _asked(path: Path, verdict: Mapping[str, Any]) -> tuple[Setup, Agenda]:
-    """How a verdict's trials were simulated, and which ones."""
+    """Rebuild the setup and agenda of a verdict's trials."""
     settings = verdict["settings"]
     tables = {name: settings[name] for name in OF_USERS}
     setup = setup_from_tables(tables, Setup(surface=settings["surface"]), str(path))
@@ -96,7 +96,7 @@ def _asked(path: Path, verdict: Mapping[str, Any]) -> tuple[Setup, Agenda]:
 def _with_outcomes(
     path: Path, found: Recorded, verdict: Mapping[str, Any], wanted: Wanted
 ) -> Recorded:
-    """The same with how its trials ended."""
+    """Add how the trials of a contact set ended."""
     if wanted.trial is not None:
         nothing: Mapping[str, Any] = {"trials": 0, "not_held": []}
         repeats: Mapping[str, Any] = verdict["robustness"] or nothing

@@ -11,14 +11,14 @@ from sim_validate.simulation.setup import Agenda, Setup
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """Which contact set of a file."""
+    """Which contact set of a file to replay."""
 
     grasp: str | None = None
-    """Its id; may be left out where there is one grasp only."""
+    """Id of the grasp; it may be left out where there is only one."""
     control: str | None = None
-    """A negative control made from it, by name."""
+    """Name of a negative control made from the grasp."""
     trial: int | None = None
-    """A repeat with noise, by number."""
+    """Number of a repeat with noise."""
     grasps: Path | None = None
     """The grasps.json behind verdicts, if it is not beside them."""
 
@@ -33,17 +33,17 @@ class Recorded:
     friction: float
     setup: Setup
     agenda: Agenda
-    """With the noise that was drawn."""
+    """Which trials were run, with the noise that was drawn."""
     control: str | None = None
-    """Which control they are; None for a grasp."""
+    """Name of the control; None for a grasp."""
     grasp: Grasp | None = None
-    """The grasp, where it is known as one."""
+    """The grasp, where the contacts are known as one."""
     trial: int | None = None
-    """The repeat with noise, if it is one."""
+    """Number of the repeat with noise, if it is one."""
     outcomes: Mapping[str, str | None] = field(default_factory=dict[str, str | None])
-    """How trials ended, by wrench; None where the file only says that it was not held."""
+    """How trials ended, by wrench; None where the file only says that the wrench was not held."""
     others: str | None = None
-    """How all others ended; None if the file does not say."""
+    """How all other trials ended; None if the file does not say."""
 
     def outcome_of(self, wrench: str) -> str | None:
         """How a trial ended; None if the file does not say."""
@@ -51,5 +51,5 @@ class Recorded:
 
     @property
     def usual(self) -> str | None:
-        """The first wrench that is known not to have been held."""
+        """The first wrench that is known not to have been held, if any."""
         return next((name for name, end in self.outcomes.items() if end != "held"), None)

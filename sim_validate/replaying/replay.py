@@ -1,6 +1,6 @@
-"""A recorded contact set on the bench again: one of its loads, held once more.
+"""A recorded contact set on the bench again: one of its loads is held once more.
 
-Trials of a scene do not touch each other, so one by itself moves as it did among the others.
+Trials of a scene do not influence each other, so one by itself moves as it did among the others.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,13 +30,13 @@ class Replayed:
     """One trial, simulated again."""
 
     name: str
-    """Of the wrench."""
+    """Name of the wrench."""
     load: Load
     predicted_limit: float | None
-    """Largest multiple of the wrench that the analysis says is resisted; None for contacts without
-    force closure, loaded with what nothing resists."""
+    """Largest multiple of the wrench that the analysis says is resisted. It is None for contacts
+    without force closure, whose loads nothing resists."""
     required_friction: float | None
-    """What the planned forces need; None where no forces balance the wrench."""
+    """Friction that the planned forces need; None where no forces balance the wrench."""
     friction: float
     hold: HoldVerdict
     watched: Watched
@@ -45,7 +45,7 @@ class Replayed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Held:
-    """A load, and how it is put on."""
+    """A load, and how it is applied."""
 
     load: Load
     predicted_limit: float | None
@@ -55,7 +55,7 @@ class _Held:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Case:
-    """Contacts in the grip of their fingers, and the loads there are."""
+    """Contacts squeezed by their fingers, and the loads that can be applied."""
 
     rig: Rig
     loads: Mapping[str, _Held]
@@ -66,11 +66,12 @@ def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
     """Simulate one trial again.
 
     Args:
-        recorded: What a file says.
-        wrench: Its name; the first that was not held, or else the hardest to hold, if None.
+        recorded: The contact set of a file.
+        wrench: Name of the wrench; None for the first that was not held, or else the hardest to
+            hold.
 
     Raises:
-        InputError: There is no such wrench, or nothing to simulate.
+        InputError: The wrench is unknown, or there is nothing to simulate.
     """
     case = _case(recorded)
     name = wrench or recorded.usual or _likeliest(recorded, case)
@@ -133,7 +134,7 @@ def _noisy(
 def _opened(
     body: Polyhedron, name: str, contacts: tuple[Contact, ...], friction: float, setup: Setup
 ) -> _Case:
-    """Contacts without force closure, as a control."""
+    """Prepare contacts without force closure as a control."""
     certificate = force_closure(*stacked(contacts), friction)
     if certificate.closed:
         raise InputError(f"{name}: its contacts are in force closure at friction {friction}")

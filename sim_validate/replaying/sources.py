@@ -1,7 +1,7 @@
 """A file or folder -> one contact set with its settings and how its trials ended.
 
-It may be a grasps.json (nothing is recorded then), a verdicts.json, the folder of a run, a
-baseline, or a dataset.
+The source may be a grasps.json (then no outcome is recorded), a verdicts.json, the folder of a run,
+a baseline, or a dataset.
 """
 
 from dataclasses import replace
@@ -31,15 +31,15 @@ VERDICTS = "verdicts.json"
 
 
 def recorded_in(source: Path, wanted: Wanted) -> Recorded:
-    """What a file or folder says about a contact set.
+    """Read a contact set from a file or folder.
 
     Args:
         source: The file or folder.
-        wanted: Which contact set.
+        wanted: Which contact set to read.
 
     Raises:
-        InputError: It is none of these, or does not hold what is wanted; the message lists what
-            there is.
+        InputError: The source is none of these, or does not hold what is wanted; the message lists
+            what there is.
     """
     if wanted.trial is not None and wanted.control is not None:
         raise InputError(
@@ -61,9 +61,7 @@ def recorded_in(source: Path, wanted: Wanted) -> Recorded:
     if "object" in record and "grasps" in record:
         saved = read_grasps(path)
         if wanted.trial is not None:
-            raise InputError(
-                f"{path}: says nothing of repeats with noise: give verdicts or a baseline"
-            )
+            raise InputError(f"{path}: records no repeats with noise: give verdicts or a baseline")
         agenda = Agenda(seed=saved.seed)
         return of_grasp(path, saved, setup_for(saved, None), agenda, wanted)
     raise InputError(

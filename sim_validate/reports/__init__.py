@@ -1,4 +1,4 @@
 """What do people see of a run?
 
-The folder of a run comes in. Charts and pages go out that open from disk.
+This room turns the folder of a run into charts, and into pages that open from disk.
 """

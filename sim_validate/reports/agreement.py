@@ -1,8 +1,9 @@
 """How far verdicts in JSON agree with the analysis: pairs of figures, and counts of trials.
 
-Four counts say whether a load was predicted to be resisted, and whether the object held. What was
-predicted to hold and did not, or the other way round, contradicts one of the two. As in `validate`,
-loads within `AGREEMENT` of their limit, and trials that say nothing, count as neither.
+Four counts say whether a load was predicted to be resisted, and whether the object held. A trial
+that was predicted to hold and did not, or the reverse, contradicts the analysis or the simulation.
+As in `validate`, loads within `AGREEMENT` of their limit, and trials that say nothing, count as
+neither.
 """
 
 import math
@@ -21,17 +22,17 @@ Record = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """One quantity as predicted and as simulated."""
+    """One quantity, predicted and simulated."""
 
     quantity: str
-    """With its unit."""
+    """Name of the quantity, with its unit."""
     pairs: tuple[tuple[float, float], ...]
-    """(predicted, simulated)"""
+    """Pairs (predicted, simulated)."""
     below: int = 0
-    """Cases that held at the least friction that is tried, and so have no figure."""
+    """Number of cases that held at the least friction that is tried, and so have no figure."""
 
     def differ(self) -> tuple[bool, ...]:
-        """Of each pair, whether it is a mismatch."""
+        """Whether each pair is a mismatch."""
         return tuple(abs(two - one) > AGREEMENT * one for one, two in self.pairs)
 
     @property
@@ -43,18 +44,18 @@ class Agreement:
 
 @dataclass(frozen=True, slots=True)
 class Quadrants:
-    """Trials by what was predicted and what happened."""
+    """Numbers of trials by what was predicted and what happened."""
 
     resisted_held: int = 0
     resisted_let_go: int = 0
     not_resisted_held: int = 0
     not_resisted_let_go: int = 0
     neither: int = 0
-    """Trials that say nothing, such as those that diverged, or are too near the limit."""
+    """Number of trials that say nothing, such as those that diverged, or are too near the limit."""
 
 
 def frictions_in(verdicts: Iterable[Record]) -> Agreement:
-    """Critical frictions; a simulated one of zero says that the least one tried was enough."""
+    """Critical frictions; a simulated one of zero means that the least one tried was enough."""
     found = [verdict["critical_friction"] for verdict in verdicts]
     measured = [each for each in found if each["simulated"] is not None]
     pairs = tuple((each["predicted"], each["simulated"]) for each in measured if each["simulated"])
@@ -62,7 +63,7 @@ def frictions_in(verdicts: Iterable[Record]) -> Agreement:
 
 
 def limits_in(verdicts: Iterable[Record]) -> Agreement:
-    """Sizes of the largest wrenches resisted."""
+    """Sizes of the largest wrenches that were resisted."""
     pairs = tuple(
         (size * trial["predicted_limit"], size * trial["simulated_limit"])
         for verdict in verdicts
@@ -74,13 +75,13 @@ def limits_in(verdicts: Iterable[Record]) -> Agreement:
 
 
 def wrench_size(verdict: Record, trial: Record) -> float:
-    """Of a trial's wrench [N], torques over the size of the grasp."""
+    """Size of a trial's wrench [N], with torques divided by the size of the grasp."""
     force, torque = np.reshape(trial["wrench"], (2, 3))
     return math.hypot(*force, *(torque / verdict["settings"]["grasp_size_m"]))
 
 
 def quadrants_in(verdicts: Sequence[Record]) -> Quadrants:
-    """Trials of grasps and of their controls; what controls are loaded with, nothing resists."""
+    """Count trials of grasps and of their controls; nothing resists the loads of controls."""
     counts = Counter[str]()
     for verdict in verdicts:
         counts.update(_place(trial, resisted(trial)) for trial in verdict["wrenches"])
@@ -98,7 +99,7 @@ def resisted(trial: Record) -> bool | None:
 
 
 def as_predicted(trial: Record) -> bool:
-    """Whether a trial ended as predicted, or as it might."""
+    """Whether a trial ended as predicted, or in a way that the prediction leaves open."""
     wanted = resisted(trial)
     ends = (HELD, *GONE) if wanted is None else (HELD,) if wanted else GONE
     return trial["outcome"] in ends
@@ -111,15 +112,15 @@ def _place(trial: Record, wanted: bool | None) -> str:
     return f"{'resisted' if wanted else 'not_resisted'}_{held}"
 
 
-"""An object of a JSON file."""
+"""Type of an object of a JSON file."""
 HELD = Outcome.HELD.value
 GONE = tuple(outcome.value for outcome in LET_GO)
 GOOD, BAD, QUIET = "good", "bad", "quiet"
-"""How news is; classes of it in pages."""
+"""Tones of a verdict, which are also classes in pages."""
 
 
 def said_of(verdict: Record | None) -> tuple[str, str]:
-    """What became of a grasp, and how good that is."""
+    """The verdict on a grasp in words, and its tone."""
     if verdict is None:
         return "not simulated", QUIET
     outcome, controls = str(verdict["outcome"]), verdict["controls"].values()
@@ -135,5 +136,5 @@ def said_of(verdict: Record | None) -> tuple[str, str]:
 
 
 def let_go(control: Record) -> bool:
-    """Whether each of a control's loads moved it, as the analysis says."""
+    """Whether each of a control's loads moved the object, as the analysis says."""
     return all(trial["outcome"] in GONE for trial in control["wrenches"])

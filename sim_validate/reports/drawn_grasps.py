@@ -1,7 +1,7 @@
-"""One grasp -> the pictures and charts of its page, in files; work for any process.
+"""One grasp -> the pictures and charts of its page, in files; any process can do the work.
 
-Charts of motion need a trial: the first that was not held, or else the weakest, is simulated again,
-which gives bit for bit what was judged, unless it was stopped then.
+Charts of motion need a trial. The first trial that was not held, or else the weakest wrench, is
+simulated again, which gives bit for bit what was judged, unless it was stopped then.
 """
 
 from dataclasses import dataclass, replace
@@ -31,49 +31,49 @@ from sim_validate.reports.wrench_charts import wrench_figure
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """A grasp to draw, as it travels to a worker."""
+    """A grasp to draw, as it is sent to a worker."""
 
     saved: SavedGrasps
     """The grasp alone, with its object."""
     friction: float
     verdict: Record | None
     regions: Record | None
-    """Certified ones."""
+    """Record of its certified regions, if any."""
     source: Path
-    """Of the verdict, for messages."""
+    """Path of the file with the verdict, for messages."""
     folder: Path
-    """Of the report."""
+    """Folder of the report."""
     name: str
-    """Of the files."""
+    """Beginning of the names of the grasp's files."""
     clip: bool
     """Whether to draw a clip of the trial, too."""
 
     @property
     def grasp(self) -> Grasp:
-        """With its certified regions, where there are any."""
+        """The grasp, with its certified regions if there are any."""
         return certified(self.saved.grasps[0], self.regions)
 
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """Files of a grasp, relative to the report's folder, and what they show."""
+    """Paths of a grasp's files, relative to the report's folder, and what they show."""
 
     picture: str
     wrenches: str | None
-    """None for contacts that are not in force closure at this friction."""
+    """Chart of wrenches; None for contacts that are not in force closure at this friction."""
     margins: str | None
     motion: str | None = None
-    """None where nothing was simulated."""
+    """Chart of motion; None where nothing was simulated."""
     clip: str | None = None
     trial: str = ""
-    """Name of the wrench of the trial."""
+    """Name of the trial's wrench."""
     outcome: str = ""
     no_clip: str = ""
     """Why a clip could not be drawn."""
 
 
 def tasks_of(run: RunFolder, folder: Path, prefix: str, clips: int) -> list[Task]:
-    """What there is to draw of a run: clips of so many grasps, those with bad news first."""
+    """List what there is to draw of a run, with clips of some grasps, those with problems first."""
     grasps = run.saved.grasps
     filmed = {each.id for each in sorted(grasps, key=lambda each: not run.alarms(each.id))[:clips]}
     return [
@@ -92,7 +92,7 @@ def tasks_of(run: RunFolder, folder: Path, prefix: str, clips: int) -> list[Task
 
 
 def certified(grasp: Grasp, record: Record | None) -> Grasp:
-    """The grasp with the regions of a record, if it has any."""
+    """Replace the regions of a grasp by those of a record, if it has any."""
     if record is None or record["regions"] is None:
         return grasp
     regions = [
@@ -106,7 +106,7 @@ def draw(task: Task) -> Drawn:
     """Write the files of one grasp.
 
     Raises:
-        InputError: Its verdict is about other contacts.
+        InputError: The verdict is about other contacts.
     """
     body, grasp = task.saved.body, task.grasp
     view = best_view(body, grasp)
@@ -161,7 +161,7 @@ def _written(task: Task, kind: str, ending: str, figure: Any) -> str:
 
 
 def largest_push(verdict: Record | None) -> float:
-    """Of each finger [N]."""
+    """Largest normal force of each finger [N]."""
     if verdict is None:
         return FingerSettings().max_normal_force_n
     return float(verdict["settings"]["fingers"]["max_normal_force_n"])

@@ -32,7 +32,7 @@ class Shown:
 
 
 def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown]) -> str:
-    """The text of the page."""
+    """Write the text of the page."""
     verdicts = all_verdicts(runs)
     cards = [_card(each) for each in shown]
     found = agreements(verdicts)
@@ -55,12 +55,12 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown]) -> str:
 
 
 def all_verdicts(runs: Iterable[RunFolder]) -> list[Record]:
-    """Verdicts of several runs, in order."""
+    """The verdicts of several runs, in order."""
     return [verdict for run in runs for verdict in run.verdicts.values()]
 
 
 def agreements(verdicts: Sequence[Record]) -> list[Agreement]:
-    """Critical frictions and, where they were simulated, limits."""
+    """Agreement of critical frictions and, where they were simulated, of limits."""
     frictions, limits = frictions_in(verdicts), limits_in(verdicts)
     return [frictions, limits] if limits.pairs else [frictions]
 
@@ -84,7 +84,7 @@ def _card(shown: Shown) -> dict[str, Any]:
 
 
 def _weakest(verdict: Record) -> float | None:
-    """The least of the limits [N], torques over the grasp's size."""
+    """The least of the limits [N], with torques divided by the grasp's size."""
     found = [
         trial["predicted_limit"] * wrench_size(verdict, trial)
         for trial in verdict["wrenches"]
@@ -138,7 +138,7 @@ def _about(run: RunFolder) -> Iterable[tuple[str, str]]:
 
 
 def _controls(verdicts: Sequence[Record]) -> list[dict[str, Any]]:
-    """How many of each kind were let go, and how many held."""
+    """Count the controls of each kind that were let go, held, or undecided."""
     kinds = dict[str, dict[str, Any]]()
     for verdict in verdicts:
         for name, control in verdict["controls"].items():

@@ -21,37 +21,38 @@ from scenes.drawing.pictures import check_drawn
 from scenes.fingertips import FingerSettings
 
 LONGITUDES, LATITUDES = 21, 11
-"""Nodes of a map: around, the first also the last, and from pole to pole."""
+"""Number of nodes of a map: around, where the first is also the last, and from pole to pole."""
 COLOURS = "cividis"
-"""From small to large; differs in brightness, too."""
+"""Colours from small to large values; they differ in brightness, too."""
 MILLI = 1e3
 USUAL_PUSH_N = FingerSettings().max_normal_force_n
 SAME = 12
-"""Decimals in which equal directions are equal."""
+"""Number of decimals to which equal directions agree."""
 NAMED = {
     "+x": (0.0, 0.0), "+y": (90.0, 0.0), "-y": (-90.0, 0.0), "+z": (0.0, 80.0), "-z": (0.0, -80.0),
     "-x": (172.0, 0.0),
 }  # fmt: skip
-"""Longitudes and latitudes at which directions are written [deg], those of z a little below."""
+"""Longitudes and latitudes at which directions are labelled [deg]; the labels of z are a little off
+the poles."""
 
 
 @in_style
 def margin_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, max_normal_force_n: float = USUAL_PUSH_N
 ) -> Any:
-    """Largest force and largest torque resisted, by direction.
+    """Draw the largest resisted force and torque in every direction.
 
     Args:
         body: The object.
-        grasp: On it, in force closure.
+        grasp: A grasp on the faces of `body`, in force closure.
         friction: Coulomb coefficient.
-        max_normal_force_n: Limit of each finger's push.
+        max_normal_force_n: Largest normal force of each finger [N].
 
     Returns:
         A matplotlib figure.
 
     Raises:
-        InputError: The grasp is none of the body, or not in force closure at this friction.
+        InputError: The grasp does not lie on the body, or is not in force closure at this friction.
     """
     check_drawn(body, grasp, friction, None)
     positive(max_normal_force_n, "max_normal_force_n")
@@ -76,7 +77,7 @@ def margin_figure(
 def _limits(
     body: Polyhedron, grasp: Grasp, friction: float, largest: float, wrenches: Array
 ) -> Array:
-    """Largest multiples of a map's wrenches, (LATITUDES, LONGITUDES); each is found once."""
+    """Largest multiples of a map's wrenches, (LATITUDES, LONGITUDES), each computed once."""
     different, same = np.unique(np.round(wrenches, SAME), axis=0, return_inverse=True)
     found = wrench_limits(
         grasp, None, friction, different, max_normal_force=largest, center=body.center_of_mass
@@ -86,7 +87,7 @@ def _limits(
 
 
 def _nodes() -> tuple[Array, Array]:
-    """Longitudes and latitudes of a map, (LATITUDES, LONGITUDES) each [rad]."""
+    """Longitudes and latitudes of a map's nodes, (LATITUDES, LONGITUDES) each [rad]."""
     around = np.linspace(-np.pi, np.pi, LONGITUDES)
     longitudes, latitudes = np.meshgrid(around, np.linspace(-0.5 * np.pi, 0.5 * np.pi, LATITUDES))
     return longitudes, latitudes
@@ -102,7 +103,7 @@ def directions_of_map() -> Array:
 
 
 def on_map(longitudes: Array, latitudes: Array) -> tuple[Array, Array]:
-    """Where directions [rad] are on a map: at most 2 aside, 1 up."""
+    """Project directions [rad] to a map, at most 2 to the side and 1 up."""
     scale = np.sqrt(1.0 + np.cos(latitudes) * np.cos(0.5 * longitudes))
     return 2.0 * np.cos(latitudes) * np.sin(0.5 * longitudes) / scale, np.sin(latitudes) / scale
 

@@ -1,4 +1,4 @@
-"""One trial over time, drawn: how far things moved, how hard fingers pushed, what friction bore."""
+"""Charts of one trial over time: how far things moved, how hard fingers pushed, friction used."""
 
 import math
 from typing import Any
@@ -12,18 +12,18 @@ from sim_validate.replaying.replay import Replayed
 
 MICRO = 1e6
 LEAST_UM = 1e-4
-"""Displacements below this are drawn as none."""
+"""Displacement below which the chart's axis ends [um]."""
 LEAST_PUSH = 1e-3
 """Share of a finger's largest push below which its friction says nothing."""
 
 
 @in_style
 def motion_figure(found: Replayed, threshold_m: float) -> Any:
-    """Displacement, normal forces, and friction used, over the time of one trial.
+    """Draw displacement, normal forces, and friction used, over the time of one trial.
 
     Args:
-        found: The trial.
-        threshold_m: Displacement that counts as motion.
+        found: The replayed trial.
+        threshold_m: Displacement that counts as motion [m].
 
     Returns:
         A matplotlib figure. Friction is lowered to the one under test at time zero.
@@ -56,7 +56,7 @@ def motion_figure(found: Replayed, threshold_m: float) -> Any:
 
 
 def friction_used(pushes: Array, friction: Array) -> Array:
-    """Tangential over normal force over friction, (n, k); NaN where fingers hardly push.
+    """Ratio of tangential to normal force over friction, (n, k); NaN where fingers hardly push.
 
     Args:
         pushes: Forces along (normal, tangent, tangent), (n, k, 3) [N].

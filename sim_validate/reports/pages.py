@@ -1,7 +1,7 @@
-"""Templates and values -> the text of pages; the door to jinja2.
+"""Templates and values -> the text of pages; the only module that uses jinja2.
 
-What is put into a page is escaped, and loses characters that do not print: names of files and
-objects come from anywhere.
+Values are escaped and lose unprintable characters, because names of files and objects come from
+anywhere.
 """
 
 import importlib
@@ -10,23 +10,23 @@ from pathlib import Path
 from typing import Any
 
 ASSETS = Path(__file__).parent / "assets"
-"""Templates, styles and scripts."""
+"""Folder of templates, styles and scripts."""
 NOTHING = "-"
-"""What stands for a number that there is none of."""
+"""Text that stands for a missing number."""
 
 
 def page(template: str, **values: object) -> str:
-    """A page's text.
+    """Fill a template with values.
 
     Args:
         template: File name of the template.
-        values: What it speaks of, by name.
+        values: Values that the template uses, by name.
     """
     return str(_environment().get_template(template).render(**values))
 
 
 def asset(name: str) -> str:
-    """The text of a style or script."""
+    """Read the text of a style or script."""
     return (ASSETS / name).read_text(encoding="utf-8")
 
 
@@ -46,7 +46,7 @@ def _environment() -> Any:
 
 
 def _printed(value: object) -> object:
-    """Text without control characters; anything else as it is."""
+    """Remove control characters from text; other values stay as they are."""
     if type(value) is not str or value.isprintable():
         return value
     return "".join(c if c.isprintable() or c == "\n" else " " for c in value)

@@ -1,4 +1,4 @@
-"""The folder of a run -> a folder of pages that opens from disk and asks no network."""
+"""The folder of a run -> a folder of pages that open from disk and need no network."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class Report:
     """A report that was written."""
 
     index: Path
-    """Its first page."""
+    """Path of its first page."""
     grasps: int
     no_clip: str
     """Why clips that were asked for are missing; empty if none is."""
@@ -50,23 +50,23 @@ def write_report(
     clips: int = 0,
     progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> Report:
-    """Write what a run has found as pages to look at.
+    """Write the results of a run as pages to look at.
 
     Args:
-        folder: Of a run, with its grasps.json; or of several runs, in folders.
-        out: Where to write; `report` in the folder if None.
+        folder: Folder of a run, with its grasps.json; or a folder of such folders.
+        out: Folder to write to; `report` in the folder if None.
         jobs: Largest number of processes; all cores if None.
-        limit: Draw only so many grasps per run, those with bad news before others; all if None.
-        clips: Also film the trials of so many grasps per run, those with bad news first, where
+        limit: Number of grasps to draw per run, those with problems before others; all if None.
+        clips: Number of grasps per run of which a trial is filmed, those with problems first, where
             there are graphics.
-        progress: Told how many grasps are drawn, of how many.
+        progress: Called with (drawn, total) after each grasp.
 
     Returns:
-        Where the report is.
+        The paths of the report, and why clips are missing.
 
     Raises:
-        InputError: The folder holds no run, a file in it is not what it should be, or the pages'
-            folder holds other things.
+        InputError: The folder holds no run, a file in it is invalid, or the pages' folder holds
+            other things.
     """
     folder = folder_of(path_of(folder, "folder"))
     out = folder / REPORT if out is None else path_of(out, "out")
@@ -112,7 +112,7 @@ def _written(
 def _grasp_pages(
     runs: tuple[RunFolder, ...], out: Path, drawn: list[Drawn], pages: list[str]
 ) -> Iterator[Shown]:
-    """Write a page for each grasp, and what is drawn of each object."""
+    """Write a page for each grasp, and a script with the drawing of each object."""
     place = 0
     for number, run in enumerate(runs):
         script = f"object-{number}.js"

@@ -1,4 +1,4 @@
-"""The files of a run -> what a report is made of."""
+"""The files of a run -> the values that a report is made of."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -25,25 +25,25 @@ SCHEMAS = {VERDICTS: VERDICTS_SCHEMA, REGIONS: REGIONS_SCHEMA}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunFolder:
-    """What `plan`, `validate` and `regions` have written into one folder."""
+    """The results that `plan`, `validate` and `regions` have written into one folder."""
 
     path: Path
     saved: SavedGrasps
     friction: float
-    """At which the grasps were tried; where they were not, at which they were planned."""
+    """Friction at which the grasps were tried; if they were not, at which they were planned."""
     verdicts: Mapping[str, Record]
-    """By the grasps' ids; empty if none was tried."""
+    """Verdicts by the grasps' ids; empty if no grasp was tried."""
     summary: Record
-    """All of `verdicts.json` but the verdicts; empty if there is none."""
+    """All of `verdicts.json` but the verdicts; empty if the file does not exist."""
     regions: Mapping[str, Record]
-    """Certified ones, by the grasps' ids; empty if there are none."""
+    """Records of certified regions, by the grasps' ids; empty if there are none."""
     regions_friction: float | None
-    """For which they are certified; None if there are none."""
+    """Friction for which the regions are certified; None if there are none."""
     left_out: int = 0
-    """Grasps of the files that are not among the `saved` ones."""
+    """Number of grasps in the files that are not among the `saved` ones."""
 
     def first(self, limit: int | None) -> "RunFolder":
-        """The run with so many of its grasps, those with bad news before others; all verdicts."""
+        """Keep some of the run's grasps, those with problems before others, and all verdicts."""
         grasps = self.saved.grasps
         if limit is None or len(grasps) <= limit:
             return self
@@ -54,7 +54,7 @@ class RunFolder:
         return replace(self, saved=replace(self.saved, grasps=kept), left_out=len(grasps) - limit)
 
     def alarms(self, name: str) -> bool:
-        """Whether there is bad news of a grasp."""
+        """Whether the verdict on a grasp is a problem."""
         return said_of(self.verdicts.get(name))[1] == BAD
 
     @property
@@ -65,20 +65,20 @@ class RunFolder:
 
     @property
     def verdicts_path(self) -> Path:
-        """Of the file, for messages."""
+        """Path of the verdicts, for messages."""
         return self.path / VERDICTS
 
 
 def folder_of(path: Path) -> Path:
-    """The folder that is meant by its own path, or by that of its grasps.json."""
+    """The folder that is named by its own path, or by the path of its grasps.json."""
     return path.parent if path.name == GRASPS else path
 
 
 def runs_in(folder: Path) -> tuple[RunFolder, ...]:
-    """The run in a folder, or those in the folders in it.
+    """Read the run in a folder, or the runs in its subfolders.
 
     Raises:
-        InputError: There is none, or a file is not what it should be.
+        InputError: There is no run, or a file is invalid.
     """
     folder = folder_of(folder)
     if not folder.is_dir():
@@ -87,7 +87,7 @@ def runs_in(folder: Path) -> tuple[RunFolder, ...]:
     found = [path for path in inside if (path / GRASPS).is_file()]
     if not found:
         raise InputError(
-            f"{folder}: has no {GRASPS}, nor has a folder in it; "
+            f"{folder}: has no {GRASPS}, and neither has a folder in it; "
             f"`graspproof run OBJECT --out {folder}` writes one"
         )
     own = found[0] == folder
@@ -114,7 +114,7 @@ def _run(path: Path) -> RunFolder:
 
 
 def _by_id(path: Path, records: Sequence[Record], saved: SavedGrasps) -> Mapping[str, Record]:
-    """Records of grasps, of the contacts that these have."""
+    """Index records by id, after a check that they are about the contacts that the grasps have."""
     contacts = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
     for each in records:
         if contacts.get(each["id"]) != each["contacts_sha256"]:
@@ -124,15 +124,15 @@ def _by_id(path: Path, records: Sequence[Record], saved: SavedGrasps) -> Mapping
             )
     found = {each["id"]: each for each in records}
     if len(found) < len(records):
-        raise InputError(f"{path}: a grasp is there twice; make the file anew, or remove it")
+        raise InputError(f"{path}: a grasp is listed twice; write the file again, or remove it")
     return found
 
 
 def _check_summary(path: Path, summary: Record, verdicts: Sequence[Record]) -> None:
-    """Refuse verdicts that say one thing in one place and another elsewhere.
+    """Refuse verdicts that contradict themselves.
 
     Raises:
-        InputError: They do.
+        InputError: A verdict or the summary contradicts another part of the file.
     """
     for number, each in enumerate(verdicts):
         if each["held"] != (each["outcome"] == Outcome.HELD):
@@ -155,7 +155,7 @@ def _check_summary(path: Path, summary: Record, verdicts: Sequence[Record]) -> N
 
 
 def _read(path: Path, kind: type[BaseModel], saved: SavedGrasps) -> Record | None:
-    """What a file about the same object holds; None where there is no file."""
+    """Read a file about the same object; None where the file does not exist."""
     if not path.is_file():
         return None
     schema = SCHEMAS[path.name]

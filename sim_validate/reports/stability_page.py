@@ -1,6 +1,6 @@
-"""What became of grasps in a run of tests -> a folder with a page and the same as JSON.
+"""The results of a run of tests -> a folder with a page, and the same data as JSON.
 
-A line is a dictionary of plain values, as it travels from test processes.
+A line is a dictionary of plain values, as test processes send it.
 """
 
 import json
@@ -26,8 +26,8 @@ def write_report(folder: Path, lines: Iterable[Line]) -> Path:
     """Write the page and the data.
 
     Args:
-        folder: Is made if it is not there.
-        lines: What became of each grasp: `test`, `grasp`, `status`, `why`, `before` and `after` as
+        folder: Folder to write to; it is made if it does not exist.
+        lines: How each grasp ended: `test`, `grasp`, `status`, `why`, `before` and `after` as
             baselines keep them, or None, `mesh_file` or None, and `mesh_note`, which may be empty.
 
     Returns:
@@ -58,7 +58,7 @@ def _page(lines: Sequence[Line]) -> str:
 
 
 def _row(line: Line) -> dict[str, Any]:
-    """What a row of the table says."""
+    """The contents of a row of the table."""
     after: Line = line["after"] or {}
     before: Line = line["before"] or {}
     trials = after.get("noisy_trials")
@@ -75,7 +75,7 @@ def _row(line: Line) -> dict[str, Any]:
 
 
 def _measured(name: str, before: Line, after: Line) -> tuple[str, str]:
-    """A figure, and what it was if that is another one."""
+    """A figure, and its former value if that differs."""
     now, was = _said(name, after), _said(name, before)
     return now, was if before and was != now else ""
 

@@ -1,7 +1,7 @@
 """A drawing -> the numbers of a page on which it can be turned.
 
-Lengths are whole thousandths of the object's radius from its centre of mass: finer than a screen,
-and a tenth of the text of full numbers.
+Lengths are whole thousandths of the object's radius from its centre of mass. That is finer than a
+screen, and takes a tenth of the text of full numbers.
 """
 
 import json
@@ -21,16 +21,16 @@ from scenes.drawing.views import best_view
 from sim_validate.reports.pages import asset, page
 
 UNITS = 1000.0
-"""Of length, in one object radius."""
+"""Units of length in one object radius."""
 
 
 def object_data(body: Polyhedron) -> list[dict[str, Any]]:
-    """What is drawn of an object, for all of its grasps."""
+    """The drawing of an object, which all of its grasps share."""
     return _data(glass(body), body)
 
 
 def grasp_data(body: Polyhedron, grasp: Grasp, friction: float) -> dict[str, Any]:
-    """What is drawn of a grasp besides the object, and from where it is seen first."""
+    """The drawing of a grasp without the object, and the view from which it is seen first."""
     beyond = drawing_of(body, grasp, friction)[len(glass(body)) :]
     return {
         "shapes": _data(beyond, body),
@@ -40,7 +40,7 @@ def grasp_data(body: Polyhedron, grasp: Grasp, friction: float) -> dict[str, Any
 
 
 def turntable_page(body: Polyhedron, grasp: Grasp, friction: float) -> str:
-    """A page by itself on which a grasp can be turned."""
+    """Write a page that stands alone and on which a grasp can be turned."""
     return page(
         "turntable.html",
         id=grasp.id,
@@ -55,7 +55,7 @@ def turntable_page(body: Polyhedron, grasp: Grasp, friction: float) -> str:
 
 
 def as_text(data: object) -> str:
-    """JSON that can stand inside a page: no tag begins in it."""
+    """Write JSON that can stand inside a page: no tag can begin in it."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 

@@ -1,10 +1,10 @@
-"""Which wrenches a grasp can apply, drawn: shadows of the wrench set on three planes.
+"""Charts of the wrenches that a grasp can apply: shadows of the wrench set on three planes.
 
 The set W of wrenches that contact forces with normal parts of sum 1 N can apply is convex, with a
-known support, so that its shadow on any plane is drawn exactly: the point of W farthest along each
-direction of the plane. The largest ball in W around zero, whose radius is the Ferrari-Canny
-quality, casts a disc. It touches W where its support is least; in a plane that holds this
-direction, the limiting facet is a line that touches disc and shadow.
+known support. So its shadow on any plane can be drawn exactly: it is bounded by the points of W
+farthest along each direction of the plane. The largest ball in W around zero, whose radius is the
+Ferrari-Canny quality, casts a disc. It touches W where its support is least; in a plane that holds
+this direction, the limiting facet is a line that touches disc and shadow.
 """
 
 from typing import Any
@@ -22,7 +22,7 @@ from scenes.drawing.pictures import check_drawn
 from scenes.drawing.views import View, best_view
 
 TURNS = 181
-"""Points on the border of a shadow, the first also the last."""
+"""Number of points on the border of a shadow; the first is also the last."""
 TINY = np.finfo(np.float64).tiny
 
 
@@ -30,19 +30,19 @@ TINY = np.finfo(np.float64).tiny
 def wrench_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None
 ) -> Any:
-    """Shadows of the wrench set: on a plane of the weakest direction, and of forces and torques.
+    """Draw shadows of the wrench set on a plane of its weakest direction, of forces and of torques.
 
     Args:
         body: The object.
-        grasp: On it.
+        grasp: A grasp on the faces of `body`.
         friction: Coulomb coefficient.
-        view: From where forces and torques are seen; as in the grasp's picture if None.
+        view: The view in which forces and torques are seen; None for that of the grasp's picture.
 
     Returns:
         A matplotlib figure.
 
     Raises:
-        InputError: The grasp is none of the body, or the friction is out of range.
+        InputError: The grasp does not lie on the body, or the friction is out of range.
     """
     check_drawn(body, grasp, friction, view)
     view = view or best_view(body, grasp)
@@ -81,14 +81,17 @@ def _weakest_plane(wrenches: WrenchSet, direction: Array) -> Array:
 
 
 def shadow_of(wrenches: WrenchSet, plane: Array) -> Array:
-    """Border of the shadow of an `l1` wrench set: of one contact each, at the rim of its cone.
+    """Border of the shadow of an `l1` wrench set.
+
+    Each point of the border is the wrench of one contact alone, whose force is at the rim of its
+    cone.
 
     Args:
-        wrenches: The set.
+        wrenches: The wrench set.
         plane: Two unit wrenches, (2, 6), rows.
 
     Returns:
-        Points, (TURNS, 2), counter-clockwise.
+        Points of the border, (TURNS, 2), counter-clockwise.
     """
     angles = np.linspace(0.0, 2.0 * np.pi, TURNS)
     ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)

@@ -1,5 +1,5 @@
-"""What moves when forces act on an object between fingertips?
+"""How does an object move when forces act on it between fingertips?
 
-A scene comes in, with schedules of forces, wrenches and friction. Traces of the motion go out, and
-what they mean: held or let go, critical friction, largest wrench.
+This room takes a scene and schedules of forces, wrenches and friction. It returns traces of the
+motion, and what they mean: held or let go, the critical friction, the largest wrench.
 """

@@ -1,10 +1,10 @@
 """The critical friction of a grasp in simulation: friction is lowered until the object lets go.
 
 Fingers squeeze with forces that balance at the predicted critical friction mu*, and need it. Above
-mu* these forces are inside their cones. Below it no balanced forces are with which all of these
-fingers push, so the object must move. Where two fingers alone need mu*, the others must push as
-well, or the object turns about the line between the two far above mu*: the forces are those just
-above mu* whose least push is largest.
+mu* these forces are inside their cones. Below mu* there are no balanced forces with which all of
+these fingers push, so the object must move. Where two fingers alone need mu*, the others must push
+as well: otherwise the object turns about the line between the two far above mu*. The forces used
+are therefore those just above mu* whose smallest push is largest.
 """
 
 from collections.abc import Callable
@@ -22,24 +22,25 @@ from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.simulate import Bench
 
 ABOVE = (5e-4, 1e-3, 2e-3, 3e-3)
-"""How far above the critical friction the forces are, tried in turn, relative to it: as far as the
-simulated friction is then above the critical one, too."""
+"""Excess of the friction for which forces are computed, relative to the critical friction. The
+values are tried in turn. The simulated critical friction is too high by the same excess."""
 LEAST_PUSH = 1e-3
-"""Least push that is enough, in largest pushes: with less than half of it boxes were seen to turn
-up to 9 % above their critical friction."""
+"""Least normal force that is enough, relative to the largest one. With less than half of it, boxes
+were seen to turn up to 9 % above their critical friction."""
 TILT = 2e-3
-"""Largest displacement, in grasp sizes and critical frictions: a tilt acts like as much friction,
-and servos hide five times as much, in largest normal forces."""
+"""Largest displacement, in grasp sizes times the critical friction. A tilt acts like that much
+additional friction; servos hide a force imbalance of five times as much, in largest normal
+forces."""
 
 
 @dataclass(frozen=True, slots=True)
 class CriticalFriction:
-    """Where the analysis puts the least friction, and where simulation finds it."""
+    """The critical friction that the analysis predicts, and the one that simulation finds."""
 
     predicted: float
     simulated: float | None = None
-    """The middle of a bracket; zero where a tiny friction is enough; None where it was not
-    measured, or not found near the prediction."""
+    """The middle of the bracket. It is zero if the object stays at `least_friction`, and None if
+    nothing was measured or found near the prediction."""
     bracket: tuple[float, float] | None = None
     """A friction at which the object slipped, and one at which it stayed."""
 
@@ -47,20 +48,21 @@ class CriticalFriction:
 def released_friction(
     bench: Bench, positions: Array, normals: Array, predicted: float, setup: Setup
 ) -> CriticalFriction:
-    """Critical friction on a bench; its scene's own friction does not matter.
+    """Measure the critical friction on a bench; the friction of its scene does not matter.
 
     Args:
-        bench: Where fingertips stand at the contacts.
-        positions: (k, 3) [m]
-        normals: (k, 3)
-        predicted: What the analysis says.
+        bench: The compiled scene whose fingertips stand at the contacts.
+        positions: Contact points, (k, 3) [m].
+        normals: Unit normals into the object, (k, 3).
+        predicted: The critical friction that the analysis predicts.
         setup: How trials are simulated.
 
     Raises:
-        UndecidedError: No forces with which every finger pushes were found just above it.
+        UndecidedError: No forces with which every finger pushes were found just above `predicted`.
     """
     protocol = setup.friction
     high = protocol.settling_friction * max(predicted, protocol.least_friction)
+    # The excess is relative, so a prediction of zero needs a friction to be relative to.
     least = max(predicted, 0.5 * protocol.least_friction)
     forces = forces_just_above(positions, normals, least)
     forces *= SQUEEZE * setup.fingers.max_normal_force_n
@@ -84,9 +86,9 @@ def released_friction(
 def bisected(
     stays: Callable[[list[float]], list[bool | None]], predicted: float, protocol: FrictionProtocol
 ) -> tuple[float, float] | None:
-    """Frictions between which the object begins to stay, near the predicted one.
+    """Bracket the friction at which the object begins to stay, near the predicted one.
 
-    None if it does so elsewhere, or if a trial says nothing about the object.
+    The result is None if the object begins to stay elsewhere, or if a trial says nothing about it.
     """
     for span in protocol.spans:
         lower, upper = (1.0 - span) * predicted, (1.0 + span) * predicted
@@ -104,10 +106,11 @@ def bisected(
 def forces_just_above(positions: Array, normals: Array, critical: float) -> Array:
     """Balanced forces that need almost exactly the critical friction, the largest push 1 N, (k, 3).
 
-    Those nearest to it with which every finger pushes enough, or else those farthest above.
+    These are the forces nearest to the critical friction with which every finger pushes enough. If
+    there are none, they are the forces for the largest friction in `ABOVE` that has any.
 
     Raises:
-        UndecidedError: None with which every finger pushes were found.
+        UndecidedError: No forces with which every finger pushes were found.
     """
     forces = None
     for above in ABOVE:

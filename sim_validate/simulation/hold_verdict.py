@@ -1,6 +1,6 @@
 """Trace -> outcome: held, or what went wrong, where and when.
 
-Pure, so that old traces can be judged again.
+The functions are pure, so that old traces can be judged again.
 """
 
 from collections.abc import Sequence
@@ -29,25 +29,29 @@ class Outcome(StrEnum):
 
 
 LET_GO = (Outcome.SLIPPED, Outcome.LOST_CONTACT)
-"""Endings that say that the object was not held; all others but `held` say nothing about it."""
+"""Outcomes that say that the object was not held. All other outcomes but `HELD` say nothing about
+whether it is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HoldVerdict:
-    """What a trace amounts to."""
+    """The outcome of a trial, with the figures that led to it."""
 
     outcome: Outcome
     reason: str
-    """What happened, in words; empty if it held."""
+    """What happened, in words; empty if the object was held."""
     displacement_m: float
-    """Largest while holding: motion between the contacts plus grasp size times rotation."""
+    """Largest displacement while holding [m]: motion of the point between the contacts plus grasp
+    size times rotation."""
     start_displacement_m: float
-    """Before that, while the object was loaded at high friction."""
+    """Displacement before friction was lowered, while the object was loaded at high friction
+    [m]."""
     rotation_rad: float
     slip_m: Array
-    """Largest tangential motion of each fingertip over its face, (k,)."""
+    """Largest tangential motion of each fingertip over its face, (k,) [m]."""
     failed_after_s: float | None
-    """When a threshold was first crossed."""
+    """When a threshold was first crossed [s], from the moment friction was lowered; None if
+    never."""
 
 
 def judge(trace: Trace, layout: Layout, protocol: HoldProtocol) -> HoldVerdict:
@@ -55,8 +59,8 @@ def judge(trace: Trace, layout: Layout, protocol: HoldProtocol) -> HoldVerdict:
 
     Args:
         trace: Motion from the moment friction was lowered.
-        layout: What was simulated; thresholds are relative to its grasp size.
-        protocol: Where the thresholds come from.
+        layout: The simulated layout; thresholds are relative to its grasp size.
+        protocol: The thresholds.
     """
     failing = _failing(trace, layout.grasp_size_m, protocol)
     first = int(failing[0]) if failing.size else None
@@ -73,18 +77,18 @@ def judge(trace: Trace, layout: Layout, protocol: HoldProtocol) -> HoldVerdict:
 
 
 def holds(trace: Trace, layout: Layout, protocol: HoldProtocol) -> bool | None:
-    """Whether a trace shows that the object is held; None if it says nothing about it."""
+    """Whether a trace shows that the object is held; None if the trace says nothing about it."""
     outcome = judge(trace, layout, protocol).outcome
     return outcome is Outcome.HELD if outcome in (Outcome.HELD, *LET_GO) else None
 
 
 def invalid_start(verdict: HoldVerdict, reasons: Sequence[str]) -> HoldVerdict:
-    """The same verdict for fingertips that cannot be where they were put."""
+    """Replace the outcome of a verdict because fingertips cannot be where they were put."""
     return replace(verdict, outcome=Outcome.INVALID_START, reason="; ".join(reasons))
 
 
 def _failing(trace: Trace, size: float, protocol: HoldProtocol) -> Indices:
-    """Samples in which a threshold is crossed."""
+    """Indices of the samples in which a threshold is crossed."""
     moved = trace.displacements_m >= protocol.hold_threshold * size
     strayed = trace.start_m + trace.displacements_m >= protocol.total_threshold * size
     apart = (trace.gaps_m > protocol.gap_threshold * size).any(axis=1)
@@ -111,7 +115,7 @@ def _outcome(
 def _how_it_let_go(
     trace: Trace, layout: Layout, protocol: HoldProtocol, first: int
 ) -> tuple[Outcome, str]:
-    """Which finger lost its face, or slid the farthest, when the first threshold was crossed."""
+    """Name the finger that lost its face, or slid the farthest, at the first crossed threshold."""
     gaps, slips = trace.gaps_m[first], trace.slips_m[first]
     rolled = np.flatnonzero([not on for on in _on_faces(trace.touched_m[first], layout)])
     if rolled.size:
@@ -127,7 +131,7 @@ def _how_it_let_go(
 
 
 def _on_faces(touched: Array, layout: Layout) -> list[bool]:
-    """Whether each point is on the face of its contact; so are contacts whose face is not known."""
+    """Whether each point is on its contact's face; True where that face is not known."""
     return [
         not border or any(within(point, piece, frame[:, 0], 0.0) for piece in border)
         for point, border, frame in zip(touched, layout.borders, layout.frames, strict=True)

@@ -1,4 +1,4 @@
-"""Which wrenches a grasp is tested with, how far each is resisted, and the planned forces."""
+"""The wrenches a grasp is tested with, how far each is resisted, and the planned forces."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,22 +16,22 @@ from sim_validate.simulation.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, S
 from sim_validate.simulation.wrench_limits import part
 
 NO_PUSH = 1e-9
-"""Normal forces below this, in largest ones, are none."""
+"""Normal forces below this, relative to the largest one, count as zero."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedLoad:
-    """One wrench to hold, and what the analysis says about it."""
+    """One wrench to hold, with what the analysis predicts about it."""
 
     name: str
     load: Load
-    """What is applied, and the forces planned for it."""
+    """The wrench that is applied, and the forces planned for it."""
     predicted_limit: float
     """Largest multiple of the wrench that the analysis says is resisted."""
     limit: Load
     """The wrench at that multiple, and the forces that balance it."""
     required_friction: float
-    """What the planned forces need."""
+    """The friction that the planned forces need."""
 
 
 def planned_loads(
@@ -42,15 +42,15 @@ def planned_loads(
     agenda: Agenda,
     setup: Setup,
 ) -> tuple[PlannedLoad, ...]:
-    """The loads of an agenda, in its order: axes, weakest, random, a user's own.
+    """Build the loads of an agenda in its order: axes, weakest, random, a user's own.
 
     Args:
         body: The object.
-        contacts: In force closure at this friction.
+        contacts: Contacts in force closure at this friction.
         friction: Coulomb coefficient at every contact.
-        idle: No wrench, and the forces of the gentle grasp.
-        agenda: Which wrenches.
-        setup: The largest normal force, and the share of the limit that is applied.
+        idle: The load without a wrench: only the forces of the gentle grasp.
+        agenda: The wrenches to apply.
+        setup: The settings with the largest normal force and the applied share of the limit.
     """
     resisted, (_, normals) = _resisted(body, contacts, friction, setup), stacked(contacts)
     share = setup.hold.load_share
@@ -71,15 +71,15 @@ def loads_as_they_are(
     wrenches: Sequence[tuple[str, Array]],
     setup: Setup,
 ) -> tuple[PlannedLoad, ...]:
-    """Given wrenches as loads on contacts.
+    """Build loads from wrenches that are applied as they are given.
 
     Args:
         body: The object.
-        contacts: In force closure at this friction.
+        contacts: Contacts in force closure at this friction.
         friction: Coulomb coefficient at every contact.
-        idle: No wrench, and the forces of the gentle grasp.
-        wrenches: To hold as they are, by name, (6,) each [N, N m].
-        setup: The largest normal force.
+        idle: The load without a wrench: only the forces of the gentle grasp.
+        wrenches: Named wrenches to hold, (6,) each [N, N m].
+        setup: The settings with the largest normal force.
     """
     resisted, (_, normals) = _resisted(body, contacts, friction, setup), stacked(contacts)
     return tuple(
@@ -102,7 +102,7 @@ def _resisted(
 def _relative(
     resisted: WrenchBody, torque_scale: float, agenda: Agenda
 ) -> list[tuple[str, WrenchLimit]]:
-    """Wrenches that are applied at a share of what is resisted, with that limit."""
+    """Name the wrenches that are applied at a share of their limit, and compute that limit."""
     axes = [resisted.limit(wrench) for wrench in axis_wrenches(torque_scale)]
     weakest = resisted.weakest_from(axes, torque_scale)
     rng = np.random.default_rng(agenda.seed)
@@ -116,7 +116,7 @@ def _relative(
 def _load(
     name: str, found: WrenchLimit, multiple: float, idle: Load, normals: Array
 ) -> PlannedLoad:
-    """A multiple of a wrench with forces between those at rest and those at the limit."""
+    """Apply a multiple of a wrench, with forces between those at rest and those at the limit."""
     wrench = to_digits(multiple * found.wrench)
     predicted = found.limit / multiple
     limit = Load(predicted * wrench, to_digits(found.forces))
@@ -126,7 +126,7 @@ def _load(
 
 
 def _needed(forces: Array, normals: Array) -> float:
-    """Friction that forces (k, 3) need."""
+    """The friction that forces (k, 3) need: the largest ratio of tangential to normal force."""
     along, across = normal_and_tangential(forces, normals)
     pushing = along > NO_PUSH * along.max()
     return float(to_digits((across[pushing] / along[pushing]).max()))

@@ -1,12 +1,12 @@
 """Seeded noise on a grasp: where the object stands, how its surface leans, friction, mass.
 
-The fingers come along their planned lines, but the object stands a little elsewhere, so each
-contact is where such a line enters the same face (on a curved object, the surface near it), if it
-does. There the surface leans a little from its model. Friction is the same at all contacts; mass
-scales the simulated mass and every load. Loads turn with the object.
+The fingers come along their planned lines, but the object is displaced. Each contact is where such
+a line enters the same face (on a curved object, the surface near the planned contact), if it does.
+There the surface leans a little from its model. Friction is the same at all contacts; mass scales
+the simulated mass and every load. Loads turn with the object.
 
-All is drawn from normal distributions; friction and mass are multiplied by the exponential of
-what is drawn. The draws of a trial depend on the seed and its number only, so that they are the
+All noise is drawn from normal distributions; friction and mass are multiplied by the exponential of
+what is drawn. The draws of a trial depend only on the seed and the trial's number. So they are the
 same for every grasp, and only larger with more noise.
 """
 
@@ -24,28 +24,28 @@ from grasp_core.values import Contact, Grasp
 from sim_validate.simulation.traces import rotated
 
 STREAM = 1
-"""Of random numbers; others with the same seed share none of them."""
+"""Number of the random stream of noise; other streams with the same seed share no draws with it."""
 LARGEST = {"shift": 1.0, "turn_deg": 45.0, "normal_deg": 45.0, "friction": 1.0, "mass": 1.0}
 
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """How uncertain things are, as standard deviations.
+    """How uncertain a grasp is, as standard deviations.
 
     Raises:
         InputError: A number is negative or out of its range.
     """
 
     shift: float = 0.01
-    """Of the object's position along each axis, in object radii."""
+    """Deviation of the object's position along each axis, in object radii."""
     turn_deg: float = 1.0
-    """Of its orientation about each axis, through its centre of mass."""
+    """Deviation of its orientation about each axis, through its centre of mass [deg]."""
     normal_deg: float = 1.0
-    """Of the surface at each contact, about two axes in it."""
+    """Deviation of the surface normal at each contact, about two axes in the surface [deg]."""
     friction: float = 0.05
-    """Of the friction, relative to it."""
+    """Deviation of the friction, relative to it."""
     mass: float = 0.05
-    """Of the mass and with it of every load, relative to them."""
+    """Deviation of the mass and with it of every load, relative to them."""
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
@@ -54,29 +54,30 @@ class Noise:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Disturbed:
-    """A grasp as noise makes it."""
+    """A grasp under one draw of noise."""
 
     landed: tuple[Contact, ...]
-    """Where fingers meet the surface, with the model's normals; fewer if some miss it."""
+    """Where fingers meet the surface, with the model's normals; fewer than k contacts if some
+    miss."""
     contacts: tuple[Contact, ...]
-    """The same with the normals of the trial."""
+    """The contacts in `landed`, with the leaning normals of the trial."""
     missed: tuple[int, ...]
-    """Fingers whose lines pass beside their faces."""
+    """Indices of the fingers whose lines pass beside their faces."""
     friction: float
     mass: float
-    """Relative to what was planned."""
+    """Mass of the trial, relative to the planned mass."""
 
 
 def disturbed(
     body: Polyhedron, grasp: Grasp, friction: float, noise: Noise, draw: tuple[int, int]
 ) -> Disturbed:
-    """A grasp with noise.
+    """Disturb a grasp by one draw of noise.
 
     Args:
         body: The object.
-        grasp: On its faces.
+        grasp: A grasp on the faces of `body`.
         friction: Coulomb coefficient that was planned with.
-        noise: How much of it.
+        noise: The standard deviations.
         draw: The seed, and the number of the trial.
     """
     seed, number = draw
@@ -84,6 +85,7 @@ def disturbed(
     shift, turn = noise.shift * body.radius * rng.normal(size=3), rng.normal(size=3)
     slipperiness, heaviness = rng.normal(size=2)
     leaning = math.radians(noise.normal_deg) * rng.normal(size=(len(grasp.contacts), 2))
+    # Turning the object is the same as turning the fingers' lines back.
     back = _quaternion(-math.radians(noise.turn_deg) * turn)
     center = body.center_of_mass
     points = rotated(back, grasp.positions - center - shift) + center
@@ -112,13 +114,13 @@ def _quaternion(rotation: Array) -> Array:
 
 
 def _leaning(normal: Array, lean: Array) -> Array:
-    """A normal turned about an axis across it, given along the tangents [rad]."""
+    """Turn a normal about an axis in the surface, given by its tangential coordinates [rad]."""
     tangents = contact_frames(normal[None])[0, :, 1:]
     return rotated(_quaternion(tangents @ lean), normal)
 
 
 def _landing(body: Polyhedron, face: int, point: Array, way: Array) -> Contact | None:
-    """Where a line enters a face, or a curved object's surface, next to a point."""
+    """Where a line enters a face, or a curved object's surface next to a point; None if nowhere."""
     if body.patches is None:
         plane = body.faces[face]
         at = _crossing(plane.centroid[None], plane.normal[None], point, way)[0]
@@ -141,7 +143,7 @@ def _landing(body: Polyhedron, face: int, point: Array, way: Array) -> Contact |
 
 
 def _crossing(points: Array, normals: Array, point: Array, way: Array) -> Array:
-    """Where a line enters each of n planes, (n, 3); NaN where it does not."""
+    """Points where a line enters each of n planes, (n, 3); NaN where it does not."""
     falling = normals @ way
     entering = falling > 0.0
     share = np.einsum("ni,ni->n", normals, points - point) / np.where(entering, falling, np.nan)

@@ -1,8 +1,8 @@
-"""Acceptance rules of other grasp validators, so that a user sees what each would have accepted.
+"""Acceptance rules of other grasp validators: what each would have accepted.
 
-None of them applies a torque: an object is pulled or weighed along the six directions of the
-axes, and is accepted if it roughly stays. Here they judge the traces of our own trials, which
-are shorter (0.4 s) than theirs (0.5 to 2 s), with forces that are planned, not merely closed.
+None of them applies a torque: an object is pulled or weighed along the six directions of the axes,
+and is accepted if it roughly stays. Here they judge the traces of our own trials, which are shorter
+(0.4 s) than theirs (0.5 to 2 s), with forces that are planned, not merely closed.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,11 +27,11 @@ class Rule:
     name: str
     source: str
     accepts: Callable[[Trace, Layout, HoldProtocol], bool]
-    """Whether one trial passes; all six must."""
+    """Function that decides whether one trial passes; all six trials must."""
 
 
 def accepted(rule: Rule, trials: Sequence[Trace], layout: Layout, protocol: HoldProtocol) -> bool:
-    """Whether a rule accepts a grasp by the trials of its six forces, all of them to their end."""
+    """Whether a rule accepts a grasp: all trials of its six forces must end and pass."""
     return all(not trace.fault and rule.accepts(trace, layout, protocol) for trace in trials)
 
 
@@ -64,10 +64,10 @@ RULES = {
 
 
 def rules_named(names: Sequence[str]) -> tuple[Rule, ...]:
-    """Rules by name.
+    """Look up rules by name.
 
     Raises:
-        InputError: There is none of such a name.
+        InputError: A name is not the name of a rule.
     """
     unknown = [name for name in names if name not in RULES]
     if unknown:

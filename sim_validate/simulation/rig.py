@@ -1,4 +1,4 @@
-"""An object squeezed on the bench: from there the wrench holds, ramps and releases start."""
+"""An object squeezed on the bench; the wrench holds, ramps and releases start from there."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,44 +19,44 @@ class Watched:
     """One hold from the closed fingers to its end."""
 
     joints: Array
-    """As in `Motion`, (n, 7 + 3k)."""
+    """Joint positions as in `Motion.joints`, (n, 7 + 3k)."""
     trace: Trace
-    """From the moment friction was lowered."""
+    """The trace from the moment friction was lowered."""
     times_s: Array
-    """Of the samples before and after that moment, which is at zero, (n,)."""
+    """Times of the samples, zero at the moment friction was lowered, (n,) [s]."""
     pushes_n: Array
-    """What each fingertip's servos push with, along the axes of its contact, (n, k, 3)."""
+    """Forces of each fingertip's servos along the axes of its contact, (n, k, 3) [N]."""
     friction: Array
-    """In each sample, (n,)."""
+    """Friction in each sample, (n,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """An object in the grip of its fingers, unloaded."""
+    """An unloaded object squeezed by its fingers."""
 
     bench: Bench
     setup: Setup
     friction: float
-    """At which it is to be held."""
+    """The friction at which the object is to be held."""
     idle: Load
-    """No wrench, and the forces that squeeze it."""
+    """The load without a wrench: only the forces that squeeze the object."""
     closed: Motion | None
-    """How the fingers closed; None for rigid ones, which are put where they are."""
+    """How the fingers closed; None for rigid fingers, which are put where they are."""
 
     def hold(
         self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None
     ) -> tuple[Trace, ...]:
-        """Motion under each load, from the moment friction is lowered.
+        """Simulate a hold under each load and trace it from the moment friction is lowered.
 
         Args:
-            loads: What to hold.
-            settling_frictions: Friction until then, one for each load; a multiple of that to hold
-                at if None.
+            loads: The loads to hold.
+            settling_frictions: Friction of each load until then; None for the protocol's multiple
+                of the friction to hold at.
         """
         return self._traces(self._holds(loads, settling_frictions))
 
     def watch(self, load: Load, settling_friction: float | None = None) -> Watched:
-        """One load, held as above, with all that moved since the fingers closed."""
+        """Simulate one hold as `hold` does, and keep all motion since the fingers closed."""
         settling = None if settling_friction is None else [settling_friction]
         (schedule,) = self._holds([load], settling)
         (motion,) = self.bench.run([schedule], self.closed and self.closed.state)
@@ -86,7 +86,7 @@ class Rig:
     def ramp(
         self, limits: Sequence[Load], shares: tuple[float, float]
     ) -> tuple[tuple[Trace, ...], Array]:
-        """Motion while each load rises between two shares of itself, and the shares (n,)."""
+        """Raise each load between two shares of itself; return the motions and the shares (n,)."""
         clock, protocols = self.bench.clock, (self.setup.hold, self.setup.limit)
         rises = [
             schedules.ramp(self.idle, load, shares, self.friction, clock, protocols)
@@ -95,7 +95,7 @@ class Rig:
         return self._traces([schedule for schedule, _ in rises]), rises[0][1]
 
     def release(self, settling_friction: float, frictions: Sequence[float]) -> tuple[Trace, ...]:
-        """Motion of the unloaded object after friction is lowered to each of several values."""
+        """Lower the friction of the unloaded object to each of several values, and trace it."""
         return self._traces(self._releases(settling_friction, frictions))
 
     def _releases(self, settling_friction: float, frictions: Sequence[float]) -> list[Schedule]:
@@ -110,7 +110,7 @@ class Rig:
         return self._joints(self._holds(loads, None))
 
     def motions_of_releases(self, settling_friction: float, frictions: Sequence[float]) -> Array:
-        """The same, of the unloaded object after friction is lowered to each of several values."""
+        """Joint positions after each release, from the closed fingers on, (trials, n, 7 + 3k)."""
         return self._joints(self._releases(settling_friction, frictions))
 
     def _joints(self, trials: Sequence[Schedule]) -> Array:
@@ -129,15 +129,15 @@ class Rig:
 
 
 def pushes(planned: Array, joints: Array, layout: Layout) -> Array:
-    """What the servos push fingertips with: the planned forces, less what their springs gave way.
+    """The forces of the servos: the planned forces, less what their springs gave way.
 
     Args:
-        planned: Forces that the fingers are told to apply, (n, k, 3) [N], world axes.
-        joints: As in `Motion`, (n, 7 + 3k) [m].
-        layout: Of the scene, with fingertips on slides.
+        planned: Forces that the fingers are commanded to apply, (n, k, 3) [N], world axes.
+        joints: Joint positions as in `Motion.joints`, (n, 7 + 3k) [m].
+        layout: Layout of the scene, with fingertips on slides.
 
     Returns:
-        Along the axes of the contacts, (n, k, 3) [N]. At rest, the contact forces.
+        Forces along the axes of the contacts, (n, k, 3) [N]; at rest they are the contact forces.
     """
     local = np.einsum("kij,nki->nkj", layout.frames, planned)
     forces = local - layout.drive.stiffness_n_per_m * joints[:, 7:].reshape(local.shape)
@@ -152,11 +152,11 @@ def squeezed(
     """Close the fingers of a bench on the unloaded object.
 
     Args:
-        bench: With a scene whose fingers are driven by servos.
+        bench: A bench whose scene has fingers driven by servos.
         setup: How trials are simulated.
         forces: Planned forces, (k, 3) [N].
-        friction: At which the object is to be held.
-        settling_friction: While closing; a multiple of `friction` if None.
+        friction: Friction at which the object is to be held.
+        settling_friction: Friction while closing; None for a multiple of `friction`.
     """
     high = settling_friction or setup.hold.settling_friction * friction
     (closed,) = bench.run([schedules.squeeze(forces, high, bench.clock, setup.hold)])

@@ -1,8 +1,7 @@
-"""What is applied to an object over the time of one trial, sample by sample: no simulator here.
+"""Schedules: what is applied to an object in each sample of one trial. No simulator is used here.
 
-Every trial is a schedule: the forces planned for the fingers, the external wrench and the
-friction in each sample. Between loads they change smoothly, for with a sudden start long objects
-spring loose.
+Every trial is a schedule: the forces planned for the fingers, the external wrench and the friction
+in each sample. Loads change smoothly, because long objects spring loose under a sudden start.
 """
 
 from dataclasses import dataclass
@@ -18,9 +17,9 @@ class Load:
     """An external wrench with the contact forces planned to balance it."""
 
     wrench: Array
-    """(6,) [N, N m], about the centre of mass, world axes."""
+    """External wrench, (6,) [N, N m], torque about the centre of mass, world axes."""
     forces: Array
-    """(k, 3) [N], world axes."""
+    """Contact forces on the object, (k, 3) [N], world axes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,9 +27,9 @@ class Schedule:
     """Loads and friction in the n samples of a trial."""
 
     wrenches: Array
-    """(n, 6)"""
+    """(n, 6) [N, N m]"""
     forces: Array
-    """(n, k, 3)"""
+    """(n, k, 3) [N]"""
     friction: Array
     """(n,)"""
     watched: int
@@ -39,7 +38,7 @@ class Schedule:
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """Durations in samples."""
+    """The length of a sample; it converts durations to numbers of samples."""
 
     sample_s: float
 
@@ -71,8 +70,8 @@ def ramp(
 ) -> tuple[Schedule, Array]:  # fmt: skip
     """Raise a load through the largest one that is resisted.
 
-    Up to the first share of the limit as in `hold`, then slowly to the second. The forces balance
-    the load all the way, whether the fingers can apply them or not.
+    The load rises to the first share of the limit as in `hold`, then slowly to the second. The
+    forces balance the load all the way, whether the fingers can apply them or not.
 
     Returns:
         The schedule, and the share of the limit that is applied in each watched sample.
@@ -99,7 +98,7 @@ def release(
 
 
 def smooth(count: int) -> Array:
-    """Shares from zero to one that start and end gently, (count,)."""
+    """Shares from zero to one with no slope at either end, (count,)."""
     time = np.arange(1, count + 1) / count
     return time**2 * (3.0 - 2.0 * time)
 

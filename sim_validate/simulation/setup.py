@@ -53,7 +53,7 @@ PARTS = {
 }
 MOST_THREADS = 1024
 HARD_FINGER = 3
-"""Dimension of a contact whose force has a normal and two tangential parts."""
+"""`condim` of a contact whose force has a normal and two tangential parts."""
 LimitSearch: TypeAlias = Literal["none", "ramp", "bisection"]
 
 
@@ -62,21 +62,22 @@ class Setup:
     """How trials are simulated.
 
     Raises:
-        InputError: A part is none, a number is out of its range, or the physics is not that of the
-            predictions.
+        InputError: A part has the wrong type, a number is out of its range, or the physics is not
+            the physics of the predictions.
     """
 
     fingers: FingerSettings = field(default_factory=FingerSettings)
     physics: PhysicsSettings = field(default_factory=PhysicsSettings)
     surface: Surface = "pads"
-    """What fingertips touch: pads, exact on any object, or the mesh of a convex one."""
+    """What fingertips touch: pads, which are exact on any object, or the mesh of a convex
+    object."""
     hold: HoldProtocol = field(default_factory=HoldProtocol)
     limit: LimitProtocol = field(default_factory=LimitProtocol)
     friction: FrictionProtocol = field(default_factory=FrictionProtocol)
     threads: int = 1
-    """Of the simulator; results do not depend on it."""
+    """Number of the simulator's threads; results do not depend on it."""
     timeout_s: float = math.inf
-    """Trials of one contact set that run longer are stopped."""
+    """Time after which the trials of one contact set are stopped [s]."""
 
     def __post_init__(self) -> None:
         for name, kind in PARTS.items():
@@ -87,14 +88,14 @@ class Setup:
         number(self.timeout_s, "timeout_s", above=0.0, most=math.inf)
 
     def scene(self, body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float) -> Scene:
-        """The scene of a grasp with these settings."""
+        """Build the scene of a grasp with these settings."""
         return build_scene(
             body, grasp, friction, fingers=self.fingers, physics=self.physics, surface=self.surface
         )
 
 
 def _check_model(physics: PhysicsSettings) -> None:
-    """Refuse physics in which forces act that the predictions do not know."""
+    """Refuse physics with forces that the predictions do not know."""
     if any(physics.gravity):
         raise InputError(
             f"physics.gravity must be zero, got {physics.gravity}: masses are scaled, so it would "
@@ -109,14 +110,14 @@ def _check_model(physics: PhysicsSettings) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NamedWrench:
-    """An external wrench from a user."""
+    """An external wrench that a user names."""
 
     name: str
     wrench: Array
     """(6,) [N, N m], torque about the centre of mass, in the object's frame."""
 
     def __post_init__(self) -> None:
-        """Refuse what could not be tested, or not be told apart in a file."""
+        """Refuse a wrench that cannot be tested, or a name that a file cannot hold."""
         text(self.name, "name")
         given = frozen(self.wrench, (6,), "wrench")
         object.__setattr__(self, "wrench", frozen(to_digits(given), (6,), "wrench"))
@@ -138,29 +139,32 @@ class Agenda:
     """Which trials a grasp goes through.
 
     The twelve axis wrenches and the weakest one are always held, at a share of what the analysis
-    says is resisted; so are random ones. A user's wrenches are held as they are.
+    says is resisted. Random wrenches are held at the same share. A user's wrenches are held as they
+    are.
     """
 
     random_wrenches: int = 0
     wrenches: tuple[NamedWrench, ...] = ()
     critical_friction: bool = True
-    """Find the critical friction in simulation."""
+    """Whether to find the critical friction in simulation."""
     limits: LimitSearch = "none"
-    """Find the largest multiple of each wrench in simulation."""
+    """How to find the largest multiple of each wrench in simulation, if at all."""
     independent: bool = False
-    """Also try what does not know the planned forces (`independent`)."""
+    """Whether to also run the trials of `unplanned_bounds`, which do not know the planned
+    forces."""
     controls: bool = True
     rules: tuple[str, ...] = ()
-    """Acceptance rules of other tools by which the same traces are also judged."""
+    """Names of other tools' acceptance rules that also judge the same traces."""
     trials: int = 0
-    """Repeat all holds so many times with noise."""
+    """How many times all holds are repeated with noise."""
     noise: Noise = field(default_factory=Noise)
     keep_traces: bool = False
     seed: int = 0
-    """Chooses random wrenches, noise, and how contacts are moved for a negative control."""
+    """Seed of the random wrenches, of noise, and of how contacts are moved for a negative
+    control."""
 
     def __post_init__(self) -> None:
-        """Refuse what no trial can be made of, and names that two would share."""
+        """Refuse settings that no trial can be made of, and names that two wrenches would share."""
         one_of(self.limits, get_args(LimitSearch), "limits")
         whole(self.random_wrenches, "random_wrenches", most=MOST_RANDOM_WRENCHES)
         whole(self.trials, "trials", most=MOST_TRIALS)
@@ -181,7 +185,7 @@ class Agenda:
 
 
 def with_planned_radius(fingers: FingerSettings, planned: Finger | None) -> FingerSettings:
-    """Fingertips of the radius that was planned for, unless they have one of their own."""
+    """Give fingertips the radius that was planned for, unless they have one of their own."""
     if planned is None or fingers.radius_m is not None:
         return fingers
     return replace(fingers, radius_m=planned.radius_m)

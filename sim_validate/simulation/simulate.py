@@ -1,8 +1,8 @@
 """Scene and schedules -> motions; the only module that steps MuJoCo.
 
-The scene's text is compiled, never a model built otherwise, so that the text is the whole
-experiment. All trials of a scene run together on MuJoCo's own threads; each is bit for bit what
-a plain loop over `mj_step` gives, whatever the number of threads.
+The scene's text is always what is compiled, so that the text is the whole experiment. All trials of
+a scene run together on MuJoCo's own threads; each is bit for bit what a plain loop over `mj_step`
+gives, whatever the number of threads.
 """
 
 # pyright: basic, reportAttributeAccessIssue=false
@@ -25,13 +25,13 @@ try:
     import mujoco  # noqa: TID251 - this is the door
     from mujoco import batch as mujoco_batch  # noqa: TID251
 except (ImportError, RuntimeError, AttributeError, OSError) as error:
-    raise InputError(  # it looks for graphics when it is imported, which nothing here needs
-        f"MuJoCo cannot be imported ({error}); is MUJOCO_GL set to graphics that are not here? "
-        "Unset it, or install the package anew"
+    raise InputError(  # importing mujoco looks for graphics, which nothing here needs
+        f"MuJoCo cannot be imported ({error}); is MUJOCO_GL set to graphics that are missing? "
+        "Unset it, or reinstall the package"
     ) from error
 
 CHUNK = 5
-"""Steps between changes of load and samples of motion."""
+"""Steps per sample: loads change, and motion is recorded, once every so many steps."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,25 +39,25 @@ class Motion:
     """Where everything was after each of the n samples of one trial, in the world frame."""
 
     times_s: Array
-    """(n,)"""
+    """(n,) [s]"""
     joints: Array
-    """Position (3) and quaternion (4) of the object's frame, then the slides (3) of each fingertip
-    along the axes of its contact's frame if it has any, (n, 7 or 7 + 3k) [m]."""
+    """Joint positions, (n, 7 + 3k), or (n, 7) for rigid fingertips [m]: position (3) and quaternion
+    (4) of the object's frame, then the slides (3) of each fingertip along its contact's axes."""
     state: Array
-    """Everything that a further trial can start from."""
+    """Complete state of the simulator at the end, from which a further trial can start."""
     finite: bool
     """Whether every number of the state stayed finite."""
     warnings: int
     """How many warnings the simulator raised."""
     clock_error_s: float
-    """Simulated time minus the time stepped: not zero after a silent reset."""
+    """Simulated time minus the time stepped [s]; it is not zero after a silent reset."""
     error: str
-    """The simulator's own words, if it gave up."""
+    """The simulator's own message if it gave up, else empty."""
     timed_out: bool
-    """Whether it was stopped before its end."""
+    """Whether the trial was stopped before its end."""
 
     def after(self, earlier: "Motion") -> "Motion":
-        """The same, with the faults of the motion whose state it started from."""
+        """Add the faults of the motion whose end state this motion started from."""
         return replace(
             self,
             finite=earlier.finite and self.finite,
@@ -76,8 +76,8 @@ class Bench:
 
         Args:
             scene: What to simulate.
-            threads: Of the simulator; results do not depend on it.
-            timeout_s: Trials that still run after so long, counted from now, are stopped.
+            threads: Number of the simulator's threads; results do not depend on it.
+            timeout_s: Time from now after which trials that still run are stopped [s].
         """
         self.scene, self.threads = scene, threads
         self.deadline = time.monotonic() + timeout_s
@@ -91,7 +91,8 @@ class Bench:
 
         Args:
             schedules: What is applied in each trial.
-            start: A motion's state; fingertips at their contacts, all at rest, if None.
+            start: State at the end of an earlier motion; None puts fingertips at their contacts, at
+                rest.
         """
         trials = mujoco_batch.Batch(self.model, len(schedules), self.threads)
         if start is None:
@@ -122,13 +123,14 @@ class Bench:
     def _step_through(
         self, trials: mujoco_batch.Batch, schedules: Sequence[Schedule]
     ) -> tuple[Array, dict[int, str]]:
-        """All joint positions of m trials in the samples done, (m, n, q), and errors by trial."""
+        """Joint positions of m trials in the samples done, (m, n, q), and errors by trial."""
         layout = self.scene.layout
         wrenches = np.array([schedule.wrenches for schedule in schedules])
         wrenches[..., 3:] -= np.cross(layout.center, wrenches[..., :3])
         forces = np.array([schedule.forces for schedule in schedules])
         pushes = np.einsum("kij,mnki->mnkj", layout.frames, forces)
-        for trial in range(len(schedules)):  # like the scene (see `layout.arrange`)
+        # rounded like the scene's numbers (see `layout.arrange`)
+        for trial in range(len(schedules)):
             for part in (wrenches[trial, :, :3], wrenches[trial, :, 3:], pushes[trial]):
                 part[...] = to_digits(part)
         controls = pushes.reshape(*pushes.shape[:2], -1) / layout.drive.stiffness_n_per_m
@@ -158,7 +160,7 @@ def _compiled(scene: Scene) -> mujoco.MjModel:
 
 
 def _step(trials: mujoco_batch.Batch, errors: dict[int, str]) -> None:
-    """One sample of all trials but those that an error ended."""
+    """Step all trials by one sample, except those that an error ended."""
     running = np.setdiff1d(np.arange(trials.nsim), list(errors)) if errors else None
     try:
         trials.step(running, nstep=CHUNK)
@@ -170,7 +172,7 @@ def _step(trials: mujoco_batch.Batch, errors: dict[int, str]) -> None:
 def _unlogged() -> Iterator[None]:
     """Keep the simulator from writing warnings to a file in the working directory.
 
-    They are counted in its data, and `Motion.warnings` reports them.
+    The simulator's data counts the warnings, and `Motion.warnings` reports them.
     """
     before, quiet = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
     quiet.logto_file = quiet.logto_console = False
@@ -182,10 +184,10 @@ def _unlogged() -> Iterator[None]:
 
 
 def first_touch(scene: Scene) -> tuple[Array, Array]:
-    """What each fingertip touches before anything moves.
+    """Find what each fingertip touches before anything moves.
 
     Args:
-        scene: With rigid fingertips that are put into the object.
+        scene: A scene with rigid fingertips that are put into the object.
 
     Returns:
         Normals out of the fingertips, (k, 3), world axes, and depths, (k,) [m]; NaN for a fingertip
@@ -207,15 +209,15 @@ def first_touch(scene: Scene) -> tuple[Array, Array]:
 
 
 def acceleration(scene: Scene, wrenches: Array) -> Array:
-    """What acceleration of the object each of several wrenches causes at once, unloaded fingers.
+    """The object's instant acceleration under each of several wrenches, with unloaded fingers.
 
     Args:
-        scene: With rigid fingertips that touch the object.
+        scene: A scene with rigid fingertips that touch the object.
         wrenches: (n, 6) [N, N m], torque about the centre of mass, world axes.
 
     Returns:
-        Force and torque that are left over, mass times acceleration, (n, 6), torque about
-        the centre of mass.
+        Force and torque that are not opposed, which is mass times acceleration, (n, 6), torque
+        about the centre of mass.
     """
     model = _compiled(scene)
     data = mujoco.MjData(model)

@@ -1,7 +1,8 @@
-"""Motion -> trace: how far the object turned and moved, and what each contact did meanwhile.
+"""Motion -> trace: how far the object moved and turned, and what each contact did.
 
-Displacements are measured on the object's pose against the pose at the moment when it had to stay
-where it was, not on contact counts. A rotation counts as the path of a point one grasp size away.
+Displacements are differences of the object's pose from its pose at the moment when it had to stay
+where it was; contact counts play no part. A rotation counts as the path of a point one grasp size
+away.
 """
 
 from dataclasses import dataclass
@@ -14,7 +15,8 @@ from scenes.layout import Layout
 from sim_validate.simulation.simulate import Motion
 
 CLOCK_SLACK_S = 1e-9
-"""Simulated time is a sum of equal steps; a reset would put it off by milliseconds."""
+"""Largest clock error that is rounding [s]: simulated time is a sum of equal steps, and a reset
+would change it by milliseconds."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,35 +24,36 @@ class Trace:
     """Motion of the object and fingertips in the n samples from the moment watching began."""
 
     times_s: Array
-    """(n,)"""
+    """(n,) [s]"""
     displacements_m: Array
-    """Motion of the point between the contacts plus grasp size times rotation, (n,)."""
+    """Motion of the point between the contacts plus grasp size times rotation, (n,) [m]."""
     shifts_m: Array
-    """Motion of that point alone, (n,)."""
+    """Motion of the point between the contacts alone, (n,) [m]."""
     rotations_rad: Array
-    """(n,)"""
+    """(n,) [rad]"""
     slips_m: Array
-    """Tangential motion of each fingertip over its face, (n, k)."""
+    """Tangential motion of each fingertip over its face, (n, k) [m]."""
     gaps_m: Array
-    """Distance of each fingertip from its face, negative in contact, (n, k)."""
+    """Distance of each fingertip from its face, negative in contact, (n, k) [m]."""
     touched_m: Array
-    """Where each fingertip touches, in the object's frame about its centre of mass, (n, k, 3)."""
+    """Where each fingertip touches, in the object's frame about its centre of mass, (n, k, 3)
+    [m]."""
     start_m: float
-    """Displacement from the planned pose at that moment."""
+    """Displacement from the planned pose at the moment watching began [m]."""
     finite: bool
     """Whether every number of the state stayed finite."""
     warnings: int
     """How many warnings the simulator raised."""
     clock_error_s: float
-    """Simulated time minus the time stepped: not zero after a silent reset."""
+    """Simulated time minus the time stepped [s]; it is not zero after a silent reset."""
     error: str = ""
-    """The simulator's own words, if it gave up."""
+    """The simulator's own message if it gave up, else empty."""
     timed_out: bool = False
-    """Whether it was stopped before its end."""
+    """Whether the trial was stopped before its end."""
 
     @property
     def fault(self) -> str:
-        """Why it says nothing about the object; empty if it does."""
+        """Why the trace says nothing about the object; empty if it does."""
         if self.error:
             return self.error
         if self.timed_out:
@@ -64,17 +67,17 @@ class Trace:
         return ""
 
     def stayed(self, threshold_m: float) -> bool | None:
-        """Whether no displacement reached a threshold; None if the trace says nothing."""
+        """Whether no displacement reached a threshold [m]; None if the trace says nothing."""
         return None if self.fault else bool((self.displacements_m < threshold_m).all())
 
 
 def trace(motion: Motion, layout: Layout, watched: int) -> Trace:
-    """What a motion amounts to.
+    """Measure displacements, slips and gaps on a motion.
 
     Args:
-        motion: Of one trial.
-        layout: What was simulated.
-        watched: First sample in which the object had to stay where it was.
+        motion: Motion of one trial.
+        layout: The simulated layout.
+        watched: Index of the first sample in which the object had to stay where it was.
     """
     before = min(watched, len(motion.joints)) - 1
     planned = np.concatenate([np.zeros(3), [1.0, 0.0, 0.0, 0.0]])
@@ -118,19 +121,20 @@ def _tips(joints: Array, layout: Layout) -> Array:
         slides = np.zeros((1, len(layout.contacts), 3))
     slid = np.einsum("kij,nkj->nki", layout.frames, slides)
     centers = layout.tip_centers + slid - joints[:, None, :3]
+    # The conjugate of the object's quaternion turns world vectors into its frame.
     backwards = joints[:, None, 3:7] * np.array([1.0, -1.0, -1.0, -1.0])
     return rotated(backwards, centers)
 
 
 def rotated(quaternions: Array, vectors: Array) -> Array:
-    """Vectors (..., 3) turned by quaternions (..., 4) wxyz, of any length but zero."""
+    """Turn vectors (..., 3) by quaternions (..., 4) wxyz of any length but zero."""
     w, v = quaternions[..., :1], quaternions[..., 1:]
     twice = 2.0 * np.cross(v, vectors) / np.sum(quaternions**2, axis=-1, keepdims=True)
     return vectors + w * twice + np.cross(v, twice)
 
 
 def rotation_angles(quaternions: Array, start: Array) -> Array:
-    """Angles [rad] between orientations (n, 4) and one (4,), exact for small angles, (n,)."""
+    """Angles between orientations (n, 4) and one (4,), exact for small angles, (n,) [rad]."""
     w, v = quaternions[:, 0], quaternions[:, 1:]
     along = np.abs(quaternions @ start)
     across = start[0] * v - w[:, None] * start[1:] - np.cross(v, start[1:])

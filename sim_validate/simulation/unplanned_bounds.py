@@ -1,17 +1,18 @@
-"""What simulation says about a grasp without knowing the forces that were planned for it.
+"""Bounds on a grasp that simulation finds without knowing the planned forces.
 
-Forces planned for a load presume the analysis that they are to confirm. These three have none:
+Forces planned for a load presume the analysis that they are to confirm. Three kinds of trial need
+none:
 
-* rigid fingertips, each put equally deep into its face: what squeezes the object is elasticity
-  alone. The least friction at which the object stays is never below the critical friction: where
+* Rigid fingertips are each put equally deep into their faces, so that elasticity alone squeezes the
+  object. The least friction at which the object stays is never below the critical friction: where
   all fingers push and it rests, balanced forces in the cones exist. It may be far above, as equal
   depths need not give the best forces.
-* a fixed squeeze: the fingers keep the forces of the gentle grasp, whatever the load. The
-  largest multiple of a wrench that is resisted is never above the predicted limit, as the forces
-  at rest are within the cones and the limit on the push. It may be far below.
-* the acceleration that an axis wrench causes in the first instant, with rigid fingertips that just
-  touch: nothing is left over in any direction if contacts can oppose all of them. Contacts that
-  only touch must be pressed first, so a small share is always left.
+* With a fixed squeeze the fingers keep the forces of the gentle grasp, whatever the load. The
+  largest multiple of a wrench that is resisted is never above the predicted limit, as the forces at
+  rest are within the cones and the limit on the push. It may be far below.
+* The acceleration that an axis wrench causes in the first instant is measured with rigid fingertips
+  that just touch. No force is left over in any direction if contacts can oppose all of them.
+  Contacts that only touch must be pressed first, so a small share is always left.
 """
 
 from collections.abc import Sequence
@@ -31,21 +32,23 @@ from sim_validate.simulation.traces import Trace
 
 INDENTATION = 2e-5
 """Depth of rigid fingertips, in grasp sizes. Much deeper ones let the object turn and adapt, and
-accept frictions below the critical one; with none, contacts open and nothing holds."""
+accept frictions below the critical one; without depth, contacts open and nothing holds."""
 TOUCH = 2e-6
-"""Depth of rigid fingertips for the first instant: vertices of a mesh have single precision."""
+"""Depth of rigid fingertips for the first instant, in grasp sizes. It is not zero because vertices
+of a mesh have single precision."""
 STEPS = (0.98, 1.02, 1.05, 1.1, 1.2, 1.4, 1.7, 2.0, 3.0, 5.0)
 """Frictions at which rigid fingertips are tried, relative to the critical one."""
 STIFFER = 20.0
 """Stiffness of servos that keep a fixed squeeze, relative to those that follow planned forces."""
 RISE_S = 2.0
 LARGEST_SHARE = 1.2
-"""With a fixed squeeze the load rises so slowly to this share of the predicted limit."""
+"""Largest load with a fixed squeeze, relative to the predicted limit. The load rises to it in
+`RISE_S` seconds, which is slow enough."""
 SLIDING = 1e-3
-"""How far a fingertip may slide before a fixed squeeze has given way, in grasp sizes."""
+"""Slide of a fingertip at which a fixed squeeze has given way, in grasp sizes."""
 SLACK = 0.05
-"""By how much a fixed squeeze may seem to pass a limit: the object moves under the load, by some
-per cent of the grasp size."""
+"""Relative excess by which a fixed squeeze may seem to pass a limit: the object moves under the
+load by some per cent of the grasp size."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +56,10 @@ class Bounds:
     """What was found without planned forces."""
 
     friction_at_most: float | None
-    """Rigid fingertips hold the object at this friction; None where they did at none tried."""
+    """Least friction tried at which rigid fingertips hold the object; None if they never did. It
+    must not be below the critical friction."""
     friction_slipped: float | None
-    """And did not at this one; None where they did at all tried. Never below the critical friction
-    may the object stay."""
+    """Largest friction tried below that at which they did not hold it; None if they always did."""
     limit_shares: tuple[float, ...]
     """Share of the predicted limit of each wrench at which a fixed squeeze gives way."""
     residual: float
@@ -64,7 +67,7 @@ class Bounds:
     Below about 0.3 every wrench is opposed; near one some wrench is not."""
 
     def agree(self, critical: float) -> bool:
-        """Whether they are on the side of the predictions on which they must be."""
+        """Whether the bounds lie on the right side of the predictions."""
         lowest = self.friction_at_most is None or self.friction_at_most >= critical
         return lowest and max(self.limit_shares) <= 1.0 + SLACK
 
@@ -76,10 +79,10 @@ def independent_bounds(
 
     Args:
         body: The object.
-        grasp: On its faces.
-        critical: Its predicted critical friction.
+        grasp: A grasp on the faces of `body`.
+        critical: The grasp's predicted critical friction.
         rig: The object squeezed by servos with the forces of a gentle grasp.
-        limits: Wrenches at their predicted limits.
+        limits: The wrenches at their predicted limits.
     """
     slipped, stayed = _rigid_friction(body, grasp, critical, rig.setup)
     return Bounds(
@@ -93,7 +96,7 @@ def independent_bounds(
 def _rigid_friction(
     body: Polyhedron, grasp: Grasp, critical: float, setup: Setup
 ) -> tuple[float | None, float | None]:
-    """The largest friction tried at which the object slipped, and the least at which it stayed."""
+    """Largest friction tried at which the object slipped, and least at which it stayed."""
     protocol = setup.friction
     frictions = [step * max(critical, protocol.least_friction) for step in STEPS]
     high = protocol.settling_friction * max(frictions)
@@ -120,7 +123,8 @@ def _fixed_squeeze(
 ) -> tuple[float, ...]:
     """The share of each limit at which a finger begins to slide, with unchanged forces.
 
-    The servos are stiffer than usual: they give way to the load instead of the planned forces.
+    The servos are stiffer than usual, because without planned forces their springs give way to the
+    whole load.
     """
     usual = rig.bench.scene.layout.drive.stiffness_n_per_m
     fingers = replace(rig.setup.fingers, stiffness_n_per_m=STIFFER * usual)
@@ -136,7 +140,7 @@ def _fixed_squeeze(
 
 
 def _until(trace: Trace, shares: Array, threshold: float) -> float:
-    """Share that is applied before a finger slides over its face, or leaves it."""
+    """The share that is applied before a finger slides over its face, or leaves it."""
     moved = np.maximum(trace.slips_m, trace.gaps_m).max(axis=1)
     sliding = np.flatnonzero(~(moved < threshold))
     count = int(sliding[0]) if sliding.size else len(trace.times_s)

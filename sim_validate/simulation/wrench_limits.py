@@ -1,15 +1,15 @@
-"""The largest multiple of each wrench that a grasp resists in simulation, by ramp or by bisection.
+"""The largest multiple of each wrench that a grasp resists in simulation, by ramp or bisection.
 
-Both load the object with a share of the predicted limit and the forces planned for it: those of
-the gentle squeeze plus that share of the way to the forces at the limit. They balance the load,
-because both ends do. Below the limit they are inside the cones and the limits on the push, again
-because both ends are. Above it, up to twice the limit, they still balance, on paper: what lets go
-is friction, or a finger that cannot push harder.
+Both methods load the object with a share of the predicted limit and the forces planned for it,
+which lie that share of the way from the gentle squeeze to the forces at the limit. They balance the
+load, because both ends do. Below the limit they are inside the cones and the limits on the push,
+again because both ends are. Above it, up to twice the limit, the forces still balance on paper, but
+friction gives way, or a finger cannot push harder.
 
 A ramp passes the limit slowly. The load left over grows in proportion to the time since, so the
-displacement grows with its third power and the ramp ends late. A displacement eight times as
-large is reached when twice as much time has passed since the limit; where
-the two lead back to is a bound from below.
+displacement grows with its third power and the ramp ends late. A displacement eight times as large
+is reached when twice as much time has passed since the limit. Extrapolating the two times back
+gives a bound from below.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,24 +24,24 @@ from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.traces import Trace
 
 LATER = 8.0
-"""Displacement at the second reading of a ramp, in thresholds."""
+"""Displacement at the second reading of a ramp, relative to the threshold; 8 = 2 cubed."""
 OVERLOAD = 2.0
-"""Forces are planned for loads up to this share of the limit; for larger ones they stay."""
+"""Largest share of the limit for which forces are planned; for larger loads the forces stay."""
 HELD, SLID, UNKNOWN = 1, 0, -1
 
 
 @dataclass(frozen=True, slots=True)
 class SimulatedLimit:
-    """Where between two shares of the predicted limit the object lets go."""
+    """The shares of the predicted limit between which the object lets go."""
 
     lower: float
     upper: float
     share: float
-    """The best guess: where a ramp passed its threshold, or the middle of a bisection."""
+    """The best estimate: where a ramp passed its threshold, or the middle of a bisection."""
 
 
 def ramped_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | None, ...]:
-    """Shares of the predicted limits at which ramps let go; None where none did in any span.
+    """Find by ramps the shares of the limits at which the object lets go; None where it does not.
 
     Args:
         rig: The squeezed object.
@@ -61,7 +61,7 @@ def _in_some_span(
     limits: Sequence[Load],
     search: Callable[[Sequence[Load], float], Sequence[SimulatedLimit | None]],
 ) -> tuple[SimulatedLimit | None, ...]:
-    """What a search finds near each predicted limit, or farther away."""
+    """Search near each predicted limit first, then in wider spans; None where nothing is found."""
     found: dict[int, SimulatedLimit] = {}
     for span in rig.setup.limit.spans:
         rest = [place for place in range(len(limits)) if place not in found]
@@ -73,7 +73,7 @@ def _in_some_span(
 
 
 def _onset(trace: Trace, shares: Array, threshold: float) -> SimulatedLimit | None:
-    """Where a ramp lets go, if it does, and not at its very start.
+    """Find where a ramp lets go; None if it does not, or does at its very start.
 
     Within a sample the displacement grows with the third power of time.
     """
@@ -83,15 +83,18 @@ def _onset(trace: Trace, shares: Array, threshold: float) -> SimulatedLimit | No
         return None
     first = int(passed[0])
     before, after = shares[first - 1], shares[first]
+    # Interpolate the cube root of the displacement, which is linear in time.
     roots = np.cbrt([moved[first - 1], threshold, moved[first]])
     at = before + (after - before) * (roots[1] - roots[0]) / (roots[2] - roots[0])
     later = np.flatnonzero(moved >= LATER * threshold)
+    # Twice the time since the limit has passed at eight times the displacement, so the limit lies
+    # as far before the first reading as the second lies after it.
     lower = 2.0 * before - shares[later[0]] if later.size else shares[0]
     return SimulatedLimit(lower=float(lower), upper=float(after), share=float(at))
 
 
 def bisected_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | None, ...]:
-    """Shares of the predicted limits between holding and letting go; None where in no span.
+    """Bisect the shares of the limits between holding and letting go; None where in no span.
 
     Args:
         rig: The squeezed object.
@@ -119,7 +122,7 @@ def bisected_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | 
 
 
 def _ends(rig: Rig, limits: Sequence[Load], shares: Array) -> Indices:
-    """Whether shares of loads hold; `UNKNOWN` where a trial says nothing about the object."""
+    """Whether shares of loads hold: `HELD`, `SLID`, or `UNKNOWN` if a trial says nothing."""
     loads = [part(rig.idle, limit, share) for limit, share in zip(limits, shares, strict=True)]
     layout, protocol = rig.bench.scene.layout, rig.setup.hold
     ends = [holds(trace, layout, protocol) for trace in rig.hold(loads)]
@@ -130,9 +133,9 @@ def part(idle: Load, limit: Load, share: float) -> Load:
     """A share of a limiting wrench, with forces between those without load and at the limit.
 
     Args:
-        idle: Forces that squeeze the unloaded object.
-        limit: The largest wrench that is resisted, and the forces that do it.
-        share: Of that wrench.
+        idle: The forces that squeeze the unloaded object, without a wrench.
+        limit: The largest wrench that is resisted, and the forces that balance it.
+        share: Share of that wrench to apply.
     """
     planned = min(float(share), OVERLOAD)
     wrench = idle.wrench + share * (limit.wrench - idle.wrench)

@@ -1,8 +1,9 @@
-"""Negative controls on the bench: contact sets proved open must not hold what nothing can balance.
+"""Trials of negative controls: contact sets proved open must not hold what nothing can balance.
 
-A control is loaded with the wrench of its certificate, which no contact force within the cones
-opposes, and, where not even the bare squeeze can be balanced, with nothing. The fingers do their
-best: forces that need the least friction, or where nothing balances, the closest ones.
+A control is loaded with the separating wrench of its certificate, which no contact force within the
+cones opposes. Where not even the bare squeeze can be balanced, the control is also tried without a
+load. The fingers do their best: they apply forces that need the least friction, or where nothing
+balances, the closest forces.
 """
 
 from dataclasses import dataclass, replace
@@ -23,64 +24,64 @@ from sim_validate.simulation.traces import Trace
 from sim_validate.validation.controls import Control
 
 SEPARATING = "separating"
-"""The wrench that a control's certificate says is not resisted."""
+"""Name of the wrench that a control's certificate says is not resisted."""
 UNLOADED = "unloaded"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlLoad:
-    """A load that a control is to let go."""
+    """A load under which a control must let go."""
 
     name: str
     load: Load
     settling: float
-    """Friction while things settle."""
+    """Friction while the object settles."""
     required_friction: float | None
-    """What the planned forces need; None where no forces balance the wrench."""
+    """Friction that the planned forces need; None where no forces balance the wrench."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlTrial:
-    """One load on a control."""
+    """One simulated load on a control."""
 
     name: str
     wrench: Array
     """Applied external wrench, (6,) [N, N m], torque about the centre of mass."""
     required_friction: float | None
-    """What the planned forces need; None where no forces balance the wrench."""
+    """Friction that the planned forces need; None where no forces balance the wrench."""
     hold: HoldVerdict
     trace: Trace | None
-    """Kept on request."""
+    """Motion in the trial; kept on request."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlVerdict:
-    """A contact set proved not to be force-closed, and what the simulator made of it."""
+    """A contact set proved not to be force-closed, and how it ended in simulation."""
 
     control: Control
     tried: tuple[ControlTrial, ...]
-    """Loads that no contact forces can balance."""
+    """Trials of the loads that no contact forces can balance."""
     accepted_by: dict[str, bool]
-    """What rules of other tools say, by name."""
+    """Whether each rule of another tool accepts the control, by name."""
 
     @property
     def held(self) -> bool:
-        """Whether any of them held: none must."""
+        """Whether the control held any of the loads, which it must not."""
         return any(trial.hold.outcome is Outcome.HELD for trial in self.tried)
 
     @property
     def failed(self) -> bool:
-        """Whether all of them ended as they must, by the object moving."""
+        """Whether the object moved in every trial, as it must."""
         return all(trial.hold.outcome in LET_GO for trial in self.tried)
 
 
 def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup) -> ControlVerdict:
-    """Simulate a control.
+    """Simulate a control under the loads that it must not hold.
 
     Args:
         body: The object.
-        control: With its proof.
-        agenda: Rules of other tools that also judge it, and whether traces are kept.
+        control: The contact set with its proof.
+        agenda: Rules of other tools that also judge the control, and whether traces are kept.
         setup: How trials are simulated.
     """
     rig, loads = control_case(body, control, setup)
@@ -105,13 +106,14 @@ def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup
 def control_case(
     body: Polyhedron, control: Control, setup: Setup
 ) -> tuple[Rig, tuple[ControlLoad, ...]]:
-    """A control in the grip of its fingers, and the loads that it must not hold.
+    """Close fingers on a control, and find the loads that it must not hold.
 
     Args:
         body: The object.
-        control: With its proof.
+        control: The contact set with its proof.
         setup: How trials are simulated.
     """
+    # Other contacts than the grasp's may lack room for its fingertips or lie off the mesh.
     fingers = replace(setup.fingers, radius_m=None)
     on_pads = replace(setup, fingers=fingers, surface="pads")
     scene = on_pads.scene(body, control.contacts, control.friction)
@@ -124,7 +126,9 @@ def control_case(
 
 
 def _hopeless(body: Polyhedron, control: Control, setup: Setup) -> list[tuple[str, Array]]:
-    """The separating wrench, and no wrench at all where not even that can be balanced."""
+    """The separating wrench, and no wrench at all where the bare squeeze cannot be balanced."""
+    # The separating wrench is a linear function of wrenches. With torques measured in object
+    # radii its coefficients are times the scale; the wrench along them is times it once more.
     scale = np.array([1.0] * 3 + [body.radius] * 3)
     facing = -control.separating_wrench(body.center_of_mass) * scale**2
     size = setup.hold.control_load * setup.fingers.max_normal_force_n
@@ -143,7 +147,7 @@ def _pulls(body: Polyhedron, control: Control, setup: Setup) -> tuple[ControlLoa
 
 
 class _Planner:
-    """Forces for a control: of least friction, or the closest to balance."""
+    """Plans forces for a control: those that need least friction, or those closest to balance."""
 
     def __init__(self, body: Polyhedron, control: Control, setup: Setup) -> None:
         self.contacts = (
@@ -156,13 +160,13 @@ class _Planner:
         self.center, self.protocol = body.center_of_mass, setup.hold
 
     def load(self, name: str, wrench: Array) -> ControlLoad:
-        """A wrench with forces planned for it."""
+        """Plan forces for a wrench."""
         forces, needed = self._forces(wrench)
         settling = self.protocol.settling_friction * max(self.contacts[2], needed or 0.0)
         return ControlLoad(name, Load(wrench, forces), settling, needed)
 
     def _forces(self, wrench: Array) -> tuple[Array, float | None]:
-        """Planned forces, (k, 3), and the friction they need; None where nothing balances."""
+        """Planned forces, (k, 3) [N], and the friction they need; None where nothing balances."""
         limits, center = self.limits, self.center
         balanced = least_friction_forces(*self.contacts, wrench, normal_force=limits, center=center)
         if balanced is not None:

@@ -1,8 +1,8 @@
 """Negative controls: contact sets made from a grasp that are proved not to be force-closed.
 
-A validator that cannot say no proves nothing. Each control carries the certificate of its
-failure, and its separating wrench is the first thing it is tested with: no contact force
-within the cones can oppose that wrench, whatever the fingers do.
+A validator that cannot say no proves nothing. Each control carries the certificate that it is open.
+The certificate's separating wrench is the first load that the control is tested with: no contact
+force within the cones can oppose it, whatever the fingers do.
 """
 
 import math
@@ -22,18 +22,18 @@ from grasp_core.values import Contact, Grasp
 from sim_validate.validation.paper_as_printed import uncorrected_contacts
 
 FRICTION_SHARE = 0.9
-"""Share of the critical friction that the low-friction control gets."""
+"""Friction of the low-friction control, relative to the critical friction."""
 LEAST_FRICTION = 1e-4
-"""Simulated friction cannot be lower than 1e-5."""
+"""Lowest friction of a control; the simulator's friction cannot be lower than 1e-5."""
 SEARCH = 64
-"""How many random displacements of the contacts are tried."""
+"""Number of random displacements of the contacts that are tried."""
 TOWARD_CORNER = 0.95
-"""How far towards a corner of its face a moved contact goes."""
+"""How far towards a corner of its face a moved contact goes, as a share of the way."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Control:
-    """Contacts that must not hold, and the proof."""
+    """Contacts that must not hold, with the proof."""
 
     name: str
     contacts: tuple[Contact, ...]
@@ -50,11 +50,11 @@ class Control:
 def negative_controls(
     body: Polyhedron, grasp: Grasp, friction: float, seed: int
 ) -> tuple[Control, ...]:
-    """The controls that exist for a grasp, one of each kind at most.
+    """Make the controls that exist for a grasp, at most one of each kind.
 
-    Friction below the critical one, fingers removed, a normal flipped, contacts moved on their
-    faces, which takes them out of the grasp's region, and the paper's uncorrected constructions on
-    the same faces.
+    The kinds are friction below the critical one, fingers removed, a normal flipped, contacts moved
+    on their faces, which takes them out of the grasp's region, and the paper's uncorrected
+    constructions on the same faces.
     """
     rng = np.random.default_rng(seed)
     candidates = (
@@ -74,10 +74,11 @@ def _low_friction(grasp: Grasp) -> Iterator[Control]:
 
 
 def _fingers_removed(grasp: Grasp, friction: float) -> Iterator[Control]:
-    """Three contacts that lose closure, at less friction if they must be made to, or else two.
+    """Remove one finger, lowering the friction if that is needed to open the rest, or else two.
 
-    Without friction no three contacts are in closure, so three are open below some friction. Two
-    are at any, as they can always be turned about the line between them.
+    Without friction no three contacts are in closure, so any three are open below some friction.
+    Two contacts are open at any friction, because the object can always turn about the line between
+    them.
     """
     threes = list(combinations(grasp.contacts, 3))
     for rest in threes:
@@ -91,7 +92,7 @@ def _fingers_removed(grasp: Grasp, friction: float) -> Iterator[Control]:
 
 
 def _critical(contacts: Sequence[Contact]) -> float:
-    """The critical friction of contacts; infinite where it is not decided."""
+    """The critical friction of contacts; infinite where it is undecided."""
     try:
         return critical_friction(*stacked(contacts))
     except (SolverError, UndecidedError):
@@ -99,7 +100,7 @@ def _critical(contacts: Sequence[Contact]) -> float:
 
 
 def _normal_flipped(grasp: Grasp, friction: float) -> Iterator[Control]:
-    """A finger that pulls where it should push, as with a normal of the wrong sign in a file."""
+    """Flip a normal, so that a finger pulls instead of pushing, as a wrong sign in a file would."""
     for finger, contact in enumerate(grasp.contacts):
         contacts = list(grasp.contacts)
         contacts[finger] = replace(contact, normal=-contact.normal)
@@ -107,7 +108,7 @@ def _normal_flipped(grasp: Grasp, friction: float) -> Iterator[Control]:
 
 
 def _uncorrected(body: Polyhedron, grasp: Grasp, friction: float) -> Iterator[Control]:
-    """Contacts that the paper's programs as printed call a grasp, though they are none."""
+    """Contacts that the paper's programs as printed take for a grasp, but that are open."""
     try:
         for supposed, contacts in uncorrected_contacts(body, grasp, friction):
             yield from _refuted("uncorrected", contacts, supposed)
@@ -128,14 +129,14 @@ def _contacts_moved(
 
 
 def _near_corner(pieces: Sequence[Array], rng: np.random.Generator) -> Array:
-    """A point of a face next to one of its corners."""
+    """A random point of a face next to one of its corners."""
     piece = pieces[int(rng.integers(len(pieces)))]
     corner, middle = piece[int(rng.integers(len(piece)))], piece.mean(axis=0)
     return middle + TOWARD_CORNER * (corner - middle)
 
 
 def _refuted(name: str, contacts: Sequence[Contact], friction: float) -> Iterator[Control]:
-    """The control, if the analysis proves that it is not in force closure."""
+    """Yield the control if the analysis proves that it is not in force closure."""
     try:
         certificate = force_closure(*stacked(contacts), friction)
     except UndecidedError:

@@ -1,4 +1,4 @@
-"""What simulation says about a grasp: every wrench, every control, and where analysis is wrong."""
+"""The verdict on a grasp: every wrench, every control, and each contradiction of the analysis."""
 
 from dataclasses import dataclass
 
@@ -25,11 +25,11 @@ class Verdict:
     wrenches: tuple[WrenchVerdict, ...]
     controls: tuple[ControlVerdict, ...]
     bounds: Bounds | None
-    """What was found without planned forces, if asked for."""
+    """Bounds found without planned forces, if asked for."""
     robustness: Robustness | None
-    """What noise makes of it, if asked for."""
+    """How often the grasp holds with noise, if asked for."""
     accepted_by: dict[str, bool]
-    """What rules of other tools say, by name."""
+    """Whether each rule of another tool accepts the grasp, by name."""
     gate: Gate
     scene: Scene
     setup: Setup
@@ -77,7 +77,7 @@ class Verdict:
 
 
 def _disagreement(friction: CriticalFriction) -> str:
-    """What is wrong with a simulated critical friction, if something is."""
+    """What is wrong with a simulated critical friction; empty if nothing is."""
     simulated, predicted = friction.simulated, friction.predicted
     if simulated is None:
         return "not found near the predicted one"

@@ -1,4 +1,4 @@
-"""Grasps of one object, validated one after another or on several processes, in order."""
+"""Grasps of one object, validated one after another or by several processes, in order."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from sim_validate.validation.validation import validate
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One grasp to validate, as it travels to a worker."""
+    """One grasp to validate, as it is sent to a worker."""
 
     body: Polyhedron
     grasp: Grasp
@@ -23,12 +23,12 @@ class Job:
 
 
 def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
-    """Verdicts as they become ready, in order; they do not depend on how many processors there are.
+    """Yield verdicts in the order of the jobs as they become ready; `processors` changes none.
 
     Args:
-        jobs: What to validate.
-        processors: How many to use: as processes, and as threads of the simulator where there are
-            too few grasps for so many processes.
+        jobs: The grasps to validate.
+        processors: How many processors to use: as processes, and as threads of the simulator where
+            there are too few grasps for that many processes.
 
     Raises:
         InputError: A grasp is refused.
@@ -38,7 +38,7 @@ def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
 
 
 def with_threads(jobs: Sequence[Job], processors: int) -> list[Job]:
-    """Jobs whose simulations share the processors that are too many for so few of them."""
+    """Give each job an equal share of the processors that remain when there are fewer jobs."""
     threads = max(1, processors // processes(len(jobs), processors))
     return [replace(job, setup=replace(job.setup, threads=threads)) for job in jobs]
 

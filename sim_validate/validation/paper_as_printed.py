@@ -2,8 +2,8 @@
 
 Sections 3.2 and 3.3 of Sudsang & Ponce read simpler than the constructions in `grasp_core`. The
 printed pencil program leaves the order of the foci open, so its discs hold contacts out of
-equilibrium; the printed regulus program lacks the equation of equal pitch, so its four lines
-are independent and often cannot balance. Their answers look like grasps, which makes them good
+equilibrium. The printed regulus program lacks the equation of equal pitch, so its four lines are
+independent and often cannot balance. Their answers look like grasps, which makes them good
 controls. Nothing but controls and tests may use them.
 """
 
@@ -25,26 +25,26 @@ from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.values import Contact, ForceCone, Grasp
 
 LEAST = 1e-3
-"""Smallest disc of the printed pencil program, in object radii."""
+"""Smallest radius of a disc in the printed pencil program, in object radii."""
 PAIR = (0, 0, 1, 1)
-"""Pair i of each finger, from zero."""
+"""Index of each finger's pair, from zero."""
 BELOW_SPAN = 0.99
-"""Half-angle that is planned with, relative to the angle at which the normals stop spanning."""
+"""Largest half-angle of the cones, relative to the angle at which the normals stop spanning."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Discs:
-    """One disc per face, all of one radius, in object radii."""
+    """One disc per face, all of one radius; lengths are in object radii."""
 
     centers: Array
     radii: Array
     foci: Array
-    """(2, 3)"""
+    """The two foci, (2, 3)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lines:
-    """Contacts and forces of the printed regulus program, and the largest offset t."""
+    """Contacts and forces of the printed regulus program, (4, 3), and the largest offset t."""
 
     positions: Array
     forces: Array
@@ -54,12 +54,13 @@ class Lines:
 def uncorrected_contacts(
     body: Polyhedron, grasp: Grasp, friction: float
 ) -> Iterator[tuple[float, tuple[Contact, ...]]]:
-    """What the printed programs call grasps on the faces of a grasp, and the friction they suppose.
+    """Yield contacts that the printed programs take for grasps, with the friction they suppose.
 
     Args:
         body: The object.
-        grasp: Its faces count.
-        friction: Whose cones the programs may use, as far as the faces' normals span with them.
+        grasp: The grasp whose faces are used.
+        friction: Friction whose cones the programs may use, as far as the faces' normals span with
+            them.
     """
     theta = min(math.atan(friction), BELOW_SPAN * span_angle(grasp.normals))
     if theta <= 0.0:
@@ -83,7 +84,7 @@ def _contacts(body: Polyhedron, quad: Sequence[FacePiece], positions: Array) -> 
 
 
 def _border_points(quad: Sequence[FacePiece], discs: Discs) -> Iterator[Array]:
-    """Contacts on the borders of the discs that push the farthest out of the plane of each pair."""
+    """Contacts on the borders of the discs that push farthest out of the plane of each pair."""
     N, _ = focus_line(quad)
     for signs in product((1.0, -1.0), repeat=4):
         flat = [piece.frame @ (piece.frame.T @ N[i]) for i, piece in zip(PAIR, quad, strict=True)]
@@ -109,12 +110,12 @@ def focus_gap(quad: Sequence[FacePiece], foci: Array) -> float:
 
 
 def unit(vector: Array) -> Array:
-    """A vector over its length."""
+    """Divide a vector by its length."""
     return vector / np.linalg.norm(vector)
 
 
 def printed_pencil(quad: Sequence[FacePiece], theta: float) -> Discs | None:
-    """Section 3.2 with R = r, over (x0, k, r): None without a disc of radius `LEAST`."""
+    """Solve section 3.2 with R = r, over (x0, k, r); None without a disc of radius `LEAST`."""
     _, u = focus_line(quad)
     foci = [np.column_stack([np.eye(3), sign * u]) for sign in (1.0, -1.0)]
     rows, limits = [np.array([[0.0] * 4 + [-1.0]])], [np.array([-LEAST])]
@@ -141,7 +142,7 @@ def printed_pencil(quad: Sequence[FacePiece], theta: float) -> Discs | None:
 def printed_regulus(
     quad: Sequence[FacePiece], cones: Sequence[ForceCone], least_depth: float
 ) -> Lines | None:
-    """Section 3.3 over (x0, k, l_1, l_2, (x_i, y_i, z_i), t), and n.f >= least_depth."""
+    """Solve section 3.3 over (x0, k, l_1, l_2, (x_i, y_i, z_i), t) with n.f >= least_depth."""
     v, least = np.eye(13), np.array([-least_depth])
     N, u = focus_line(quad)
     rows, limits, A_eq, b_eq = list[Array](), list[Array](), list[Array](), list[float]()

@@ -1,10 +1,10 @@
 """How often a grasp holds although nothing is quite as planned: repeats with seeded noise.
 
 Each repeat draws noise, lets the analysis say which of the nominal loads are still resisted, and
-simulates them all, with forces planned for the contacts as they are then: it asks whether the
-grasp still can hold, not whether fingers notice. Contacts that lost force closure are loaded like
-a negative control. Analysis and simulation must agree in every repeat; how many hold is a count,
-and comes with an interval.
+simulates them all with forces planned for the disturbed contacts. It asks whether the grasp can
+still hold, not whether fingers notice the change. Contacts that lost force closure are loaded like
+a negative control. Analysis and simulation must agree in every repeat. How many repeats hold is a
+count, and comes with an interval.
 """
 
 import importlib
@@ -31,54 +31,54 @@ from sim_validate.validation.controls import Control
 from sim_validate.validation.wrench_verdict import AGREEMENT, WrenchVerdict
 
 NamedLoad: TypeAlias = tuple[str, Array]
-"""A wrench (6,) [N, N m] by its name, torque about the centre of mass."""
+"""A name with a wrench, (6,) [N, N m], torque about the centre of mass."""
 OPEN = "noise"
-"""Contacts that noise has opened, as a control."""
+"""Name of the control made of contacts that noise has opened."""
 
 
 @dataclass(frozen=True, slots=True)
 class NoisyTrial:
-    """A repeat with noise."""
+    """The outcome of one repeat with noise."""
 
     number: int
     predicted: bool | None
-    """Whether the analysis says that every load is resisted; None if that is too close to call."""
+    """Whether the analysis says that every load is resisted; None if it is undecided."""
     outcome: Outcome
     """`held`, or how the first load that did not hold ended."""
     wrench: str
-    """That load's name; empty if all held, or if nothing was loaded."""
+    """Name of the first load that did not hold; empty if all held, or if nothing was loaded."""
     reason: str
     contradictions: tuple[str, ...]
     """Where simulation contradicts the analysis, or says nothing about it, in words."""
     close: bool = False
-    """Whether a load is within a trifle of what the analysis says is resisted."""
+    """Whether a predicted limit is so close to a load that the analysis may err either way."""
 
 
 @dataclass(frozen=True, slots=True)
 class Robustness:
-    """Repeats with noise, as statistics."""
+    """All repeats of a grasp with noise, and their statistics."""
 
     noise: Noise
     trials: tuple[NoisyTrial, ...]
 
     @property
     def held(self) -> int:
-        """How many repeats held every load."""
+        """Number of repeats in which every load held."""
         return sum(trial.outcome is Outcome.HELD for trial in self.trials)
 
     @property
     def predicted(self) -> int:
-        """How many of them hold every load by analysis."""
+        """Number of repeats in which every load is resisted according to the analysis."""
         return sum(trial.predicted is True for trial in self.trials)
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Where the share of repeats that hold is with 95 % confidence."""
+        """The 95 % confidence interval of the share of repeats that hold."""
         return interval(self.held, len(self.trials))
 
     @property
     def contradictions(self) -> tuple[str, ...]:
-        """Where simulation contradicts the analysis, in words."""
+        """Where simulation contradicts the analysis in any repeat, in words."""
         return tuple(
             f"trial {trial.number}: {text}"
             for trial in self.trials
@@ -94,11 +94,11 @@ def robustness(
 
     Args:
         body: The object.
-        grasp: In force closure at this friction.
+        grasp: A grasp in force closure at this friction.
         friction: Coulomb coefficient that was planned with.
-        loads: What each repeat must hold.
-        agenda: How many repeats, with how much noise, and the seed.
-        setup: How trials are simulated: as `for_repeats` says.
+        loads: The loads that each repeat must hold.
+        agenda: The agenda with the number of repeats, the noise and the seed.
+        setup: How trials are simulated, as returned by `for_repeats`.
     """
     trials = tuple(
         noisy_trial(body, disturbed_in(body, grasp, friction, agenda, number), loads, number, setup)
@@ -108,7 +108,7 @@ def robustness(
 
 
 def for_repeats(setup: Setup, scene: Scene) -> Setup:
-    """How repeats are simulated: with the fingertips of the grasp itself, on leaning pads."""
+    """The setup of repeats: the fingertips of the grasp itself, on leaning pads."""
     fingers = replace(setup.fingers, radius_m=scene.layout.drive.radius_m)
     return replace(setup, fingers=fingers, surface="pads")
 
@@ -116,14 +116,14 @@ def for_repeats(setup: Setup, scene: Scene) -> Setup:
 def disturbed_in(
     body: Polyhedron, grasp: Grasp, friction: float, agenda: Agenda, number: int
 ) -> Disturbed:
-    """What noise makes of a grasp in one repeat."""
+    """Disturb a grasp by the noise of one repeat."""
     return disturbed(body, grasp, friction, agenda.noise, (agenda.seed, number))
 
 
 def noisy_trial(
     body: Polyhedron, case: Disturbed, loads: Sequence[NamedLoad], number: int, setup: Setup
 ) -> NoisyTrial:
-    """Simulate one repeat."""
+    """Simulate one repeat of all loads, or of the contacts as a control if noise opened them."""
     if case.missed:
         reason = f"finger {case.missed[0]} misses its face"
         return NoisyTrial(number, False, Outcome.LOST_CONTACT, "", reason, ())
@@ -150,7 +150,7 @@ def noisy_trial(
 
 
 def _silent(outcome: Outcome) -> tuple[str, ...]:
-    """Endings that say nothing about the object; fingertips without room are none of them."""
+    """Report an outcome that says nothing about the object, unless fingertips only lack room."""
     says = (Outcome.HELD, *LET_GO, Outcome.INVALID_START)
     return () if outcome in says else (f"{outcome.value}: neither held nor let go",)
 
@@ -172,12 +172,12 @@ def _held_loads(
 def noisy_case(
     body: Polyhedron, case: Disturbed, loads: Sequence[NamedLoad], setup: Setup
 ) -> tuple[Rig, tuple[PlannedLoad, ...]]:
-    """The contacts of a repeat, in force closure, in the grip of their fingers, and the loads.
+    """Close fingers on the contacts of a repeat, and plan forces for its loads.
 
     Args:
         body: The object.
-        case: What noise made of the grasp.
-        loads: What is to be held, but for the mass.
+        case: The disturbed grasp, whose contacts are in force closure.
+        loads: The loads to hold, before the mass scales them.
         setup: How trials are simulated.
     """
     scene = heavier(setup.scene(body, case.contacts, case.friction), case.mass)
@@ -188,7 +188,7 @@ def noisy_case(
 
 
 def heavier(scene: Scene, factor: float) -> Scene:
-    """A scene with an object of more mass."""
+    """Scale the mass and inertia of the object in a scene."""
     layout = replace(
         scene.layout,
         mass_kg=factor * scene.layout.mass_kg,
@@ -198,7 +198,7 @@ def heavier(scene: Scene, factor: float) -> Scene:
 
 
 def _opened(body: Polyhedron, control: Control, number: int, setup: Setup) -> NoisyTrial:
-    """Contacts that are not in force closure: as a control they must let go."""
+    """Try contacts that are not in force closure as a control, which must let go."""
     verdict = try_control(body, control, Agenda(), setup)
     if verdict.held:
         wrong = ("contacts without force closure held",)
@@ -212,16 +212,16 @@ CONFIDENCE = 0.95
 
 
 def interval(count: int, of: int) -> tuple[float, float]:
-    """Where the share behind a count is with 95 % confidence (Clopper and Pearson, exact).
+    """The 95 % confidence interval of a share, by Clopper and Pearson's exact method.
 
     Args:
-        count: How many did.
-        of: How many were tried, at least one.
+        count: Number of successes.
+        of: Number of trials, at least one.
     """
     found = _stats().binomtest(count, of).proportion_ci(CONFIDENCE, method="exact")
     return float(found.low), float(found.high)
 
 
 def _stats() -> Any:
-    """SciPy's statistics, which has no types and takes half a second to import."""
+    """SciPy's statistics, imported on use: it has no types and takes half a second to import."""
     return importlib.import_module("scipy.stats")

@@ -1,10 +1,9 @@
 """A grasp and its negative controls, from analysis through simulation to a verdict.
 
-For each test wrench the analysis predicts the largest multiple that is resisted; a share of
-it is applied in simulation, with forces between those at rest and those at the limit. The
-critical friction is found in simulation too, and on request the limits. The grasp is confirmed
-when all wrenches hold, and the run can be trusted when the simulator is faithful (`gate`) and no
-control holds.
+For each test wrench the analysis predicts the largest multiple that is resisted. A share of it is
+applied in simulation, with forces between those at rest and those at the limit. The critical
+friction is found in simulation too, and on request the limits. The grasp is confirmed when all
+wrenches hold. The run can be trusted when the simulator is faithful (`gate`) and no control holds.
 """
 
 from collections.abc import Sequence
@@ -57,8 +56,8 @@ def validate(
         body: The object.
         grasp: A grasp in force closure at this friction.
         friction: Coulomb coefficient at every contact.
-        agenda: Which trials.
-        setup: How they are simulated.
+        agenda: Which trials to run; the default agenda if None.
+        setup: How trials are simulated; the default setup if None.
 
     Raises:
         InputError: The contacts are not on the body's faces, or not closed at this friction.
@@ -97,12 +96,12 @@ def validate(
 def simulated_critical_friction(
     body: Polyhedron, grasp: Grasp, setup: Setup | None = None
 ) -> float:
-    """Smallest friction at which a squeezed object stays where it is in simulation.
+    """Find the smallest friction at which a squeezed object stays in place in simulation.
 
     Args:
         body: The object.
-        grasp: On its faces.
-        setup: How trials are simulated.
+        grasp: A grasp on the faces of `body`.
+        setup: How trials are simulated; the default setup if None.
 
     Returns:
         The friction; zero if less than `FrictionProtocol.least_friction` is enough; infinity
@@ -127,7 +126,7 @@ def simulated_critical_friction(
 
 
 def _given(value: Chosen | None, default: Chosen, name: str) -> Chosen:
-    """What was given, or else the default, which says of what class it must be."""
+    """The value, checked to be of the default's class, or the default if it is None."""
     if value is None:
         return default
     instance(value, type(default), name)
@@ -135,7 +134,7 @@ def _given(value: Chosen | None, default: Chosen, name: str) -> Chosen:
 
 
 class _Bout:
-    """A grasp on the bench, and the trials of an agenda."""
+    """A grasp on the bench, with the trials of an agenda."""
 
     def __init__(
         self, body: Polyhedron, grasp: Grasp, friction: float, scene: Scene,
@@ -149,7 +148,7 @@ class _Bout:
         self.traces = self.rig.hold([planned.load for planned in self.loads])
 
     def wrenches(self) -> tuple[WrenchVerdict, ...]:
-        """Every load, held and, if asked for, raised to its limit."""
+        """Judge the hold of every load and, if asked for, find its limit."""
         radius = self.layout.drive.radius_m
         overlap = clashes(self.body, self.grasp.positions, self.grasp.normals, radius)
         return tuple(
@@ -181,7 +180,7 @@ class _Bout:
         return (None,) * len(limits)
 
     def critical(self) -> CriticalFriction:
-        """Critical friction, predicted and, if asked for, simulated."""
+        """Predict the critical friction and, if asked for, find it in simulation."""
         predicted = self.grasp.critical_friction
         if not self.agenda.critical_friction:
             return CriticalFriction(predicted)
@@ -192,14 +191,14 @@ class _Bout:
             return CriticalFriction(predicted)
 
     def controls(self) -> tuple[ControlVerdict, ...]:
-        """What must not hold."""
+        """Try the negative controls, if asked for."""
         if not self.agenda.controls:
             return ()
         found = negative_controls(self.body, self.grasp, self.friction, self.agenda.seed)
         return tuple(try_control(self.body, each, self.agenda, self.setup) for each in found)
 
     def bounds(self) -> Bounds | None:
-        """What is found without planned forces, if asked for."""
+        """Find bounds without planned forces, if asked for."""
         if not self.agenda.independent:
             return None
         limits = [planned.limit for planned in self.loads]
@@ -207,7 +206,7 @@ class _Bout:
         return independent_bounds(self.body, self.grasp, critical, self.rig, limits)
 
     def robustness(self) -> Robustness | None:
-        """What noise makes of it, if asked for: the same fingertips hold the same wrenches."""
+        """Repeat the holds with noise, if asked for: the same fingertips hold the same wrenches."""
         if not self.agenda.trials:
             return None
         setup = for_repeats(self.setup, self.bench.scene)
@@ -215,7 +214,7 @@ class _Bout:
         return robustness(self.body, self.grasp, self.friction, loads, self.agenda, setup)
 
     def accepted_by(self) -> dict[str, bool]:
-        """What rules of other tools make of the same traces."""
+        """Apply the rules of other tools to the same traces."""
         pulled = [trace for planned, trace in zip(self.loads, self.traces, strict=True)
                   if planned.name in FORCE_AXES]  # fmt: skip
         rules = rules_named(self.agenda.rules)

@@ -1,4 +1,4 @@
-"""One wrench on a grasp, predicted and simulated, and whether the two agree."""
+"""The verdict on one wrench: predicted, simulated, and whether the two agree."""
 
 from dataclasses import dataclass
 
@@ -8,13 +8,13 @@ from sim_validate.simulation.traces import Trace
 from sim_validate.simulation.wrench_limits import SimulatedLimit
 
 AGREEMENT = 0.02
-"""How far simulated limits and critical frictions may be off, relative to the predicted ones: five
-times the worst that was measured."""
+"""Largest relative error of simulated limits and critical frictions: five times the worst that was
+measured."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WrenchVerdict:
-    """One wrench, predicted and simulated."""
+    """One wrench on a grasp, predicted and simulated."""
 
     name: str
     wrench: Array
@@ -22,10 +22,11 @@ class WrenchVerdict:
     predicted_limit: float
     """Largest multiple of the applied wrench that the analysis says is resisted."""
     required_friction: float
-    """What the planned forces need."""
+    """Friction that the planned forces need."""
     hold: HoldVerdict
     simulated_limit: SimulatedLimit | None = None
-    """Where the object lets go, in predicted limits; None if not measured, or not found."""
+    """Where the object lets go, relative to the predicted limit; None if not measured, or not
+    found."""
     trace: Trace | None = None
 
     @property

@@ -83,7 +83,7 @@ NPZS = {
     "words": (arrays(contact_points_m=np.full((1, 4, 3), "a")), "contact_points_m"),
     "nan": (arrays(contact_points_m=np.full((1, 4, 3), np.nan)), "contact_points_m|finite"),
     "two numbers a point": (arrays(contact_points_m=np.zeros((1, 4, 2))), "contact_points_m"),
-    "other counts": (arrays(contact_normals=np.ones((2, 4, 3))), "one length"),
+    "other counts": (arrays(contact_normals=np.ones((2, 4, 3))), "equal length"),
     "normals of no length": (arrays(contact_normals=np.zeros((1, 4, 3))), "contacts"),
     "no normals": (zipped((POSITIONS_NPY, npy(POSITIONS))), "contact_normals"),
     "complex numbers": (arrays(contact_points_m=np.ones((1, 4, 3)) * 1j), "contact_points_m"),

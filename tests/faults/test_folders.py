@@ -19,7 +19,7 @@ PLAN = ["plan", "tetrahedron", "--family", "concurrent", "-q"]
 def test_a_file_in_place_of_a_folder_is_refused(command, below, tmp_path, capsys):
     (tmp_path / "file").write_text("mine")
     assert main([command, "tetrahedron", "-q", "--out", str(tmp_path / "file" / below)]) == 4
-    assert "is there, and no folder; give another --out" in capsys.readouterr().err
+    assert "exists and is not a folder; give another --out" in capsys.readouterr().err
     assert contents(tmp_path) == {"file": b"mine"}
 
 

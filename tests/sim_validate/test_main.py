@@ -347,7 +347,7 @@ def test_planning_flags_reach_the_planner(capsys):
         (["--finger-radius-m", "0.01"], "--finger-radius-m also needs --approach-m"),
         (["--edge-clearance-m", "5"], "clearance must be a number from 0"),
         (["--complete", "--family", "pencil"], "takes the free method"),
-        (["--optimize", "--share-faces-m", "0.01"], "leave it out, or them"),
+        (["--optimize", "--share-faces-m", "0.01"], "leave out --optimize or these"),
         (["--unit", "mm"], "box is built in"),
     ],
 )

@@ -1,4 +1,4 @@
 """How is a dataset made, on one machine or many, and resumed?
 
-A configuration comes in. Staged units and then whole tables go out.
+A configuration becomes staged units of work, and these become whole tables.
 """

@@ -1,6 +1,6 @@
-"""From a configuration to a finished dataset in a folder; what was done before is not done again.
+"""From a configuration to a finished dataset in a folder; finished units are not computed again.
 
-The manifest is written last; once it is there, the staging folder goes.
+The manifest is written last; once it is there, the staging folder is removed.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,16 +33,16 @@ from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.setup import Setup
 
 OWN = ("staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, CROISSANT, MANIFEST)
-"""What a dataset's folder holds, and nothing else."""
+"""Names of all files and folders that a dataset's folder may hold."""
 
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """What came of a build."""
+    """The result of a build: how many units and rows there are."""
 
     units: int
     made: int
-    """Units that were not done before."""
+    """Units that were computed in this run."""
     quarantined: int
     rows: dict[Name, int]
 
@@ -54,20 +54,21 @@ def build(
     report: Callable[[int, int], None],
     limits: Limits | None = None,
 ) -> Built:
-    """Make a dataset, or go on making it.
+    """Make a dataset, or resume making it.
 
     Args:
-        config: What it is made of.
-        folder: Where; it may hold an unfinished or finished dataset of the same configuration.
-        engine: Where units are done.
-        report: Told how many units are finished, and of how many.
-        limits: What each unit may take; only for engines with processes of their own.
+        config: What the dataset is made of.
+        folder: Folder of the dataset; it may hold an unfinished or finished dataset of the same
+            configuration.
+        engine: The engine that computes units.
+        report: Called with (finished, total) after each unit.
+        limits: Time and memory for each unit; only for engines with processes of their own.
 
     Raises:
-        InputError: An object is nowhere, the folder holds something else, or another command is
+        InputError: An object does not exist, the folder holds something else, or another command is
             at work in it.
         UnfaithfulError: The simulator fails the gate.
-        WorkerError: A worker cannot do units for this driver.
+        WorkerError: A worker cannot compute units for this driver.
     """
     require_pyarrow()
     units = units_of(config)
@@ -84,14 +85,15 @@ def build(
         for unit in left:
             staging.forget(unit)
         for friction in config.frictions if left else ():
-            require_faithful(Setup(), friction)  # what fails at one object's size leaves it out
+            # a gate that fails at one object's size only leaves that object out
+            require_faithful(Setup(), friction)
         drive(left, staging, engine, report, limits)
         finish(config, units, staging, folder)
         return _as_built(folder, units, len(left))
 
 
 def _refuse_sources_inside(units: Sequence[WorkUnit], config: DatasetConfig, folder: Path) -> None:
-    """Refuse to write over what the dataset is made of."""
+    """Refuse to write over the meshes or contacts that the dataset is made of."""
     sources = [unit.path for unit in units if unit.path is not None]
     sources += [Path(config.contacts).resolve()] if config.contacts else []
     for path in sources:
@@ -100,10 +102,10 @@ def _refuse_sources_inside(units: Sequence[WorkUnit], config: DatasetConfig, fol
 
 
 def _refuse_others(folder: Path, config: DatasetConfig) -> None:
-    """Refuse a folder of something else, and remove what a killed build had not finished writing.
+    """Refuse a folder of something else, and remove half-written files of a killed build.
 
     Raises:
-        InputError: It holds other files, or a dataset of another configuration.
+        InputError: The folder holds other files, or a dataset of another configuration.
     """
     stated = folder / CONFIG
     own = OWN if stated.is_file() else ()
@@ -112,7 +114,7 @@ def _refuse_others(folder: Path, config: DatasetConfig) -> None:
         if path.name.startswith(half_written):
             path.unlink()
         elif path.name not in own:
-            raise InputError(f"{path}: is there, and not of this dataset; give another --out")
+            raise InputError(f"{path}: exists, but is not part of this dataset; give another --out")
     if stated.is_file() and read_text(stated) != config_to_toml(config):
         raise InputError(
             f"{folder}: holds a dataset of another configuration (see its {CONFIG}); give "
@@ -121,16 +123,17 @@ def _refuse_others(folder: Path, config: DatasetConfig) -> None:
 
 
 def _as_built(folder: Path, units: Sequence[WorkUnit], made: int = 0) -> Built:
-    """What a finished dataset holds.
+    """Describe a finished dataset, after a check that it is the wanted one.
 
     Raises:
-        InputError: It was made from other meshes or contacts, or by other versions, or damaged.
+        InputError: The dataset was made from other meshes or contacts, or by other versions, or is
+            damaged.
     """
     manifest = read_manifest(folder)
     if manifest.units_sha256 != units_sha256(units):
         raise InputError(
-            f"{folder}: is finished, but its meshes or contacts have changed since, or the "
-            "versions of packages; give another --out to make it again"
+            f"{folder}: is finished, but its meshes, its contacts or the versions of packages "
+            "have changed since; give another --out to make it again"
         )
     for each in manifest.files:
         path = path_inside(folder, each.path)

@@ -1,9 +1,9 @@
-"""One loop that has work units done by an engine, some at a time, and notes what became of each.
+"""The loop that has an engine compute work units, and records how each of them ended.
 
-An engine submits a task and returns a future. A unit that ends its worker, or takes too long, is
-tried once more when nothing else is under way; then it is quarantined with its reason. What fails
-with an error of ours is quarantined at once, by the worker: it would come out the same again. What
-would befall every unit - a full disk, a worker with other packages - ends the run.
+An engine submits a task and returns a future. A unit whose worker ends, or that takes too long, is
+tried once more when nothing else is under way; then it is quarantined with its reason. A unit that
+fails with an error of this project is quarantined at once, by the worker: it would fail again. A
+failure that would befall every unit - a full disk, a worker with other packages - ends the run.
 """
 
 import time
@@ -18,23 +18,23 @@ from sim_validate.datasets.units import WorkUnit, provenance
 from sim_validate.parallel import interrupts
 
 AHEAD = 3
-"""Units under way for each worker, so that none waits for the driver."""
+"""Units under way per worker, so that no worker waits for the driver."""
 LOOK_S = 1.0
-"""How often the driver looks whether it was interrupted [s]."""
+"""Time between two checks for an interrupt [s]."""
 
 
 class Engine(Protocol):
-    """Where units are done."""
+    """Something that computes units on some workers."""
 
     workers: int
 
     @property
     def ended(self) -> tuple[str, ...]:
-        """Names of the errors that say that a worker ended, not that it could not begin."""
+        """Names of the errors which say that a worker ended, not that it could not begin."""
         ...
 
     def submit(self, function: Callable[[Task], None], task: Task, /) -> "Future[None]":
-        """Have a task done."""
+        """Start a task on a worker."""
         ...
 
 
@@ -46,18 +46,18 @@ def drive(
     limits: Limits | None = None,
     work: Work = do_unit,
 ) -> None:
-    """Have units done, each kept or quarantined in the end.
+    """Have units computed; each is kept or quarantined in the end.
 
     Args:
-        units: Those that are not done.
-        staging: Where they are kept.
-        engine: Where they are done.
-        report: Told how many are finished, and of how many.
-        limits: What each unit may take.
-        work: What is done with it.
+        units: The units to compute.
+        staging: The folder of finished units.
+        engine: The engine that computes them.
+        report: Called with (finished, total) when units finish.
+        limits: Time and memory for each unit.
+        work: The function that computes a unit.
 
     Raises:
-        WorkerError: A worker cannot do units for this driver.
+        WorkerError: A worker cannot compute units for this driver.
         OSError: Rows cannot be written.
     """
     own = dict(provenance())
@@ -87,7 +87,7 @@ def drive(
 
 
 def _try_alone(task: Task, engine: Engine) -> None:
-    """Try a unit once more; what fails now is at fault itself."""
+    """Try a unit once more by itself; a second failure is its own fault."""
     began = time.monotonic()
     future = engine.submit(do_task, task)
     while not wait([future], timeout=LOOK_S).done:
@@ -101,23 +101,23 @@ def _try_alone(task: Task, engine: Engine) -> None:
 
 
 def _succeeded(future: "Future[None]", task: Task, engine: Engine) -> bool:
-    """Whether a unit was done; false if its worker ended, or was ended.
+    """Whether a unit was computed; False if its worker ended, or was ended.
 
     Raises:
-        WorkerError: The worker cannot do units for this driver.
-        OSError: Its rows could not be written.
+        WorkerError: The worker cannot compute units for this driver.
+        OSError: The unit's rows could not be written.
     """
     error = future.exception()
     if error is None:
         if task.staging.finished(task.unit):
             return True
         raise WorkerError(
-            f"{task.staging.folder}: a unit was done, but its rows are not here; --out must be on "
-            "a file system that driver and workers share"
+            f"{task.staging.folder}: a unit is finished, but its rows are missing; --out must be "
+            "on a file system that driver and workers share"
         )
     if type(error).__name__ in engine.ended:
         return False
     if isinstance(error, WorkerError | OSError | KeyboardInterrupt):
         raise error
     name = type(error).__name__
-    raise WorkerError(f"a worker cannot do units: {name}: {error}") from error
+    raise WorkerError(f"a worker cannot compute units: {name}: {error}") from error

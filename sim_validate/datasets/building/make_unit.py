@@ -1,4 +1,4 @@
-"""A work unit -> rows and files: grasps are planned, or taken as given, and tried in simulation."""
+"""A work unit -> rows and files: grasps are planned or given, and tried in simulation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,21 +22,21 @@ from sim_validate.validation.validation import validate
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """What comes of a unit."""
+    """The rows and files of a unit."""
 
     object_id: str
     split: str
     rows: Rows
     files: Mapping[str, str]
-    """Texts by their paths in the dataset's folder."""
+    """Texts of the files by their paths in the dataset's folder."""
 
 
 def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
-    """Plan the grasps of a unit or take those given, try each, and write down everything.
+    """Plan the grasps of a unit or judge the given ones, try each, and make rows of everything.
 
     Args:
-        unit: What to do.
-        body: Its object.
+        unit: The unit to compute.
+        body: The object of the unit.
 
     Raises:
         GraspError: The simulator fails its gate.
@@ -55,7 +55,7 @@ def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
 
 
 class _Making:
-    """What comes of a unit as it grows."""
+    """The rows and files of a unit while they are made."""
 
     def __init__(self, unit: WorkUnit, body: Polyhedron) -> None:
         self.unit, self.body = unit, body
@@ -68,7 +68,7 @@ class _Making:
         )
 
     def plan(self) -> None:
-        """The best grasps of each family by itself."""
+        """Plan and try the best grasps of each family, planned separately."""
         config = self.unit.config
         for family in config.families:
             planned = plan(
@@ -79,7 +79,7 @@ class _Making:
                 self.found.add(grasp, self._tried(grasp, self.body))
 
     def judge(self) -> None:
-        """The given grasps, those that can be tried."""
+        """Judge the given grasps; those that cannot be tried get a row with the reason."""
         for given in self.unit.given:
             try:
                 self._judge(given)
@@ -91,7 +91,7 @@ class _Making:
 
         Raises:
             InputError: A contact is not on the object, or fingertips find no room.
-            UndecidedError: Closure is too close to call.
+            UndecidedError: Closure is too close to decide.
         """
         friction = self.unit.friction
         seated = seat(self.body, given.points, given.normals)

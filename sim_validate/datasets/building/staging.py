@@ -1,7 +1,7 @@
-"""What is done so far, in a folder: a subfolder for each finished unit, put there in one step.
+"""Finished units in a folder: one subfolder per unit, renamed into place in one step.
 
-A unit that was killed leaves nothing but a temporary folder, which the next run removes. So what is
-there is whole, and a run that is started again redoes no more than what was under way.
+A unit that was killed leaves only a temporary folder, which the next run removes. So every
+subfolder is complete, and a restarted run repeats only the units that were under way.
 """
 
 import hashlib
@@ -27,24 +27,24 @@ from sim_validate.files.reading import read_bytes, read_text
 
 RECORD = "unit.json"
 OTHERS = "others"
-"""Folder of what is no table."""
+"""Folder of a unit's files that are no tables."""
 UNFINISHED = "."
 """First letter of the names of temporary folders."""
 
 
 MOST_BYTES = 2**31
-"""Of one file of a unit."""
+"""Largest size of one file of a unit."""
 
 
 class UnitRecord(BaseModel):
-    """What is noted of a unit: where its rows belong, or why it has none."""
+    """The record of a unit: where its rows belong, or why it has none."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
     object: str
     friction: float
     files: dict[str, str]
-    """Hashes, by path in the unit's folder."""
+    """SHA-256 of each file, by its path in the unit's folder."""
     object_id: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = None
     split: Literal["train", "validation", "test"] | None = None
     reason: str | None = None
@@ -66,45 +66,48 @@ class Staging:
     folder: Path
 
     def clear_unfinished(self) -> None:
-        """Remove what killed units left; only when none is under way."""
+        """Remove what killed units left; this is safe only when no unit is under way."""
         self.folder.mkdir(parents=True, exist_ok=True)
         for path in self.folder.iterdir():
             if path.name.startswith(UNFINISHED):
-                shutil.rmtree(path, ignore_errors=True)  # a worker of a killed driver may be at it
+                # a worker of a killed driver may still write here
+                shutil.rmtree(path, ignore_errors=True)
 
     def remove(self) -> None:
-        """Remove everything, when it is in a finished dataset."""
+        """Remove the whole folder, once its contents are in a finished dataset."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def write(self, unit: WorkUnit, made: Made) -> None:
-        """Keep what came of a finished unit."""
+        """Keep the rows and files of a finished unit."""
         tables = {_file(name): parquet_bytes(name, made.rows[name], {}) for name in TABLES}
         others = {f"{OTHERS}/{path}": text.encode() for path, text in made.files.items()}
         about = {"object_id": made.object_id, "split": made.split}
         self._put(unit, {**tables, **others}, about)
 
     def quarantine(self, unit: WorkUnit, reason: str) -> None:
-        """Note that a unit cannot be done."""
+        """Record that a unit cannot be computed."""
         self._put(unit, {}, {"reason": reason})
 
     def result(self, unit: WorkUnit) -> Finished | str:
-        """What a unit came to, or why it cannot be done.
+        """Look up the result of a unit: its object and split, or why it has no rows.
 
         Raises:
-            InputError: Its record is damaged.
+            InputError: The record of the unit is damaged.
         """
         record = self._record(unit)
         if record.reason is not None:
             return record.reason
         if record.object_id is None or record.split is None:
-            raise InputError(f"{self._of(unit) / RECORD}: neither rows nor a reason; build again")
+            raise InputError(
+                f"{self._of(unit) / RECORD}: records neither rows nor a reason; build again"
+            )
         return Finished(unit, record.object_id, record.split)
 
     def done(self, unit: WorkUnit) -> bool:
-        """Whether a unit is finished or quarantined, and all its files are as they were written."""
+        """Whether a unit is finished or quarantined, with all its files as they were written."""
         try:
             record = self._record(unit)
-            self.result(unit)  # or it says nothing
+            self.result(unit)  # raises if the record says nothing
             return all(
                 _sha256(read_bytes(path_inside(self._of(unit), name), MOST_BYTES)) == sha256
                 for name, sha256 in record.files.items()
@@ -113,19 +116,19 @@ class Staging:
             return False
 
     def finished(self, unit: WorkUnit) -> bool:
-        """Whether there is anything of a unit: its rows, or why there are none."""
+        """Whether a unit has a folder, with its rows or the reason why it has none."""
         return self._of(unit).is_dir()
 
     def table(self, unit: WorkUnit, name: Name) -> Path:
-        """The file of a finished unit's rows in one of the tables."""
+        """Path of a finished unit's rows in one of the tables."""
         return self._of(unit) / _file(name)
 
     def copy_files(self, unit: WorkUnit, folder: Path) -> None:
-        """Put what a finished unit made beside its rows into the dataset."""
+        """Copy the files that a finished unit made beside its rows into the dataset."""
         shutil.copytree(self._of(unit) / OTHERS, folder, dirs_exist_ok=True)
 
     def forget(self, unit: WorkUnit) -> None:
-        """Remove what there is of a unit that is not done: damaged files."""
+        """Remove a unit whose files are damaged."""
         shutil.rmtree(self._of(unit), ignore_errors=True)
 
     def _of(self, unit: WorkUnit) -> Path:
@@ -158,7 +161,7 @@ class Staging:
             made.rename(self._of(unit))
         except OSError:
             shutil.rmtree(made, ignore_errors=True)
-            if not self.done(unit):  # else another attempt was faster, with the same rows
+            if not self.done(unit):  # otherwise another attempt was faster and wrote the same rows
                 raise
 
 

@@ -1,7 +1,7 @@
-"""One work unit, wherever it is done: the worker is checked, limits are kept, rows are put away.
+"""One work unit in a worker: the worker is checked, limits are enforced, rows are kept.
 
 A worker must run the code and the packages of the driver, or its rows would not be those of the
-driver. Limits are kept by the system, whatever a unit does: a timer ends a process in which one
+driver. The system enforces the limits, whatever a unit does: a timer ends a process in which a unit
 takes too long, also inside a call that never comes back, and memory beyond the limit is refused.
 """
 
@@ -25,11 +25,11 @@ from sim_validate.datasets.units import WorkerError, WorkUnit, body_of, provenan
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one unit may take."""
+    """Time and memory that one unit may use."""
 
     timeout_s: float
     memory_bytes: int | None = None
-    """Address space beyond what a process needs to start; no limit if not given."""
+    """Address space beyond what a process needs to start; None for no limit."""
 
 
 Work: TypeAlias = Callable[[WorkUnit, Staging], None]
@@ -39,7 +39,7 @@ def do_unit(unit: WorkUnit, staging: Staging) -> None:
     """Make the rows of a unit and keep them, or the reason why there are none.
 
     Raises:
-        WorkerError: The worker does not see the unit's mesh.
+        WorkerError: The worker cannot see the unit's mesh.
         OSError: Nothing can be written.
     """
     try:
@@ -54,28 +54,29 @@ def do_unit(unit: WorkUnit, staging: Staging) -> None:
         if error.errno != errno.ENOMEM:
             raise
         staging.quarantine(unit, "out of memory")
-    except Exception as error:  # a fault of ours with one object must not stop the others
+    except Exception as error:  # a bug that one object triggers must not stop the others
         staging.quarantine(unit, f"internal error: {type(error).__name__}: {error}")
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A unit as it is given to a worker."""
+    """A unit as it is sent to a worker."""
 
     unit: WorkUnit
     staging: Staging
     provenance: Mapping[str, str]
-    """The driver's."""
+    """Versions and code hash of the driver."""
     limits: Limits | None = None
-    """None where the worker is the driver's own process."""
+    """Limits of the unit; None where the worker is the driver's own process."""
     work: Work = do_unit
 
 
 def do_task(task: Task) -> None:
-    """Do a unit in a worker.
+    """Compute a unit in a worker.
 
     Raises:
-        WorkerError: The worker's packages are not the driver's, or it does not see its folder.
+        WorkerError: The worker's packages are not the driver's, or it cannot see the driver's
+            folder.
     """
     _check_worker(task)
     if task.limits is None:
@@ -95,7 +96,7 @@ def _check_worker(task: Task) -> None:
             )
     if not task.staging.folder.is_dir():
         raise WorkerError(
-            f"{task.staging.folder}: a worker does not see this folder; --out must be on a file "
+            f"{task.staging.folder}: a worker cannot see this folder; --out must be on a file "
             "system that driver and workers share"
         )
 
@@ -115,7 +116,7 @@ def _memory_kept(more: int | None) -> Generator[None]:
     if more is None:
         yield
         return
-    _load()  # a library short of memory while it starts can hang
+    _load()  # a library that runs out of memory while it starts can hang
     resource: Any = importlib.import_module("resource")
     before, most = resource.getrlimit(resource.RLIMIT_AS)
     set_before = [limit for limit in (before, most) if limit != resource.RLIM_INFINITY]
@@ -129,14 +130,14 @@ def _memory_kept(more: int | None) -> Generator[None]:
 
 @cache
 def _load() -> None:
-    """Do a small unit, so that all is loaded that units need."""
+    """Compute a small unit, so that everything that units need is loaded."""
     config = DatasetConfig(objects=("tetrahedron",), families=("concurrent",), limit=1)
     (unit,) = units_of(config)
     made_of(unit, body_of(unit))
 
 
 def _address_space() -> int:
-    """Bytes of address space this process has; 0 where the system does not tell."""
+    """Size of this process's address space in bytes; 0 where the system does not say."""
     sizes = Path("/proc/self/statm")
     if not sizes.is_file():
         return 0

@@ -1,8 +1,8 @@
-"""From the rows of all units to the files of a dataset, an object at a time.
+"""From the rows of all units to the files of a dataset, one object at a time.
 
-Rows are sorted by object, then by their table's key, so the files do not depend on which unit was
-done when, where, or in which run; nothing but the rows of one object, and those that wait to be
-written, is in memory.
+Rows are sorted by object, then by their table's key, so the files do not depend on when, where or
+in which run each unit was computed. Only the rows of one object, and rows that wait to be written,
+are in memory.
 """
 
 import json
@@ -26,9 +26,10 @@ from sim_validate.files.reading import write_text
 
 DATA = "data"
 TWIN = "the same object as"
-"""How the reason begins why an object's rows are not there a second time."""
+"""Beginning of the reason why an object's rows are not in the tables a second time."""
 CONTACTS = "contacts.json"
-"""Contacts that were judged, if any, as a contacts file with normals into the object."""
+"""Name of the file with the contacts that were judged, if any; its normals point into the
+object."""
 CONFIG, QUARANTINE = "config.toml", "quarantine.jsonl"
 EXTRAS = ("meshes", "scenes")
 """Folders of files that units make beside their rows."""
@@ -37,7 +38,7 @@ EXTRAS = ("meshes", "scenes")
 def finish(
     config: DatasetConfig, units: Sequence[WorkUnit], staging: Staging, folder: Path
 ) -> None:
-    """Put the rows of all units into tables, list all files, and remove what was staged."""
+    """Write the rows of all units into tables, list all files, and remove the staging folder."""
     for name in (DATA, *EXTRAS):
         shutil.rmtree(folder / name, ignore_errors=True)
     good, quarantined = _sorted_out(units, staging)
@@ -74,7 +75,7 @@ def finish(
 def _sorted_out(
     units: Sequence[WorkUnit], staging: Staging
 ) -> tuple[list[Finished], list[dict[str, object]]]:
-    """Units with rows of their own, by object, and why others have none."""
+    """Units with rows of their own, sorted by object, and records of why the others have none."""
     good, quarantined = list[Finished](), list[dict[str, object]]()
     first: dict[tuple[str, float], str] = {}
     for unit in sorted(units, key=lambda each: (each.object, each.friction)):

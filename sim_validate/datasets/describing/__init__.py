@@ -1,4 +1,4 @@
 """What does a dataset say about itself?
 
-A finished dataset comes in. Its card and its description for catalogues go out.
+This room writes the card of a finished dataset, and its description for catalogues.
 """

@@ -1,6 +1,6 @@
-"""The card of a dataset, `README.md`: what the Hugging Face Hub and people read first.
+"""The card of a dataset, `README.md`, which the Hugging Face Hub and people read first.
 
-Words of the user's are escaped: in the header as quoted strings, in the text as Markdown.
+A user's own words are escaped: in the header as quoted strings, in the text as Markdown.
 """
 
 import re
@@ -32,20 +32,20 @@ SIZES = (
     (10**3, "n<1K"), (10**4, "1K<n<10K"), (10**5, "10K<n<100K"), (10**6, "100K<n<1M"),
     (10**7, "1M<n<10M"), (10**8, "10M<n<100M"), (10**9, "100M<n<1B"), (10**10, "1B<n<10B"),
 )  # fmt: skip
-"""Up to how many rows, and what the Hub calls that."""
+"""Bounds on the number of rows, and the Hub's name for datasets below each."""
 LARGEST = "10B<n<100B"
 MARKS = frozenset("\\`*_[]<>|~&#!$@")
-"""What can begin something in Markdown within a line."""
+"""Letters that can begin Markdown or HTML within a line."""
 ADDRESS = re.compile(r"https?://[^\s<>\"'`\\|{}^]+")
-"""What can be a link as it is."""
+"""Pattern of an address that can be a link as it is."""
 
 
 def card_text(config: DatasetConfig, manifest: Manifest) -> str:
-    """The card of a dataset.
+    """Write the card of a dataset.
 
     Args:
-        config: What it is made of.
-        manifest: The files of its tables, and what made them.
+        config: What the dataset is made of.
+        manifest: The files of its tables, and the versions that made them.
     """
     sections = (
         _header(config, manifest),
@@ -68,7 +68,7 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
 
 
 def _header(config: DatasetConfig, manifest: Manifest) -> str:
-    """The header for the Hub, in YAML."""
+    """The card's header for the Hub, in YAML."""
     lines = [f"pretty_name: {quoted(config.title)}", *_license_lines(config.license)]
     lines += ["task_categories:", f"- {quoted('robotics')}", "tags:"]
     lines += [f"- {quoted(word)}" for word in KEYWORDS]
@@ -87,7 +87,7 @@ def _license_lines(name: str) -> list[str]:
 
 
 def _config_lines(name: Name, manifest: Manifest) -> list[str]:
-    """Where the files of a table are, by split; nothing if there are none."""
+    """The header's lines about the files of a table, by split; none if the table has no files."""
     splits = _splits(name, manifest)
     if not splits:
         return []
@@ -101,7 +101,7 @@ def _config_lines(name: Name, manifest: Manifest) -> list[str]:
 
 
 def _splits(name: Name, manifest: Manifest) -> list[str]:
-    """The splits that have rows of a table, the one to train with first."""
+    """The splits in which a table has rows, the one to train with first."""
     there = {each.split for each in manifest.of_table(name)}
     return [split for split, _ in reversed(SPLITS) if split in there]
 
@@ -111,7 +111,7 @@ def _size(rows: int) -> str:
 
 
 def _credits(config: DatasetConfig) -> str:
-    """What the user says of the dataset."""
+    """The user's statements about the dataset, as a list."""
     known = known_license(config.license)
     name = config.license if known is None else known.spdx
     said = {
@@ -135,7 +135,7 @@ def _counts(manifest: Manifest) -> str:
 
 
 def _table(name: Name) -> str:
-    """All columns of a table."""
+    """A Markdown table of all columns of a table."""
     lines = [
         f"### {name}", "",
         f"Sorted by, and unique in, {' and '.join(f'`{key}`' for key in KEYS[name])}.", "",
@@ -170,7 +170,7 @@ def _labels() -> str:
 
 
 def _loading(manifest: Manifest) -> str:
-    """Code that loads the dataset, for a folder called `ds`; what follows tries it."""
+    """Code that loads the dataset from a folder called `ds`; the tests run it."""
     split = next(iter(_splits(FIRST, manifest)), "train")
     return f"""\
 ## Loading
@@ -224,6 +224,6 @@ def _is_address(text: str) -> bool:
 
 
 def _as_markdown(text: str) -> str:
-    """A user's text on one line, with nothing in it that is Markdown or HTML."""
+    """A user's text on one line, with all Markdown and HTML escaped."""
     line = "".join(letter if letter.isprintable() else " " for letter in text).strip()
     return "".join(f"\\{letter}" if letter in MARKS else letter for letter in line)

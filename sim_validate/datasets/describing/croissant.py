@@ -1,7 +1,8 @@
-"""`croissant.json`: a dataset as data catalogues and their readers know it.
+"""`croissant.json`: the description of a dataset for data catalogues and their readers.
 
-Croissant 1.1 with the vocabulary for responsible AI 1.0: https://mlcommons.org/croissant/1.1. What
-only the maker of a dataset knows - its licence, its date - is left out where it is not given.
+It is Croissant 1.1 with the vocabulary for responsible AI 1.0: https://mlcommons.org/croissant/1.1.
+Facts that only the maker of a dataset knows - its licence, its date - are left out where they are
+not given.
 """
 
 import json
@@ -37,7 +38,7 @@ ASKED = {
     "url": "url",
     "datePublished": "published",
 }
-"""Required fields that are the user's to give, and the settings that give them."""
+"""Required fields that only the user can give, with the settings that give them."""
 OWN_TERMS = (
     "annotation", "arrayShape", "citeAs", "column", "containedIn", "equivalentProperty",
     "excludes", "extract", "field", "fileObject", "fileProperty", "fileSet", "format", "includes",
@@ -45,7 +46,7 @@ OWN_TERMS = (
     "recordSet", "references", "regex", "repeated", "replace", "samplingRate", "sdVersion",
     "separator", "source", "subField", "transform", "unArchive", "value",
 )  # fmt: skip
-"""Terms of Croissant without a rule of their own: the specification's, and its reader's."""
+"""Terms of Croissant that need no rule of their own: the specification's, and its reader's."""
 CONTEXT: Json = {
     "@language": "en",
     "@vocab": "https://schema.org/",
@@ -62,7 +63,7 @@ CONTEXT: Json = {
     "name": {"@container": "@language"},
     **{term: f"cr:{term}" for term in OWN_TERMS},
 }
-"""As in the specification's appendix, with https for schema.org, as readers want it."""
+"""The context from the specification's appendix, with https for schema.org, as readers want it."""
 TYPES = {"text": "sc:Text", "bool": "sc:Boolean", "int": "sc:Integer", "float": "sc:Float"}
 FORMATS = {
     "parquet": "application/x-parquet",
@@ -73,7 +74,7 @@ FORMATS = {
     "obj": "model/obj",
     "xml": "application/xml",
 }
-"""By the endings of files."""
+"""Media types by the endings of files."""
 FOLDERS = {
     "meshes": ("obj", "Canonical meshes of the objects [m]"),
     "scenes": ("xml", "Grasps as MuJoCo scenes"),
@@ -83,12 +84,12 @@ SPLIT_NAMES = {"train": "TrainingSplit", "validation": "ValidationSplit", "test"
 
 
 def croissant_text(config: DatasetConfig, manifest: Manifest) -> str:
-    """The description of a dataset, in JSON; the same for equal values.
+    """Describe a dataset in JSON; equal values give equal texts.
 
     Args:
-        config: What it is made of.
-        manifest: Its files, and what made them; this file itself, which cannot hold its own hash,
-            counts for nothing.
+        config: What the dataset is made of.
+        manifest: The files of the dataset, and the versions that made them. This description itself
+            cannot hold its own hash, so it is not listed.
     """
     record: Json = {
         "@context": CONTEXT,
@@ -125,7 +126,7 @@ def _credits(config: DatasetConfig) -> Json:
 
 
 def _license(name: str) -> str | Json:
-    """The address of a usual licence, or any other by its name."""
+    """The address of a usual licence, or any other licence by its name."""
     if name.startswith(("http://", "https://")):
         return name
     known = known_license(name)
@@ -133,7 +134,7 @@ def _license(name: str) -> str | Json:
 
 
 def _responsible(config: DatasetConfig, manifest: Manifest) -> Json:
-    """What the vocabulary for responsible AI asks for, as far as it applies."""
+    """The fields that the vocabulary for responsible AI asks for, as far as they apply."""
     labels = "; ".join(f"{label}: {meaning}" for label, meaning in LABELS.items())
     tools = list(makers(manifest))
     return {
@@ -163,7 +164,7 @@ def _responsible(config: DatasetConfig, manifest: Manifest) -> Json:
 
 
 def _distribution(manifest: Manifest) -> list[Json]:
-    """All files but those of large folders by themselves, and the sets that they make up."""
+    """All files, except that the files of large folders are described as sets."""
     others = [each for each in manifest.files if each.path != CROISSANT]
     single = [each for each in others if each.path.partition("/")[0] not in FOLDERS]
     sets = [
@@ -201,7 +202,7 @@ def _file_set(name: str, pattern: str, meaning: str) -> Json:
 
 
 def _files(name: Name) -> str:
-    """What the set of a table's files is called."""
+    """The name of the set of a table's files."""
     return f"{name}-files"
 
 
@@ -225,7 +226,7 @@ def _splits() -> Json:
 
 
 def _records(name: Name) -> Json:
-    """A table."""
+    """The description of a table."""
     return {
         "@type": "cr:RecordSet",
         "@id": name,
@@ -237,7 +238,7 @@ def _records(name: Name) -> Json:
 
 
 def _field(name: Name, column: Column) -> Json:
-    """A column."""
+    """The description of a column."""
     field: Json = {
         "@type": "cr:Field",
         "@id": f"{name}/{column.name}",
@@ -256,5 +257,8 @@ def _field(name: Name, column: Column) -> Json:
 
 
 def _reference(field: str) -> Json:
-    """Another field. Without `field`, as in the text of 1.1, mlcroissant 1.1.1 cannot read it."""
+    """Refer to another field.
+
+    mlcroissant 1.1.1 needs the key `field`, which the text of Croissant 1.1 leaves out.
+    """
     return {"field": {"@id": field}}

@@ -1,18 +1,18 @@
-"""Usual licences of data: what SPDX and the Hugging Face Hub call them."""
+"""Usual licences of data, with their names in SPDX and on the Hugging Face Hub."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class License:
-    """A licence that both know."""
+    """A licence that both SPDX and the Hub know."""
 
     spdx: str
     hub: str
 
     @property
     def url(self) -> str:
-        """Where its text is."""
+        """Address of the licence's text."""
         return f"https://spdx.org/licenses/{self.spdx}"
 
 
@@ -22,7 +22,7 @@ NAMED_ALIKE = (
     "CC-BY-NC-SA-4.0", "CDLA-Permissive-1.0", "CDLA-Permissive-2.0", "CDLA-Sharing-1.0",
     "Apache-2.0", "BSD-2-Clause", "BSD-3-Clause", "MIT", "Unlicense",
 )  # fmt: skip
-"""By SPDX; the Hub writes them in small letters."""
+"""SPDX names of licences whose names on the Hub differ only by small letters."""
 LICENSES = (
     *(License(spdx, spdx.lower()) for spdx in NAMED_ALIKE),
     License("ODbL-1.0", "odbl"),

@@ -1,4 +1,4 @@
-"""What the card and `croissant.json` of a dataset both say about it."""
+"""Statements that the card and `croissant.json` of a dataset share."""
 
 from collections.abc import Mapping
 
@@ -16,7 +16,7 @@ ROWS: Mapping[Name, str] = {
     "grasps": "four contacts on an object at one friction, or a negative control made from them",
     "trials": "a grasp or control under one wrench, in simulation",
 }
-"""What a row is."""
+"""What a row of each table is."""
 LABELS: Mapping[str, str] = {
     "grasp": "a planned grasp, proved to be in force closure",
     "given": "contacts from elsewhere, put on the object and judged",
@@ -26,7 +26,7 @@ LABELS: Mapping[str, str] = {
     "contacts_moved": "contacts moved on their faces",
     "uncorrected": "what the paper's construction as printed takes for a grasp on these faces",
 }
-"""What `label` is, and what it means."""
+"""Values of the column `label`, with their meanings."""
 PLANNED = (
     "Each object is planned at each friction, each family of grasps by itself. Every grasp has "
     "a certificate of force closure."
@@ -63,7 +63,7 @@ SOURCES = (
 
 
 def summary(config: DatasetConfig, manifest: Manifest) -> str:
-    """What there is, in a few sentences without a user's words."""
+    """A few sentences about what the dataset holds, without a user's words."""
     rows = manifest.rows()
     frictions = ", ".join(f"{friction:g}" for friction in config.frictions)
     return (
@@ -74,12 +74,12 @@ def summary(config: DatasetConfig, manifest: Manifest) -> str:
 
 
 def made(config: DatasetConfig) -> str:
-    """How grasps come about."""
+    """How the grasps were made."""
     return f"{JUDGED if config.contacts else PLANNED} {TRIED}"
 
 
 def choice(config: DatasetConfig, manifest: Manifest) -> str:
-    """Which objects and grasps are in, so what the dataset is no fair sample of."""
+    """Which objects and grasps were chosen, so in which way the dataset is no fair sample."""
     left_out = (
         f"Of {manifest.units} units of work {manifest.quarantined} were left out, for the reasons "
         "in `quarantine.jsonl`."
@@ -107,6 +107,6 @@ def splitting() -> str:
 
 
 def makers(manifest: Manifest) -> tuple[str, ...]:
-    """The programs that made it, with versions."""
+    """The programs that made the dataset, with versions."""
     named = (("graspproof", "graspproof"), ("MuJoCo", "mujoco"), ("Python", "python"))
     return tuple(f"{name} {manifest.versions.get(key, 'unknown')}" for name, key in named)

@@ -1,8 +1,7 @@
-"""Tables of a dataset -> NumPy archives that hold no pickled objects, a file per table.
+"""Tables of a dataset -> NumPy archives without pickled objects, one file per table.
 
-As in `load_dataset`, numbers that are null are NaN in columns of floats and -1 in columns of whole
-numbers; text that is null is empty. Text is of fixed width. Truth values are 1 and 0, and -1 where
-they are null.
+As in `load_dataset`, null is NaN in columns of floats and -1 in columns of whole numbers. Text has
+a fixed width, and null is the empty text. Truth values are 1 and 0, and -1 for null.
 """
 
 from collections.abc import Callable
@@ -25,7 +24,7 @@ NULLS = {"float": "NaN", "int": "-1", "text": "empty", "bool": "-1"}
 def write_npz(
     chosen: Selection, folder: Path, report: Callable[[int, int], None]
 ) -> dict[Name, int]:
-    """Write an archive per table, with an array per column.
+    """Write one archive per table, with one array per column.
 
     Raises:
         InputError: The dataset is damaged.

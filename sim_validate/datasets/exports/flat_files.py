@@ -1,9 +1,9 @@
-"""Tables of a dataset -> CSV and JSON Lines, a text file per table, and `about.json` beside them.
+"""Tables of a dataset -> CSV and JSON Lines, one text file per table, with `about.json`.
 
-CSV has a column per number: `contact_points_m_0_x` is of the first contact, `wrench_n_nm_fx` a
-force. Null is an empty cell. Text is in quotes; where it could be taken for a formula, it begins
-with an apostrophe, which is to be removed, as is one that was there before. JSON Lines have a row
-per line, nested, with null.
+CSV has one column per number: `contact_points_m_0_x` belongs to the first contact, `wrench_n_nm_fx`
+is a force. Null is an empty cell. Text is in quotes; text that a spreadsheet could take for a
+formula, or that begins with an apostrophe, gets an apostrophe in front, which readers must remove.
+JSON Lines have one row per line, nested, with null.
 """
 
 import json
@@ -22,15 +22,16 @@ from sim_validate.files.reading import write_lines, write_text
 
 Row: TypeAlias = Mapping[str, Any]
 PARTS = {3: tuple("xyz"), 4: tuple("0123"), 6: ("fx", "fy", "fz", "tx", "ty", "tz")}
-"""What the places of a cell are called, by how many there are: a point, fingers, a wrench."""
+"""Names of the places in a cell, by how many there are: a point, fingers, a wrench."""
 FORMULA = "=+-@\uff1d\uff0b\uff0d\uff20'"
-"""What a cell that spreadsheets calculate begins with, also in full width, and our own mark."""
+"""First letters of cells that spreadsheets calculate, also in full width, and the apostrophe that
+marks text."""
 
 
 def write_csv(
     chosen: Selection, folder: Path, report: Callable[[int, int], None]
 ) -> dict[Name, int]:
-    """Write a CSV file per table.
+    """Write one CSV file per table.
 
     Raises:
         InputError: The dataset is damaged.
@@ -45,7 +46,7 @@ def write_csv(
 def write_jsonl(
     chosen: Selection, folder: Path, report: Callable[[int, int], None]
 ) -> dict[Name, int]:
-    """Write a file of JSON Lines per table.
+    """Write one file of JSON Lines per table.
 
     Raises:
         InputError: The dataset is damaged.
@@ -64,13 +65,13 @@ def write_tables(
     report: Callable[[int, int], None],
     write: Callable[[Name], None],
 ) -> dict[Name, int]:
-    """Write a file for each table, and what made the dataset and its columns mean beside them.
+    """Write a file for each table, and `about.json` with the dataset's origin and its columns.
 
     Args:
-        chosen: What is asked for.
-        folder: Where.
-        report: Told how many tables are written, and of how many.
-        write: Writes one of them.
+        chosen: The dataset, or the split to write.
+        folder: Folder to write into.
+        report: Called with (written, total) after each table.
+        write: Writes one table.
     """
     for done, name in enumerate(TABLES, start=1):
         write(name)
@@ -102,7 +103,7 @@ def _cells(column: Column, row: Row) -> list[str]:
 
 
 def _cell(value: object) -> str:
-    """Of a plain value, so that no spreadsheet takes it for a formula."""
+    """Write a plain value so that no spreadsheet takes it for a formula."""
     if value is None:
         return ""
     if not isinstance(value, str):

@@ -25,17 +25,17 @@ EXPORTERS: Mapping[ExportFormat, Exporter] = {
     "isaac": write_isaac,
     "mjcf": write_mjcf,
 }
-"""What writes each format into a folder and says how many rows it took. The first four hold all
-rows, negative controls too; the last two hold closed grasps only."""
+"""Functions that write each format into a folder and return the number of rows used. The first four
+formats hold all rows, negative controls too; the last two hold closed grasps only."""
 
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """What came of an export."""
+    """The result of an export."""
 
     files: int
     rows: dict[Name, int]
-    """How many rows of each table were written, or made into something."""
+    """Number of rows of each table that were written, or turned into files."""
 
 
 def export(
@@ -45,18 +45,18 @@ def export(
     split: SplitName | None,
     report: Callable[[int, int], None],
 ) -> Exported:
-    """Write a dataset in another format, the same bytes for the same dataset.
+    """Write a dataset in another format; the same dataset gives the same bytes.
 
     Args:
-        folder: Of the dataset.
+        folder: Folder of the dataset.
         to: The format.
-        out: Folder to make; when it is there, everything is in it.
-        split: Whose objects; all if None.
-        report: Told how much is written, and of how much.
+        out: Folder to make; it appears only when it is complete.
+        split: The split whose objects are written; all if None.
+        report: Called with (written, total) while writing.
 
     Raises:
-        InputError: There is no finished dataset, it is damaged, the folder to make is in it or
-            holds something, or what the format takes is not installed.
+        InputError: The dataset is missing, unfinished or damaged, the folder to make is inside it
+            or holds something, or a package that the format needs is not installed.
     """
     require_pyarrow()
     chosen = select(folder, split)

@@ -1,7 +1,8 @@
-"""Tables of a dataset -> one HDF5 file, the same for the same rows; the door to h5py.
+"""Tables of a dataset -> one HDF5 file, equal for equal rows; the only module that uses h5py.
 
-A group per table, a dataset per column with its `unit`, its `meaning` and what stands for `null`;
-what made the dataset is in the file's attributes. Text is UTF-8 of fixed width.
+The file has one group per table, and in it one dataset per column with its `unit`, its `meaning`
+and the value that stands for `null`. The file's attributes say what made the dataset. Text is UTF-8
+of fixed width.
 """
 
 import importlib
@@ -25,7 +26,7 @@ FILE = "dataset.h5"
 def write_hdf5(
     chosen: Selection, folder: Path, report: Callable[[int, int], None]
 ) -> dict[Name, int]:
-    """Write everything into one file.
+    """Write all tables into one file.
 
     Raises:
         InputError: The dataset is damaged, or h5py is not installed.
@@ -47,7 +48,8 @@ def _add(group: Any, column: Column, values: NDArray[Any]) -> None:
     if column.kind == "text":
         encoded = np.char.encode(values, "utf-8")
         values = encoded.astype(_h5py().string_dtype("utf-8", encoded.dtype.itemsize))
-    packed = {"compression": "gzip", "shuffle": True} if len(values) else {}  # it refuses no rows
+    # gzip refuses columns without rows
+    packed = {"compression": "gzip", "shuffle": True} if len(values) else {}
     added = group.create_dataset(column.name, data=values, track_times=False, **packed)
     unit = {"unit": column.unit} if column.unit else {}
     added.attrs.update({**unit, "meaning": column.meaning, "null": NULLS[column.kind]})
@@ -58,5 +60,5 @@ def _h5py() -> Any:
         return importlib.import_module("h5py")
     except ImportError as error:
         raise InputError(
-            "HDF5 files take h5py: pip install 'graspproof[hdf5]'; the other formats do without"
+            "HDF5 files need h5py: pip install 'graspproof[hdf5]'; the other formats do not"
         ) from error

@@ -2,10 +2,11 @@
 
 The format describes a gripper by a pose and the positions of joints, so the four fingertips are
 taken as one gripper: `fingerI_x`, `fingerI_y` and `fingerI_z` slide fingertip I along the axes of
-the gripper's frame, whose origin its centre is at when they are zero. The gripper's frame is turned
-like the object's, which is that of the mesh in metres, and lies midway between the contacts. All
-fingertips of a file have the radius that fits all of its grasps, so a tip's centre is a radius
-before its contact. What is not in force closure is left out.
+the gripper's frame; with all three at zero, the fingertip's centre is at the frame's origin. The
+gripper's frame is parallel to the object's, which is that of the mesh in metres, and its origin is
+the mean of the contacts. All fingertips of a file have the radius that fits all of its grasps; the
+centre of a fingertip lies one radius outside of its contact. Contact sets that are not in force
+closure are left out.
 
 Source:
     NVIDIA, "Isaac Grasp File", nvidia-isaac-ros.github.io/concepts/manipulation/isaac_grasp.html.
@@ -49,7 +50,7 @@ HEAD = """\
 def write_isaac(
     chosen: Selection, folder: Path, report: Callable[[int, int], None]
 ) -> dict[Name, int]:
-    """Write the grasps of each object at each friction.
+    """Write one file for the grasps of each object at each friction.
 
     Raises:
         InputError: The dataset is damaged.
@@ -97,7 +98,7 @@ def _grasp_lines(body: Polyhedron, grasp: StoredGrasp, radius: float) -> Iterato
 
 
 def _contacts(grasp: StoredGrasp) -> tuple[Array, Array]:
-    """Positions (4, 3) [m] and normals (4, 3)."""
+    """Positions (4, 3) [m] and normals (4, 3) of a grasp's contacts."""
     points = np.array([contact.position for contact in grasp.contacts])
     return points, np.array([contact.normal for contact in grasp.contacts])
 
@@ -113,6 +114,6 @@ def _list(values: Array) -> str:
 
 
 def yaml_number(value: float) -> str:
-    """A number in full; without a point YAML 1.1 would take one with an exponent for text."""
+    """Write a number in full; YAML 1.1 takes a number with an exponent and no point for text."""
     text = repr(value)
     return text if "." in text else text.replace("e", ".0e")

@@ -13,7 +13,7 @@ from sim_validate.files.reading import write_text
 def write_mjcf(
     chosen: Selection, folder: Path, report: Callable[[int, int], None]
 ) -> dict[Name, int]:
-    """Write the scene in which each grasp was simulated, made again from mesh and contacts.
+    """Write the scene in which each grasp was simulated, rebuilt from mesh and contacts.
 
     Raises:
         InputError: The dataset is damaged.

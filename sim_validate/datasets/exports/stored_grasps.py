@@ -1,4 +1,4 @@
-"""The grasps of a dataset with their solids, an object at a time; nothing that is not closed."""
+"""The closed grasps of a dataset with their solids, one object at a time."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -16,19 +16,19 @@ from sim_validate.datasets.rows import GIVEN
 
 UNSAFE = re.compile(r"[^A-Za-z0-9._-]")
 GRASPS = ("grasp", GIVEN)
-"""Labels of what is no negative control."""
+"""Labels of rows that are no negative controls."""
 LONGEST = 150
-"""Letters of a file's name, fewer than any file system allows."""
+"""Largest number of letters in a file's name; every file system allows more."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoredGrasp:
-    """A grasp as the tables have it."""
+    """A grasp as the tables hold it."""
 
     id: str
-    """Of the whole dataset."""
+    """Name of the grasp in the whole dataset."""
     name: str
-    """Family and faces."""
+    """Family and faces of the grasp, or the name that its file gave it."""
     friction: float
     held: bool
     contacts: tuple[Contact, ...]
@@ -36,7 +36,7 @@ class StoredGrasp:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GraspedObject:
-    """An object with all of its grasps."""
+    """An object with all of its closed grasps."""
 
     object_id: str
     body: Polyhedron
@@ -44,23 +44,25 @@ class GraspedObject:
 
 
 def grasped_objects(chosen: Selection) -> Iterator[GraspedObject]:
-    """All objects that have grasps, in the order of the tables.
+    """Yield all objects that have grasps, in the order of the tables.
 
     Raises:
-        InputError: A table or a mesh is damaged, or a grasp's object is not there.
+        InputError: A table or a mesh is damaged, or a grasp's object is missing.
     """
     names = {row["object_id"]: row["source_name"] for row in chosen.rows("objects")}
     faces = chosen.config().faces
     planned = (row for row in chosen.rows("grasps") if is_grasp(row))
     for object_id, rows in groupby(planned, key=lambda row: row["object_id"]):
         if object_id not in names:
-            raise InputError(f"{chosen.folder}: {object_id} has grasps, but is no object")
+            raise InputError(
+                f"{chosen.folder}: {object_id} has grasps, but is not among the objects"
+            )
         body = stored_body(chosen.folder, object_id, names[object_id], faces)
         yield GraspedObject(object_id, body, tuple(map(_grasp, rows)))
 
 
 def is_grasp(row: Mapping[str, Any]) -> bool:
-    """Whether a row is of a grasp, planned or given, that is proved to be closed."""
+    """Whether a row is a planned or given grasp that is proved to be closed."""
     return row["label"] in GRASPS and bool(row["force_closed"])
 
 
@@ -76,10 +78,10 @@ def _grasp(row: Mapping[str, Any]) -> StoredGrasp:
 
 
 def new_path(folder: Path, name: str, ending: str) -> Path:
-    """Where a file of some name goes, whatever letters the name has.
+    """Path for a file with a given name, whatever letters the name has.
 
     Raises:
-        InputError: There is a file of that name.
+        InputError: A file of that name exists.
     """
     path = folder / f"{UNSAFE.sub('_', name).lstrip('.')[:LONGEST]}.{ending}"
     if path.exists():

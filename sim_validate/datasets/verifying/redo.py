@@ -1,8 +1,8 @@
 """Plan and simulate a sample of a dataset again: do the same rows come out?
 
-With the same packages and code, on processors that round alike, every cell must be the same. Else
-there must be as many grasps of each family, and those that come out with the same contacts must
-have the same verdict and critical friction.
+With the same packages and code, on processors that round alike, every cell must be the same.
+Otherwise each family must have as many grasps as before, and grasps that come out with the same
+contacts must have the same verdict and critical friction.
 """
 
 import hashlib
@@ -34,28 +34,28 @@ from sim_validate.datasets.verifying.rows_by_object import ObjectRows, Row, by_o
 from sim_validate.files.reading import read_text
 
 ROUNDING = 1e-6
-"""How far numbers may be apart that other packages or processors round, relative to the larger."""
+"""Relative difference that numbers may have when other packages or processors round them."""
 MOST_NAMED = 20
-"""Faults of one unit that are listed."""
+"""Largest number of faults of one unit that are listed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Which units to do again."""
+    """Which units to compute again."""
 
     share: float
-    """Of all units; at least one is done."""
+    """Share of all units; at least one is computed."""
     seed: int = 0
-    """For which ones."""
+    """Seed of the choice."""
 
 
 def sample_faults(folder: Path, manifest: Manifest, sample: Sample) -> Iterator[str]:
-    """What comes out otherwise, a line each.
+    """Compute a sample again and yield each difference as a line.
 
     Args:
-        folder: Of the dataset.
-        manifest: What made it.
-        sample: Which units to do again.
+        folder: Folder of the dataset.
+        manifest: The manifest of the dataset.
+        sample: Which units to compute again.
 
     Raises:
         InputError: A file of the dataset is damaged.
@@ -76,7 +76,7 @@ def sample_faults(folder: Path, manifest: Manifest, sample: Sample) -> Iterator[
 
 
 class _Redoing:
-    """Units of a dataset, done again."""
+    """Computes units of a dataset again."""
 
     def __init__(self, folder: Path, manifest: Manifest) -> None:
         self._folder = folder
@@ -87,13 +87,13 @@ class _Redoing:
         self._left_out = _left_out(folder)
 
     def frictions(self, row: Mapping[str, Any]) -> list[float]:
-        """At which frictions an object has rows, though perhaps no grasp."""
+        """The frictions at which an object has rows, though perhaps no grasp."""
         return [f for f in self._config.frictions if not self._all_left_out(row, f)]
 
     def faults(
         self, row: Mapping[str, Any], rows: ObjectRows, chosen: Set[tuple[str, float]]
     ) -> Iterator[str]:
-        """What is wrong with an object at the chosen frictions."""
+        """Yield what is wrong with an object at the chosen frictions."""
         for friction in self._config.frictions:
             stored = _of_unit(rows, row["object_id"], friction)
             where = f"{row['source_name']} at friction {friction}"
@@ -132,7 +132,7 @@ class _Redoing:
 
 
 def _left_out(folder: Path) -> dict[tuple[str, float], set[str]]:
-    """Units that have no rows, with the given grasps that are missing if they are some."""
+    """Quarantined units, with the given grasps that are missing if only some are."""
     found: dict[tuple[str, float], set[str]] = {}
     for each in read_left_out(folder / QUARANTINE):
         if not each.reason.startswith(TWIN):
@@ -141,7 +141,7 @@ def _left_out(folder: Path) -> dict[tuple[str, float], set[str]]:
 
 
 def drawn(units: Sequence[tuple[str, float]], sample: Sample) -> list[tuple[str, float]]:
-    """Units in an order that only the seed decides, so that a larger share holds a smaller one."""
+    """Choose units in an order that only the seed decides: a larger share holds a smaller."""
 
     def place(unit: tuple[str, float]) -> bytes:
         return hashlib.sha256(f"{sample.seed} {unit}".encode()).digest()
@@ -159,7 +159,7 @@ def _of_unit(rows: ObjectRows, object_id: str, friction: float) -> ObjectRows:
 
 
 def _differences(name: Name, stored: Sequence[Row], made: Sequence[Row]) -> Iterator[str]:
-    """Cells that are not the same, and rows that are in one only."""
+    """Yield cells that differ, and rows that only one side has."""
     before = {tuple(row[key] for key in KEYS[name]): row for row in stored}
     after = {tuple(row[key] for key in KEYS[name]): row for row in made}
     yield from (f"{name}: {key[-1]} is not found again" for key in before.keys() - after.keys())
@@ -174,7 +174,7 @@ def _differences(name: Name, stored: Sequence[Row], made: Sequence[Row]) -> Iter
 
 
 def _loose_differences(stored: ObjectRows, made: ObjectRows) -> Iterator[str]:
-    """What cannot come from other rounding: of equally good grasps it may choose others."""
+    """Yield differences that rounding cannot cause; it may choose other, equally good grasps."""
     before = {row["grasp_id"]: row for row in stored["grasps"] if row["control_of"] is None}
     after = {row["grasp_id"]: row for row in made["grasps"] if row["control_of"] is None}
     counts = [Counter(row["family"] for row in rows.values()) for rows in (before, after)]

@@ -1,7 +1,7 @@
-"""A dataset's rows, an object at a time: what its tables hold of it, and nothing else in memory.
+"""The rows of a dataset, grouped by object, with only one object in memory.
 
-All tables are sorted by what begins the names of their rows, the first letters of the object's
-hash. Rows of no object come by themselves.
+All tables are sorted by the beginning of their rows' names, which are the first letters of the
+object's hash. Rows whose object is missing form groups of their own.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -20,14 +20,14 @@ BEGINNINGS: Mapping[Name, Callable[[Row], str]] = {
     "grasps": lambda row: str(row["object_id"])[:SHORT],
     "trials": lambda row: str(row["grasp_id"])[:SHORT],
 }
-"""What an object's rows have in common."""
+"""The part of a row that all rows of an object share."""
 
 
 def by_object(chosen: Selection) -> Iterator[ObjectRows]:
-    """The rows of each object in turn.
+    """Yield the rows of each object in turn.
 
     Raises:
-        InputError: A file is damaged, or has not as many rows as the manifest says.
+        InputError: A file is damaged, or its number of rows differs from the manifest's.
     """
     streams = {name: _groups(chosen, name) for name in TABLES}
     heads: dict[Name, Group | None] = {name: next(streams[name], None) for name in TABLES}

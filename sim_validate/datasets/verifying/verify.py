@@ -1,4 +1,4 @@
-"""Is a dataset what its manifest says, and do its rows keep the laws of what they describe?"""
+"""Is a dataset what its manifest says, and are its rows consistent with the theory?"""
 
 from collections.abc import Iterator, Mapping, Sequence, Set
 from pathlib import Path
@@ -26,24 +26,25 @@ from sim_validate.datasets.verifying.rows_by_object import ObjectRows, by_object
 from sim_validate.files.paths import path_inside
 
 SAME_MARGIN = 1e-6
-"""How far a closure margin may be from that of the contacts, relative to the friction."""
+"""Largest difference of a closure margin from that of the contacts, relative to the friction."""
 ON_SURFACE, NEAR_SURFACE = 1e-5, 0.05
-"""How far contacts may be from the object's mesh, relative to its size: planar faces are as flat as
-six digits tell. Controls are moved in the planes of patches, which a curved surface leaves."""
+"""Largest distance of contacts from the object's mesh, for grasps and for controls, relative to the
+object's radius. Planar faces are as flat as six digits show. Controls are moved in the planes of
+patches, and a curved surface leaves these."""
 UNIT = 1e-9
-"""How far normals may be from unit length."""
+"""Largest difference of a normal's length from one."""
 
 
 def verify(folder: Path, sample: Sample | None = None) -> list[str]:
-    """What is wrong with a dataset, a line each; nothing where all is well.
+    """List what is wrong with a dataset, one line each; an empty list means that all is well.
 
-    Hashes, sizes and page checksums of all files; counts, keys and references of rows; of each
-    contact set its normals, its closure proved again, and that its trials say what it says; and
-    of a sample, whether planning and simulating again gives the same rows.
+    Checked are hashes, sizes and page checksums of all files; counts, keys and references of rows;
+    for each contact set its normals, its closure (proved again), and that its trials agree with its
+    row; and for a sample, whether planning and simulating again gives the same rows.
 
     Args:
-        folder: Of the dataset.
-        sample: What to plan and simulate again; nothing if not given.
+        folder: Folder of the dataset.
+        sample: The sample to plan and simulate again; None for none.
 
     Raises:
         InputError: The folder holds no finished dataset, or pyarrow is not installed.
@@ -60,16 +61,16 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
             faults += sample_faults(folder, manifest, sample)
     except InputError as error:
         faults.append(str(error))
-    except (TypeError, KeyError, ValueError) as error:  # of cells that are null and must not be
+    except (TypeError, KeyError, ValueError) as error:  # a cell is null that must not be
         faults.append(f"data: a row is not such as are written ({shown(str(error))})")
     return faults
 
 
 def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
-    """What is wrong with rows and meshes, an object at a time.
+    """Yield what is wrong with rows and meshes, one object at a time.
 
     Raises:
-        InputError: A file is damaged, or has not as many rows as the manifest says.
+        InputError: A file is damaged, or its number of rows differs from the manifest's.
     """
     frictions = config_from_toml(folder / CONFIG).frictions
     for each in manifest.files:
@@ -89,7 +90,8 @@ def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
         for path in folder.rglob("*")
         if path.is_file() and path.name != MANIFEST
     }
-    there = {name for name in there if not name.startswith("staging/")}  # of no more use
+    # staged files no longer matter
+    there = {name for name in there if not name.startswith("staging/")}
     yield from (f"{path}: not in the manifest" for path in sorted(there - names))
     for each in files:
         if each.path not in there:
@@ -107,14 +109,14 @@ def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
 
 
 def _split_faults(split: str, rows: ObjectRows) -> Iterator[str]:
-    """Whether rows are in files of their split."""
+    """Check that rows are in files of their split."""
     for name in ("objects", "grasps"):
         if any(row["split"] != split for row in rows[name]):
             yield f"{name}: files of {split} have rows of another split"
 
 
 def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
-    """Whether the manifest's numbers are those of the files it lists."""
+    """Check that the manifest agrees with the files it lists."""
     config = config_from_toml(folder / CONFIG)
     if config.sha256 != manifest.config_sha256:
         yield f"{CONFIG}: is not the configuration that the manifest names"
@@ -148,7 +150,7 @@ def _row_faults(rows: ObjectRows, frictions: Sequence[float]) -> Iterator[str]:
 
 
 def _outcome_faults(row: Mapping[str, Any], trials: Sequence[str]) -> Iterator[str]:
-    """Whether a row says what its trials say; one that was not tried claims nothing."""
+    """Check that a row agrees with its trials, and that one that was not tried claims nothing."""
     if row["outcome"] == NOT_TRIED:
         claims = [row[name] for name in ("held", "force_closed", "closure_margin")]
         if row["label"] != GIVEN or any(claim is not None for claim in claims) or trials:
@@ -162,7 +164,7 @@ def _outcome_faults(row: Mapping[str, Any], trials: Sequence[str]) -> Iterator[s
 
 
 def _mesh_faults(folder: Path, rows: ObjectRows) -> Iterator[str]:
-    """Whether meshes are those of their objects, and contacts are on them."""
+    """Check that meshes are those of their objects, and that contacts lie on them."""
     claimed: dict[str, list[tuple[Array, Array | None, float]]] = {
         row["object_id"]: [] for row in rows["objects"]
     }
@@ -174,7 +176,7 @@ def _mesh_faults(folder: Path, rows: ObjectRows) -> Iterator[str]:
         for point, normal in list(zip(points, normals, strict=True))[: row["contacts"]]:
             if row["control_of"] is None:
                 of_object.append((np.array(point), np.array(normal), ON_SURFACE))
-            else:  # some have a normal turned
+            else:  # some controls have a flipped normal
                 of_object.append((np.array(point), None, NEAR_SURFACE))
     for row in rows["objects"]:
         try:
@@ -197,7 +199,7 @@ def _mesh_faults(folder: Path, rows: ObjectRows) -> Iterator[str]:
 def _reference_faults(
     row: Mapping[str, Any], splits: Mapping[str, str], names: Set[str]
 ) -> Iterator[str]:
-    """What a row names that is not there."""
+    """Yield references of a row to missing rows."""
     if splits.get(row["object_id"]) != row["split"]:
         yield "its object is not there, or in another split"
     if row["control_of"] is not None and row["control_of"] not in names:
@@ -205,7 +207,7 @@ def _reference_faults(
 
 
 def _contact_faults(row: Mapping[str, Any]) -> Iterator[str]:
-    """Normals, and closure from the contacts alone."""
+    """Check the normals of a contact set, and its closure from the contacts alone."""
     count = row["contacts"]
     closed = row["force_closed"]
     if not 1 <= count <= FINGERS or closed is None or (closed and row["closure_margin"] is None):

@@ -1,5 +1,5 @@
 """Is the simulator right under these settings?
 
-A setup comes in, with a friction and a size. Checks of cases with known answers go out; if one
+The gate takes a setup, a friction and a size, and checks cases with known answers. If one check
 fails, nothing is simulated.
 """

@@ -1,4 +1,4 @@
-"""What the gate's known cases are measured with, and the figures that they give."""
+"""The settings with which the gate's known cases are measured, and the checks that they give."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,24 +17,24 @@ from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.simulate import Bench
 
 LEAST_OFFSET, LARGEST_OFFSET = 0.01, 1.0
-"""Critical frictions for which the box has room."""
+"""Least and largest critical friction for which fingers can be offset on the box."""
 PUSH = 0.6
-"""Normal force of the fingers on the box, in largest normal forces."""
+"""Normal force of the fingers on the box, relative to the largest normal force."""
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One figure, and where it must lie."""
+    """One measured figure, and the interval in which it must lie."""
 
     name: str
     value: float
-    """NaN where nothing could be measured."""
+    """The measured figure, NaN where nothing could be measured."""
     least: float
     largest: float
 
     @property
     def passed(self) -> bool:
-        """Whether the figure is where it must be."""
+        """Whether the figure lies in its interval."""
         return self.least <= self.value <= self.largest
 
     def __str__(self) -> str:
@@ -46,7 +46,7 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """What the known cases are measured with."""
+    """The settings, friction and object size with which the known cases are measured."""
 
     setup: Setup
     friction: float
@@ -58,7 +58,7 @@ class Case:
         return min(max(self.friction, LEAST_OFFSET), LARGEST_OFFSET)
 
     def body(self, name: str) -> Polyhedron:
-        """An example object of the size under test, about its centre of mass."""
+        """Scale an example object to the size under test, with its centre of mass at the origin."""
         example = example_object(name)
         vertices = (example.vertices - example.center_of_mass) * self.radius_m / example.radius
         return Polyhedron.from_mesh(vertices, example.triangles, name=name)
@@ -66,7 +66,7 @@ class Case:
     def squeezed(
         self, body: Polyhedron, contacts: Sequence[Contact], forces: Array, friction: float
     ) -> Rig:
-        """Fingers that push on a body with planned forces."""
+        """Close fingers on a body with planned forces."""
         bench = Bench(self.setup.scene(body, contacts, friction))
         return squeezed(bench, self.setup, forces, friction)
 

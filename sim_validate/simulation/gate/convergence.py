@@ -1,11 +1,12 @@
-"""Whether the solver goes far enough: going on to the last digit must not move anything elsewhere.
+"""Whether the solver iterates far enough: solving to the last digit must not change the motion.
 
-A solver that stops early lets contacts slip that would hold. It shows first where fingers push so
-lightly that hardly anything keeps the object from turning about the line between two others, and
-on small objects, as tolerances are absolute. Both are compared over whole trials: a tetrahedron
-under load, and a box whose offset fingers need its friction, with two more that hardly push. The
-box is released at the friction under test and at a low one as well: however high the former, the
-critical friction of a grasp may be low, and it is there that friction is lowered to.
+A solver that stops early lets contacts slip that would hold. This shows first in two places: where
+fingers push so lightly that hardly anything keeps the object from turning about the line between
+two others, and on small objects, because tolerances are absolute. Whole trials are therefore
+compared for two bodies: a tetrahedron under load, and a box with two offset fingers that need its
+friction and two more that hardly push. The box is released at the friction under test and at a low
+one as well: even where the friction under test is high, the critical friction of a grasp may be
+low, and friction is lowered to it.
 """
 
 from collections.abc import Sequence
@@ -21,22 +22,22 @@ from sim_validate.simulation.wrench_limits import part
 
 GAP_LIMIT = 1e-9
 """Largest difference of a position or angle, in grasp sizes: a ten-thousandth of the finest
-threshold. Usual solvers differ by 2e-10 at most, on a millimetre at friction 0.02, else by 1e-15;
-those that are known to slip falsely by 1.6e-9 and more."""
+threshold. Usual solvers differ by 2e-10 at most, on a millimetre at friction 0.02, and else by
+1e-15. Solvers that are known to slip falsely differ by 1.6e-9 and more."""
 LOW_GAP_LIMIT = 1e-7
-"""The same at low friction: a hundredth of the finest threshold. Usual solvers differ by 2e-8 at
-most, on a millimetre; those under which boxes of that size were seen to let go far above their
-critical friction, implicit integrators among them, by 4e-5."""
+"""Largest difference at low friction, in grasp sizes: a hundredth of the finest threshold. Usual
+solvers differ by 2e-8 at most, on a millimetre. Solvers under which boxes of that size were seen to
+let go far above their critical friction, implicit integrators among them, differ by 4e-5."""
 SHARE = 0.8
-"""Load on the tetrahedron, in limits."""
+"""Load on the tetrahedron, relative to the largest load that it resists."""
 LIGHT = 1e-3
-"""Push of the light fingers, in that of the others."""
+"""Normal force of the light fingers, relative to that of the others."""
 ABOVE = (1.01, 1.05, 2.0)
-"""Frictions at which the box is released, over the one that it needs: it stays."""
+"""Frictions at which the box is released, relative to the one that it needs, so it stays."""
 
 
 def solver_gaps(case: Case) -> tuple[Check, Check]:
-    """How far from the motions of a solver that goes on to the last digit those of this one are."""
+    """Compare the motions under this solver with those under one that goes to the last digit."""
     physics = replace(
         case.setup.physics, solver="Newton", jacobian="dense", tolerance=1e-18, iterations=300,
         ls_iterations=100, ls_tolerance=1e-3,
@@ -53,18 +54,18 @@ def solver_gaps(case: Case) -> tuple[Check, Check]:
 
 def _gap(motions: Sequence[Array], others: Sequence[Array]) -> float:
     gaps = [np.max(np.abs(one - other)) for one, other in zip(motions, others, strict=True)]
-    return float(np.max(gaps))  # NaN if one is
+    return float(np.max(gaps))  # the maximum is NaN if one difference is
 
 
 def _held(case: Case) -> Array:
-    """Positions of the tetrahedron in all samples, (trials, n, q), in grasp sizes."""
+    """Joint positions of the held tetrahedron in all samples, (trials, n, q), in grasp sizes."""
     rig, limits = tetrahedron(case)
     held = rig.motions_of_holds([part(rig.idle, limit, SHARE) for limit in limits])
     return _in_sizes(held, rig)
 
 
 def _released(case: Case, needed: float) -> Array:
-    """Positions of a box that needs a friction, released above it, (trials, n, q), grasp sizes."""
+    """Joint positions of a box that needs a friction and is released above it, as in `_held`."""
     box = _lightly_held_box(case, needed)
     settling = case.setup.friction.settling_friction * needed
     released = box.motions_of_releases(settling, [above * needed for above in ABOVE])
@@ -78,19 +79,18 @@ def _in_sizes(joints: Array, rig: Rig) -> Array:
 
 
 def _lightly_held_box(case: Case, friction: float) -> Rig:
-    """Fingers above and below a box push along an oblique line; two at the sides hardly push."""
+    """Squeeze a box along an oblique line from above and below; two side fingers hardly push."""
     body = case.body("box")
     _, width, height = np.ptp(body.vertices, axis=0)
     shift = 0.5 * friction * height
+    # The side fingers stand off centre, because symmetry hides faults.
     contacts = [
         *(Contact(np.array([s * shift, 0.0, s * height / 2]), np.array([0.0, 0.0, -s]))
           for s in (-1.0, 1.0)),
         *(Contact(np.array([0.13 * height, s * width / 2, 0.07 * height]), np.array([0.0, -s, 0.0]))
           for s in (-1.0, 1.0)),
     ]  # fmt: skip
-    normals = np.array(
-        [contact.normal for contact in contacts]
-    )  # off centre: symmetry hides faults
+    normals = np.array([contact.normal for contact in contacts])
     pushes = np.array([1.0, 1.0, LIGHT, LIGHT])[:, None] * normals
     pushes[:2, 0] = friction * np.array([1.0, -1.0])
     largest = PUSH * case.setup.fingers.max_normal_force_n

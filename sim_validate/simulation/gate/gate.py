@@ -15,25 +15,25 @@ USUAL_FRICTION, USUAL_RADIUS_M = 0.5, 0.07
 
 @dataclass(frozen=True, slots=True)
 class Gate:
-    """What the simulator made of the known cases."""
+    """The checks of the known cases, and the simulator that was checked."""
 
     checks: tuple[Check, ...]
     mujoco: str
-    """Version of the simulator."""
+    """Version of MuJoCo."""
 
     @property
     def passed(self) -> bool:
-        """Whether all figures are where they must be."""
+        """Whether all checks passed."""
         return all(check.passed for check in self.checks)
 
 
 def require_faithful(
     setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
 ) -> Gate:
-    """The gate's figures.
+    """Measure the known cases and refuse settings under which a check fails.
 
     Raises:
-        UnfaithfulError: One is out of tolerance; nothing simulated with this setup would count.
+        UnfaithfulError: A check failed; nothing simulated with this setup would count.
     """
     gate = measured_gate(setup, friction, radius_m)
     if not gate.passed:
@@ -52,8 +52,9 @@ def measured_gate(
     Args:
         setup: How trials are simulated.
         friction: Coulomb coefficient under test.
-        radius_m: Of the object under test; the known cases get its size to two digits.
+        radius_m: Radius of the object under test [m], rounded to two digits for the known cases.
     """
+    # Two digits of the radius let objects of nearly the same size share one measurement.
     fingers = replace(setup.fingers, radius_m=None, approach=None)
     setup = replace(setup, fingers=fingers, threads=1, timeout_s=math.inf)
     return _measured(Case(setup, friction, float(f"{radius_m:.1e}")))

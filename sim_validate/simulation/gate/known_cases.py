@@ -1,21 +1,21 @@
-"""Known answers of statics, as this simulator gives them.
+"""Known answers of statics, measured in this simulator.
 
-With mu the friction, N the normal force of a contact:
+With mu the friction and N the normal force of a contact:
 
 * a box on a slope of four contacts slides when the tangential load passes mu times the normal one,
   whatever the direction;
 * a box between two pairs of fingers slips when it is pulled with more than 4 mu N, whatever the
   direction across the normals;
 * a grasp under a part of the load that it resists does not creep;
-* fingers that push on two opposite faces a height h apart, from a distance w, hold down to the
+* fingers on two opposite faces a distance w apart, offset by h along them, hold down to the
   friction h / w;
-* what the thresholds of displacement let pass is, by the stiffness of the servos, a small force;
-* a solver that goes on to the last digit moves nothing elsewhere;
-* a blow-up is reported, and does not put everything back to the start.
+* the thresholds of displacement, times the stiffness of the servos, hide only a small force;
+* a solver that goes on to the last digit changes no motion;
+* a blow-up is reported, and does not silently reset the simulation to its start.
 
 The loads and frictions at which the boxes slip are found and judged exactly as those of grasps are,
-by holds, ramps and releases, so that thresholds too loose to notice a slip are refused with
-settings that slip falsely. The cases have the friction and the size of what is under test.
+by holds, ramps and releases. So thresholds too loose to notice a slip are refused, like settings
+that slip falsely. The cases have the friction and the size of the object under test.
 """
 
 import math
@@ -44,25 +44,26 @@ from sim_validate.simulation.wrench_limits import (
 
 AZIMUTHS_DEG = (0.0, 22.5, 45.0, 67.5)
 SLIP_TOLERANCE = 0.005
-"""How far the load at which a box slips may be off, relative to statics."""
+"""Largest error of the load at which a box slips, relative to the load that statics predicts."""
 CREEP_LIMIT = 1e-4
-"""Fastest creep under load, in grasp sizes per second: good settings show a twentieth."""
+"""Fastest creep under load, in grasp sizes per second; good settings show a twentieth of it."""
 CREEP_SHARE = 0.2
-"""Most that creep may use up of the threshold of a hold."""
+"""Largest share of the threshold of a hold that creep may use up."""
 CREEP_LOAD = 0.8
 HIDDEN_LIMIT = 0.01
-"""Largest force that thresholds may let pass, over the largest normal force: ten times what the
-usual ones do."""
+"""Largest force that the thresholds may let pass, relative to the largest normal force. It is ten
+times what the usual thresholds let pass."""
 NEAR = 0.01
-"""How far from the critical friction a hold must tell whether the object stays."""
+"""Distance from the critical friction, relative to it, at which a hold must tell whether the object
+stays."""
 MANY_FACED, FINGERS = "random-100-1", 20
-"""A mesh with many faces, and how many fingertips touch it at a time."""
+"""An example mesh with many faces, and how many fingertips touch it at a time."""
 BLOW_UP = 1e14
-"""A load that no simulation survives [N]."""
+"""Each part of a load that no simulation survives [N, N m]."""
 
 
 def known_answers(case: Case) -> tuple[Check, ...]:
-    """What the simulator makes of the known cases."""
+    """Measure all known cases on the surface of the case's setup."""
     return (
         *_incline(case), *_pulled_box(case), *_offset_fingers(case), _creep(case), _hidden(case),
         *solver_gaps(case), _blow_up(case),
@@ -70,7 +71,7 @@ def known_answers(case: Case) -> tuple[Check, ...]:
 
 
 def _incline(case: Case) -> list[Check]:
-    """Four rigid supports under a box that weighs on them and is pulled at their level."""
+    """Put a box on four rigid supports, let it weigh on them and pull it at their level."""
     body = case.body("box")
     length, width, height = np.ptp(body.vertices, axis=0)
     corners = [(s * length / 4, t * width / 4) for s in (-1, 1) for t in (-1, 1)]
@@ -90,7 +91,7 @@ def _incline(case: Case) -> list[Check]:
 
 
 def _pulled_box(case: Case) -> list[Check]:
-    """Four fingers on two opposite faces of a box that is pulled across their normals."""
+    """Pull a box across the normals of four fingers on two opposite faces."""
     body = case.body("box")
     length, width, _ = np.ptp(body.vertices, axis=0)
     contacts = [
@@ -119,7 +120,7 @@ def _ways() -> list[Array]:
 
 
 def _slips(name: str, found: Sequence[SimulatedLimit | None]) -> list[Check]:
-    """How the loads at which a box slips compare with those of statics."""
+    """Compare the loads at which a box slips with those of statics, one check per direction."""
     tolerance = (1.0 - SLIP_TOLERANCE, 1.0 + SLIP_TOLERANCE)
     return [
         Check(f"{name}, at {azimuth:g} deg", math.nan if at is None else at.share, *tolerance)
@@ -128,7 +129,7 @@ def _slips(name: str, found: Sequence[SimulatedLimit | None]) -> list[Check]:
 
 
 def _offset_fingers(case: Case) -> list[Check]:
-    """Two fingers on each of two opposite faces; the line between the nearest two is oblique."""
+    """Offset two fingers on each of two opposite faces, so that their nearest line is oblique."""
     body = case.body("box")
     length, _, distance = np.ptp(body.vertices, axis=0)
     critical = case.offset_friction
@@ -167,10 +168,11 @@ def _offset_fingers(case: Case) -> list[Check]:
 
 
 def _creep(case: Case) -> Check:
-    """The fastest creep of a tetrahedron held at the centres of its faces, under twelve loads."""
+    """Measure the fastest creep of a tetrahedron held at its face centres, under twelve loads."""
     rig, limits = tetrahedron(case)
     traces = rig.hold([part(rig.idle, limit, CREEP_LOAD) for limit in limits])
-    fastest = np.abs([_speed(trace) for trace in traces]).max()  # NaN if one is
+    # the maximum is NaN if one speed is
+    fastest = np.abs([_speed(trace) for trace in traces]).max()
     speed = float(fastest) / rig.bench.scene.layout.grasp_size_m
     noticed = case.setup.hold.hold_threshold / case.setup.hold.hold_s
     limit = min(CREEP_LIMIT, CREEP_SHARE * noticed)
@@ -178,7 +180,7 @@ def _creep(case: Case) -> Check:
 
 
 def _hidden(case: Case) -> Check:
-    """The force that servos give way by before a threshold notices that something moved."""
+    """Compute the force that servos give way to before a threshold notices a motion."""
     rig, _ = tetrahedron(case)
     layout, setup = rig.bench.scene.layout, case.setup
     threshold = max(
@@ -192,12 +194,13 @@ def _hidden(case: Case) -> Check:
 
 
 def mesh_touches(case: Case) -> tuple[Check, Check]:
-    """How fingertips touch the faces of a mesh with many of them."""
+    """Measure how fingertips touch the faces of a mesh with many faces."""
     body = case.body(MANY_FACED)
     contacts = [Contact(face.centroid, face.normal) for face in body.faces]
     groups = [contacts[start : start + FINGERS] for start in range(0, len(contacts), FINGERS)]
     touches = [worst_touch(body, group, case.setup) for group in groups]
-    turned = np.max([touch.normal_error_rad for touch in touches])  # NaN if one is
+    # the maximum is NaN if one angle is
+    turned = np.max([touch.normal_error_rad for touch in touches])
     deep = np.max([touch.depth_error for touch in touches])
     return (
         Check("angle between a contact's normal and its face's", float(turned), 0.0, NORMAL_ERROR),
@@ -206,7 +209,7 @@ def mesh_touches(case: Case) -> tuple[Check, Check]:
 
 
 def _speed(trace: Trace) -> float:
-    """Mean speed of a trace's second half [m/s]; NaN if it says nothing."""
+    """Mean speed of a trace's second half [m/s]; NaN if the trace has a fault or is too short."""
     half = len(trace.times_s) // 2
     if trace.fault or not half:
         return math.nan
@@ -215,7 +218,7 @@ def _speed(trace: Trace) -> float:
 
 
 def _blow_up(case: Case) -> Check:
-    """By how much the clock is off after a load that makes numbers overflow."""
+    """Measure the error of the simulator's clock after a load that makes numbers overflow."""
     rig, _ = tetrahedron(case)
     (trace,) = rig.hold([Load(np.full(6, BLOW_UP), rig.idle.forces)])
     seen = not trace.finite or trace.warnings > 0

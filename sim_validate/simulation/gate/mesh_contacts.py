@@ -1,4 +1,7 @@
-"""Fingertips that touch a mesh must touch it as its faces lie, or no verdict on it counts."""
+"""Whether fingertips touch a mesh with the normals and depths of its faces.
+
+If they do not, no verdict on the mesh counts.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,35 +15,39 @@ from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.simulate import first_touch
 
 DEPTH = 1e-4
-"""How deep rigid fingertips are put into the faces, in object radii: a thousand times what single
-precision, which vertices of meshes have, leaves of a coordinate."""
+"""Depth to which rigid fingertips are put into the faces, in object radii. It is a thousand times
+the rounding of a coordinate in single precision, which vertices of meshes have."""
 NORMAL_ERROR = 1e-4
-"""Largest angle between a contact's normal and its face's [rad]: it acts like as much friction."""
+"""Largest angle between a contact's normal and its face's [rad]; it acts like that much additional
+friction."""
 DEPTH_ERROR = 0.1
-"""Largest error of a depth, relative to it: vertices may be three hundredths off their faces."""
+"""Largest relative error of a depth: vertices may be three hundredths of it off their faces."""
 
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """The worst contact of fingertips with a mesh; NaN where one has no contact, or several."""
+    """The worst contact between fingertips and a mesh.
+
+    The errors are NaN where a fingertip has no contact, or several.
+    """
 
     finger: int
     normal_error_rad: float
     depth_error: float
-    """Relative to the depth."""
+    """Error of the contact's depth, relative to that depth."""
 
     @property
     def right(self) -> bool:
-        """Whether contacts are as the faces lie."""
+        """Whether both errors are within their limits."""
         return self.normal_error_rad <= NORMAL_ERROR and self.depth_error <= DEPTH_ERROR
 
 
 def worst_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> Touch:
-    """The contact farthest from what the faces say, of fingertips put a little into a mesh.
+    """Put fingertips a little into a mesh and find the contact that differs most from its face.
 
     Args:
         body: A convex object.
-        contacts: On its faces.
+        contacts: Contacts on the faces of `body`.
         setup: How trials are simulated.
     """
     rigid = replace(setup, fingers=replace(setup.fingers, drive="rigid", indentation=0.0))
@@ -59,10 +66,10 @@ def worst_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> 
 
 
 def require_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> None:
-    """Check the contacts of a grasp, where fingertips touch the mesh.
+    """Check the contacts of a grasp where fingertips touch the mesh itself.
 
     Raises:
-        UnfaithfulError: A contact is not as its face lies; what is simulated would not count.
+        UnfaithfulError: A contact differs from its face; what is simulated would not count.
     """
     if setup.surface != "mesh":
         return

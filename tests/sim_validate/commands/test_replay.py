@@ -158,7 +158,7 @@ def test_dataset_rows(tmp_path, replay, capsys):
         (
             "x.json",
             '{"schema": 1, "verdicts": [], "object": {"content_sha256": ""}, "friction": 1}',
-            "not there",
+            "is missing",
         ),
     ],
 )
@@ -193,7 +193,7 @@ def test_grasps_of_another_object_are_refused(folder, tmp_path, capsys):
     assert main(["plan", "wedge", "--limit", "1", "--out", str(tmp_path), "-q"]) == Exit.GOOD
     other = str(tmp_path / "grasps.json")
     assert main(["replay", str(folder), "--grasp", "x", "--grasps", other]) == Exit.INPUT
-    assert "its object is another one" in capsys.readouterr().err
+    assert "its object is not that" in capsys.readouterr().err
 
 
 def test_other_contacts_under_the_same_id_are_refused(folder, tmp_path, capsys):

@@ -182,4 +182,4 @@ def test_doctor_names_what_failed(monkeypatch, capsys):
     assert main(["doctor"]) == Exit.INTERNAL
     shown = capsys.readouterr()
     assert "FAILED critical friction" in " ".join(shown.out.split())
-    assert "install the package anew" in shown.err
+    assert "reinstall the package" in shown.err

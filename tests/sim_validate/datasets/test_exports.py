@@ -386,7 +386,7 @@ def test_what_is_there_already_is_left_alone(dataset, tmp_path):
     (mine / "thesis.tex").write_text("all my work")
     for to in FORMATS:
         for out in (mine, mine / "thesis.tex"):
-            with pytest.raises(gc.InputError, match="no empty folder"):
+            with pytest.raises(gc.InputError, match="not an empty folder"):
                 export(dataset, to, out, None, silent)
         with pytest.raises(gc.InputError, match="is in the dataset"):
             export(dataset, to, dataset / "exports" / to, None, silent)
@@ -424,7 +424,7 @@ def test_fewer_rows_than_listed_are_noticed(copy, tmp_path):
     text = (copy / "manifest.json").read_text()
     wrong = text.replace(f'"rows": {listed["rows"]},', f'"rows": {listed["rows"] + 1},')
     (copy / "manifest.json").write_text(wrong)
-    with pytest.raises(gc.InputError, match="rows, listed are"):
+    with pytest.raises(gc.InputError, match="rows, but the manifest lists"):
         export(copy, "csv", tmp_path / "out", None, silent)
 
 
@@ -465,7 +465,7 @@ def test_the_command_says_what_it_wrote(dataset, tmp_path, capsys):
         "rows": rows,
     }  # fmt: skip
     assert main([*command, "csv", "--out", str(out)]) == Exit.INPUT
-    assert "no empty folder" in capsys.readouterr().err
+    assert "not an empty folder" in capsys.readouterr().err
     assert main([*command, "pickle", "--out", str(tmp_path / "x")]) == Exit.USAGE
     assert main([*command, "csv", "--out", str(tmp_path / "x"), "--split", "all"]) == Exit.USAGE
     assert main(["dataset", "export", str(tmp_path), "--to", "npz", "--out", "x"]) == Exit.INPUT

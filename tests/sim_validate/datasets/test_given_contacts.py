@@ -148,8 +148,8 @@ GOOD = {"contact_points_m": np.eye(4, 3)[None] * 0.01, "contact_normals": NORMAL
         ({"contact_points_m": POINTS}, "no array contact_normals"),
         ({"contact_points_m": POINTS[:, :3], "contact_normals": NORMALS}, "expected numbers"),
         ({"contact_points_m": POINTS.astype(str), "contact_normals": NORMALS}, "expected numbers"),
-        ({"contact_points_m": POINTS[:1], "contact_normals": NORMALS}, "of one length"),
-        (GOOD | {"grasp_id": np.array(["a", "b"])}, "of one length"),
+        ({"contact_points_m": POINTS[:1], "contact_normals": NORMALS}, "of equal length"),
+        (GOOD | {"grasp_id": np.array(["a", "b"])}, "of equal length"),
         (GOOD | {"contact_points_m": np.full((1, 4, 3), np.nan)}, "finite"),
         (GOOD | {"contact_normals": 2.0 * NORMALS[:1]}, "normal"),
         (GOOD | {"grasp_id": np.array([{}], dtype=object)}, "grasp_id: expected numbers or text"),
@@ -173,7 +173,7 @@ def test_three_contacts_and_files_of_something_else_are_refused(tmp_path):
     with pytest.raises(gc.InputError, match="expected 4 contacts, got 3"):
         read_given(three)
     config = DatasetConfig(objects=("wedge",), contacts=str(three))
-    with pytest.raises(gc.InputError, match="the one that the contacts are on"):
+    with pytest.raises(gc.InputError, match="only the object that the contacts are on"):
         dataclasses.replace(config, objects=("wedge", "prism"))
 
 

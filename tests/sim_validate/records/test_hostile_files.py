@@ -86,7 +86,7 @@ def test_long_settings_are_refused_before_they_are_read(tmp_path):
     with pytest.raises(gc.InputError, match="larger than"):
         read_tables(path)
     for key in ("a.", '"a b" . ', "'=,'."):  # tomllib would take hours
-        with pytest.raises(gc.InputError, match="a key of more than 64 parts"):
+        with pytest.raises(gc.InputError, match="a key has more than 64 parts"):
             tables_of_toml("x = 1\n" + key * (MOST_LETTERS // 8) + "a = 1")
     with pytest.raises(gc.InputError, match="more than 64 deep"):
         tables_of_toml("[a.a]\na = " + "[" * 65 + "]" * 65)
@@ -157,7 +157,7 @@ ARCHIVES = {
     "code": (_archive(("a.npy", _npy("__import__('os').abort()"))), "cannot be read as npz"),
     "deep": (_archive(("a.npy", _npy("(" * 100))), "cannot be read as npz"),
     "version": (_archive(("a.npy", _npy(_header(), b"\0" * 8, b"\x03\x00"))), "format"),
-    "letters": (_archive(("a.npy", _npy(_header("'<U1'"), b"\xff" * 4))), "text that is none"),
+    "letters": (_archive(("a.npy", _npy(_header("'<U1'"), b"\xff" * 4))), "are no letters"),
     "nested": (_archive(("a.npy", _archive(("a.npy", GOOD)))), "cannot be read as npz"),
     "many": (_archive(*((f"{i}.npy", GOOD) for i in range(300))), "300 members"),
     "empty": (b"", "cannot be read as npz"),

@@ -30,8 +30,8 @@ def test_a_file_changes_what_it_names_and_nothing_else(tmp_path):
     ("text", "words"),
     [
         ("[physics]\ntimestp = 0.001\n", r"\[physics\] has .*timestep.* got .timestp."),
-        ("[physic]\ntimestep = 0.001\n", "tables are physics.* got .physic."),
-        ("timestep = 0.001\n", "tables are physics.* got .timestep."),
+        ("[physic]\ntimestep = 0.001\n", "expected tables physics.* got .physic."),
+        ("timestep = 0.001\n", "expected tables physics.* got .timestep."),
         ('[physics]\ntimestep = "slow"\n', r"\[physics\] timestep: .*number"),
         ("[physics]\ntimestep = -0.001\n", "timestep must be a number from 1e-05"),
         ("[physics]\ntolerance = nan\n", "physics.tolerance: expected a finite"),

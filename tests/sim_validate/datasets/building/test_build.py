@@ -183,7 +183,7 @@ def test_folders_of_something_else_are_refused(copy, tmp_path):
         build(dataclasses.replace(CONFIG, limit=3), copy, Here(), silent)
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("all my work")
-    with pytest.raises(gc.InputError, match=r"thesis\.tex: is there"):
+    with pytest.raises(gc.InputError, match=r"thesis\.tex: exists"):
         build(CONFIG, tmp_path / "mine", Here(), silent)
     with pytest.raises(gc.InputError, match="no dataset"):
         verify(tmp_path / "mine")
@@ -194,7 +194,7 @@ def test_what_a_dataset_would_overwrite_in_a_folder_of_another_is_refused(tmp_pa
     path = tmp_path / "mine" / name
     path.parent.mkdir(parents=True)
     path.write_text("mine")
-    with pytest.raises(gc.InputError, match="not of this dataset"):
+    with pytest.raises(gc.InputError, match="not part of this dataset"):
         build(CONFIG, tmp_path / "mine", Here(), silent)
     assert path.read_text() == "mine"
 
@@ -232,7 +232,7 @@ def test_a_finished_dataset_that_is_damaged_is_not_taken_for_one(copy):
 
 def test_a_folder_that_cannot_be_made_is_said(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(gc.InputError, match=r"file: is there, and no folder"):
+    with pytest.raises(gc.InputError, match=r"file: exists and is not a folder"):
         build(CONFIG, tmp_path / "file", Here(), silent)
 
 

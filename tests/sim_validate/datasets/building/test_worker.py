@@ -74,7 +74,7 @@ def test_rows_that_do_not_arrive_end_the_run(staging):
         def submit(self, function, given):
             return super().submit(function, dataclasses.replace(given, work=lambda *_: None))
 
-    with pytest.raises(WorkerError, match="its rows are not here"):
+    with pytest.raises(WorkerError, match="its rows are missing"):
         drive(units_of(CONFIG), staging, Elsewhere(), silent)
 
 
@@ -102,7 +102,7 @@ def test_a_worker_that_cannot_begin_ends_the_run(tmp_path):
     def lack(_):
         raise ModuleNotFoundError("No module named 'sim_validate'")
 
-    with pytest.raises(WorkerError, match="cannot do units: ModuleNotFoundError: No module"):
+    with pytest.raises(WorkerError, match="cannot compute units: ModuleNotFoundError: No module"):
         build(CONFIG, tmp_path / "ds", Here(lack), silent)
     assert build(CONFIG, tmp_path / "ds", Here(), silent).quarantined == 0
 
