@@ -1,7 +1,9 @@
 """Vertices and polygons as a file lists them -> triangles: fans, where a fan is the polygon."""
 
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,25 +12,32 @@ from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.mesh_files.refusals import broken, outside
 
 CORNERS = 3
-QUAD = 4
 FOLDED = 1e-9
 """A triangle of a fan that faces backwards by more than this share of its polygon."""
 FLATTEST = 0.5
 """Least area of a polygon seen along its normal, relative to that of its triangles."""
 
 
+def _no_triangles() -> "array[int]":
+    return array("q")
+
+
 @dataclass(slots=True)
-class Surface:
-    """What was read so far."""
+class Polygons:
+    """The polygons that were read so far, as triangles: 24 bytes for each of them."""
 
     most: int
     """Triangles that may be."""
-    points: list[Sequence[float]] = field(default_factory=list[Sequence[float]])
-    triangles: list[tuple[int, int, int]] = field(default_factory=list[tuple[int, int, int]])
-    polygons: list[tuple[str, Sequence[int]]] = field(
-        default_factory=list[tuple[str, Sequence[int]]]
-    )
-    """Those of four corners and more, with where they are written."""
+    first: int = 0
+    """The number that the file gives to its first vertex, for messages."""
+    triangles: "array[int]" = field(default_factory=_no_triangles)
+    """Three corners of each triangle."""
+    large: list[tuple[str, Sequence[int]]] = field(default_factory=list[tuple[str, Sequence[int]]])
+    """Polygons of four corners and more, with where they are written."""
+    lowest: tuple[int, str] = (0, "")
+    """The least corner below 0, and where it is written."""
+    highest: tuple[int, str] = (-1, "")
+    """The largest corner, and where it is written."""
 
     def add(self, corners: Sequence[int], where: str) -> None:
         """Add a polygon, by the numbers of its vertices from 0 on.
@@ -38,31 +47,39 @@ class Surface:
         """
         if len(corners) < CORNERS:
             broken(where, f"a face needs three corners, got {len(corners)}")
-        if len(self.triangles) + len(corners) - 2 > self.most:
-            too_many(len(self.triangles) + len(corners) - 2, self.most)
-        first, second, *others = corners
-        if len(corners) == QUAD:  # in the order of trimesh, as readings are compared by corners
-            third, last = others
-            self.triangles += [(first, second, third), (third, last, first)]
-        else:
-            for third in others:
-                self.triangles.append((first, second, third))
-                second = third
+        triangles = len(self.triangles) // CORNERS + len(corners) - 2
+        if triangles > self.most:
+            too_many(triangles, self.most)
+        if (least := min(corners)) < self.lowest[0]:
+            self.lowest = least, where
+        if (largest := max(corners)) > self.highest[0]:
+            self.highest = largest, where
+        first, *others = corners
+        for second, third in pairwise(others):
+            self.triangles.extend((first, second, third))
         if len(corners) > CORNERS:
-            self.polygons.append((where, corners))
+            self.large.append((where, corners))
 
-    def arrays(self) -> tuple[Array, Indices]:
-        """Vertices (n, 3) and triangles (t, 3).
+    def on(self, points: Array) -> tuple[Array, Indices]:
+        """Vertices (n, 3), as given, and triangles (t, 3).
 
         Raises:
             MeshError: A corner is no vertex, or a fan folds back on its polygon.
         """
-        points = np.array(self.points, dtype=np.float64).reshape(-1, 3)
-        triangles = np.array(self.triangles, dtype=np.int64).reshape(-1, 3)
-        check_corners(triangles, len(points))
-        for where, corners in self.polygons:
+        for (corner, where), wrong in (
+            (self.lowest, self.lowest[0] < 0),
+            (self.highest, self.highest[0] >= len(points)),
+        ):
+            if wrong:
+                outside(where, corner + self.first, len(points))
+        for where, corners in self.large:
             _check_fan(points[list(corners)], where)
-        return points, triangles
+        return points, np.array(self.triangles, dtype=np.int64).reshape(-1, 3)
+
+
+def points_of(coordinates: "array[float]") -> Array:
+    """Vertices (n, 3) of coordinates one after another, which are not copied."""
+    return np.frombuffer(coordinates, dtype=np.float64).reshape(-1, 3)
 
 
 def too_many(triangles: int, most: int) -> None:
@@ -73,19 +90,6 @@ def too_many(triangles: int, most: int) -> None:
     """
     message = f"{triangles} triangles or more, the limit is {most}; simplify the mesh"
     raise MeshError(MeshRefusal.TOO_MANY, message)
-
-
-def check_corners(triangles: Indices, vertices: int) -> None:
-    """Refuse triangles that name vertices that are not there.
-
-    Raises:
-        MeshError: One does.
-    """
-    wrong = np.flatnonzero(((triangles < 0) | (triangles >= vertices)).any(axis=1))
-    if wrong.size:
-        row = triangles[wrong[0]]
-        corner = int(row[(row < 0) | (row >= vertices)][0])
-        outside(f"triangle {wrong[0]}", corner, vertices)
 
 
 def _check_fan(corners: Array, where: str) -> None:

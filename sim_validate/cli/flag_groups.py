@@ -54,7 +54,7 @@ class Speech:
 
 @dataclass(frozen=True, slots=True)
 class MeshLimits:
-    """How large a mesh may be, and what reading its file may cost."""
+    """How large a mesh file and what it holds may be."""
 
     max_mesh_bytes: Count = USUAL_MESH.max_bytes
     """Larger mesh files are refused."""
@@ -64,10 +64,6 @@ class MeshLimits:
     """Objects of more planar faces are refused."""
     max_parts: Count = USUAL_MESH.max_parts
     """Surfaces of more separate parts are refused."""
-    max_mesh_seconds: Positive = USUAL_MESH.max_seconds
-    """Of a processor, for reading a mesh file."""
-    max_mesh_memory_mib: Count = USUAL_MESH.max_memory_mib
-    """For reading a mesh file."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,7 @@ import numpy as np
 import trimesh
 
 import grasp_core as gc
-from grasp_core.mesh_files.child_main import triangles_of
-from grasp_core.mesh_files.reading import FORMATS, check_beginning
+from grasp_core.mesh_files.reading import FORMATS, check_beginning, triangles_of
 from tests.fuzzing.plain_meshes import PLAIN
 from tests.fuzzing.targets import Target
 

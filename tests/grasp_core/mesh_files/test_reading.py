@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import grasp_core as gc
-from grasp_core.mesh_files.child_main import triangles_of
+from grasp_core.mesh_files.reading import triangles_of
 from tests.bad_input.mesh_texts import off, ply, stl, stl_text
 from tests.bad_input.of_binary_meshes import glb, tree
 from tests.fuzzing.mesh_files import same_triangles
