@@ -49,7 +49,8 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     """
     tree, binary = _chunks(data)
     try:
-        return _scene(tree, binary, most)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
+            return _scene(tree, binary, most)
     except WRONG_TREE as error:
         message = f"the JSON part is no glTF ({type(error).__name__}: {shown(error)})"
         raise MeshError(MeshRefusal.UNREADABLE, f"{message}; export it again") from error

@@ -13,6 +13,7 @@ from grasp_core.mesh_files.words import (
     numbers,
     plain_text,
     whole,
+    worded_lines,
 )
 
 PASSED_OVER = frozenset(
@@ -20,7 +21,7 @@ PASSED_OVER = frozenset(
     b"l p".split()
 )
 """They change looks, names or curves, not the surface."""
-SURFACE = (b"v", b"f")
+SURFACE = re.compile(rb"\s*[vf]\s")
 CORNER = re.compile(rb"[+-]?\d++(/([+-]?\d++)?){0,2}")
 """A vertex, perhaps of a texture and a normal."""
 WIDTHS = (3, 4, 6, 7)
@@ -51,33 +52,32 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
 
 
 def _statements(text: bytes) -> Iterator[tuple[int, list[bytes]]]:
-    """The words of each statement with the number of its first line.
+    """The words of each statement with the number of its first line."""
+    return _joined(text) if GOES_ON in text else worded_lines(text, comments=True)
 
-    A backslash at the end of a line joins it with the next. Whether it does so in a comment is not
-    said anywhere, so that a comment which could swallow a part of the surface is refused.
+
+def _joined(text: bytes) -> Iterator[tuple[int, list[bytes]]]:
+    """Statements of which some go on: a backslash at the end of a line joins it with the next.
+
+    Whether it does so in a comment is not said anywhere, so that a comment which could swallow a
+    part of the surface is refused.
     """
-    held, size, begun = list[bytes](), 0, 0
-    after_backslash = False
-    for number, line in numbered_lines(text):
-        if b"#" not in line and not (held or after_backslash or line.endswith(GOES_ON)):
-            if words := line.split():  # as nearly all lines are
-                yield number, words
-            continue
-        kept, hash_sign, comment = line.partition(b"#")
-        if after_backslash and kept.split(None, 1)[:1] in ([SURFACE[0]], [SURFACE[1]]):
+    held, begun, after_backslash = bytearray(), 0, False
+    for number, line in numbered_lines(text):  # pieces are appended in place, in linear time
+        kept, _, comment = line.partition(b"#")
+        if after_backslash and SURFACE.match(kept):
             broken(f"line {number - 1}", "a comment ends in a backslash, before a part of the mesh")
         after_backslash = comment.endswith(GOES_ON)
         begun = begun if held else number
-        goes_on = not hash_sign and kept.endswith(GOES_ON)
-        held.append(kept[: -len(GOES_ON)] if goes_on else kept)
-        size += len(kept)
-        if size > LONGEST_LINE:
+        goes_on = kept.endswith(GOES_ON)
+        held += kept.removesuffix(GOES_ON)
+        if len(held) > LONGEST_LINE:
             broken(f"line {begun}", f"goes on for more than {LONGEST_LINE} bytes")
         if not goes_on:
-            if words := b"".join(held).split():
+            if words := bytes(held).split():
                 yield begun, words
-            held, size = [], 0
-    if words := b"".join(held).split():
+            held.clear()
+    if words := bytes(held).split():
         yield begun, words
 
 

@@ -11,7 +11,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.mesh_files.ply_header import LISTS, POINT, Element, Header, Property, read_header
 from grasp_core.mesh_files.polygon_soup import CORNERS, Polygons, points_of, too_many
-from grasp_core.mesh_files.refusals import broken
+from grasp_core.mesh_files.refusals import broken, shown
 from grasp_core.mesh_files.words import numbers, plain_text, whole, worded_lines
 
 LARGEST_CORNER = 2**32
@@ -83,12 +83,15 @@ def _text_vertices(element: Element, lines: Lines) -> Array:
             three = [cells[axis][0] for axis in POINT]
         else:
             three = [words[place] for place in places]
+            if len(words) > len(three):
+                _check_numbers(words, where)
         coordinates.extend(numbers(three, where))
     return _as_typed(element, points_of(coordinates))
 
 
 def _text_cells(element: Element, words: list[bytes], where: str) -> dict[str, list[bytes]]:
     """The words of each property of a row."""
+    _check_numbers(words, where)
     found, place = dict[str, list[bytes]](), 0
     for each in element.properties:
         length = 1
@@ -103,6 +106,15 @@ def _text_cells(element: Element, words: list[bytes], where: str) -> dict[str, l
     if place < len(words):
         broken(where, "more values than properties")
     return found
+
+
+def _check_numbers(words: list[bytes], where: str) -> None:
+    """Refuse words that are no numbers where nothing is made of them; normals may be nan."""
+    try:
+        for word in words:
+            float(word)
+    except ValueError:
+        broken(where, f"expected numbers, got {shown(b' '.join(words))!r}")
 
 
 def _as_typed(element: Element, points: Array) -> Array:

@@ -94,12 +94,14 @@ def too_many(triangles: int, most: int) -> None:
 
 def _check_fan(corners: Array, where: str) -> None:
     """Refuse a polygon that is not the fan around its first corner."""
-    spokes = corners[1:] - corners[0]
-    crosses = np.cross(spokes[:-1], spokes[1:])
-    whole = crosses.sum(axis=0)
-    areas, dots = np.linalg.norm(crosses, axis=1), (spokes[:-1] * spokes[1:]).sum(axis=1)
-    folds = ((crosses @ whole) < -FOLDED * (whole @ whole)).any()
-    winds = np.arctan2(areas, dots).sum() > 2.0 * np.pi + FOLDED
-    if folds or winds or np.linalg.norm(whole) < FLATTEST * areas.sum():
+    with np.errstate(over="ignore", invalid="ignore"):  # sizes are judged later
+        spokes = corners[1:] - corners[0]
+        crosses = np.cross(spokes[:-1], spokes[1:])
+        whole = crosses.sum(axis=0)
+        areas, dots = np.linalg.norm(crosses, axis=1), (spokes[:-1] * spokes[1:]).sum(axis=1)
+        folds = ((crosses @ whole) < -FOLDED * (whole @ whole)).any()
+        winds = np.arctan2(areas, dots).sum() > 2.0 * np.pi + FOLDED
+        flat = np.linalg.norm(whole) < FLATTEST * areas.sum()
+    if folds or winds or flat:
         message = f"{where}: a face with a dent, which can be cut in several ways; export triangles"
         raise MeshError(MeshRefusal.POLYGON, message)

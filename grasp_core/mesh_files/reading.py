@@ -36,6 +36,9 @@ def read_triangles(path: Path, limits: MeshLimits) -> tuple[Array, Indices, byte
         return *triangles_of(kind, data, limits.max_triangles), data
     except MeshError as error:
         raise MeshError(error.reason, f"{path}: {error.message}") from error
+    except MemoryError as error:
+        message = f"{path}: reading it needs more memory than there is; simplify the mesh"
+        raise MeshError(MeshRefusal.LIMIT, message) from error
 
 
 def mesh_kind(path: Path) -> str:

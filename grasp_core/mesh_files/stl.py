@@ -16,6 +16,7 @@ HEADER, TRIANGLE = 80, 50
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 FLOATS_OF_TRIANGLE = 9
 FLOATS = 3
+KEYWORDS = frozenset(b"facet normal outer loop vertex endloop endfacet".split())
 Lines = Iterator[tuple[int, list[bytes]]]
 Words = Iterator[tuple[int, bytes]]
 
@@ -85,7 +86,7 @@ def _corners(words: Words) -> list[float]:
     _expect(*_next(words), b"normal")
     number, word = _next(words)
     for _ in range(FLOATS):  # a normal, or none
-        if word.lower() != b"outer":
+        if word.lower() not in KEYWORDS:
             number, word = _next(words)
     _expect(number, word, b"outer")
     _expect(*_next(words), b"loop")
@@ -94,7 +95,7 @@ def _corners(words: Words) -> list[float]:
         number, word = _next(words)
         _expect(number, word, b"vertex")
         three = [_next(words)[1] for _ in range(FLOATS)]
-        if b"vertex" in three or b"endloop" in three:
+        if not KEYWORDS.isdisjoint(three):
             broken(f"line {number}", "a vertex needs three numbers")
         found += numbers(three, f"line {number}")
     _expect(*_next(words), b"endloop")

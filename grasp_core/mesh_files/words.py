@@ -36,7 +36,8 @@ def plain_text(data: bytes, start: int = 0) -> bytes:
         broken("byte 0", "expected UTF-8 text, got UTF-16")
     if found := CONTROL.search(data, start):
         broken(f"byte {found.start()}", f"expected text, got the control character {found[0]!r}")
-    text = data[start:].removeprefix(BYTE_ORDER_MARK).translate(OTHER_ALPHABETS)
+    text = data[start:] if start else data.removeprefix(BYTE_ORDER_MARK)
+    text = text.translate(OTHER_ALPHABETS)
     return text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 
 
@@ -78,7 +79,7 @@ def numbers(words: Sequence[bytes], where: Where) -> list[float]:
         values = [float(word) for word in words]
     except ValueError:
         values = [math.nan]
-    # Python also takes underscores and words such as nan; a sum tells of most lines that it has none
+    # Python also takes underscores, and nan and inf, which would make the sum one of them
     if not math.isfinite(sum(values)) or b"_" in b"".join(words):
         values = [_finite(word, where) for word in words]
     return values
