@@ -1,5 +1,6 @@
 """Reading costs time and memory in proportion to a file's bytes, whatever stands in it."""
 
+import contextlib
 import time
 import tracemalloc
 
@@ -37,25 +38,21 @@ BILLIONS = {
 }
 
 
-def seconds(kind, data, repeats):
-    """Of the processor, the least of several readings; other processes do not count."""
-    found = []
-    for _ in range(repeats):
-        begun = time.process_time()
-        try:
-            triangles_of(kind, data, MOST)
-        except gc.MeshError:
-            pass
-        found.append(time.process_time() - begun)
-    return min(found)
+def seconds(kind, data):
+    """Of the processor, for one reading; what other processes do does not count."""
+    begun = time.process_time()
+    with contextlib.suppress(gc.MeshError):
+        triangles_of(kind, data, MOST)
+    return time.process_time() - begun
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_time_grows_as_bytes_do(name):
+    """One of three readings of the large file, as caches are shared with other processes."""
     kind, make = name.partition(":")[0], FILES[name]
     small, large = make(SMALL), make(TIMES * SMALL)
-    before = max(seconds(kind, small, 5), SHORTEST_S * len(small) / SMALL)
-    assert seconds(kind, large, 3) < SLOWEST_GROWTH * before
+    before = max(SHORTEST_S, min(seconds(kind, small) for _ in range(5)))
+    assert any(seconds(kind, large) < SLOWEST_GROWTH * before for _ in range(3))
 
 
 @pytest.mark.parametrize("case", BILLIONS)
