@@ -12,6 +12,7 @@ from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.mesh_files.refusals import broken, outside
 
 CORNERS = 3
+QUAD = 4
 FOLDED = 1e-9
 """A triangle of a fan that faces backwards by more than this share of its polygon."""
 FLATTEST = 0.5
@@ -55,8 +56,12 @@ class Polygons:
         if (largest := max(corners)) > self.highest[0]:
             self.highest = largest, where
         first, *others = corners
-        for second, third in pairwise(others):
-            self.triangles.extend((first, second, third))
+        if len(corners) == QUAD:  # masses are summed in this order, and keep their last digits
+            second, third, last = others
+            self.triangles.extend((first, second, third, third, last, first))
+        else:
+            for second, third in pairwise(others):
+                self.triangles.extend((first, second, third))
         if len(corners) > CORNERS:
             self.large.append((where, corners))
 
