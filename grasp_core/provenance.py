@@ -14,7 +14,7 @@ import numpy as np
 from grasp_core.compiled import compiled
 
 PACKAGES = (
-    "graspproof", "mujoco", "numpy", "scipy", "trimesh", "manifold3d", "highspy", "numba",
+    "graspproof", "mujoco", "numpy", "scipy", "manifold3d", "highspy", "numba",
     "clarabel", "qpsolvers", "proxsuite",
 )  # fmt: skip
 

@@ -16,7 +16,6 @@ from sim_validate.main import ACTIONS
 
 ROOT = Path(__file__).parent.parent
 DOORS = {
-    "trimesh": "grasp_core/geometry/mesh.py",
     "manifold3d": "grasp_core/objects/booleans.py",
     "highspy": "grasp_core/solvers/lp.py",
     "clarabel": "grasp_core/solvers/conic.py",
@@ -46,9 +45,6 @@ def test_a_package_is_imported_at_its_door_only(package):
     ]
     assert len(sources) > 25
     users = {str(p.relative_to(ROOT)) for p in sources if pattern.search(p.read_text())}
-    if package == "trimesh":
-        pattern = re.compile(r"import_module\(f\"trimesh")
-        users = {str(p.relative_to(ROOT)) for p in sources if pattern.search(p.read_text())}
     if package in {"ray", "distributed"}:  # imported by a name that is looked up
         users = {str(p.relative_to(ROOT)) for p in sources if f'("{package}", ' in p.read_text()}
     assert users

@@ -1,21 +1,27 @@
 """Reads GLB: a JSON tree of nodes and meshes whose numbers lie in one binary chunk.
 
 The frame of a mesh is the product of the matrices from the root of its scene to its node; a mirror
-turns its triangles, so that outside stays outside. Features that would change shapes and are not
-read (compression, sparse numbers, skins, morphs, other files) are refused.
+turns its triangles, so that outside stays outside. What would change shapes and is not read -
+compression, sparse numbers, skins, morphs, other files - is refused.
+
+Nodes may place the same part, and parts may share their numbers, as often as they like. So that a
+small file does not become a large scene, a part is read as far as its triangles go, and costs at
+least one of the triangles that are allowed.
 """
 
 import json
 import struct
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.mesh_files.polygon_soup import CORNERS, check_corners, too_many
-from grasp_core.mesh_files.refusals import broken, shown, unsupported
+from grasp_core.mesh_files.polygon_soup import CORNERS, too_many
+from grasp_core.mesh_files.refusals import broken, outside, shown, unsupported
 
 MAGIC, VERSION = b"glTF", 2
 HEAD, CHUNK_HEAD = 12, 8
@@ -24,9 +30,15 @@ INDEX_TYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4"}
 FLOAT_TYPE = 5126
 TRIANGLES, STRIP = 4, 5
 MOST_NODES = 10_000
+MOST_VALUES = 4_000_000
+"""In the JSON part: small ones take a quarter of a kilobyte of memory each."""
 PLAIN_EXTENSIONS = ("KHR_materials", "KHR_texture", "KHR_lights", "EXT_texture", "KHR_xmp")
 """Beginnings of the extensions that change looks only; all others are refused."""
 Tree = dict[str, Any]
+WRONG_TREE = (
+    KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError,
+)  # fmt: skip
+"""What a tree of other keys and values than glTF has leads to."""
 
 
 def read(data: bytes, most: int) -> tuple[Array, Indices]:
@@ -37,9 +49,10 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     """
     tree, binary = _chunks(data)
     try:
-        return _scene(tree, binary, most)
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        message = f"the JSON part is not glTF ({type(error).__name__}: {shown(error)})"
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
+            return _scene(tree, binary, most)
+    except WRONG_TREE as error:
+        message = f"the JSON part is no glTF ({type(error).__name__}: {shown(error)})"
         raise MeshError(MeshRefusal.UNREADABLE, f"{message}; export it again") from error
 
 
@@ -65,6 +78,9 @@ def _chunks(data: bytes) -> tuple[Tree, bytes]:
 
 
 def _tree(text: bytes) -> Tree:
+    if sum(map(text.count, (b",", b"[", b"{"))) > MOST_VALUES:
+        message = f"the JSON part has over {MOST_VALUES} values, the limit; simplify the mesh"
+        raise MeshError(MeshRefusal.TOO_MANY, message)
     try:
         tree: object = json.loads(text.decode("utf-8"))
     except (ValueError, RecursionError) as error:
@@ -78,16 +94,15 @@ def _tree(text: bytes) -> Tree:
 def _scene(tree: Tree, binary: bytes, most: int) -> tuple[Array, Indices]:
     _check_features(tree)
     points, triangles = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)]
-    before = count = 0
+    before = placed = 0
     for matrix, mesh in _placed(tree):
+        mirrored = np.linalg.det(matrix[:3, :3]) < 0.0
         for primitive in tree["meshes"][mesh]["primitives"]:
-            corners, local = _primitive(tree, binary, primitive)
-            count += len(corners)
-            if count > most:
-                too_many(count, most)
+            corners, local = _primitive(tree, binary, primitive, most - placed)
+            placed += max(len(corners), 1)
+            if placed > most:
+                too_many(placed, most)
             points.append(local @ matrix[:3, :3].T + matrix[:3, 3])
-            # a mirror turns triangles inside out: their order is turned back
-            mirrored = np.linalg.det(matrix[:3, :3]) < 0.0
             triangles.append(before + (corners[:, ::-1] if mirrored else corners))
             before += len(local)
     moved = np.vstack(points)
@@ -120,8 +135,8 @@ def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
         return
     place = tree.get("scene", 0)
     _check_place(place, scenes)
-    waiting = [(np.eye(4), root) for root in scenes[place].get("nodes", [])]
-    seen = set[int]()
+    waiting, seen = list[tuple[Array, int]](), set[int]()
+    _await(waiting, np.eye(4), scenes[place].get("nodes", []))
     while waiting:
         parent, number = waiting.pop()
         _check_place(number, tree["nodes"])
@@ -130,12 +145,18 @@ def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
         seen.add(number)
         node = tree["nodes"][number]
         matrix = parent @ _matrix(node)
-        waiting += [(matrix, child) for child in node.get("children", [])]
+        _await(waiting, matrix, node.get("children", []))
         if "mesh" in node:
             _check_place(node["mesh"], tree["meshes"])
             if "camera" in node:
                 unsupported(f"node {number} is a mesh and a camera", "export the mesh alone")
             yield matrix, node["mesh"]
+
+
+def _await(waiting: list[tuple[Array, int]], matrix: Array, nodes: list[int]) -> None:
+    if len(waiting) + len(nodes) > MOST_NODES:
+        broken("the JSON part", f"nodes must form a tree, of {MOST_NODES} at most")
+    waiting += [(matrix, number) for number in nodes]
 
 
 def _check_place(place: object, listed: list[Any]) -> None:
@@ -188,18 +209,29 @@ def _rotation(quaternion: Array) -> Array:
     )
 
 
-def _primitive(tree: Tree, binary: bytes, primitive: Tree) -> tuple[Indices, Array]:
-    """Triangles (t, 3) and vertices (n, 3) of one part of a mesh."""
+def _primitive(tree: Tree, binary: bytes, primitive: Tree, left: int) -> tuple[Indices, Array]:
+    """Triangles (t, 3) and the vertices that they use (n, 3), of a part of a mesh.
+
+    Args:
+        tree: The JSON part.
+        binary: The binary part.
+        primitive: The part of a mesh, in the tree.
+        left: Triangles that may be.
+    """
     mode = primitive.get("mode", TRIANGLES)
     if "targets" in primitive or primitive.get("extensions"):
         unsupported("a part with morphs or compression", "export plain triangles")
     if mode not in (TRIANGLES, STRIP):
         unsupported(f"a part of mode {shown(mode)}, not of triangles", "export triangles only")
-    points = _numbers(tree, binary, primitive["attributes"]["POSITION"], "VEC3").astype(np.float64)
-    if "indices" in primitive:
-        flat = _numbers(tree, binary, primitive["indices"], "SCALAR").ravel().astype(np.int64)
-    else:
-        flat = np.arange(len(points))
+    points = _stored(tree, binary, primitive["attributes"]["POSITION"], "VEC3")
+    order = (
+        _stored(tree, binary, primitive["indices"], "SCALAR") if "indices" in primitive else None
+    )
+    corners = points.count if order is None else order.count
+    triangles = corners - 2 if mode == STRIP else corners // CORNERS
+    if triangles > left:
+        too_many(triangles, left)
+    flat = np.arange(corners) if order is None else order.rows(slice(None)).ravel().astype(np.int64)
     if mode == STRIP:
         rows = np.stack([flat[:-2], flat[1:-1], flat[2:]], axis=1)
         # every other triangle of a strip is wound the other way
@@ -208,12 +240,32 @@ def _primitive(tree: Tree, binary: bytes, primitive: Tree) -> tuple[Indices, Arr
         broken("a part", f"{len(flat)} corners do not make whole triangles")
     else:
         rows = flat.reshape(-1, 3)
-    check_corners(rows, len(points))
-    return rows, points
+    if rows.size and rows.max() >= points.count:
+        wrong = int(rows.max())
+        outside(f"triangle {np.argwhere(rows == wrong)[0, 0]}", wrong, points.count)
+    used, rows = np.unique(rows, return_inverse=True)
+    return rows.reshape(-1, 3), points.rows(used).astype(np.float64)
 
 
-def _numbers(tree: Tree, binary: bytes, number: int, shape: str) -> Any:
-    """The numbers of an accessor, one row per element."""
+@dataclass(frozen=True, slots=True)
+class _Stored:
+    """Numbers as they lie in the file, which are read when they are asked for."""
+
+    raw: NDArray[np.uint8]
+    """Bytes of each row, (count, bytes of a row)."""
+    item: "np.dtype[Any]"
+
+    @property
+    def count(self) -> int:
+        return len(self.raw)
+
+    def rows(self, which: "slice | Indices") -> "NDArray[Any]":
+        """Some rows, (n, numbers of a row)."""
+        return np.ascontiguousarray(self.raw[which]).view(self.item)
+
+
+def _stored(tree: Tree, binary: bytes, number: int, shape: str) -> _Stored:
+    """The numbers of an accessor, a row for each of its elements."""
     _check_place(number, tree["accessors"])
     accessor = tree["accessors"][number]
     kind = accessor["componentType"]
@@ -228,21 +280,16 @@ def _numbers(tree: Tree, binary: bytes, number: int, shape: str) -> Any:
     _check_place(accessor["bufferView"], tree["bufferViews"])
     view = tree["bufferViews"][accessor["bufferView"]]
     _check_place(view["buffer"], tree["buffers"])
-    item, columns = np.dtype(wanted[kind]), CORNERS if shape == "VEC3" else 1
-    row = item.itemsize * columns
-    stride = view.get("byteStride", row)
-    inside, start, count = (
-        accessor.get("byteOffset", 0),
-        view.get("byteOffset", 0),
-        accessor["count"],
-    )
+    item = np.dtype(wanted[kind])
+    row = item.itemsize * (CORNERS if shape == "VEC3" else 1)
+    stride, count = view.get("byteStride", row), accessor["count"]
+    inside, start = accessor.get("byteOffset", 0), view.get("byteOffset", 0)
     sizes = (stride, inside, start, count, view["byteLength"])
     if any(type(size) is not int or size < 0 for size in sizes) or stride < row:
         broken(f"accessor {number}", f"sizes must be whole numbers, rows at least {row} bytes")
     length = (count - 1) * stride + row if count else 0
     if inside + length > view["byteLength"] or start + view["byteLength"] > len(binary):
         broken(f"accessor {number}", f"{count} numbers do not fit into their {len(binary)} bytes")
-    raw = np.frombuffer(binary, dtype=np.uint8, offset=start + inside, count=length)
-    # copied before the view: rows in the file need not be contiguous or aligned
-    rows = np.lib.stride_tricks.as_strided(raw, (count, row), (stride, 1)).copy()
-    return rows.view(item).reshape(count, columns)
+    raw = np.frombuffer(binary, dtype=np.uint8)[start + inside :]
+    rows = np.lib.stride_tricks.as_strided(raw, (count, row), (stride, 1), writeable=False)
+    return _Stored(rows, item)

@@ -1,43 +1,84 @@
 """Reads OBJ text: `v` and `f` lines; looks and groups are ignored, curved surfaces refused."""
 
 import re
+from array import array
+from collections.abc import Iterator
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.mesh_files.polygon_soup import Surface
+from grasp_core.mesh_files.polygon_soup import Polygons, points_of
 from grasp_core.mesh_files.refusals import broken, outside, shown, unsupported
-from grasp_core.mesh_files.words import numbers, whole, worded_lines
+from grasp_core.mesh_files.words import (
+    LONGEST_LINE,
+    numbered_lines,
+    numbers,
+    plain_text,
+    whole,
+    worded_lines,
+)
 
 PASSED_OVER = frozenset(
     b"vt vn g o s usemtl mtllib usemap maplib lod bevel c_interp d_interp shadow_obj trace_obj mg "
     b"l p".split()
 )
-"""Keywords that change looks, names or curves, not the surface."""
-CORNER = re.compile(rb"[+-]?\d+(/([+-]?\d+)?){0,2}")
-"""A corner of a face: a vertex, perhaps with a texture and a normal."""
+"""They change looks, names or curves, not the surface."""
+SURFACE = re.compile(rb"\s*[vf]\s")
+CORNER = re.compile(rb"[+-]?\d++(/([+-]?\d++)?){0,2}")
+"""A vertex, perhaps of a texture and a normal."""
 WIDTHS = (3, 4, 6, 7)
 """How many numbers a vertex may have: a point, perhaps its weight, perhaps a colour."""
 WEIGHTED = (4, 7)
 FLOATS = 3
+GOES_ON = b"\\\n"
 
 
-def read(text: bytes, most: int) -> tuple[Array, Indices]:
+def read(data: bytes, most: int) -> tuple[Array, Indices]:
     """Vertices (n, 3) and triangles (t, 3) of an OBJ text.
 
     Raises:
         MeshError: The text breaks a rule, with the line, or has more than `most` triangles.
     """
-    surface = Surface(most)
-    for number, (keyword, *words) in worded_lines(text):
+    points, polygons = array("d"), Polygons(most, first=1)
+    for number, (keyword, *words) in _statements(plain_text(data)):
         where = f"line {number}"
         if keyword == b"v":
-            surface.points.append(_vertex(words, where))
+            points.extend(_vertex(words, where))
         elif keyword == b"f":
-            surface.add(_corners(words, len(surface.points), where), where)
+            polygons.add(_corners(words, len(points) // FLOATS, where), where)
         elif keyword not in PASSED_OVER:
             unsupported(
                 f"{where}: {shown(keyword)!r} is not part of a polyhedron", "export polygons only"
             )
-    return surface.arrays()
+    return polygons.on(points_of(points))
+
+
+def _statements(text: bytes) -> Iterator[tuple[int, list[bytes]]]:
+    """The words of each statement with the number of its first line."""
+    return _joined(text) if GOES_ON in text else worded_lines(text, comments=True)
+
+
+def _joined(text: bytes) -> Iterator[tuple[int, list[bytes]]]:
+    """Statements of which some go on: a backslash at the end of a line joins it with the next.
+
+    Whether it does so in a comment is not said anywhere, so that a comment which could swallow a
+    part of the surface is refused.
+    """
+    held, begun, after_backslash = bytearray(), 0, False
+    for number, line in numbered_lines(text):  # pieces are appended in place, in linear time
+        kept, _, comment = line.partition(b"#")
+        if after_backslash and SURFACE.match(kept):
+            broken(f"line {number - 1}", "a comment ends in a backslash, before a part of the mesh")
+        after_backslash = comment.endswith(GOES_ON)
+        begun = begun if held else number
+        goes_on = kept.endswith(GOES_ON)
+        held += kept.removesuffix(GOES_ON)
+        if len(held) > LONGEST_LINE:
+            broken(f"line {begun}", f"goes on for more than {LONGEST_LINE} bytes")
+        if not goes_on:
+            if words := bytes(held).split():
+                yield begun, words
+            held.clear()
+    if words := bytes(held).split():
+        yield begun, words
 
 
 def _vertex(words: list[bytes], where: str) -> list[float]:
@@ -50,12 +91,16 @@ def _vertex(words: list[bytes], where: str) -> list[float]:
 
 
 def _corners(words: list[bytes], vertices: int, where: str) -> list[int]:
-    """Vertex numbers from 0 on; the file counts from 1, or back from the last vertex by then."""
+    """Numbers of vertices from 0 on.
+
+    Those in the file count from 1, wherever in the file their vertex stands, or back from the last
+    vertex above their line.
+    """
     for word in words:
         if not CORNER.fullmatch(word):
             broken(where, f"a corner must be whole numbers separated by `/`, got {shown(word)!r}")
     corners = [whole(word.partition(b"/")[0], where) for word in words]
     for corner in corners:
-        if not 1 <= abs(corner) <= vertices:
+        if corner == 0 or corner < -vertices:
             outside(where, corner, vertices)
     return [corner - 1 if corner > 0 else vertices + corner for corner in corners]

@@ -1,48 +1,51 @@
 """Reads OFF text: the word OFF, three counts, the vertices, the polygons, and nothing else."""
 
+import re
+from array import array
 from collections.abc import Iterator
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.mesh_files.polygon_soup import Surface
+from grasp_core.mesh_files.polygon_soup import Polygons, points_of
 from grasp_core.mesh_files.refusals import broken
-from grasp_core.mesh_files.words import numbers, whole, worded_lines
+from grasp_core.mesh_files.words import numbers, plain_text, whole, worded_lines
 
 Lines = Iterator[tuple[int, list[bytes]]]
-COLOURED = b"COFF"
+HEAD = re.compile(rb"(ST)?C?N?OFF")
+"""Textures, colours and normals follow the three coordinates of a vertex, and are passed over."""
 COUNTS = (2, 3)
 FLOATS = 3
 
 
-def read(text: bytes, most: int) -> tuple[Array, Indices]:
+def read(data: bytes, most: int) -> tuple[Array, Indices]:
     """Vertices (n, 3) and triangles (t, 3) of an OFF text.
 
     Raises:
         MeshError: The text breaks a rule, with the line, or has more than `most` triangles.
     """
-    lines = worded_lines(text)
+    lines = worded_lines(plain_text(data), comments=True)
     vertices, faces = _counts(lines)
-    surface = Surface(most)
+    points, polygons = array("d"), Polygons(most)
     for _ in range(vertices):
         number, words = _next(lines, "a vertex")
         values = numbers(words, f"line {number}")
         if len(values) < FLOATS:
             broken(f"line {number}", f"a vertex needs three numbers, got {len(values)}")
-        surface.points.append(values[:FLOATS])
+        points.extend(values[:FLOATS])
     for _ in range(faces):
         number, words = _next(lines, "a face")
         where = f"line {number}"
         corners = whole(words[0], where)
         if not 0 <= corners < len(words):
             broken(where, f"a face of {corners} corners lists {len(words) - 1}")
-        surface.add([whole(word, where) for word in words[1 : corners + 1]], where)
+        polygons.add([whole(word, where) for word in words[1 : corners + 1]], where)
     if (after := next(lines, None)) is not None:
         broken(f"line {after[0]}", f"comes after the {vertices} vertices and {faces} faces counted")
-    return surface.arrays()
+    return polygons.on(points_of(points))
 
 
 def _counts(lines: Lines) -> tuple[int, int]:
     number, words = _next(lines, "OFF")
-    if words[0] not in {b"OFF", COLOURED}:
+    if not HEAD.fullmatch(words[0]):
         broken(f"line {number}", "expected the word OFF")
     if len(words) == 1:
         number, counts = _next(lines, "the counts")

@@ -1,63 +1,26 @@
-"""Reads PLY: a header that lists elements and properties, then their rows, as text or binary."""
+"""PLY: elements with properties as text or binary, as many as the header says, and nothing else."""
 
-import re
-from collections.abc import Iterator
-from dataclasses import dataclass, field
-from itertools import islice
+import struct
+from array import array
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.mesh_files.polygon_soup import Surface
-from grasp_core.mesh_files.refusals import broken, shown, unsupported
+from grasp_core.mesh_files.ply_header import LISTS, POINT, Element, Header, Property, read_header
+from grasp_core.mesh_files.polygon_soup import CORNERS, Polygons, points_of, too_many
+from grasp_core.mesh_files.refusals import broken, shown
 from grasp_core.mesh_files.words import numbers, plain_text, whole, worded_lines
 
-TYPES = {
-    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
-    "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
-    "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
-}  # fmt: skip
-ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
-END = re.compile(rb"\nend_header[ \t]*\r?\n")
-LONGEST_HEADER = 2**16
-NAME = re.compile(r"\w{1,100}", re.ASCII)
 LARGEST_CORNER = 2**32
-LISTS = ("vertex_indices", "vertex_index")
-POINT = ("x", "y", "z")
-Cell = tuple[str, list[float]]
-"""Name and values of a property in one row; properties that are ignored get no values."""
-
-
-@dataclass(frozen=True, slots=True)
-class Property:
-    """A property of an element: each row has a number for it, or a list of numbers."""
-
-    name: str
-    kind: str
-    count_kind: str | None = None
-    """Type of the length of a list; None for a number."""
-
-
-@dataclass(frozen=True, slots=True)
-class Element:
-    """A table of the file: its name, number of rows, and properties."""
-
-    name: str
-    rows: int
-    properties: list[Property] = field(default_factory=list[Property])
-
-    def place(self, names: tuple[str, ...]) -> Property:
-        """The one property with one of the given names.
-
-        Raises:
-            MeshError: There is no such property, or there are several.
-        """
-        found = [each for each in self.properties if each.name in names]
-        if len(found) != 1:
-            broken("header", f"element {self.name} needs one property {' or '.join(names)}")
-        return found[0]
+LARGEST_ROW = 2**30
+"""Bytes of a row that numpy takes."""
+CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
+Lines = Iterator[tuple[int, list[bytes]]]
+Cells = dict[str, Sequence[float]]
+"""The values of a row that make the surface, by the names of their properties."""
 
 
 def read(data: bytes, most: int) -> tuple[Array, Indices]:
@@ -66,179 +29,248 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     Raises:
         MeshError: The file breaks a rule, or has more than `most` triangles.
     """
-    found = END.search(data[:LONGEST_HEADER])
-    if not found:
-        broken("header", "expected `end_header`")
-    order, elements = _header(data[: found.start()])
-    if not order:
-        broken("header", "expected a format")
-    for element in elements:
-        _check_element(element)
-    body = data[found.end() :]
-    tables = {each.name: each for each in elements}
-    if len(tables) < len(elements) or not {"vertex", "face"} <= tables.keys():
-        broken("header", f"expected elements vertex and face, once each, got {shown(list(tables))}")
-    _check_properties(tables["vertex"], tables["face"])
-    surface = Surface(most)
-    if order == "=":
-        _add_text(surface, elements, body)
+    header = read_header(data)
+    polygons = Polygons(most)
+    if header.order == "=":
+        points = _text_points(header, data, polygons)
     else:
-        _add_binary(surface, elements, body, order)
-    return surface.arrays()
-
-
-def is_text(data: bytes) -> bool:
-    """Whether the header says that text follows; what comes after the header is not looked at."""
-    ended = END.search(data[:LONGEST_HEADER])
-    return ended is not None and b"\nformat ascii" in data[: ended.start()]
-
-
-def _check_properties(vertex: Element, face: Element) -> None:
-    for name in POINT:
-        if vertex.place((name,)).count_kind is not None:
-            broken("header", f"property {name} must be a number, not a list")
-    if face.place(LISTS).count_kind is None:
-        broken("header", "the corners of faces must be a list")
-
-
-def _header(text: bytes) -> tuple[str, list[Element]]:
-    """Byte order, or `=` for text, and the elements."""
-    first, *lines = [line.split() for line in text.decode("ascii", "replace").splitlines()]
-    order, elements = "", list[Element]()
-    if first != ["ply"]:
-        broken("header", "expected the word ply")
-    for number, words in enumerate(lines, 2):
-        where = f"header line {number}"
-        match words:
-            case ["comment" | "obj_info", *_] | []:
-                pass
-            case ["format", name, "1.0"] if name in ORDERS and not order:
-                order = ORDERS[name]
-            case ["element", name, rows]:
-                elements.append(Element(name, whole(rows.encode(), where)))
-            case ["property", first, *others] if elements:
-                elements[-1].properties.append(_property([first, *others], where))
-            case _:
-                broken(
-                    where, f"expected a format, element or property, got {shown(' '.join(words))!r}"
-                )
-    return order, elements
-
-
-def _check_element(element: Element) -> None:
-    names = [element.name, *(each.name for each in element.properties)]
-    if not all(NAME.fullmatch(name) for name in names) or len(names[1:]) > len(set(names[1:])):
-        broken("header", "names must be of letters and digits, and differ")
-    if element.rows < 0 or not element.properties:
-        broken("header", f"element {element.name} needs properties, and a count from 0 on")
-
-
-def _property(said: list[str], where: str) -> Property:
-    lists = said[0] == "list"
-    kinds = said[1:-1] if lists else said[:-1]
-    if len(kinds) != 1 + lists or not TYPES.keys() >= set(kinds):
-        broken(where, f"expected a property of known type, got {shown(' '.join(said))!r}")
-    if lists and TYPES[kinds[0]].startswith("f"):
-        broken(where, "the length of a list must be a whole number")
-    return Property(said[-1], TYPES[kinds[-1]], TYPES[kinds[0]] if lists else None)
-
-
-def _add_text(surface: Surface, elements: list[Element], body: bytes) -> None:
-    lines = worded_lines(plain_text(body))
-    for element in elements:
-        for row in range(element.rows):
-            number, words = next(lines, (0, list[bytes]()))
-            where = f"{element.name} {row}, line {number} after the header"
-            if not words:
-                broken("the end", f"{element.rows} rows of {element.name} are counted, got {row}")
-            values = dict(_cells(element, iter(words), where))
-            _add_row(surface, element.name, values, where)
-    if (after := next(lines, None)) is not None:
-        broken(f"line {after[0]} after the header", "comes after the last row that is counted")
-
-
-def _cells(element: Element, words: Iterator[bytes], where: str) -> Iterator[Cell]:
-    for each in element.properties:
-        length = 1 if each.count_kind is None else whole(next(words, b""), where)
-        found = list(islice(words, max(length, 0)))
-        if len(found) != length:
-            broken(where, f"{each.name} lists {length} values, got {len(found)}")
-        kept = element.name in {"vertex", "face"} and each.name in (*POINT, *LISTS)
-        yield each.name, _rounded(numbers(found, where), each.kind, where) if kept else []
-    if next(words, None) is not None:
-        broken(where, "more values than properties")
-
-
-def _rounded(values: list[float], kind: str, where: str) -> list[float]:
-    """Round numbers as their type would keep them."""
-    if not kind.startswith("f"):
-        return values
-    with np.errstate(over="ignore", under="ignore"):
-        kept = np.array(values).astype(kind)
-    if not np.isfinite(kept).all():
-        message = f"{where}: a coordinate must be finite in single precision; repair it"
+        points = _binary_points(header, data, polygons)
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if bad.size:
+        message = (
+            f"vertex {bad[0]}: a coordinate must be finite in the precision of its type, got "
+            f"{points[bad[0]].tolist()}; repair it"
+        )
         raise MeshError(MeshRefusal.NON_FINITE, message)
-    return kept.tolist()
+    return polygons.on(points)
 
 
-def _add_row(surface: Surface, name: str, values: dict[str, list[float]], where: str) -> None:
-    if name == "vertex":
-        surface.points.append([values[axis][0] for axis in POINT])
-    elif name == "face":
-        corners = next(values[each] for each in LISTS if each in values)
-        if any(corner != int(corner) or abs(corner) > LARGEST_CORNER for corner in corners):
-            broken(where, "corners must be numbers of vertices")
-        surface.add([int(corner) for corner in corners], where)
-
-
-def _add_binary(surface: Surface, elements: list[Element], body: bytes, order: str) -> None:
-    for element in elements:
-        row = _row_type(element, body, order)
-        size = row.itemsize * element.rows
-        if len(body) < size:
-            broken("the end", f"{element.rows} rows of {element.name} are counted, got fewer")
-        rows = np.frombuffer(body[:size], dtype=row)
-        for each in element.properties:
-            if each.count_kind and (rows["count " + each.name] != row[each.name].shape[0]).any():
-                unsupported(f"{element.name} of differing numbers of corners", "export triangles")
-        _add_rows(surface, element, rows)
-        body = body[size:]
-    if body:
-        broken("the end", f"{len(body)} bytes come after the last row that is counted")
-
-
-def _row_type(element: Element, body: bytes, order: str) -> np.dtype[np.void]:
-    """Type of a binary row, if the lists of all rows are as long as the lists of the first."""
-    parts = list[tuple[str, str] | tuple[str, str, tuple[int]]]()
-    for each in element.properties:
-        if each.count_kind is None:
-            parts.append((each.name, order + each.kind))
+def _text_points(header: Header, data: bytes, polygons: Polygons) -> Array:
+    """Vertices (n, 3) as their types keep them; faces are added to the polygons."""
+    points = np.empty((0, 3))
+    lines = worded_lines(plain_text(data, header.end))
+    for element in header.elements:
+        if element.name == "vertex":
+            points = _text_vertices(element, lines)
             continue
-        before = np.dtype(parts).itemsize if parts else 0
-        parts.append(("count " + each.name, order + each.count_kind))
-        counted = body[before : np.dtype(parts).itemsize] if element.rows else b""
-        full = before + len(counted) == np.dtype(parts).itemsize
-        length = int(np.frombuffer(counted, order + each.count_kind)[0]) if full else 0
-        if not 0 <= length <= len(body):
-            broken(f"{element.name} 0", f"{each.name} lists {length} values")
-        parts.append((each.name, order + each.kind, (length,)))
-    return np.dtype(parts)
+        corners = element.place(LISTS) if element.name == "face" else None
+        for where, words in _rows_of(element, lines):
+            cells = _text_cells(element, words, where)
+            if corners is not None:
+                listed = _text_corners(corners, numbers(cells[corners.name], where), where)
+                polygons.add(listed, where)
+    if (after := next(lines, None)) is not None:
+        broken(f"line {after[0]} after the header", "comes after all that is counted")
+    return points
 
 
-def _add_rows(surface: Surface, element: Element, rows: NDArray[np.void]) -> None:
-    if element.name == "vertex":
-        points = np.stack([rows[axis].astype(np.float64) for axis in POINT], axis=1)
-        bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
-        if bad.size:
-            message = (
-                f"vertex {bad[0]}: a coordinate must be finite, got {points[bad[0]].tolist()}; "
-                "repair it"
-            )
-            raise MeshError(MeshRefusal.NON_FINITE, message)
-        surface.points += points.tolist()
-    elif element.name == "face":
-        corners = rows[element.place(LISTS).name]
-        if corners.dtype.kind == "f" and (corners != np.floor(corners)).any():
-            broken("faces", "corners must be whole numbers")
-        for place, row in enumerate(corners.astype(np.int64).tolist()):
-            surface.add(row, f"face {place}")
+def _rows_of(element: Element, lines: Lines) -> Iterator[tuple[str, list[bytes]]]:
+    """The words of each row, and where it is written."""
+    for row in range(element.rows):
+        number, words = next(lines, (0, list[bytes]()))
+        if not words:
+            broken("the end", f"{element.rows} of {element.name} are counted, {row} are there")
+        yield f"{element.name} {row}, line {number} after the header", words
+
+
+def _text_vertices(element: Element, lines: Lines) -> Array:
+    """Vertices (n, 3)."""
+    coordinates = array("d")
+    places = [element.properties.index(element.place((axis,))) for axis in POINT]
+    for where, words in _rows_of(element, lines):
+        if element.lists or len(words) != len(element.properties):
+            cells = _text_cells(element, words, where)
+            three = [cells[axis][0] for axis in POINT]
+        else:
+            three = [words[place] for place in places]
+            if len(words) > len(three):
+                _check_numbers(words, where)
+        coordinates.extend(numbers(three, where))
+    return _as_typed(element, points_of(coordinates))
+
+
+def _text_cells(element: Element, words: list[bytes], where: str) -> dict[str, list[bytes]]:
+    """The words of each property of a row."""
+    _check_numbers(words, where)
+    found, place = dict[str, list[bytes]](), 0
+    for each in element.properties:
+        length = 1
+        if each.count_kind is not None:
+            length = whole(words[place], where) if place < len(words) else -1
+            place += 1
+        found[each.name] = words[place : place + max(length, 0)]
+        place += max(length, 0)
+        if length < 0 or place > len(words):
+            there = len(found[each.name])
+            broken(where, f"{each.name} lists {length} values, {there} are there")
+    if place < len(words):
+        broken(where, "more values than properties")
+    return found
+
+
+def _check_numbers(words: list[bytes], where: str) -> None:
+    """Refuse words that are no numbers where nothing is made of them; normals may be nan."""
+    try:
+        for word in words:
+            float(word)
+    except ValueError:
+        broken(where, f"expected numbers, got {shown(b' '.join(words))!r}")
+
+
+def _as_typed(element: Element, points: Array) -> Array:
+    """Coordinates (n, 3) as the types of their properties keep them."""
+    for column, axis in enumerate(POINT):
+        kind = np.dtype(element.place((axis,)).kind)
+        values = points[:, column]
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+            kept = values.astype(kind)
+        if kind.kind != "f" and (wrong := np.flatnonzero(kept != values)).size:
+            broken(f"vertex {wrong[0]}", f"{axis} is no whole number of its type")
+        points[:, column] = kept
+    return points
+
+
+def _text_corners(each: Property, values: list[float], where: str) -> list[int]:
+    kind = np.dtype(each.kind)
+    if kind == np.float32:
+        with np.errstate(over="ignore"):
+            values = np.array(values).astype(kind).tolist()
+    low, high = -LARGEST_CORNER, LARGEST_CORNER
+    if kind.kind != "f":
+        low, high = int(np.iinfo(kind).min), int(np.iinfo(kind).max)
+    if not all(low <= value <= high and value == int(value) for value in values):
+        broken(where, "corners must be numbers of vertices")
+    return [int(value) for value in values]
+
+
+def _binary_points(header: Header, data: bytes, polygons: Polygons) -> Array:
+    """Vertices (n, 3); faces are added to the polygons."""
+    points, place = np.empty((0, 3)), header.end
+    for element in header.elements:
+        rows = _equal_rows(element, data, place, header.order)
+        if rows is None:
+            listed = _differing_rows(element, data, place, header.order, polygons.most)
+            points, place = _add_differing(element, listed, points, place, polygons)
+            continue
+        place += rows.nbytes
+        if element.name == "vertex":
+            points = np.stack([rows[axis].astype(np.float64) for axis in POINT], axis=1)
+        elif element.name == "face":
+            _add_faces(rows[element.place(LISTS).name], polygons)
+    if place < len(data):
+        broken("the end", f"{len(data) - place} bytes come after all that is counted")
+    return points
+
+
+def _equal_rows(element: Element, data: bytes, place: int, order: str) -> NDArray[np.void] | None:
+    """All rows, if their lists are as long as those of the first; None if they may not be.
+
+    Raises:
+        MeshError: The rows do not fit into the file.
+    """
+    fields, counts, width = dict[str, tuple[str | tuple[str, int], int]](), dict[str, int](), 0
+    for number, each in enumerate(element.properties):
+        length, kind = 1, order + each.kind
+        if each.count_kind is not None:
+            count = np.dtype(order + each.count_kind)
+            if not element.rows or place + width + count.itemsize > len(data):
+                return None
+            length = int(np.frombuffer(data, count, 1, place + width)[0])
+            fields[f"count {number}"], counts[f"count {number}"] = (count.str, width), length
+            width += count.itemsize
+        if each.name in element.kept:
+            fields[each.name] = ((kind, length) if each.count_kind else kind), width
+        width += np.dtype(kind).itemsize * length
+        if length < 0 or width > min(len(data), LARGEST_ROW):
+            return None
+    if width * element.rows > len(data) - place:
+        if not counts:
+            broken("the end", f"{element.rows} of {element.name} are counted, fewer are there")
+        return None
+    row = np.dtype(
+        {
+            "names": list(fields),
+            "formats": [
+                kind if isinstance(kind, str) else np.dtype((kind[0], (kind[1],)))
+                for kind, _ in fields.values()
+            ],
+            "offsets": [offset for _, offset in fields.values()],
+            "itemsize": width,
+        }
+    )
+    rows = np.frombuffer(data, row, element.rows, place)
+    equal = all((rows[name] == length).all() for name, length in counts.items())
+    return rows if equal else None
+
+
+def _add_faces(corners: NDArray[np.generic], polygons: Polygons) -> None:
+    """Add faces of as many corners each, (n, k)."""
+    count, sides = corners.shape
+    if count and sides < CORNERS:
+        broken("face 0", f"a face needs three corners, got {sides}")
+    if count * (sides - 2) > polygons.most:
+        too_many(count * (sides - 2), polygons.most)
+    for row, listed in enumerate(corners.tolist()):
+        polygons.add(_whole_corners(listed, f"face {row}"), f"face {row}")
+
+
+def _whole_corners(listed: Sequence[float], where: str) -> list[int]:
+    if not all(abs(corner) <= LARGEST_CORNER and corner == int(corner) for corner in listed):
+        broken(where, "corners must be numbers of vertices")
+    return [int(corner) for corner in listed]
+
+
+def _differing_rows(
+    element: Element, data: bytes, place: int, order: str, most: int
+) -> Iterator[tuple[int, Cells]]:
+    """Each row, one after another, and where it ends; lists may differ in length.
+
+    Raises:
+        MeshError: A row does not fit into the file, or is a polygon of more than `most` triangles.
+    """
+    steps = [
+        (
+            each.name,
+            CODES[each.kind],
+            struct.calcsize("=" + CODES[each.kind]),
+            struct.Struct(order + CODES[each.count_kind]) if each.count_kind else None,
+            each.name in element.kept,
+        )
+        for each in element.properties
+    ]
+    for row in range(element.rows):
+        cells: Cells = {}
+        for name, code, size, count, kept in steps:
+            length = 1
+            if count is not None and (place := place + count.size) <= len(data):
+                (length,) = count.unpack_from(data, place - count.size)
+            past = place + size * length
+            if length < 0:
+                broken(f"{element.name} {row}", f"{name} lists {length} values")
+            if past > len(data):
+                broken("the end", f"{element.rows} of {element.name} are counted, {row} are there")
+            if kept:
+                if length - 2 > most:
+                    too_many(length - 2, most)
+                cells[name] = struct.unpack_from(f"{order}{length}{code}", data, place)
+            place = past
+        yield place, cells
+
+
+def _add_differing(
+    element: Element,
+    rows: Iterator[tuple[int, Cells]],
+    points: Array,
+    place: int,
+    polygons: Polygons,
+) -> tuple[Array, int]:
+    """Vertices (n, 3) where the element is theirs, else as given, and where the rows end."""
+    coordinates = array("d")
+    for row, (end, cells) in enumerate(rows):
+        place = end
+        if element.name == "vertex":
+            coordinates.extend(cells[axis][0] for axis in POINT)
+        elif element.name == "face":
+            corners = cells[element.place(LISTS).name]
+            polygons.add(_whole_corners(corners, f"face {row}"), f"face {row}")
+    return (points_of(coordinates) if element.name == "vertex" else points), place

@@ -1,7 +1,9 @@
 """Turns vertices and polygons as a file lists them into triangles, if fans give the polygons."""
 
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,18 +19,26 @@ FLATTEST = 0.5
 """Least area of a polygon seen along its normal, relative to that of its triangles."""
 
 
+def _no_triangles() -> "array[int]":
+    return array("q")
+
+
 @dataclass(slots=True)
-class Surface:
-    """The vertices and triangles read so far."""
+class Polygons:
+    """The polygons that were read so far, as triangles: 24 bytes for each of them."""
 
     most: int
-    """Largest number of triangles."""
-    points: list[Sequence[float]] = field(default_factory=list[Sequence[float]])
-    triangles: list[tuple[int, int, int]] = field(default_factory=list[tuple[int, int, int]])
-    polygons: list[tuple[str, Sequence[int]]] = field(
-        default_factory=list[tuple[str, Sequence[int]]]
-    )
-    """Polygons of four corners and more, each with its place in the file."""
+    """Triangles that may be."""
+    first: int = 0
+    """The number that the file gives to its first vertex, for messages."""
+    triangles: "array[int]" = field(default_factory=_no_triangles)
+    """Three corners of each triangle."""
+    large: list[tuple[str, Sequence[int]]] = field(default_factory=list[tuple[str, Sequence[int]]])
+    """Polygons of four corners and more, with where they are written."""
+    lowest: tuple[int, str] = (0, "")
+    """The least corner below 0, and where it is written."""
+    highest: tuple[int, str] = (-1, "")
+    """The largest corner, and where it is written."""
 
     def add(self, corners: Sequence[int], where: str) -> None:
         """Add a polygon, by the numbers of its vertices from 0 on.
@@ -38,31 +48,43 @@ class Surface:
         """
         if len(corners) < CORNERS:
             broken(where, f"a face needs three corners, got {len(corners)}")
-        if len(self.triangles) + len(corners) - 2 > self.most:
-            too_many(len(self.triangles) + len(corners) - 2, self.most)
-        first, second, *others = corners
-        if len(corners) == QUAD:  # in the order of trimesh, as readings are compared by corners
-            third, last = others
-            self.triangles += [(first, second, third), (third, last, first)]
+        triangles = len(self.triangles) // CORNERS + len(corners) - 2
+        if triangles > self.most:
+            too_many(triangles, self.most)
+        if (least := min(corners)) < self.lowest[0]:
+            self.lowest = least, where
+        if (largest := max(corners)) > self.highest[0]:
+            self.highest = largest, where
+        first, *others = corners
+        if len(corners) == QUAD:  # masses are summed in this order, and keep their last digits
+            second, third, last = others
+            self.triangles.extend((first, second, third, third, last, first))
         else:
-            for third in others:
-                self.triangles.append((first, second, third))
-                second = third
+            for second, third in pairwise(others):
+                self.triangles.extend((first, second, third))
         if len(corners) > CORNERS:
-            self.polygons.append((where, corners))
+            self.large.append((where, corners))
 
-    def arrays(self) -> tuple[Array, Indices]:
-        """Vertices (n, 3) and triangles (t, 3).
+    def on(self, points: Array) -> tuple[Array, Indices]:
+        """Vertices (n, 3), as given, and triangles (t, 3).
 
         Raises:
             MeshError: A corner names a missing vertex, or a fan folds back on its polygon.
         """
-        points = np.array(self.points, dtype=np.float64).reshape(-1, 3)
-        triangles = np.array(self.triangles, dtype=np.int64).reshape(-1, 3)
-        check_corners(triangles, len(points))
-        for where, corners in self.polygons:
+        for (corner, where), wrong in (
+            (self.lowest, self.lowest[0] < 0),
+            (self.highest, self.highest[0] >= len(points)),
+        ):
+            if wrong:
+                outside(where, corner + self.first, len(points))
+        for where, corners in self.large:
             _check_fan(points[list(corners)], where)
-        return points, triangles
+        return points, np.array(self.triangles, dtype=np.int64).reshape(-1, 3)
+
+
+def points_of(coordinates: "array[float]") -> Array:
+    """Vertices (n, 3) of coordinates one after another, which are not copied."""
+    return np.frombuffer(coordinates, dtype=np.float64).reshape(-1, 3)
 
 
 def too_many(triangles: int, most: int) -> None:
@@ -75,27 +97,16 @@ def too_many(triangles: int, most: int) -> None:
     raise MeshError(MeshRefusal.TOO_MANY, message)
 
 
-def check_corners(triangles: Indices, vertices: int) -> None:
-    """Refuse triangles that name missing vertices.
-
-    Raises:
-        MeshError: A triangle names a missing vertex.
-    """
-    wrong = np.flatnonzero(((triangles < 0) | (triangles >= vertices)).any(axis=1))
-    if wrong.size:
-        row = triangles[wrong[0]]
-        corner = int(row[(row < 0) | (row >= vertices)][0])
-        outside(f"triangle {wrong[0]}", corner, vertices)
-
-
 def _check_fan(corners: Array, where: str) -> None:
     """Refuse a polygon that is not the fan around its first corner."""
-    spokes = corners[1:] - corners[0]
-    crosses = np.cross(spokes[:-1], spokes[1:])
-    whole = crosses.sum(axis=0)
-    areas, dots = np.linalg.norm(crosses, axis=1), (spokes[:-1] * spokes[1:]).sum(axis=1)
-    folds = ((crosses @ whole) < -FOLDED * (whole @ whole)).any()
-    winds = np.arctan2(areas, dots).sum() > 2.0 * np.pi + FOLDED
-    if folds or winds or np.linalg.norm(whole) < FLATTEST * areas.sum():
+    with np.errstate(over="ignore", invalid="ignore"):  # sizes are judged later
+        spokes = corners[1:] - corners[0]
+        crosses = np.cross(spokes[:-1], spokes[1:])
+        whole = crosses.sum(axis=0)
+        areas, dots = np.linalg.norm(crosses, axis=1), (spokes[:-1] * spokes[1:]).sum(axis=1)
+        folds = ((crosses @ whole) < -FOLDED * (whole @ whole)).any()
+        winds = np.arctan2(areas, dots).sum() > 2.0 * np.pi + FOLDED
+        flat = np.linalg.norm(whole) < FLATTEST * areas.sum()
+    if folds or winds or flat:
         message = f"{where}: a face with a dent, which can be cut in several ways; export triangles"
         raise MeshError(MeshRefusal.POLYGON, message)

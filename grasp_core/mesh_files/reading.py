@@ -1,13 +1,19 @@
-"""Reads a mesh file's bytes: from a regular file, of a known kind, and not too many."""
+"""A mesh file is a regular file of a known kind, read once, by the rules of its format.
+
+Reading takes time and memory in proportion to the bytes of the file, and no more triangles than are
+allowed are kept: `MeshLimits` bounds both.
+"""
 
 from pathlib import Path
 
+from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.files.whole_files import bounded_bytes
-from grasp_core.mesh_files import stl
+from grasp_core.mesh_files import glb, obj, off, ply, stl
 from grasp_core.mesh_files.limits import MeshLimits
 
-FORMATS = ("obj", "stl", "ply", "off", "glb")
+READERS = {"obj": obj.read, "stl": stl.read, "ply": ply.read, "off": off.read, "glb": glb.read}
+FORMATS = tuple(READERS)
 OTHER_FILES = {
     b"\x1f\x8b": "a gzip archive", b"PK\x03\x04": "a zip archive", b"BZh": "a bzip2 archive",
     b"\xfd7zXZ": "an xz archive", b"7z\xbc\xaf": "a 7z archive", b"Rar!": "a rar archive",
@@ -18,6 +24,23 @@ OTHER_FILES = {
 MAGIC = {"ply": b"ply", "glb": b"glTF"}
 
 
+def read_triangles(path: Path, limits: MeshLimits) -> tuple[Array, Indices, bytes]:
+    """Vertices (n, 3) in the file's unit, triangles (t, 3), and the bytes of the file.
+
+    Raises:
+        MeshError: The file is not a whole mesh of a known format, or is larger than is allowed.
+    """
+    try:
+        kind = mesh_kind(path)
+        data = _bytes_of(path, limits)
+        return *triangles_of(kind, data, limits.max_triangles), data
+    except MeshError as error:
+        raise MeshError(error.reason, f"{path}: {error.message}") from error
+    except MemoryError as error:
+        message = f"{path}: reading it needs more memory than there is; simplify the mesh"
+        raise MeshError(MeshRefusal.LIMIT, message) from error
+
+
 def mesh_kind(path: Path) -> str:
     """The format of a file, by its ending.
 
@@ -26,33 +49,40 @@ def mesh_kind(path: Path) -> str:
     """
     kind = path.suffix.lower().lstrip(".")
     if kind not in FORMATS:
-        message = f"{path}: the ending must be one of {', '.join(FORMATS)}, got {kind!r}"
+        message = f"the ending must be one of {', '.join(FORMATS)}, got {kind!r}"
         raise MeshError(MeshRefusal.FORMAT, message)
     return kind
 
 
-def mesh_bytes(path: Path, limits: MeshLimits) -> bytes:
-    """The bytes of a mesh file; they begin as files with its ending do.
+def triangles_of(kind: str, data: bytes, most: int) -> tuple[Array, Indices]:
+    """Vertices (n, 3) in the file's unit and triangles (t, 3).
+
+    Args:
+        kind: One of `FORMATS`.
+        data: The file's bytes.
+        most: Triangles that may be.
 
     Raises:
-        MeshError: The file cannot be read, is not a regular file, too large, empty, or of
-            another kind.
+        MeshError: It is no whole file of its kind, has no triangles, or more than `most`.
     """
-    kind = mesh_kind(path)
+    check_beginning(kind, data)
+    points, triangles = READERS[kind](data, most)
+    if not len(triangles):
+        raise MeshError(MeshRefusal.EMPTY, "holds no triangles; export surfaces")
+    return points, triangles
+
+
+def _bytes_of(path: Path, limits: MeshLimits) -> bytes:
     try:
         data = bounded_bytes(path, limits.max_bytes)
     except OSError as error:
-        message = f"{path}: cannot be read ({error.strerror}); check the path and its rights"
+        message = f"cannot be read ({error.strerror}); check the path and its rights"
         raise MeshError(MeshRefusal.UNREADABLE, message) from error
     if len(data) > limits.max_bytes:
-        message = f"{path}: is over the limit of {limits.max_bytes} bytes; simplify the mesh"
+        message = f"over {limits.max_bytes} bytes, the limit; simplify the mesh"
         raise MeshError(MeshRefusal.TOO_MANY, message)
     if not data:
-        raise MeshError(MeshRefusal.EMPTY, f"{path}: the file is empty; export it again")
-    try:
-        check_beginning(kind, data)
-    except MeshError as error:
-        raise MeshError(error.reason, f"{path}: {error.message}") from error
+        raise MeshError(MeshRefusal.EMPTY, "the file is empty; export it again")
     return data
 
 

@@ -1,19 +1,24 @@
 """Reads STL, binary or text; normals are ignored, as many programs write none."""
 
-from collections.abc import Iterator, Sequence
+from array import array
+from collections.abc import Iterator
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.mesh_files.polygon_soup import too_many
+from grasp_core.mesh_files.polygon_soup import points_of, too_many
 from grasp_core.mesh_files.refusals import broken, shown
-from grasp_core.mesh_files.words import numbers, worded_lines
+from grasp_core.mesh_files.words import numbers, plain_text, worded_lines
 
 HEADER, TRIANGLE = 80, 50
 """Bytes of a binary file before the number of triangles, and bytes of each triangle."""
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+FLOATS_OF_TRIANGLE = 9
+FLOATS = 3
+KEYWORDS = frozenset(b"facet normal outer loop vertex endloop endfacet".split())
 Lines = Iterator[tuple[int, list[bytes]]]
+Words = Iterator[tuple[int, bytes]]
 
 
 def is_binary(data: bytes) -> bool:
@@ -33,9 +38,7 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     Raises:
         MeshError: The file breaks a rule, or has more than `most` triangles.
     """
-    points = _of_binary(data) if is_binary(data) else _of_text(data, most)
-    if len(points) > 3 * most:
-        too_many(len(points) // 3, most)
+    points = _of_binary(data, most) if is_binary(data) else _of_text(plain_text(data), most)
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if bad.size:
         message = (
@@ -46,56 +49,68 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     return points, np.arange(len(points)).reshape(-1, 3)
 
 
-def _of_binary(data: bytes) -> Array:
+def _of_binary(data: bytes, most: int) -> Array:
     records = np.frombuffer(data, dtype=RECORD, offset=HEADER + 4)
+    if len(records) > most:
+        too_many(len(records), most)
     return records["corners"].reshape(-1, 3).astype(np.float64)
 
 
-def _of_text(data: bytes, most: int) -> Array:
-    points = list[list[float]]()
-    lines = worded_lines(data)
+def _of_text(text: bytes, most: int) -> Array:
+    """Corners of all solids; words may stand in any lines, as the format does not part them."""
+    coordinates = array("d")
+    lines = worded_lines(text)
     for number, words in lines:
-        _expect(words, [b"solid"], number, whole_line=False)
-        for place, inside in lines:
-            if inside[0].lower() == b"endsolid":
-                break
-            points += _facet(place, inside, lines)
-            if len(points) > 3 * most:
-                too_many(len(points) // 3, most)
-        else:
-            broken("the end", "expected `endsolid`")
-    return np.array(points, dtype=np.float64).reshape(-1, 3)
+        _expect(number, words[0], b"solid")
+        inside = _until_its_end(lines)
+        for place, word in inside:
+            _expect(place, word, b"facet")
+            coordinates.extend(_corners(inside))
+            if len(coordinates) > FLOATS_OF_TRIANGLE * most:
+                too_many(len(coordinates) // FLOATS_OF_TRIANGLE, most)
+    return points_of(coordinates)
 
 
-def _facet(number: int, words: list[bytes], lines: Lines) -> list[list[float]]:
-    _expect(words, [b"facet", b"normal"], number, whole_line=False)
-    number, words = _next(lines)
-    _expect(words, [b"outer", b"loop"], number)
-    corners = list[list[float]]()
+def _until_its_end(lines: Lines) -> Words:
+    """The words of a solid with the numbers of their lines; its name at the end is left out."""
+    for number, words in lines:
+        for word in words:
+            if word.lower() == b"endsolid":
+                return
+            yield number, word
+    broken("the end", "expected `endsolid`")
+
+
+def _corners(words: Words) -> list[float]:
+    """The nine coordinates of a triangle."""
+    _expect(*_next(words), b"normal")
+    number, word = _next(words)
+    for _ in range(FLOATS):  # a normal, or none
+        if word.lower() not in KEYWORDS:
+            number, word = _next(words)
+    _expect(number, word, b"outer")
+    _expect(*_next(words), b"loop")
+    found = list[float]()
     for _ in range(3):
-        number, words = _next(lines)
-        _expect(words, [b"vertex"], number, whole_line=False)
-        values = numbers(words[1:], f"line {number}")
-        if len(values) != 3:  # noqa: PLR2004 - x y z
-            broken(f"line {number}", f"a vertex needs three numbers, got {len(values)}")
-        corners.append(values)
-    for last in (b"endloop", b"endfacet"):
-        number, words = _next(lines)
-        _expect(words, [last], number)
-    return corners
+        number, word = _next(words)
+        _expect(number, word, b"vertex")
+        three = [_next(words)[1] for _ in range(FLOATS)]
+        if not KEYWORDS.isdisjoint(three):
+            broken(f"line {number}", "a vertex needs three numbers")
+        found += numbers(three, f"line {number}")
+    _expect(*_next(words), b"endloop")
+    _expect(*_next(words), b"endfacet")
+    return found
 
 
-def _next(lines: Lines) -> tuple[int, list[bytes]]:
-    line = next(lines, None)
-    if line is None:
-        broken("the end", "expected a whole triangle")
-    return line
+def _next(words: Words) -> tuple[int, bytes]:
+    word = next(words, None)
+    if word is None:
+        broken("the end", "the last triangle is not whole")
+    return word
 
 
-def _expect(
-    words: Sequence[bytes], expected: list[bytes], number: int, *, whole_line: bool = True
-) -> None:
-    found = [word.lower() for word in (words if whole_line else words[: len(expected)])]
-    if found != expected:
-        wanted = b" ".join(expected).decode("ascii")
-        broken(f"line {number}", f"expected `{wanted}`, got {shown(b' '.join(words))!r}")
+def _expect(number: int, word: bytes, expected: bytes) -> None:
+    if word.lower() != expected:
+        wanted = expected.decode("ascii")
+        broken(f"line {number}", f"expected `{wanted}`, got {shown(word)!r}")

@@ -1,4 +1,4 @@
-"""Splits text into words and reads numbers, in ASCII only, which all readers read alike."""
+"""Lines of text as words, words as numbers, in ASCII only; time and memory grow with the bytes."""
 
 import io
 import math
@@ -13,54 +13,58 @@ BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 CONTROL = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 OTHER_ALPHABETS = bytes(range(128)) + b"?" * 128
-COMMENT = re.compile(rb"#[^\n]*")
-CONTINUED = re.compile(rb"\\\r?\n")
-CONTINUED_COMMENT = re.compile(rb"#[^\n]*\\\r?\n")
-NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,9})?")
+NUMBER = re.compile(rb"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d{1,9})?")
+"""No run of digits is tried twice: else a long word that is no number would take hours."""
 WHOLE = re.compile(rb"[+-]?\d{1,18}")
 NOT_FINITE = re.compile(rb"[+-]?(nan|inf(inity)?)", re.IGNORECASE)
 Where = str
 
 
-def plain_text(data: bytes) -> bytes:
-    """Text with one byte per character: comments and names in other alphabets become `?`.
+def plain_text(data: bytes, start: int = 0) -> bytes:
+    """Text with one byte a character and lines that end in a line feed.
+
+    Letters of other alphabets, as in comments and names, become `?`.
+
+    Args:
+        data: The bytes of a file.
+        start: Where the text begins.
 
     Raises:
-        MeshError: The data are UTF-16, hold control characters, or have too long a line.
+        MeshError: It is UTF-16, or holds control characters.
     """
     if data.startswith(UTF_16):
         broken("byte 0", "expected UTF-8 text, got UTF-16")
-    text = data.removeprefix(BYTE_ORDER_MARK).translate(OTHER_ALPHABETS)
-    if found := CONTROL.search(text):
+    if found := CONTROL.search(data, start):
         broken(f"byte {found.start()}", f"expected text, got the control character {found[0]!r}")
+    text = data[start:] if start else data.removeprefix(BYTE_ORDER_MARK)
+    text = text.translate(OTHER_ALPHABETS)
+    return text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+
+
+def numbered_lines(text: bytes) -> Iterator[tuple[int, bytes]]:
+    """Each line with its number from 1 on, one after another: text is not held as words.
+
+    Raises:
+        MeshError: A line is too long.
+    """
     for number, line in enumerate(io.BytesIO(text), 1):
         if len(line) > LONGEST_LINE:
             broken(f"line {number}", f"is longer than {LONGEST_LINE} bytes")
-    return text
+        yield number, line
 
 
-def tidied(text: bytes, *, continued: bool) -> bytes:
-    """The words of each line with one space between them, without what follows a `#`.
+def worded_lines(text: bytes, *, comments: bool = False) -> Iterator[tuple[int, list[bytes]]]:
+    """The words of each line that has some, with the number of the line.
 
     Args:
-        text: Lines of text.
-        continued: Whether a backslash at the end of a line continues it on the next.
+        text: Lines.
+        comments: Whether what follows a `#` is left out.
 
     Raises:
-        MeshError: A comment ends in a backslash: readers differ on whether it goes on.
+        MeshError: A line is too long.
     """
-    if found := CONTINUED_COMMENT.search(text):
-        line = text.count(b"\n", 0, found.start()) + 1
-        broken(f"line {line}", "a comment ends in a backslash")
-    whole = CONTINUED.sub(b"", text) if continued else text
-    lines = COMMENT.sub(b"", whole).split(b"\n")
-    return b"\n".join(b" ".join(line.split()) for line in lines)
-
-
-def worded_lines(text: bytes) -> Iterator[tuple[int, list[bytes]]]:
-    """Yield the number and the words of each line that has words."""
-    for number, line in enumerate(io.BytesIO(text), 1):
-        words = line.split()
+    for number, line in numbered_lines(text):
+        words = (line.partition(b"#")[0] if comments else line).split()
         if words:
             yield number, words
 
@@ -71,11 +75,19 @@ def numbers(words: Sequence[bytes], where: Where) -> list[float]:
     Raises:
         MeshError: A word is not a finite number.
     """
-    values = [float(word) if NUMBER.fullmatch(word) else _refused(word, where) for word in words]
-    for word, value in zip(words, values, strict=True):
-        if not math.isfinite(value):
-            _refused(word, where)
+    try:
+        values = [float(word) for word in words]
+    except ValueError:
+        values = [math.nan]
+    # Python also takes underscores, and nan and inf, which would make the sum one of them
+    if not math.isfinite(sum(values)) or b"_" in b"".join(words):
+        values = [_finite(word, where) for word in words]
     return values
+
+
+def _finite(word: bytes, where: Where) -> float:
+    value = float(word) if NUMBER.fullmatch(word) else math.nan
+    return value if math.isfinite(value) else _refused(word, where)
 
 
 def _refused(word: bytes, where: Where) -> float:

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices
 from grasp_core.checked import LARGEST, instance, number, one_of, path_of, several, shown, text
 from grasp_core.errors import InputError, MeshError
-from grasp_core.mesh_files.child import read_triangles
 from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.mesh_files.reading import read_triangles
 from grasp_core.objects.build import DEFAULT_FLATNESS, DEFAULT_LIMITS, build, check_choices
 from grasp_core.objects.face import Face, FaceKind, PatchLimits
 from grasp_core.objects.planar_faces import FlatnessLimits

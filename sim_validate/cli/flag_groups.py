@@ -54,7 +54,7 @@ class Speech:
 
 @dataclass(frozen=True, slots=True)
 class MeshLimits:
-    """How large a mesh may be, and what reading its file may cost."""
+    """How large a mesh file and what it holds may be."""
 
     max_mesh_bytes: Count = USUAL_MESH.max_bytes
     """Largest size of a mesh file that is read [bytes]."""
@@ -64,10 +64,6 @@ class MeshLimits:
     """Largest number of planar faces of an object."""
     max_parts: Count = USUAL_MESH.max_parts
     """Largest number of separate parts of a surface."""
-    max_mesh_seconds: Positive = USUAL_MESH.max_seconds
-    """Processor time for reading a mesh file [s]."""
-    max_mesh_memory_mib: Count = USUAL_MESH.max_memory_mib
-    """Memory for reading a mesh file [MiB]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,8 +30,6 @@ def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
                 max_triangles=given.max_triangles,
                 max_faces=given.max_faces,
                 max_parts=given.max_parts,
-                max_seconds=given.max_mesh_seconds,
-                max_memory_mib=given.max_mesh_memory_mib,
             ),
         )
     if path.suffix or len(path.parts) > 1:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
-from grasp_core.mesh_files.child import read_triangles
+from grasp_core.mesh_files.reading import read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
 from grasp_core.objects.face import FaceKind
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron

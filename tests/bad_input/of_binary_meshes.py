@@ -12,7 +12,6 @@ GROUP = "binary meshes"
 NAN = struct.pack("<f", float("nan"))
 HUGE = struct.pack("<I", 4_000_000_000)
 STL, STL_TEXT = stl(), stl_text()
-PENTAGON = "ply\nformat binary_little_endian 1.0\nelement vertex 5\n"
 STLS = {
     "a count of 4e9 in 100 bytes": (bytes(80) + HUGE + bytes(16), "STL"),
     "fewer triangles counted than there are": (STL[:80] + b"\3\0\0\0" + STL[84:], "STL"),
@@ -23,7 +22,8 @@ STLS = {
     "no triangles": (bytes(84), "no triangles"),
     "binary that begins with solid, cut": (stl(head=b"solid")[:-7], "control character|export"),
     "text without its end": (STL_TEXT.replace("endsolid hand\n", ""), "the end|endsolid"),
-    "text cut in a triangle": (STL_TEXT[:200], "the end|whole"),
+    "text cut in a triangle": (STL_TEXT[:200], "the end|endsolid"),
+    "text that ends in a triangle": (STL_TEXT[:200] + "\nendsolid\n", "the end|whole"),
     "text of two corners a triangle": (
         STL_TEXT.replace("vertex 0.0 0.0 0.0\n", "", 1), "vertex|endloop"),
     "text with a word for a number": (STL_TEXT.replace("0.1", "O.1", 1), "number"),
@@ -34,7 +34,6 @@ STLS = {
         STL_TEXT.replace("endloop", "vertex 1 1 1\nendloop", 1), "endloop"),
     "text without triangles": ("solid a\nendsolid a\n", "no triangles"),
     "text that ends before it begins": ("solid\nendsolid\nendsolid\n", "solid"),
-    "a name that means something": (STL_TEXT.replace("hand", "a vertex 1 2 3"), "two readings"),
 }  # fmt: skip
 BODY = ply_binary()
 PLYS = {
@@ -43,16 +42,18 @@ PLYS = {
     "2^64 faces": (ply(faces=2**64), "whole number"),
     "-1 vertices": (ply(vertices=-1), "count"),
     "a vertex too many": (ply(vertices=3), "face 0|whole number|export"),
-    "text where binary is said": (ply(form="binary_little_endian"), "vertex"),
+    "text where binary is said": (ply(form="binary_little_endian"), "face|counted"),
     "binary where text is said": (ply(body=BODY), "control"),
-    "the other byte order": (ply(form="binary_big_endian", body=BODY), "vertex 33554432|export"),
+    "the other byte order": (ply(form="binary_big_endian", body=BODY), "vertex 50331648|export"),
     "cut": (ply(form="binary_little_endian", body=BODY[:-3]), "face|counted"),
     "bytes after the end": (ply(form="binary_little_endian", body=BODY + b"\0"), "after"),
     "a list of 255": (
         ply(form="binary_little_endian", body=BODY.replace(b"\3", b"\xff", 1)), "export"),
-    "differing lists": (
+    "differing lists, cut": (
         ply(form="binary_little_endian",
-            body=ply_binary()[:61] + b"\4" + struct.pack("<4i", 0, 1, 3, 2) + BODY[74:]), "face"),
+            body=ply_binary()[:61] + b"\4" + struct.pack("<4i", 0, 1, 3, 2) + BODY[74:-1]), "face"),
+    "a coordinate that its type cannot hold": (
+        ply().replace(b"float x", b"uchar x"), "vertex 1|whole number"),
     "nan": (ply(form="binary_little_endian", body=NAN + BODY[4:]), "vertex 0|finite"),
     "text nan": (ply().replace(b"0.1", b"nan", 1), "finite"),
     "beyond single precision": (ply().replace(b"0.1", b"1e39", 1), "finite|precision"),
@@ -202,6 +203,9 @@ GLBS = {
         "tree"),
 }  # fmt: skip
 GOODS = {
+    "name.stl": STL_TEXT.replace("hand", "a vertex 1 2 3").encode(),
+    "lines.stl": STL_TEXT.replace("\nouter", " outer").encode(),
+    "normals.off": off().replace("OFF", "NOFF").replace(" 0.0\n", " 0.0 0 0 1\n").encode(),
     "good.glb": GOOD,
     "normals.stl": STL[:84] + 3 * NAN + STL[96:],
     "solid.stl": stl(head=b"solid but binary"),

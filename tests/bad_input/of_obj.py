@@ -38,11 +38,7 @@ BAD = {
     "index 2^63": (_with("f 1 3 2", "f 9223372036854775808 3 2"), "line 5"),
     "index -99": (_with("f 1 3 2", "f -99 3 2"), "line 5|-99"),
     "an index that is no whole number": (_with("f 1 3 2", "f 1.5 3 2"), "line 5|whole number"),
-    "a face before its vertices": ("f 1 2 3\n" + GOOD, "line 1|vertex 1"),
-    "relative indices amid the file": (
-        _with("v 0.0 0.0 0.1\n", "f -3 -2 -1\nv 0.0 0.0 0.1\n").replace("f 1 3 2\n", ""),
-        "two readings|export",
-    ),
+    "a relative index before its vertices": ("f -3 -2 -1\n" + GOOD, "line 1|vertex -3|has 0"),
     "a face of two corners": (_with("f 1 3 2", "f 1 3"), "line 5|three corners"),
     "a face of none": (_with("f 1 3 2", "f"), "line 5|three corners"),
     "a face with a dent": (obj(DENT, [(1, 2, 3, 4, 0)]), "dent|triangles"),
@@ -51,6 +47,8 @@ BAD = {
     "a curved surface": (GOOD + "cstype bezier\nsurf 0 1 0 1 1 2 3\n", "cstype|polygons"),
     "an unknown word": (GOOD + "extrude 1\n", "line 9|extrude"),
     "a comment that may go on": ("# in C:\\\n" + GOOD, "line 1|comment"),
+    "a million digits and no number": (GOOD + "v " + "1" * 10**6 + "x 0 0\n", "line 9|number"),
+    "a million hashes": (GOOD + "#" * 10**6 + "\nx\n", "line 10|polygons"),
     "a zero byte": (GOOD + "# \0\n", "control character"),
     "a form feed": (GOOD + "# \f\n", "control character"),
     "a line of two megabytes": (GOOD + "#" + "x" * 2**21 + "\n", "line 9|longer"),
@@ -60,7 +58,6 @@ BAD = {
     "lines only": (GOOD.split("f ")[0] + "l 1 2 3 4\n", "no triangles"),
     "points only": (GOOD.split("f ")[0] + "p 1 2 3 4\n", "no triangles"),
     "all in one line": (GOOD.replace("\n", " "), "line 1"),
-    "old line ends": (GOOD.replace("\n", "\r"), "line 1"),
     "cut in a number": (GOOD[:-4], "line 8"),
     "UTF-16": (GOOD.encode("utf-16"), "UTF-16"),
     "UTF-32": (GOOD.encode("utf-32"), "UTF-16"),
@@ -69,6 +66,14 @@ BAD = {
 }  # fmt: skip
 GOOD_TEXTS = {
     "Windows' line ends": GOOD.replace("\n", "\r\n").encode(),
+    "old line ends": GOOD.replace("\n", "\r").encode(),
+    "a face before its vertices": "\n".join(
+        [*GOOD.splitlines()[4:], *GOOD.splitlines()[:4]]
+    ).encode(),
+    "relative indices amid the file": _with("f 1 3 2\n", "")
+    .replace("v 0.0 0.0 0.1\n", "f -3 -1 -2\nv 0.0 0.0 0.1\n")
+    .encode(),
+    "a plus sign": _with("f 1 3 2", "f +1 +3 +2").encode(),
     "a byte order mark": b"\xef\xbb\xbf" + GOOD.encode(),
     "a continued line": _with("f 1 3 2", "f 1 \\\n3 2").encode(),
     "a library of materials elsewhere": ("mtllib ../../etc/passwd\nusemtl a\n" + GOOD).encode(),

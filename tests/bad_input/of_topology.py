@@ -120,7 +120,6 @@ FLAGS = {
         ([*CORNERS], [(0, 1, 2)]), "--faces patches", "GP-MESH-NOT-FLAT|four"),
     "a centre of mass far off": (BOX, "--center-of-mass-m 9 9 9", "center_of_mass|outside"),
     "in inches by mistake": (boxes(((0, 0, 0), 1000.0)), "--unit in", "GP-MESH-SIZE|unit"),
-    "read in no memory": (BOX, "--max-mesh-memory-mib 1", "GP-MESH-LIMIT"),
 }  # fmt: skip
 GOOD = {
     "inside out": (CORNERS, turned(TRIANGLES)),

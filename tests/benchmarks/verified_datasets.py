@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from grasp_core.mesh_files.child import read_triangles
 from grasp_core.mesh_files.limits import MeshLimits
-from grasp_core.mesh_files.reading import FORMATS
+from grasp_core.mesh_files.reading import FORMATS, read_triangles
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.main import main as graspproof
 

@@ -1,4 +1,4 @@
-"""Readers of mesh files as targets, and the making of solids; each against a plain reading."""
+"""Readers of mesh files as targets, against two other readings, and the making of solids."""
 
 import io
 import json
@@ -9,10 +9,10 @@ import numpy as np
 import trimesh
 
 import grasp_core as gc
-from grasp_core.mesh_files.child_main import triangles_of
-from grasp_core.mesh_files.reading import FORMATS, check_beginning
+from grasp_core.mesh_files.reading import FORMATS, triangles_of
 from tests.fuzzing.plain_meshes import PLAIN
 from tests.fuzzing.targets import Target
+from tests.fuzzing.trimesh_readings import by_trimesh, is_misread
 
 MOST = 10_000
 """Triangles of a fuzzed file."""
@@ -21,7 +21,6 @@ VOLUME_ROUNDING = 1e-6
 
 
 def read(kind, data):
-    check_beginning(kind, data)
     return triangles_of(kind, data, MOST)
 
 
@@ -32,10 +31,18 @@ def first_least(corners):
 
 
 def same_triangles(kind, data, found):
-    """All coordinates are those of the plain reading, triangle by triangle, in any order."""
+    """All triangles are those of the plain reading, and of trimesh where it reads the file."""
     points, corners = found
-    rows = sorted(first_least(each) for each in points[corners])
-    plain = sorted(first_least(each) for each in PLAIN[kind](data))
+    same_rows(kind, points[corners], PLAIN[kind](data))
+    others = by_trimesh(kind, data)
+    if others is not None and not is_misread(kind, data):
+        same_rows(kind, points[corners], others)
+
+
+def same_rows(kind, triangles, others):
+    """All coordinates are the same, triangle by triangle, in any order."""
+    rows = sorted(first_least(each) for each in triangles)
+    plain = sorted(first_least(each) for each in others)
     assert len(rows) == len(plain), (len(rows), len(plain))
     if rows == plain:
         return

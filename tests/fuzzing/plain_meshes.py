@@ -10,8 +10,9 @@ Triangle = tuple[Point, Point, Point]
 
 
 def text_of(data):
-    """Text of which only ASCII means anything."""
-    return "".join(chr(byte) if byte < 128 else "?" for byte in data)
+    """Text of which only ASCII means anything, with the line ends of any system."""
+    text = "".join(chr(byte) if byte < 128 else "?" for byte in data)
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def fan(corners):
@@ -19,17 +20,16 @@ def fan(corners):
 
 
 def of_obj(data: bytes) -> list[Triangle]:
-    text = text_of(data).replace("\\\r\n", "").replace("\\\n", "")
-    points, triangles = [], []
-    for line in text.split("\n"):
-        words = line.split("#")[0].removeprefix("???").split()
+    points, corners = [], []
+    lines = re.sub("#[^\n]*", "", text_of(data).removeprefix("???")).replace("\\\n", "").split("\n")
+    for words in (line.split() for line in lines):
         if words[:1] == ["v"]:
             points.append(tuple(map(float, words[1:4])))
         elif words[:1] == ["f"]:
             numbers = [int(word.split("/")[0]) for word in words[1:]]
-            assert all(numbers)
-            triangles += fan([points[n - 1 if n > 0 else n] for n in numbers])
-    return triangles
+            corners.append([n - 1 if n > 0 else len(points) + n for n in numbers])
+    assert all(n >= 0 for each in corners for n in each)
+    return [each for face in corners for each in fan([points[n] for n in face])]
 
 
 def of_stl(data: bytes) -> list[Triangle]:
@@ -37,8 +37,12 @@ def of_stl(data: bytes) -> list[Triangle]:
     if len(data) == 84 + 50 * count:
         rows = [struct.unpack_from("<12f", data, 84 + 50 * i)[3:] for i in range(count)]
         return [(row[:3], row[3:6], row[6:]) for row in rows]
-    lines = [line.split("#")[0].split() for line in text_of(data).split("\n")]
-    points = [tuple(map(float, w[1:])) for w in lines if w[:1] and w[0].lower() == "vertex"]
+    words = []
+    for line in text_of(data).lower().split("\n"):
+        before, _, _ = line.partition("endsolid")
+        words += [] if line.split()[:1] == ["solid"] else before.split()
+    places = [i for i, word in enumerate(words) if word == "vertex"]
+    points = [tuple(map(float, words[i + 1 : i + 4])) for i in places]
     assert len(points) % 3 == 0
     return [tuple(points[i : i + 3]) for i in range(0, len(points), 3)]
 

@@ -48,8 +48,6 @@ CALLS = [
         "max_triangles": AT_LEAST_ONE,
         "max_faces": AT_LEAST_ONE,
         "max_parts": AT_LEAST_ONE,
-        "max_seconds": POSITIVE,
-        "max_memory_mib": AT_LEAST_ONE,
     }),
     Call("gc.Polyhedron.from_mesh", mesh, {
         "vertices": spread(body().vertices) | {"of one place": np.zeros((4, 3))},

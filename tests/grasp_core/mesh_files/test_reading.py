@@ -1,6 +1,8 @@
 """What is written is what is read, in every format and style; what is damaged is refused."""
 
+import signal
 import struct
+import threading
 
 import numpy as np
 import pytest
@@ -8,8 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import grasp_core as gc
-from grasp_core.mesh_files.child_main import triangles_of
-from tests.bad_input.mesh_texts import off, ply, stl, stl_text
+from grasp_core.errors import MeshRefusal
+from grasp_core.mesh_files import obj
+from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.mesh_files.reading import read_triangles, triangles_of
+from sim_validate.main import main
+from tests.bad_input.mesh_texts import CORNERS, TRIANGLES, off, ply, stl, stl_text
+from tests.bad_input.mesh_texts import obj as obj_text
 from tests.bad_input.of_binary_meshes import glb, tree
 from tests.fuzzing.mesh_files import same_triangles
 
@@ -200,3 +207,154 @@ def test_a_file_cut_anywhere_is_never_read_as_another_whole(kind):
             continue
         same_triangles(kind, whole[:size], found)
     assert refused > 0.5 * len(whole)
+
+
+WHOLE = [[list(CORNERS[i]) for i in face] for face in TRIANGLES]
+LINES = obj_text().split("\n")
+"""Four vertices, four faces and nothing."""
+AMID = [*LINES[:3], "v 9 9 9", "f -4 -2 -3", LINES[3], "f 1 2 5", "f 1 5 3", "f 2 3 5", ""]
+MIXED_FACES = (
+    struct.pack("<B4i", 4, 0, 2, 3, 1) + struct.pack("<B3i", 3, 0, 1, 4)
+    + struct.pack("<B3i", 3, 1, 3, 4) + struct.pack("<B3i", 3, 3, 2, 4)
+    + struct.pack("<B3i", 3, 2, 0, 4)
+)  # fmt: skip
+"""A pyramid on a square."""
+MIXED_POINTS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0), (0, 0, 1))
+LISTED_VERTICES = (
+    b"ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty list uchar uchar seen\n"
+    b"property float x\nproperty float y\nproperty float z\nelement face 4\n"
+    b"property list uchar int vertex_indices\nend_header\n"
+)
+RIGHT = {
+    "relative corners amid an OBJ": ("obj", "\n".join(AMID)),
+    "corners with a plus sign": ("obj", obj_text().replace("f 1 3 2", "f +1 +3 +2")),
+    "OBJ faces before their vertices": ("obj", "\n".join([*LINES[4:], *LINES[:4]])),
+    "corners of differing forms": ("obj", obj_text().replace("f 1 3 2", "f 1/1 3 2//7")),
+    "a comment that ends in a backslash": ("obj", "# in C:\\\no a\n" + obj_text()),
+    "an OBJ with the line ends of old": ("obj", obj_text().replace("\n", "\r")),
+    "an OFF comment that ends in a backslash": ("off", off().replace("OFF", "OFF # in C:\\")),
+    "an OFF with the line ends of old": ("off", off().replace("\n", "\r")),
+    "an OFF with normals": (
+        "off", off().replace("OFF", "NOFF").replace(" 0.1\n", " 0.1 1 0 0\n")),
+    "an STL name that means something": ("stl", stl_text().replace("hand", "a vertex 1 2 3")),
+    "an STL that is called solid": ("stl", stl_text().replace("hand", "endsolid solid facet")),
+    "an STL without normals": ("stl", stl_text().replace("normal 0 0 0", "normal")),
+    "STL words in other lines": (
+        "stl", stl_text().replace("\nouter", " outer").replace("endloop\n", "endloop ")),
+    "an STL with the line ends of old": ("stl", stl_text().replace("\n", "\r")),
+    "vertices with lists that differ": (
+        "ply",
+        LISTED_VERTICES
+        + b"".join(bytes([i, *[7] * i]) + struct.pack("<3f", *CORNERS[i]) for i in range(4))
+        + b"".join(struct.pack("<B3i", 3, *face) for face in TRIANGLES),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", RIGHT)
+def test_what_is_right_by_its_format_is_read_as_it_says(case):
+    kind, text = RIGHT[case]
+    points, corners = triangles_of(kind, text if isinstance(text, bytes) else text.encode(), MOST)
+    found = sorted(points[corners].tolist())
+    if kind == "ply":
+        np.testing.assert_array_equal(found, sorted(np.float32(WHOLE).tolist()))
+    else:
+        assert found == sorted(WHOLE)
+
+
+def test_binary_ply_faces_may_differ_in_their_numbers_of_corners():
+    rows = b"".join(struct.pack("<3f", *point) for point in MIXED_POINTS)
+    data = ply(5, 5, form="binary_little_endian", body=rows + MIXED_FACES)
+    points, corners = triangles_of("ply", data, MOST)
+    assert corners.tolist() == [[0, 2, 3], [3, 1, 0], [0, 1, 4], [1, 3, 4], [3, 2, 4], [2, 0, 4]]
+    same_triangles("ply", data, (points, corners))
+    for size in range(len(data)):
+        with pytest.raises(gc.MeshError):
+            triangles_of("ply", data[:size], MOST)
+
+
+def test_a_comment_that_could_swallow_a_vertex_is_refused():
+    for lines in ("# in C:\\\n", "# a\\\n\n", "# a\\\n# b\n"):
+        accepted = "in C" not in lines
+        if accepted:
+            assert len(triangles_of("obj", (lines + obj_text()).encode(), MOST)[1]) == 4
+            continue
+        with pytest.raises(gc.MeshError, match="line 1: a comment ends in a backslash"):
+            triangles_of("obj", (lines + obj_text()).encode(), MOST)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (ply().replace(b"float x", b"uchar x"), "vertex 1: x is no whole number of its type"),
+        (ply().replace(b"uchar int", b"uchar char").replace(b"3 0 2 1", b"3 0 2 300"), "corners"),
+        (ply().replace(b"float z", b"float z\nproperty float w").replace(b" 0.0\n", b" 0.0 w\n"),
+         "expected numbers"),
+    ],
+)  # fmt: skip
+def test_ply_text_that_its_types_cannot_hold_is_refused(text, said):
+    with pytest.raises(gc.MeshError, match=said) as caught:
+        triangles_of("ply", text, MOST)
+    assert caught.value.reason is MeshRefusal.UNREADABLE
+
+
+@pytest.mark.parametrize("kind", [*FILES, "glb"])
+def test_bytes_and_triangles_are_bounded_by_their_limits(kind, tmp_path):
+    path = tmp_path / f"part.{kind}"
+    data = FILES.get(kind) or glb(tree())
+    path.write_bytes(data)
+    just = MeshLimits(max_bytes=len(data), max_triangles=4)
+    points, corners, held = read_triangles(path, just)
+    assert (len(corners), held) == (4, data)
+    assert np.isfinite(points).all()
+    for limits in (MeshLimits(max_bytes=len(data) - 1), MeshLimits(max_triangles=3)):
+        with pytest.raises(gc.MeshError, match=rf"part\.{kind}: .*limit") as caught:
+            read_triangles(path, limits)
+        assert caught.value.reason is MeshRefusal.TOO_MANY
+
+
+def test_a_command_ends_at_once_where_it_is_interrupted_amid_a_file(tmp_path, monkeypatch, capsys):
+    path, read = tmp_path / "part.obj", []
+
+    def interrupted(words, where):
+        read.append(where)
+        if len(read) == 3:
+            signal.raise_signal(signal.SIGINT)
+        return numbers(words, where)
+
+    path.write_text(obj_text())
+    numbers = obj.numbers
+    with monkeypatch.context() as patched:
+        patched.setattr(obj, "numbers", interrupted)
+        assert main(["inspect", str(path)]) == 130
+    assert len(read) == 3
+    assert "interrupted" in capsys.readouterr().err
+    assert main(["inspect", str(path)]) == 0
+
+
+def test_too_little_memory_is_a_refusal(tmp_path, monkeypatch):
+    def full(*_):
+        raise MemoryError
+
+    path = tmp_path / "part.obj"
+    path.write_text(obj_text())
+    monkeypatch.setattr(obj, "numbers", full)
+    with pytest.raises(gc.MeshError, match=r"part\.obj: .*memory") as caught:
+        gc.load_polyhedron(path)
+    assert caught.value.reason is MeshRefusal.LIMIT
+
+
+def test_many_threads_read_each_its_own_file(tmp_path):
+    files, found = [tmp_path / f"{count}.off" for count in range(1, 9)], {}
+    for count, path in enumerate(files, 1):
+        path.write_text(off(f"4 {4 * count} 0", faces=TRIANGLES * count))
+
+    def read(path):
+        found[path] = len(read_triangles(path, MeshLimits())[1])
+
+    threads = [threading.Thread(target=read, args=(path,)) for path in files]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == {path: 4 * count for count, path in enumerate(files, 1)}

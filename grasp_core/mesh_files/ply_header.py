@@ -1,0 +1,138 @@
+"""The header of a PLY file: which elements follow, and what each row of them holds."""
+
+import re
+from dataclasses import dataclass, field
+
+from grasp_core.mesh_files.refusals import broken, shown
+from grasp_core.mesh_files.words import whole
+
+TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+    "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+    "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
+END = re.compile(rb"\nend_header[ \t]*\r?\n")
+LONGEST_HEADER = 2**16
+NAME = re.compile(r"\w{1,100}", re.ASCII)
+LISTS = ("vertex_indices", "vertex_index")
+POINT = ("x", "y", "z")
+
+
+@dataclass(frozen=True, slots=True)
+class Property:
+    """A number, or a list of numbers, of each thing of an element."""
+
+    name: str
+    kind: str
+    """The type of the numbers, as numpy writes it without the order of bytes."""
+    count_kind: str | None = None
+    """The type of a list's length; None for a number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """A table of the file."""
+
+    name: str
+    rows: int
+    properties: list[Property] = field(default_factory=list[Property])
+
+    def place(self, names: tuple[str, ...]) -> Property:
+        """The property of one of the names.
+
+        Raises:
+            MeshError: There is none.
+        """
+        found = [each for each in self.properties if each.name in names]
+        if len(found) != 1:
+            broken("header", f"element {self.name} needs one property {' or '.join(names)}")
+        return found[0]
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """The names of the properties that make the surface."""
+        return {"vertex": POINT, "face": LISTS}.get(self.name, ())
+
+    @property
+    def lists(self) -> bool:
+        """Whether rows hold lists, so that they may differ in length."""
+        return any(each.count_kind is not None for each in self.properties)
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """What follows a header, and from which byte on."""
+
+    order: str
+    """Byte order, or `=` for text."""
+    elements: list[Element]
+    end: int
+
+
+def read_header(data: bytes) -> Header:
+    """The header of a PLY file.
+
+    Raises:
+        MeshError: It breaks a rule, or has no vertices or faces.
+    """
+    found = END.search(data[:LONGEST_HEADER])
+    if not found:
+        broken("header", "expected `end_header`")
+    order, elements = _lines(data[: found.start()])
+    if not order:
+        broken("header", "expected a format")
+    for element in elements:
+        _check_element(element)
+    tables = {each.name: each for each in elements}
+    if len(tables) < len(elements) or not {"vertex", "face"} <= tables.keys():
+        broken("header", f"expected elements vertex and face, once each, got {shown(list(tables))}")
+    _check_properties(tables["vertex"], tables["face"])
+    return Header(order, elements, found.end())
+
+
+def _lines(text: bytes) -> tuple[str, list[Element]]:
+    first, *lines = [line.split() for line in text.decode("ascii", "replace").splitlines()]
+    order, elements = "", list[Element]()
+    if first != ["ply"]:
+        broken("header", "expected the word ply")
+    for number, words in enumerate(lines, 2):
+        where = f"header line {number}"
+        match words:
+            case ["comment" | "obj_info", *_] | []:
+                pass
+            case ["format", name, "1.0"] if name in ORDERS and not order:
+                order = ORDERS[name]
+            case ["element", name, rows]:
+                elements.append(Element(name, whole(rows.encode(), where)))
+            case ["property", first, *others] if elements:
+                elements[-1].properties.append(_property([first, *others], where))
+            case _:
+                broken(where, f"got {shown(' '.join(words))!r}")
+    return order, elements
+
+
+def _check_properties(vertex: Element, face: Element) -> None:
+    for name in POINT:
+        if vertex.place((name,)).count_kind is not None:
+            broken("header", f"property {name} must be a number, not a list")
+    if face.place(LISTS).count_kind is None:
+        broken("header", "the corners of faces must be a list")
+
+
+def _check_element(element: Element) -> None:
+    names = [element.name, *(each.name for each in element.properties)]
+    if not all(NAME.fullmatch(name) for name in names) or len(names[1:]) > len(set(names[1:])):
+        broken("header", "names must be of letters and digits, and differ")
+    if element.rows < 0 or not element.properties:
+        broken("header", f"element {element.name} needs properties, and a count from 0 on")
+
+
+def _property(said: list[str], where: str) -> Property:
+    lists = said[0] == "list"
+    kinds = said[1:-1] if lists else said[:-1]
+    if len(kinds) != 1 + lists or not TYPES.keys() >= set(kinds):
+        broken(where, f"got the property {shown(' '.join(said))!r}")
+    if lists and TYPES[kinds[0]].startswith("f"):
+        broken(where, "the length of a list must be a whole number")
+    return Property(said[-1], TYPES[kinds[-1]], TYPES[kinds[0]] if lists else None)
