@@ -19,6 +19,8 @@ from grasp_core.errors import UndecidedError as UndecidedError
 from grasp_core.errors import UnfaithfulError as UnfaithfulError
 from grasp_core.forces.contact_forces import contact_forces as contact_forces
 from grasp_core.mesh_files.limits import MeshLimits as MeshLimits
+from grasp_core.objects.conversion import from_trimesh as from_trimesh
+from grasp_core.objects.conversion import to_trimesh as to_trimesh
 from grasp_core.objects.face import Face as Face
 from grasp_core.objects.face import PatchLimits as PatchLimits
 from grasp_core.objects.polyhedron import Polyhedron as Polyhedron

@@ -17,6 +17,7 @@ from sim_validate.main import ACTIONS
 ROOT = Path(__file__).parent.parent
 DOORS = {
     "manifold3d": "grasp_core/objects/booleans.py",
+    "trimesh": "grasp_core/objects/conversion.py",
     "highspy": "grasp_core/solvers/lp.py",
     "clarabel": "grasp_core/solvers/conic.py",
     "qpsolvers": "grasp_core/solvers/qp.py",
