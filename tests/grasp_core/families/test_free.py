@@ -205,12 +205,13 @@ def test_no_contacts_in_closure_are_found_where_absence_is_proved():
     assert len(absent) >= 60
 
 
-def test_absence_holds_up_to_the_friction_at_which_the_patch_closes():
+@pytest.mark.parametrize("each", [2, pytest.param(6, marks=pytest.mark.slow)])
+def test_absence_holds_up_to_the_friction_at_which_the_patch_closes(each):
     """Just above it a grasp is found at once, or nearly always."""
     rng = np.random.default_rng(4)
     tested = found = 0
     for name in OBJECTS:
-        for _ in range(6):
+        for _ in range(each):
             pieces = quadruple(name, rng.choice(len(faces_of(name)), 4, replace=False))
             lower, upper = 0.0, 4.0
             for _ in range(16):
@@ -227,7 +228,7 @@ def test_absence_holds_up_to_the_friction_at_which_the_patch_closes():
             assert not isinstance(above, Absence)
             found += isinstance(above, Placement)
             tested += 1
-    assert tested >= 15
+    assert tested >= 2.5 * each
     assert found >= 0.9 * tested
 
 

@@ -67,18 +67,21 @@ def test_every_four_faces_are_held_or_proved_to_hold_nothing(name):
             assert counts.rejected == 0
 
 
-def test_what_less_friction_holds_more_friction_holds():
+@pytest.mark.parametrize(
+    ("name", "least"),
+    [("box", 5), ("wedge", 20), pytest.param("octahedron", 60, marks=pytest.mark.slow)],
+)
+def test_what_less_friction_holds_more_friction_holds(name, least):
     tested = 0
-    for name in ("box", "wedge", "octahedron"):
-        plans = [
-            gc.plan(example_object(name), friction, families=METHODS, cones="tilted")
-            for friction in (0.1, 0.3, 0.7)
-        ]
-        for less, more in pairwise(plans):
-            held = [{tuple(sorted(g.faces)) for g in plan.grasps} for plan in (less, more)]
-            assert held[0] <= held[1]
-            tested += len(held[0])
-    assert tested >= 100
+    plans = [
+        gc.plan(example_object(name), friction, families=METHODS, cones="tilted")
+        for friction in (0.1, 0.3, 0.7)
+    ]
+    for less, more in pairwise(plans):
+        held = [{tuple(sorted(g.faces)) for g in plan.grasps} for plan in (less, more)]
+        assert held[0] <= held[1]
+        tested += len(held[0])
+    assert tested >= least
 
 
 def test_what_is_left_open_is_decided_when_asked_and_the_gap_is_said_before():

@@ -102,40 +102,43 @@ def test_every_grasp_lies_on_its_faces_inside_its_regions():
     assert tested >= 90
 
 
-def test_moving_turning_and_scaling_the_object_moves_its_grasps():
+@pytest.mark.parametrize(
+    "name",
+    [
+        "wedge",
+        "box",
+        *(pytest.param(n, marks=pytest.mark.slow) for n in ("random-10-1", "octahedron")),
+    ],
+)
+def test_moving_turning_and_scaling_the_object_moves_its_grasps(name):
     rng = np.random.default_rng(1)
-    tested = 0
-    for name in ("wedge", "random-10-1", "octahedron", "box"):
-        body = example_object(name)
-        here = gc.plan(body, 0.3, families=DISCS, cones="tilted")
-        R, scale = random_rotation(rng), float(rng.uniform(0.1, 3.0))
-        there = gc.plan(
-            remade(body, lambda v, R=R, s=scale: s * v @ R.T + 0.4),
-            0.3,
-            families=DISCS,
-            cones="tilted",
-        )
-        assert {g.id for g in here.grasps} == {g.id for g in there.grasps}
-        radii = {g.id: g.radius for g in there.grasps}
-        for grasp in here.grasps:
-            expected = pytest.approx(radii[grasp.id] / scale, rel=RADIUS_ACCURACY)
-            assert grasp.radius == expected
+    body = example_object(name)
+    here = gc.plan(body, 0.3, families=DISCS, cones="tilted")
+    R, scale = random_rotation(rng), float(rng.uniform(0.1, 3.0))
+    there = gc.plan(
+        remade(body, lambda v: scale * v @ R.T + 0.4), 0.3, families=DISCS, cones="tilted"
+    )
+    assert {g.id for g in here.grasps} == {g.id for g in there.grasps}
+    radii = {g.id: g.radius for g in there.grasps}
+    for grasp in here.grasps:
+        expected = pytest.approx(radii[grasp.id] / scale, rel=RADIUS_ACCURACY)
+        assert grasp.radius == expected
+    assert len(here.grasps) >= 10
+
+
+@pytest.mark.parametrize(
+    ("name", "least"), [("wedge", 20), pytest.param("random-12-1", 100, marks=pytest.mark.slow)]
+)
+def test_more_friction_never_loses_a_grasp(name, least):
+    body, tested = example_object(name), 0
+    frictions = (0.05, 0.1, 0.2, 0.35, 0.7)
+    plans = [gc.plan(body, friction, families=DISCS, cones="normal") for friction in frictions]
+    for less, more in pairwise(plans):
+        radii = {grasp.id: grasp.radius for grasp in more.grasps}
+        for grasp in less.grasps:
+            assert radii[grasp.id] >= grasp.radius * (1 - RADIUS_ACCURACY)
             tested += 1
-    assert tested >= 60
-
-
-def test_more_friction_never_loses_a_grasp():
-    tested = 0
-    for name in ("wedge", "random-10-1", "random-12-1"):
-        body = example_object(name)
-        frictions = (0.05, 0.1, 0.2, 0.35, 0.7)
-        plans = [gc.plan(body, friction, families=DISCS, cones="normal") for friction in frictions]
-        for less, more in pairwise(plans):
-            radii = {grasp.id: grasp.radius for grasp in more.grasps}
-            for grasp in less.grasps:
-                assert radii[grasp.id] >= grasp.radius * (1 - RADIUS_ACCURACY)
-                tested += 1
-    assert tested >= 200
+    assert tested >= least
 
 
 def test_a_smaller_theta_is_allowed_and_gives_smaller_discs():
