@@ -2,15 +2,17 @@
 
     python -m tests.benchmarks.repeats [--times 50] [--objects wedge mug hex-nut]
 
-Checks the baselines in `tests/stability` again and again: by themselves, while other processes
-keep all processors busy, and by pytest on four workers. Every number of every grasp must be the
-same each time; any other answer is listed, and ends it with 1. Some ten minutes on two cores.
+Records the baselines in `tests/stability` anew, as another processor may have recorded them, and
+checks them again and again: by themselves, while other processes keep all processors busy, and by
+pytest on four workers. Every number of every grasp must be the same each time; any other answer is
+listed, and ends it with 1. Some ten minutes on two cores.
 """
 
 import argparse
 import json
 import multiprocessing
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -34,6 +36,13 @@ def main() -> int:
     parser.add_argument("--times", type=int, default=50)
     parser.add_argument("--objects", nargs="+", default=["wedge", "mug", "hex-nut"])
     asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as place:
+        folders = recorded(asked.objects, Path(place))
+        return int(repeated(folders, asked.times) > 0)
+
+
+def repeated(folders: list[Path], times: int) -> int:
+    """Check baselines in several ways, say what came of it, and count what was not the same."""
     others = 0
     for title, way, busy in (
         ("by themselves", checked, 0),
@@ -42,38 +51,51 @@ def main() -> int:
     ):
         begun, counts = time.perf_counter(), Counter()
         with load(busy):
-            for _ in range(asked.times):
-                counts.update(way(asked.objects))
-        wanted = asked.times * sum(map(grasps_in, asked.objects))
+            for _ in range(times):
+                counts.update(way(folders))
+        wanted = times * sum(map(grasps_in, folders))
         others += wanted - counts["same"]
         said = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
         took = time.perf_counter() - begun
-        print(f"{title}: {asked.times} times: {said} ({took:.0f} s)", flush=True)
-    return int(others > 0)
+        print(f"{title}: {times} times: {said} ({took:.0f} s)", flush=True)
+    return others
 
 
-def grasps_in(name: str) -> int:
-    return len(read_baseline(FOLDER / name / f"{name}.baseline.json").entries)
+def recorded(names: list[str], place: Path) -> list[Path]:
+    """Copies of the folders of some objects, their baselines recorded by this machine."""
+    for name in names:
+        shutil.copytree(FOLDER / name, place / name)
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--grasp-bless"]
+    subprocess.run([*command, str(place)], stdout=subprocess.DEVNULL, check=True)
+    return [place / name for name in names]
 
 
-def checked(names: list[str]) -> list[str]:
+def baseline_in(folder: Path) -> Path:
+    return folder / f"{folder.name}.baseline.json"
+
+
+def grasps_in(folder: Path) -> int:
+    return len(read_baseline(baseline_in(folder)).entries)
+
+
+def checked(folders: list[Path]) -> list[str]:
     """What became of each grasp of some objects, in this process."""
-    return [status for name in names for status in statuses(name)]
+    return [status for folder in folders for status in statuses(folder)]
 
 
-def statuses(name: str) -> list[str]:
-    path = FOLDER / name / f"{name}.baseline.json"
+def statuses(folder: Path) -> list[str]:
+    path = baseline_in(folder)
     before = read_baseline(path)
     saved = read_grasps(path.parent / before.grasps_file)
     done = check(before, saved, before.grasps_file, of_settings(before.settings, ""), 1, silent)
     return [" ".join([each.status.value, *each.reasons]) for each in done.findings]
 
 
-def by_pytest(names: list[str]) -> list[str]:
+def by_pytest(folders: list[Path]) -> list[str]:
     """The same by the plugin, on several workers."""
     with tempfile.TemporaryDirectory() as folder:
         flags = ("-q", "-n", str(WORKERS), "-p", "no:cacheprovider", "--grasp-report", folder)
-        paths = [str(FOLDER / name) for name in names]
+        paths = [str(each) for each in folders]
         command = [sys.executable, "-m", "pytest", *flags, *paths]
         subprocess.run(command, stdout=subprocess.DEVNULL, check=False)
         found = json.loads((Path(folder) / "report.json").read_text())["grasps"]
