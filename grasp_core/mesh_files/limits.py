@@ -17,7 +17,7 @@ class MeshLimits:
     max_faces: int = 5_000
     """Most planar faces."""
     max_parts: int = 64
-    """Of the surface: bodies and cavities."""
+    """Most parts of the surface: bodies and cavities."""
 
     def __post_init__(self) -> None:
         for name in ("max_bytes", "max_triangles", "max_faces", "max_parts"):

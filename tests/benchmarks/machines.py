@@ -1,4 +1,4 @@
-"""The same plans, regions and verdicts under other arithmetic: BLAS, NumPy features, threads.
+"""Compares plans, regions and verdicts under other arithmetic: BLAS, NumPy features, threads.
 
     python -m tests.benchmarks.machines [--quick] [--meshes FOLDER]
 
@@ -34,11 +34,11 @@ SAME_PLACE = 1e-9
 """Contacts in object radii."""
 SAME_FRICTION = 1e-7
 SAME_FIGURE = 1e-6
-"""Of a simulation, of regions and of improved contacts, relative."""
+"""Figures of simulations, regions and improved contacts may differ by this share."""
 SAME_CORNER = 1e-7
 """Corners of regions, and improved contacts, in object radii."""
 CONES = 2000
-"""Of a proof of regions."""
+"""A proof of regions has at most this many cones."""
 
 
 def arithmetics():

@@ -63,7 +63,7 @@ def small_vertices_ply(size):
 
 
 def many_elements_ply(size):
-    """As many elements without rows as a header holds, before a long body."""
+    """A PLY file has as many elements without rows as its header holds, before a long body."""
     elements = b"".join(
         b"element e%d 0\nproperty char a\n" % i for i in range(min(size // 64, 1800))
     )

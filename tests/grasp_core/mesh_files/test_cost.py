@@ -18,7 +18,7 @@ SMALL, TIMES = 2**12, 16
 SLOWEST_GROWTH = 4 * TIMES
 """Linear time grows by 16, quadratic time by 256; between them lies a factor of four both ways."""
 SHORTEST_S = 1e-4
-"""Of what takes less, the clock and Python's own start of things are most."""
+"""Shorter times count as this one: they are mostly those of the clock and of Python itself."""
 BILLIONS = {
     "off vertices": ("off", off("4000000000 4 6").encode()),
     "off faces": ("off", off("4 4000000000 6").encode()),
@@ -39,7 +39,7 @@ BILLIONS = {
 
 
 def seconds(kind, data):
-    """Of the processor, for one reading; what other processes do does not count."""
+    """The processor time of one reading, in which other processes do not count."""
     begun = time.process_time()
     with contextlib.suppress(gc.MeshError):
         triangles_of(kind, data, MOST)

@@ -123,11 +123,16 @@ def test_moving_turning_and_scaling_the_object_moves_its_grasps(name):
     for grasp in here.grasps:
         expected = pytest.approx(radii[grasp.id] / scale, rel=RADIUS_ACCURACY)
         assert grasp.radius == expected
-    assert len(here.grasps) >= 10
+    assert len(here.grasps) >= 50
 
 
 @pytest.mark.parametrize(
-    ("name", "least"), [("wedge", 20), pytest.param("random-12-1", 100, marks=pytest.mark.slow)]
+    ("name", "least"),
+    [
+        ("wedge", 200),
+        pytest.param("random-10-1", 500, marks=pytest.mark.slow),
+        pytest.param("random-12-1", 1000, marks=pytest.mark.slow),
+    ],
 )
 def test_more_friction_never_loses_a_grasp(name, least):
     body, tested = example_object(name), 0
