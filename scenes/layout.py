@@ -42,7 +42,7 @@ FLAT = 1e-6
 are the limit of what a body can have, and rounding must not pass it."""
 TOUCH = 1e-9
 """Least depth of fingertips in their faces at the start, in grasp sizes: a ten-thousandth of the
-finest threshold. If they just touched, rounding would decide which of them press in the first step,
+finer thresholds. If they just touched, rounding would decide which of them press in the first step,
 and the blows of the others, a step later, tilt lightly held objects by up to 1e-4 in long steps."""
 RETREAT = 0.5
 """Distance from which fingers approach, in grasp sizes; from much farther they would arrive too

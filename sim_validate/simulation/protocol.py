@@ -123,9 +123,10 @@ class FrictionProtocol:
     """Friction that is tried alone where the prediction is smaller than it."""
     settle_s: float = 0.10
     hold_s: float = 0.40
-    threshold: float = 1e-5
+    threshold: float = 2e-5
     """Largest displacement while holding, in grasp sizes. Within it the servos hide an imbalance of
-    five hundred-thousandths of the largest normal force."""
+    a ten-thousandth of the largest normal force. Fingers that hardly push let the object creep by
+    up to 1e-5 above the critical friction."""
 
     def __post_init__(self) -> None:
         _check(asdict(self))
