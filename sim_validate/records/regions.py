@@ -172,7 +172,7 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
     """
     if missing := [name for name in SHAPES if name not in kept]:
         raise InputError(f"no array {missing[0]}; `graspproof regions` writes it")
-    limit = kept["open_radius_m"]  # infinite where no open choice was found
+    limit = np.asarray(kept["open_radius_m"])  # infinite where no open choice was found
     finite = {
         **kept,
         "open_radius_m": np.where(np.isposinf(limit), 0.0, limit)

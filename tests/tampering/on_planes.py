@@ -54,7 +54,7 @@ def piece(p):
     if shapes != ((3,), (3, 2), (3,), (len(p.b), 2)):
         return False
     axes = np.column_stack([p.frame, p.normal])
-    square = np.abs(axes.T @ axes - np.eye(3)).max() <= 1e-8 and np.linalg.det(axes) > 0.0
+    square = np.abs(axes.T @ axes - np.eye(3)).max() <= 1e-8  # left-handed on mirrored objects
     units = (np.abs(np.linalg.norm(p.E, axis=1) - 1.0) <= UNIT).all()
     q = convex(np.asarray(p.corners))
     if q is None or not (square and units and (q @ p.E.T <= p.b + 4e-9).all()):
