@@ -131,7 +131,7 @@ def improved(body, grasp, friction):
     found = gc.optimize_contacts(body, grasp, friction)
     return {
         "exact": [found.grasp.id, found.after.verify()],
-        "figures": [found.grasp.critical_friction],
+        "frictions": [found.grasp.critical_friction],
         "places": places(body, found.grasp.positions),
     }
 
@@ -147,10 +147,12 @@ def differences(case, own, other):
         if own["exact"] != other["exact"] or len(own["places"]) != len(other["places"]):
             return [f"{case}: {shown(own)} or {shown(other)}"]
         moved = np.abs(np.subtract(own["places"], other["places"])).max(initial=0.0)
-        near = np.allclose(own["figures"], other["figures"], rtol=SAME_FIGURE, atol=0.0)
+        kinds = {"figures": (SAME_FIGURE, 0.0), "frictions": (0.0, SAME_FRICTION)}
+        pairs = {kind: (own.get(kind, []), other.get(kind, [])) for kind in kinds}
+        near = all(np.allclose(*pairs[kind], *slack) for kind, slack in kinds.items())
         if near and moved <= SAME_CORNER:
             return []
-        return [f"{case}: {own['figures']} or {other['figures']}, moved by {moved:.1e}"]
+        return [f"{case}: {pairs['figures']}, {pairs['frictions']}, moved by {moved:.1e}"]
     if [g["id"] for g in own] != [g["id"] for g in other]:
         ids, others = ([g["id"] for g in each] for each in (own, other))
         at = next((i for i, (a, b) in enumerate(zip(ids, others, strict=False)) if a != b), None)
