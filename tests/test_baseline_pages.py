@@ -49,7 +49,9 @@ def test_the_first_steps_in_a_project_of_somebody_else(project):
     code, said = run_pytest_alone(project, "--grasp-bless", "wedge.grasps.toml")
     assert code == 0, said
     assert (project / "wedge.baseline.json").is_file()
-    code, said = run_pytest_alone(project, "--strict-markers", "-W", "error", "--grasp-report", "report")
+    code, said = run_pytest_alone(
+        project, "--strict-markers", "-W", "error", "--grasp-report", "report"
+    )
     assert code == 0, said
     assert "5 passed" in said
     assert "3 same, 2 stable" in (project / "report" / "index.html").read_text()

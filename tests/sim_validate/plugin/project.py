@@ -41,7 +41,7 @@ def run_pytest(folder, *arguments):
         patched.syspath_prepend(folder)
         patched.chdir(folder)
         with contextlib.redirect_stderr(said), warnings.catch_warnings():
-            warnings.resetwarnings()  # what is an error in our tests is a warning in those of others
+            warnings.resetwarnings()  # errors in our tests are warnings in those of others
             code = pytest.main([*line, *arguments])
     for name, module in list(sys.modules.items()):  # the next project has files of the same names
         file = getattr(module, "__file__", None)

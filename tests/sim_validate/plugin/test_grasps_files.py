@@ -83,7 +83,9 @@ def test_a_report_has_a_line_for_each_grasp(blessed, tmp_path, workers):
     record["grasps"][0].update(limit_n=1e3)
     baseline.write_text(json.dumps(record))
     write_text(tmp_path / "test_mine.py", CODE)
-    code, said = (run_pytest_alone if workers else run_pytest)(tmp_path, "--grasp-report", "out/report", *workers)
+    code, said = (run_pytest_alone if workers else run_pytest)(
+        tmp_path, "--grasp-report", "out/report", *workers
+    )
     assert code == 1, said
     found = json.loads((tmp_path / "out" / "report" / "report.json").read_text())["grasps"]
     assert sorted(line["status"] for line in found) == ["regressed", "same", "stable", "unstable"]
