@@ -14,7 +14,7 @@ from tests.tampering.changes import places
 from tests.tampering.table import INTERFACES, TABLE
 from tests.tampering.trying import attack, genuine
 
-QUICK, FULL = 60, 3_000
+QUICK, FULL = 150, 3_000
 """Tries of a row of weight one."""
 
 
