@@ -16,7 +16,7 @@ from sim_validate.baselines.suite_toml import KINDS, suite_from_toml
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.simulation.noise import Noise
-from tests.sim_validate.plugin.project import run_pytest
+from tests.sim_validate.plugin.project import run_pytest_alone
 
 ROOT = Path(__file__).parent.parent
 BEFORE, FIRST_STEPS, AFTER = re.fullmatch(
@@ -46,10 +46,12 @@ def test_the_first_steps_in_a_project_of_somebody_else(project):
     assert (project / "results.xml").is_file()
     (project / "wedge.grasps.toml").write_text(block(FIRST_STEPS, "toml"))
     (project / "test_mine.py").write_text(block(FIRST_STEPS, "py"))
-    code, said = run_pytest(project, "--grasp-bless", "wedge.grasps.toml")
+    code, said = run_pytest_alone(project, "--grasp-bless", "wedge.grasps.toml")
     assert code == 0, said
     assert (project / "wedge.baseline.json").is_file()
-    code, said = run_pytest(project, "--strict-markers", "-W", "error", "--grasp-report", "report")
+    code, said = run_pytest_alone(
+        project, "--strict-markers", "-W", "error", "--grasp-report", "report"
+    )
     assert code == 0, said
     assert "5 passed" in said
     assert "3 same, 2 stable" in (project / "report" / "index.html").read_text()
@@ -57,7 +59,7 @@ def test_the_first_steps_in_a_project_of_somebody_else(project):
 
 def test_the_tests_of_the_page_pass(project):
     (project / "test_page.py").write_text(block(PAGE, "python"))
-    code, said = run_pytest(project, "test_page.py", "--strict-markers", "-W", "error")
+    code, said = run_pytest_alone(project, "test_page.py", "--strict-markers", "-W", "error")
     assert code == 0, said
     assert "5 passed" in said
 

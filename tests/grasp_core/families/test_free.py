@@ -14,6 +14,7 @@ from grasp_core.objects.booleans import extrusion
 from grasp_core.objects.face_pieces import unit_pieces
 from scenes.example_objects import example_object
 from tests.judges import pyramid_margin
+from tests.marks import more
 
 TOLERANCE = 1e-7
 """Ten times the residual at which a program's answer is accepted, in object radii."""
@@ -205,7 +206,7 @@ def test_no_contacts_in_closure_are_found_where_absence_is_proved():
     assert len(absent) >= 60
 
 
-@pytest.mark.parametrize("each", [2, pytest.param(6, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("each", [2, *more(6)])
 def test_absence_holds_up_to_the_friction_at_which_the_patch_closes(each):
     """Just above it a grasp is found at once, or nearly always."""
     rng = np.random.default_rng(4)

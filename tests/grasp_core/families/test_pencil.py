@@ -12,6 +12,7 @@ from grasp_core.families.placements import Placement
 from grasp_core.objects.face_pieces import unit_pieces
 from scenes.example_objects import example_object
 from tests.grasp_core.quadruples import paired_quadruples, tilted_side_cones
+from tests.marks import more
 
 TOLERANCE = 1e-7
 """Ten times the residual at which a program's answer is accepted, in object radii."""
@@ -121,7 +122,7 @@ def extremes(quad):
     return rows
 
 
-@pytest.mark.parametrize("theta_deg", [5.0, 10.0])
+@pytest.mark.parametrize("theta_deg", [10.0, *more(5.0)])
 def test_any_contacts_on_the_disc_borders_are_in_force_closure(theta_deg):
     rng = np.random.default_rng(2)
     theta, grasps = math.radians(theta_deg), 0

@@ -18,6 +18,7 @@ from grasp_core.planning.methods import Searches
 from grasp_core.planning.request import PlanRequest
 from scenes.example_objects import example_object
 from tests.grasp_core.curved import curved_body
+from tests.marks import more
 
 CASES = {
     "convex": (lambda: example_object("random-12-1"), {"friction": 0.4}),
@@ -78,7 +79,7 @@ def opened(body, family, least):
     return promising(construction, listed, discs, lambda _: least[0], tally), made
 
 
-@pytest.mark.parametrize("family", ["concurrent", pytest.param("pencil", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("family", ["concurrent", *more("pencil")])
 def test_quadruples_come_in_the_order_of_their_bounds_and_only_as_asked_for(family):
     body, least = example_object("random-40-1"), [1e-3]
     quadruples, made = opened(body, family, least)

@@ -9,6 +9,8 @@ import pytest
 import grasp_core as gc
 from grasp_core.planning.request import METHODS
 from scenes.example_objects import example_object
+from tests.marks import MORE
+from tests.marks import more as more_of
 
 TEN_DEGREES = math.tan(math.radians(10.0))
 FAMILIES = ("concurrent", "pencil", "regulus")
@@ -53,7 +55,7 @@ def test_every_face_quadruple_is_held_absent_or_named_undecided():
     assert found.counts.families["free"].undecided == len(found.undecided)
 
 
-@pytest.mark.parametrize("name", ["box", "prism", "l-bracket", "wedge"])
+@pytest.mark.parametrize("name", ["box", "wedge", *more_of("prism", "l-bracket")])
 def test_every_four_faces_are_held_or_proved_to_hold_nothing(name):
     """Also where no normals span: with tilted cones most grasps have regions."""
     for friction in (0.3, 0.8):
@@ -69,7 +71,11 @@ def test_every_four_faces_are_held_or_proved_to_hold_nothing(name):
 
 @pytest.mark.parametrize(
     ("name", "least"),
-    [("box", 25), ("wedge", 70), pytest.param("octahedron", 100, marks=pytest.mark.slow)],
+    [
+        ("box", 25),
+        pytest.param("wedge", 70, marks=MORE),
+        pytest.param("octahedron", 100, marks=MORE),
+    ],
 )
 def test_what_less_friction_holds_more_friction_holds(name, least):
     tested = 0

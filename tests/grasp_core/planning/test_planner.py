@@ -15,6 +15,7 @@ from grasp_core.planning.request import METHODS
 from scenes.example_objects import example_object
 from tests.benchmarks.planning import sphere_hull
 from tests.judges import pyramid_margin, random_rotation
+from tests.marks import MORE, more
 
 TEN_DEGREES = math.tan(math.radians(10.0))
 RADIUS_ACCURACY = 1e-6
@@ -107,7 +108,7 @@ def test_every_grasp_lies_on_its_faces_inside_its_regions():
     [
         "wedge",
         "box",
-        *(pytest.param(n, marks=pytest.mark.slow) for n in ("random-10-1", "octahedron")),
+        *(pytest.param(n, marks=MORE) for n in ("random-10-1", "octahedron")),
     ],
 )
 def test_moving_turning_and_scaling_the_object_moves_its_grasps(name):
@@ -130,16 +131,16 @@ def test_moving_turning_and_scaling_the_object_moves_its_grasps(name):
     ("name", "least"),
     [
         ("wedge", 200),
-        pytest.param("random-10-1", 500, marks=pytest.mark.slow),
-        pytest.param("random-12-1", 1000, marks=pytest.mark.slow),
+        pytest.param("random-10-1", 500, marks=MORE),
+        pytest.param("random-12-1", 1000, marks=MORE),
     ],
 )
 def test_more_friction_never_loses_a_grasp(name, least):
     body, tested = example_object(name), 0
     frictions = (0.05, 0.1, 0.2, 0.35, 0.7)
     plans = [gc.plan(body, friction, families=DISCS, cones="normal") for friction in frictions]
-    for less, more in pairwise(plans):
-        radii = {grasp.id: grasp.radius for grasp in more.grasps}
+    for less, greater in pairwise(plans):
+        radii = {grasp.id: grasp.radius for grasp in greater.grasps}
         for grasp in less.grasps:
             assert radii[grasp.id] >= grasp.radius * (1 - RADIUS_ACCURACY)
             tested += 1
@@ -394,7 +395,7 @@ def test_a_focus_before_some_fingers_and_behind_others_gives_regions_where_nothi
     assert mixed >= 4
 
 
-@pytest.mark.parametrize("name", ["l-bracket", "hexagonal-pyramid"])
+@pytest.mark.parametrize("name", ["hexagonal-pyramid", *more("l-bracket")])
 def test_turned_scaled_and_shaken_objects_have_the_same_faces_and_families(name):
     """All methods, where much is symmetric and faces are not convex."""
     rng, body = np.random.default_rng(5), example_object(name)

@@ -16,6 +16,7 @@ from grasp_core.regions.certify_regions import certify_regions
 from sim_validate.records.regions import area_of
 from tests.grasp_core.curved import curved_body, inside, met
 from tests.judges import random_rotation
+from tests.marks import MORE
 
 FEW = 1_000
 CASES = [
@@ -99,7 +100,9 @@ def test_more_cones_give_larger_regions():
 
 
 @needs_kernels
-@pytest.mark.parametrize(("name", "family"), [CASES[0], CASES[2], CASES[3]])
+@pytest.mark.parametrize(
+    ("name", "family"), [CASES[0], CASES[2], pytest.param(*CASES[3], marks=MORE)]
+)
 def test_not_much_larger_discs_have_an_open_choice(name, family):
     """The other side of the proof, by contacts that the exact test refutes."""
     body, grasp, proved = found(name, family, cones=50_000 if name == "box" else 8_000)

@@ -120,6 +120,7 @@ def offline(monkeypatch, tmp_path):
     return datasets
 
 
+@pytest.mark.slow
 def test_hugging_face_datasets_loads_it_as_the_card_says(beside, offline, tmp_path):
     found = run(snippet(beside, "datasets"))["grasps"]
     expected = sim_validate.load_dataset(beside, "train")["grasps"]
@@ -134,6 +135,7 @@ def test_hugging_face_datasets_loads_it_as_the_card_says(beside, offline, tmp_pa
     assert compared == sum(cells(table) for table in whole.values())
 
 
+@pytest.mark.slow
 def test_hugging_face_datasets_takes_grasps_unless_told_otherwise(beside, offline):
     found = offline.load_dataset("ds")
     assert {name: len(rows) for name, rows in found.items()} == {

@@ -1,8 +1,14 @@
 """A project of somebody else's, with a baseline of two grasps, as tests of the plugin need it."""
 
+import contextlib
+import io
 import os
 import subprocess
 import sys
+import warnings
+from pathlib import Path
+
+import pytest
 
 CODE = """
 import grasp_core as gc
@@ -25,7 +31,27 @@ def test_it_does_not(assert_stable):
 
 
 def run_pytest(folder, *arguments):
-    """Run pytest as a user would; what it printed and its exit code."""
+    """Run pytest inside this process, which spares its start; its exit code and what it printed."""
+    said = io.StringIO()
+    line = ["-p", "no:cacheprovider", "-p", "no:faulthandler", "-p", "no:hypothesispytest"]
+    with pytest.MonkeyPatch.context() as patched, contextlib.redirect_stdout(said):
+        for name in [name for name in os.environ if "PYTEST" in name]:
+            patched.delenv(name)
+        patched.setenv("COLUMNS", "80")
+        patched.syspath_prepend(folder)
+        patched.chdir(folder)
+        with contextlib.redirect_stderr(said), warnings.catch_warnings():
+            warnings.resetwarnings()  # errors in our tests are warnings in those of others
+            code = pytest.main([*line, *arguments])
+    for name, module in list(sys.modules.items()):  # the next project has files of the same names
+        file = getattr(module, "__file__", None)
+        if file and Path(file).is_relative_to(folder):
+            del sys.modules[name]
+    return code, said.getvalue()
+
+
+def run_pytest_alone(folder, *arguments):
+    """Run pytest as a user would, in a process of its own; its exit code and what it printed."""
     line = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *arguments]
     plain = {name: value for name, value in os.environ.items() if "PYTEST" not in name}
     ran = subprocess.run(

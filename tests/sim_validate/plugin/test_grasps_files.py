@@ -11,7 +11,7 @@ from sim_validate.baselines.suite_toml import suite_from_toml
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.files.reading import write_text
 from sim_validate.main import main
-from tests.sim_validate.plugin.project import CODE, copied, run_pytest
+from tests.sim_validate.plugin.project import CODE, copied, run_pytest, run_pytest_alone
 
 
 def test_grasps_that_stay_as_they_were_pass(blessed, tmp_path):
@@ -27,7 +27,7 @@ def test_grasps_that_stay_as_they_were_pass(blessed, tmp_path):
 
 @pytest.mark.slow
 def test_they_pass_on_several_workers_too(blessed):
-    code, said = run_pytest(blessed, "-n", "2")
+    code, said = run_pytest_alone(blessed, "-n", "2")
     assert code == 0, said
     assert "2 passed" in said
 
@@ -83,7 +83,9 @@ def test_a_report_has_a_line_for_each_grasp(blessed, tmp_path, workers):
     record["grasps"][0].update(limit_n=1e3)
     baseline.write_text(json.dumps(record))
     write_text(tmp_path / "test_mine.py", CODE)
-    code, said = run_pytest(tmp_path, "--grasp-report", "out/report", *workers)
+    code, said = (run_pytest_alone if workers else run_pytest)(
+        tmp_path, "--grasp-report", "out/report", *workers
+    )
     assert code == 1, said
     found = json.loads((tmp_path / "out" / "report" / "report.json").read_text())["grasps"]
     assert sorted(line["status"] for line in found) == ["regressed", "same", "stable", "unstable"]
@@ -132,7 +134,7 @@ def test_nothing_heavy_is_imported():
     assert not {"numpy", "mujoco", "tyro"} & set(sys.modules)
 """,
     )
-    code, said = run_pytest(tmp_path)
+    code, said = run_pytest_alone(tmp_path)
     assert code == 0, said
     assert "1 passed" in said
 
@@ -189,7 +191,7 @@ def pytest_runtest_logreport(report):
 """,
     )
     write_text(tmp_path / "test_plain.py", "def test_it(): pass\n")
-    code, said = run_pytest(tmp_path, "-W", "error")
+    code, said = run_pytest_alone(tmp_path, "-W", "error")
     assert code == 0, said
     after = said.split("collected 1 item")[1]
     assert "grasp" not in after

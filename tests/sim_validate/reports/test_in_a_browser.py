@@ -10,6 +10,7 @@ from sim_validate.main import main
 from sim_validate.reports.report import write_report
 from tests.sim_validate.reports.test_report import EVIL, changed
 
+pytest.importorskip("selenium")
 BROWSER, DRIVER = (shutil.which(name) for name in ("chromium", "chromedriver"))
 pytestmark = [
     pytest.mark.slow,

@@ -13,6 +13,7 @@ from sim_validate.simulation.critical_friction import bisected, forces_just_abov
 from sim_validate.simulation.protocol import FrictionProtocol
 from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.simulate import Bench
+from tests.marks import more
 from tests.sim_validate.rigs import grasps
 
 FAMILIES = ("concurrent", "pencil", "regulus", "free")
@@ -62,7 +63,7 @@ def test_a_finger_that_hardly_needs_to_push_does_not_let_the_object_turn():
 
 
 @pytest.mark.parametrize("extent_m", [1e-3, 2.0])
-@pytest.mark.parametrize("name", ["box", "prism"])
+@pytest.mark.parametrize("name", ["box", *more("prism")])
 def test_it_is_found_at_any_size(name, extent_m):
     example, tested = scenes.example_object(name), 0
     scale = extent_m / float(np.ptp(example.vertices, axis=0).max())

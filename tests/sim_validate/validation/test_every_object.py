@@ -37,6 +37,7 @@ def hold_all(body, friction, limit):
 
 
 @pytest.mark.slow
+@pytest.mark.more
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("friction", [0.3, 0.5, 0.8])
 def test_all_planned_grasps_of_built_in_objects_hold_and_controls_do_not(friction):
@@ -48,6 +49,7 @@ def test_all_planned_grasps_of_built_in_objects_hold_and_controls_do_not(frictio
 
 
 @pytest.mark.slow
+@pytest.mark.more
 @pytest.mark.timeout(900)
 @pytest.mark.skipif(not PIECES.exists(), reason="the real meshes are not part of the repository")
 def test_all_planned_grasps_of_real_pieces_hold_and_controls_do_not():

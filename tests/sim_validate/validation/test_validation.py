@@ -15,6 +15,7 @@ from sim_validate.simulation.other_rules import RULES
 from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.simulation.setup import Agenda, NamedWrench, Setup
 from sim_validate.validation.controls import negative_controls
+from tests.marks import MORE, more
 from tests.sim_validate.rigs import grasps
 
 OBJECTS = (
@@ -23,7 +24,7 @@ OBJECTS = (
 WITHOUT_CONTROLS = Agenda(controls=False)
 
 
-@pytest.mark.parametrize("name", ["tetrahedron", "chamfered-box", "double-wedge-bar"])
+@pytest.mark.parametrize("name", ["tetrahedron", *more("chamfered-box", "double-wedge-bar")])
 @pytest.mark.parametrize("family", ["pencil", "regulus", "free"])
 def test_grasps_of_every_family_are_good(name, family):
     """At theta = 10 degrees; reguli among them need friction."""
@@ -36,7 +37,7 @@ def test_grasps_of_every_family_are_good(name, family):
         assert verdict.controls
 
 
-@pytest.mark.parametrize("friction", [0.2, 0.5, 0.8])
+@pytest.mark.parametrize("friction", [0.5, *more(0.2, 0.8)])
 def test_planned_grasps_hold_all_wrenches_and_no_control_does(friction):
     tested = controls = 0
     for name in OBJECTS:
@@ -175,22 +176,29 @@ def test_limits_do_not_depend_on_how_fingers_are_built(fingers):
         assert trial.simulated_limit.share == pytest.approx(1.0, abs=0.01)
 
 
-def test_pads_are_where_the_surface_of_the_mesh_is():
+@pytest.mark.parametrize(
+    ("name", "family"),
+    [
+        ("wedge", "concurrent"),
+        pytest.param("random-12-1", "regulus", marks=MORE),
+        pytest.param("prism", "free", marks=MORE),
+    ],
+)
+def test_pads_are_where_the_surface_of_the_mesh_is(name, family):
     """The same limits and critical friction when fingertips touch a convex object's own mesh."""
     agenda = replace(WITHOUT_CONTROLS, limits="ramp")
     tested = 0
-    for name, family in (("wedge", "concurrent"), ("random-12-1", "regulus"), ("prism", "free")):
-        body, (grasp, *_) = grasps(name, 0.5, 1, (family,))
-        pads, mesh = (
-            sv.validate(body, grasp, 0.5, agenda=agenda, setup=Setup(surface=surface))
-            for surface in ("pads", "mesh")
-        )
-        assert pads.good
-        assert mesh.good
-        for one, other in zip(pads.wrenches, mesh.wrenches, strict=True):
-            assert one.simulated_limit.share == pytest.approx(other.simulated_limit.share, abs=2e-3)
-            tested += 1
-    assert tested == 39
+    body, (grasp, *_) = grasps(name, 0.5, 1, (family,))
+    pads, mesh = (
+        sv.validate(body, grasp, 0.5, agenda=agenda, setup=Setup(surface=surface))
+        for surface in ("pads", "mesh")
+    )
+    assert pads.good
+    assert mesh.good
+    for one, other in zip(pads.wrenches, mesh.wrenches, strict=True):
+        assert one.simulated_limit.share == pytest.approx(other.simulated_limit.share, abs=2e-3)
+        tested += 1
+    assert tested == 13
 
 
 def test_an_object_that_is_not_convex_has_no_mesh_to_touch():

@@ -10,6 +10,7 @@ from sim_validate.simulation.gate.gate import measured_gate, require_faithful
 from sim_validate.simulation.gate.mesh_contacts import require_touch
 from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.simulation.setup import Setup
+from tests.marks import more
 from tests.sim_validate.rigs import grasps
 
 GOOD = PhysicsSettings()
@@ -103,7 +104,7 @@ def test_fingers_far_too_heavy_are_noticed():
     assert not measured_gate(Setup(fingers=scenes.FingerSettings(mass_kg=1e6))).passed
 
 
-@pytest.mark.parametrize("friction", [0.02, 0.2, 2.0])
+@pytest.mark.parametrize("friction", [0.02, 2.0, *more(0.2)])
 @pytest.mark.parametrize("radius_m", [7e-4, 7.0])
 def test_the_gate_passes_at_other_frictions_and_sizes(friction, radius_m):
     assert measured_gate(Setup(), friction, radius_m).passed
