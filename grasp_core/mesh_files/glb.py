@@ -57,9 +57,7 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
 
 
 def _chunks(data: bytes) -> tuple[Tree, bytes]:
-    """Split a GLB file into its JSON tree and its binary chunk, which is empty if the file has
-    none.
-    """
+    """Split a GLB file into its JSON tree and its binary chunk, which may be empty."""
     if len(data) < HEAD:
         broken("the head", f"expected {HEAD} bytes")
     magic, version, length = struct.unpack_from("<4sII", data)

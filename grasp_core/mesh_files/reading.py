@@ -49,7 +49,7 @@ def mesh_kind(path: Path) -> str:
     """
     kind = path.suffix.lower().lstrip(".")
     if kind not in FORMATS:
-        message = f"the file name must end in one of {', '.join(FORMATS)}, got {kind!r}"
+        message = f"the file's ending must be one of {', '.join(FORMATS)}, got {kind!r}"
         raise MeshError(MeshRefusal.FORMAT, message)
     return kind
 

@@ -205,7 +205,7 @@ def test_plain_arrays_come_back_as_numpy_writes_them(order):
 def test_given_contacts_in_an_archive_that_lies_are_refused_with_the_file(tmp_path):
     path = tmp_path / "g.npz"
     path.write_bytes(ARCHIVES["overflow"][0])
-    with pytest.raises(gc.InputError, match=r"g\.npz: no array contact_points_m"):
+    with pytest.raises(gc.InputError, match=r"g\.npz: the array contact_points_m is missing"):
         read_given(path)
 
 
