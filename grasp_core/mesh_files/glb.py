@@ -1,12 +1,12 @@
-"""Reads GLB: a JSON tree of nodes and meshes whose numbers lie in one binary chunk.
+"""Reads GLB files (binary glTF): a JSON chunk names nodes and meshes, a binary chunk holds numbers.
 
-The frame of a mesh is the product of the matrices from the root of its scene to its node; a mirror
-turns its triangles, so that outside stays outside. What would change shapes and is not read -
-compression, sparse numbers, skins, morphs, other files - is refused.
+The pose of a mesh is the product of the matrices from the root of its scene down to its node. Where
+this matrix mirrors, the triangles are wound the other way, so that normals still point outwards.
+Features that would change the shape and are not read (compression, sparse accessors, skins, morph
+targets, external files) are refused.
 
-Nodes may place the same part, and parts may share their numbers, as often as they like. So that a
-small file does not become a large scene, a part is read as far as its triangles go, and costs at
-least one of the triangles that are allowed.
+Several nodes may place the same mesh, and meshes may share their numbers. To keep a small file from
+becoming a huge scene, every primitive that is placed counts for at least one triangle of the limit.
 """
 
 import json
@@ -31,18 +31,18 @@ FLOAT_TYPE = 5126
 TRIANGLES, STRIP = 4, 5
 MOST_NODES = 10_000
 MOST_VALUES = 4_000_000
-"""In the JSON part: small ones take a quarter of a kilobyte of memory each."""
+"""Most JSON values allowed: each of them takes up to a quarter of a kilobyte of memory."""
 PLAIN_EXTENSIONS = ("KHR_materials", "KHR_texture", "KHR_lights", "EXT_texture", "KHR_xmp")
-"""Beginnings of the extensions that change looks only; all others are refused."""
+"""Prefixes of glTF extensions that change only the appearance; files with others are refused."""
 Tree = dict[str, Any]
 WRONG_TREE = (
     KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError,
 )  # fmt: skip
-"""What a tree of other keys and values than glTF has leads to."""
+"""Errors that Python raises while reading JSON whose keys or values are not those of glTF."""
 
 
 def read(data: bytes, most: int) -> tuple[Array, Indices]:
-    """Vertices (n, 3) and triangles (t, 3) of the scene of a GLB file.
+    """Read the vertices (n, 3) and triangles (t, 3) of a GLB file's default scene.
 
     Raises:
         MeshError: The file breaks a rule, or has more than `most` triangles.
@@ -57,7 +57,7 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
 
 
 def _chunks(data: bytes) -> tuple[Tree, bytes]:
-    """The tree, and the binary chunk, which is empty where the file has none."""
+    """Split a GLB file into its JSON tree and its binary chunk, which may be empty."""
     if len(data) < HEAD:
         broken("the head", f"expected {HEAD} bytes")
     magic, version, length = struct.unpack_from("<4sII", data)
@@ -73,7 +73,7 @@ def _chunks(data: bytes) -> tuple[Tree, bytes]:
             broken("the end", f"a chunk of {size} bytes is cut off")
         chunks.append((kind, data[place - size : place]))
     if [kind for kind, _ in chunks] not in ([JSON_CHUNK], [JSON_CHUNK, BINARY_CHUNK]):
-        broken("the chunks", "expected one of JSON, then at most one of binary numbers")
+        broken("the chunks", "expected one JSON chunk, then at most one binary chunk")
     return _tree(chunks[0][1]), chunks[1][1] if len(chunks) > 1 else b""
 
 
@@ -115,17 +115,17 @@ def _scene(tree: Tree, binary: bytes, most: int) -> tuple[Array, Indices]:
 def _check_features(tree: Tree) -> None:
     buffers = tree.get("buffers", [])
     if len(buffers) > 1 or any("uri" in buffer for buffer in buffers):
-        unsupported("numbers lie in other files or texts", "export one GLB that holds them")
+        unsupported("the numbers lie outside the binary chunk", "export one GLB that holds them")
     used = [*tree.get("extensionsRequired", ()), *tree.get("extensionsUsed", ())]
     for name in used:
         if not str(name).startswith(PLAIN_EXTENSIONS):
             unsupported(f"extension {shown(name)!r}", "export plain glTF, without compression")
     if any("skin" in node or "weights" in node for node in tree.get("nodes", [])):
-        unsupported("skins and morphs move vertices", "export the mesh as it stands")
+        unsupported("a node has a skin or morph weights", "export the mesh in its final shape")
 
 
 def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
-    """Yield each mesh of the scene by its number, with its matrix, (4, 4).
+    """Yield the 4x4 pose matrix and the index of each mesh in the default scene.
 
     Raises:
         MeshError: The nodes do not form a tree, or there are too many.
@@ -149,7 +149,7 @@ def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
         if "mesh" in node:
             _check_place(node["mesh"], tree["meshes"])
             if "camera" in node:
-                unsupported(f"node {number} is a mesh and a camera", "export the mesh alone")
+                unsupported(f"node {number} holds a mesh and a camera", "export the mesh alone")
             yield matrix, node["mesh"]
 
 
@@ -161,7 +161,7 @@ def _await(waiting: list[tuple[Array, int]], matrix: Array, nodes: list[int]) ->
 
 def _check_place(place: object, listed: list[Any]) -> None:
     if type(place) is not int or not 0 <= place < len(listed):
-        broken("the JSON part", f"names item {shown(place)} of {len(listed)}")
+        broken("the JSON part", f"refers to item {shown(place)} of a list of {len(listed)}")
 
 
 def _matrix(node: Tree) -> Array:
@@ -172,7 +172,9 @@ def _matrix(node: Tree) -> Array:
         # glTF lists matrices by columns
         matrix = _floats(node, "matrix", 16).reshape(4, 4).T
         if (matrix[3] != (0.0, 0.0, 0.0, 1.0)).any():
-            unsupported("a node with a projective matrix", "export it without")
+            unsupported(
+                "the last row of a node's matrix is not 0 0 0 1", "export it without perspective"
+            )
         return matrix
     if "rotation" in node:
         matrix[:3, :3] = _rotation(_floats(node, "rotation", 4))
@@ -210,19 +212,19 @@ def _rotation(quaternion: Array) -> Array:
 
 
 def _primitive(tree: Tree, binary: bytes, primitive: Tree, left: int) -> tuple[Indices, Array]:
-    """Triangles (t, 3) and the vertices that they use (n, 3), of a part of a mesh.
+    """Read the triangles (t, 3) of one primitive of a mesh, and the vertices (n, 3) that they use.
 
     Args:
-        tree: The JSON part.
-        binary: The binary part.
-        primitive: The part of a mesh, in the tree.
-        left: Triangles that may be.
+        tree: The JSON chunk.
+        binary: The binary chunk.
+        primitive: The primitive's entry in the JSON chunk.
+        left: How many more triangles are allowed.
     """
     mode = primitive.get("mode", TRIANGLES)
     if "targets" in primitive or primitive.get("extensions"):
-        unsupported("a part with morphs or compression", "export plain triangles")
+        unsupported("a primitive has morph targets or extensions", "export plain triangles")
     if mode not in (TRIANGLES, STRIP):
-        unsupported(f"a part of mode {shown(mode)}, not of triangles", "export triangles only")
+        unsupported(f"a primitive has mode {shown(mode)}, not triangles", "export triangles only")
     points = _stored(tree, binary, primitive["attributes"]["POSITION"], "VEC3")
     order = (
         _stored(tree, binary, primitive["indices"], "SCALAR") if "indices" in primitive else None
@@ -237,7 +239,7 @@ def _primitive(tree: Tree, binary: bytes, primitive: Tree, left: int) -> tuple[I
         # every other triangle of a strip is wound the other way
         rows[1::2] = rows[1::2, [1, 0, 2]]
     elif len(flat) % CORNERS:
-        broken("a part", f"{len(flat)} corners do not make whole triangles")
+        broken("a primitive", f"{len(flat)} corners are not a multiple of three")
     else:
         rows = flat.reshape(-1, 3)
     if rows.size and rows.max() >= points.count:
@@ -249,10 +251,10 @@ def _primitive(tree: Tree, binary: bytes, primitive: Tree, left: int) -> tuple[I
 
 @dataclass(frozen=True, slots=True)
 class _Stored:
-    """Numbers as they lie in the file, which are read when they are asked for."""
+    """The numbers of one accessor as raw bytes, converted only when `rows` is called."""
 
     raw: NDArray[np.uint8]
-    """Bytes of each row, (count, bytes of a row)."""
+    """Bytes of each row, (number of rows, bytes per row)."""
     item: "np.dtype[Any]"
 
     @property
@@ -260,23 +262,23 @@ class _Stored:
         return len(self.raw)
 
     def rows(self, which: "slice | Indices") -> "NDArray[Any]":
-        """Some rows, (n, numbers of a row)."""
+        """Convert the selected rows to numbers, (n, numbers per row)."""
         return np.ascontiguousarray(self.raw[which]).view(self.item)
 
 
 def _stored(tree: Tree, binary: bytes, number: int, shape: str) -> _Stored:
-    """The numbers of an accessor, a row for each of its elements."""
+    """Find the numbers of a glTF accessor in the binary chunk, one row per element."""
     _check_place(number, tree["accessors"])
     accessor = tree["accessors"][number]
     kind = accessor["componentType"]
     wanted = {FLOAT_TYPE: "<f4"} if shape == "VEC3" else INDEX_TYPES
     if accessor["type"] != shape or kind not in wanted or accessor.get("normalized"):
         unsupported(
-            f"accessor {number} is {shown(accessor['type'])} of {shown(kind)}",
+            f"accessor {number} has type {shown(accessor['type'])} of component {shown(kind)}",
             "export plain triangles",
         )
     if "sparse" in accessor or "bufferView" not in accessor:
-        unsupported(f"accessor {number} is sparse or empty", "export plain triangles")
+        unsupported(f"accessor {number} is sparse or without data", "export plain triangles")
     _check_place(accessor["bufferView"], tree["bufferViews"])
     view = tree["bufferViews"][accessor["bufferView"]]
     _check_place(view["buffer"], tree["buffers"])
@@ -286,10 +288,16 @@ def _stored(tree: Tree, binary: bytes, number: int, shape: str) -> _Stored:
     inside, start = accessor.get("byteOffset", 0), view.get("byteOffset", 0)
     sizes = (stride, inside, start, count, view["byteLength"])
     if any(type(size) is not int or size < 0 for size in sizes) or stride < row:
-        broken(f"accessor {number}", f"sizes must be whole numbers, rows at least {row} bytes")
+        broken(
+            f"accessor {number}",
+            f"sizes must be whole numbers from 0 on, byteStride at least {row}",
+        )
     length = (count - 1) * stride + row if count else 0
     if inside + length > view["byteLength"] or start + view["byteLength"] > len(binary):
-        broken(f"accessor {number}", f"{count} numbers do not fit into their {len(binary)} bytes")
+        broken(
+            f"accessor {number}",
+            f"{count} elements do not fit into the binary chunk of {len(binary)} bytes",
+        )
     raw = np.frombuffer(binary, dtype=np.uint8)[start + inside :]
     rows = np.lib.stride_tricks.as_strided(raw, (count, row), (stride, 1), writeable=False)
     return _Stored(rows, item)

@@ -1,4 +1,4 @@
-"""How large a mesh file and what it holds may be.
+"""The limits on a mesh file's bytes, triangles, planar faces and bodies.
 
 Nothing heavy is imported here, so that command-line flags can show the same values.
 """
@@ -10,14 +10,14 @@ from grasp_core.checked import whole
 
 @dataclass(frozen=True, slots=True)
 class MeshLimits:
-    """How large a mesh file and what it holds may be; they bound the time and memory of reading."""
+    """Limits on a mesh file's size and content, which bound the time and memory of reading it."""
 
     max_bytes: int = 64 * 2**20
     max_triangles: int = 200_000
     max_faces: int = 5_000
-    """Most planar faces."""
+    """Most planar faces of the object."""
     max_parts: int = 64
-    """Most parts of the surface: bodies and cavities."""
+    """Most connected parts of the surface: separate bodies and inner cavities."""
 
     def __post_init__(self) -> None:
         for name in ("max_bytes", "max_triangles", "max_faces", "max_parts"):

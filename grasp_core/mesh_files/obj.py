@@ -1,4 +1,4 @@
-"""Reads OBJ text: `v` and `f` lines; looks and groups are ignored, curved surfaces refused."""
+"""Reads OBJ files: vertices and polygons; groups and looks are ignored, curved surfaces refused."""
 
 import re
 from array import array
@@ -20,19 +20,19 @@ PASSED_OVER = frozenset(
     b"vt vn g o s usemtl mtllib usemap maplib lod bevel c_interp d_interp shadow_obj trace_obj mg "
     b"l p".split()
 )
-"""They change looks, names or curves, not the surface."""
+"""OBJ keywords that are ignored: they set appearance, groups or curves, not the surface."""
 SURFACE = re.compile(rb"\s*[vf]\s")
 CORNER = re.compile(rb"[+-]?\d++(/([+-]?\d++)?){0,2}")
-"""A vertex, perhaps of a texture and a normal."""
+"""The form of one corner of a face: a vertex number, then optional texture and normal numbers."""
 WIDTHS = (3, 4, 6, 7)
-"""How many numbers a vertex may have: a point, perhaps its weight, perhaps a colour."""
+"""Allowed counts of numbers on a `v` line: a point, an optional weight, an optional colour."""
 WEIGHTED = (4, 7)
 FLOATS = 3
 GOES_ON = b"\\\n"
 
 
 def read(data: bytes, most: int) -> tuple[Array, Indices]:
-    """Vertices (n, 3) and triangles (t, 3) of an OBJ text.
+    """Read the vertices (n, 3) and triangles (t, 3) of an OBJ file.
 
     Raises:
         MeshError: The text breaks a rule, with the line, or has more than `most` triangles.
@@ -46,33 +46,33 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
             polygons.add(_corners(words, len(points) // FLOATS, where), where)
         elif keyword not in PASSED_OVER:
             unsupported(
-                f"{where}: {shown(keyword)!r} is not part of a polyhedron", "export polygons only"
+                f"{where}: the keyword {shown(keyword)!r} is not read", "export polygons only"
             )
     return polygons.on(points_of(points))
 
 
 def _statements(text: bytes) -> Iterator[tuple[int, list[bytes]]]:
-    """The words of each statement with the number of its first line."""
+    """Yield the words of each statement, with the number of its first line."""
     return _joined(text) if GOES_ON in text else worded_lines(text, comments=True)
 
 
 def _joined(text: bytes) -> Iterator[tuple[int, list[bytes]]]:
-    """Statements of which some go on: a backslash at the end of a line joins it with the next.
+    """Yield statements like `_statements`; a backslash at the end of a line joins it with the next.
 
-    Whether it does so in a comment is not said anywhere, so that a comment which could swallow a
-    part of the surface is refused.
+    The format does not say whether a backslash also does so in a comment. A comment with one, right
+    before a `v` or `f` line, is therefore refused.
     """
     held, begun, after_backslash = bytearray(), 0, False
     for number, line in numbered_lines(text):  # pieces are appended in place, in linear time
         kept, _, comment = line.partition(b"#")
         if after_backslash and SURFACE.match(kept):
-            broken(f"line {number - 1}", "a comment ends in a backslash, before a part of the mesh")
+            broken(f"line {number - 1}", "a comment ends in a backslash before a `v` or `f` line")
         after_backslash = comment.endswith(GOES_ON)
         begun = begun if held else number
         goes_on = kept.endswith(GOES_ON)
         held += kept.removesuffix(GOES_ON)
         if len(held) > LONGEST_LINE:
-            broken(f"line {begun}", f"goes on for more than {LONGEST_LINE} bytes")
+            broken(f"line {begun}", f"the statement is longer than {LONGEST_LINE} bytes")
         if not goes_on:
             if words := bytes(held).split():
                 yield begun, words
@@ -91,10 +91,10 @@ def _vertex(words: list[bytes], where: str) -> list[float]:
 
 
 def _corners(words: list[bytes], vertices: int, where: str) -> list[int]:
-    """Numbers of vertices from 0 on.
+    """Convert the corners of an `f` line to vertex numbers that count from 0.
 
-    Those in the file count from 1, wherever in the file their vertex stands, or back from the last
-    vertex above their line.
+    In the file, positive numbers count from 1; negative ones count back from the last vertex so
+    far.
     """
     for word in words:
         if not CORNER.fullmatch(word):

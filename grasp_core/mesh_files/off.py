@@ -1,4 +1,4 @@
-"""Reads OFF text: the word OFF, three counts, the vertices, the polygons, and nothing else."""
+"""Reads OFF files: the word OFF, three counts, the vertices and the polygons."""
 
 import re
 from array import array
@@ -11,13 +11,13 @@ from grasp_core.mesh_files.words import numbers, plain_text, whole, worded_lines
 
 Lines = Iterator[tuple[int, list[bytes]]]
 HEAD = re.compile(rb"(ST)?C?N?OFF")
-"""Textures, colours and normals follow the three coordinates of a vertex, and are passed over."""
+"""Words that begin an OFF file; texture, colour and normal values after a point are ignored."""
 COUNTS = (2, 3)
 FLOATS = 3
 
 
 def read(data: bytes, most: int) -> tuple[Array, Indices]:
-    """Vertices (n, 3) and triangles (t, 3) of an OFF text.
+    """Read the vertices (n, 3) and triangles (t, 3) of an OFF file.
 
     Raises:
         MeshError: The text breaks a rule, with the line, or has more than `most` triangles.
@@ -36,10 +36,13 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
         where = f"line {number}"
         corners = whole(words[0], where)
         if not 0 <= corners < len(words):
-            broken(where, f"a face of {corners} corners lists {len(words) - 1}")
+            broken(where, f"a face that says {corners} corners lists {len(words) - 1}")
         polygons.add([whole(word, where) for word in words[1 : corners + 1]], where)
     if (after := next(lines, None)) is not None:
-        broken(f"line {after[0]}", f"comes after the {vertices} vertices and {faces} faces counted")
+        broken(
+            f"line {after[0]}",
+            f"more lines than the {vertices} vertices and {faces} faces announced",
+        )
     return polygons.on(points_of(points))
 
 

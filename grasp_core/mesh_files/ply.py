@@ -1,4 +1,4 @@
-"""PLY: elements with properties as text or binary, as many as the header says, and nothing else."""
+"""Reads PLY files, text or binary: tables of vertices and faces that the header describes."""
 
 import struct
 from array import array
@@ -16,15 +16,15 @@ from grasp_core.mesh_files.words import numbers, plain_text, whole, worded_lines
 
 LARGEST_CORNER = 2**32
 LARGEST_ROW = 2**30
-"""Bytes of a row that numpy takes."""
+"""Most bytes of one row of a table that numpy can describe."""
 CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
 Lines = Iterator[tuple[int, list[bytes]]]
 Cells = dict[str, Sequence[float]]
-"""The values of a row that make the surface, by the names of their properties."""
+"""The values of one row that describe the surface, by the name of their property."""
 
 
 def read(data: bytes, most: int) -> tuple[Array, Indices]:
-    """Vertices (n, 3) and triangles (t, 3) of a PLY file.
+    """Read the vertices (n, 3) and triangles (t, 3) of a PLY file.
 
     Raises:
         MeshError: The file breaks a rule, or has more than `most` triangles.
@@ -46,7 +46,7 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
 
 
 def _text_points(header: Header, data: bytes, polygons: Polygons) -> Array:
-    """Vertices (n, 3) as their types keep them; faces are added to the polygons."""
+    """Read the vertices (n, 3) of a text PLY, and add its faces to `polygons`."""
     points = np.empty((0, 3))
     lines = worded_lines(plain_text(data, header.end))
     for element in header.elements:
@@ -60,21 +60,21 @@ def _text_points(header: Header, data: bytes, polygons: Polygons) -> Array:
                 listed = _text_corners(corners, numbers(cells[corners.name], where), where)
                 polygons.add(listed, where)
     if (after := next(lines, None)) is not None:
-        broken(f"line {after[0]} after the header", "comes after all that is counted")
+        broken(f"line {after[0]} after the header", "more lines than the header announces")
     return points
 
 
 def _rows_of(element: Element, lines: Lines) -> Iterator[tuple[str, list[bytes]]]:
-    """The words of each row, and where it is written."""
+    """Yield the words of each row of a table, with the row's place in the file for messages."""
     for row in range(element.rows):
         number, words = next(lines, (0, list[bytes]()))
         if not words:
-            broken("the end", f"{element.rows} of {element.name} are counted, {row} are there")
+            broken("the end", f"the header announces {element.rows} {element.name} rows, got {row}")
         yield f"{element.name} {row}, line {number} after the header", words
 
 
 def _text_vertices(element: Element, lines: Lines) -> Array:
-    """Vertices (n, 3)."""
+    """Read the vertex table of a text PLY as points (n, 3)."""
     coordinates = array("d")
     places = [element.properties.index(element.place((axis,))) for axis in POINT]
     for where, words in _rows_of(element, lines):
@@ -90,7 +90,7 @@ def _text_vertices(element: Element, lines: Lines) -> Array:
 
 
 def _text_cells(element: Element, words: list[bytes], where: str) -> dict[str, list[bytes]]:
-    """The words of each property of a row."""
+    """Split the words of one row by property name; a list comes as several words."""
     _check_numbers(words, where)
     found, place = dict[str, list[bytes]](), 0
     for each in element.properties:
@@ -102,14 +102,14 @@ def _text_cells(element: Element, words: list[bytes], where: str) -> dict[str, l
         place += max(length, 0)
         if length < 0 or place > len(words):
             there = len(found[each.name])
-            broken(where, f"{each.name} lists {length} values, {there} are there")
+            broken(where, f"list {each.name} announces {length} values, got {there}")
     if place < len(words):
-        broken(where, "more values than properties")
+        broken(where, "the row has more values than the header has properties")
     return found
 
 
 def _check_numbers(words: list[bytes], where: str) -> None:
-    """Refuse words that are no numbers where nothing is made of them; normals may be nan."""
+    """Refuse words that are not numbers in columns that are not used; nan is allowed there."""
     try:
         for word in words:
             float(word)
@@ -118,14 +118,14 @@ def _check_numbers(words: list[bytes], where: str) -> None:
 
 
 def _as_typed(element: Element, points: Array) -> Array:
-    """Coordinates (n, 3) as the types of their properties keep them."""
+    """Round coordinates (n, 3) to the number types that the header gives for x, y and z."""
     for column, axis in enumerate(POINT):
         kind = np.dtype(element.place((axis,)).kind)
         values = points[:, column]
         with np.errstate(over="ignore", under="ignore", invalid="ignore"):
             kept = values.astype(kind)
         if kind.kind != "f" and (wrong := np.flatnonzero(kept != values)).size:
-            broken(f"vertex {wrong[0]}", f"{axis} is no whole number of its type")
+            broken(f"vertex {wrong[0]}", f"{axis} does not fit its whole-number type in the header")
         points[:, column] = kept
     return points
 
@@ -139,12 +139,12 @@ def _text_corners(each: Property, values: list[float], where: str) -> list[int]:
     if kind.kind != "f":
         low, high = int(np.iinfo(kind).min), int(np.iinfo(kind).max)
     if not all(low <= value <= high and value == int(value) for value in values):
-        broken(where, "corners must be numbers of vertices")
+        broken(where, "the corners of a face must be vertex numbers, whole and in range")
     return [int(value) for value in values]
 
 
 def _binary_points(header: Header, data: bytes, polygons: Polygons) -> Array:
-    """Vertices (n, 3); faces are added to the polygons."""
+    """Read the vertices (n, 3) of a binary PLY, and add its faces to `polygons`."""
     points, place = np.empty((0, 3)), header.end
     for element in header.elements:
         rows = _equal_rows(element, data, place, header.order)
@@ -158,12 +158,12 @@ def _binary_points(header: Header, data: bytes, polygons: Polygons) -> Array:
         elif element.name == "face":
             _add_faces(rows[element.place(LISTS).name], polygons)
     if place < len(data):
-        broken("the end", f"{len(data) - place} bytes come after all that is counted")
+        broken("the end", f"{len(data) - place} bytes follow the tables that the header announces")
     return points
 
 
 def _equal_rows(element: Element, data: bytes, place: int, order: str) -> NDArray[np.void] | None:
-    """All rows, if their lists are as long as those of the first; None if they may not be.
+    """Read a binary table at once if all its rows are equally long; return None if they may not be.
 
     Raises:
         MeshError: The rows do not fit into the file.
@@ -185,7 +185,7 @@ def _equal_rows(element: Element, data: bytes, place: int, order: str) -> NDArra
             return None
     if width * element.rows > len(data) - place:
         if not counts:
-            broken("the end", f"{element.rows} of {element.name} are counted, fewer are there")
+            broken("the end", f"the header announces {element.rows} {element.name} rows, got fewer")
         return None
     row = np.dtype(
         {
@@ -204,7 +204,7 @@ def _equal_rows(element: Element, data: bytes, place: int, order: str) -> NDArra
 
 
 def _add_faces(corners: NDArray[np.generic], polygons: Polygons) -> None:
-    """Add faces of as many corners each, (n, k)."""
+    """Add faces that all have the same number of corners k, given as vertex numbers (n, k)."""
     count, sides = corners.shape
     if count and sides < CORNERS:
         broken("face 0", f"a face needs three corners, got {sides}")
@@ -216,14 +216,14 @@ def _add_faces(corners: NDArray[np.generic], polygons: Polygons) -> None:
 
 def _whole_corners(listed: Sequence[float], where: str) -> list[int]:
     if not all(abs(corner) <= LARGEST_CORNER and corner == int(corner) for corner in listed):
-        broken(where, "corners must be numbers of vertices")
+        broken(where, "the corners of a face must be vertex numbers, whole and in range")
     return [int(corner) for corner in listed]
 
 
 def _differing_rows(
     element: Element, data: bytes, place: int, order: str, most: int
 ) -> Iterator[tuple[int, Cells]]:
-    """Each row, one after another, and where it ends; lists may differ in length.
+    """Yield each row of a binary table whose rows differ in length, with the byte where it ends.
 
     Raises:
         MeshError: A row does not fit into the file, or is a polygon of more than `most` triangles.
@@ -246,9 +246,11 @@ def _differing_rows(
                 (length,) = count.unpack_from(data, place - count.size)
             past = place + size * length
             if length < 0:
-                broken(f"{element.name} {row}", f"{name} lists {length} values")
+                broken(f"{element.name} {row}", f"list {name} announces {length} values")
             if past > len(data):
-                broken("the end", f"{element.rows} of {element.name} are counted, {row} are there")
+                broken(
+                    "the end", f"the header announces {element.rows} {element.name} rows, got {row}"
+                )
             if kept:
                 if length - 2 > most:
                     too_many(length - 2, most)
@@ -264,7 +266,10 @@ def _add_differing(
     place: int,
     polygons: Polygons,
 ) -> tuple[Array, int]:
-    """Vertices (n, 3) where the element is theirs, else as given, and where the rows end."""
+    """Read rows of different lengths; return the vertices (n, 3) and the byte where the table ends.
+
+    For any table other than the vertices, the points given are returned unchanged.
+    """
     coordinates = array("d")
     for row, (end, cells) in enumerate(rows):
         place = end

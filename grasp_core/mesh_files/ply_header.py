@@ -1,4 +1,4 @@
-"""The header of a PLY file: which elements follow, and what each row of them holds."""
+"""Reads the header of a PLY file: which tables ("elements") follow, and the columns of each."""
 
 import re
 from dataclasses import dataclass, field
@@ -21,28 +21,28 @@ POINT = ("x", "y", "z")
 
 @dataclass(frozen=True, slots=True)
 class Property:
-    """A number, or a list of numbers, of each thing of an element."""
+    """A column of a PLY table: one number, or one list of numbers, in each row."""
 
     name: str
     kind: str
-    """The type of the numbers, as numpy writes it without the order of bytes."""
+    """The number type as numpy writes it, without the byte order, such as `f4`."""
     count_kind: str | None = None
-    """The type of a list's length; None for a number."""
+    """The number type of a list's length; None if the column holds single numbers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """A table of the file."""
+    """A table that the header of a PLY file announces, such as `vertex` or `face`."""
 
     name: str
     rows: int
     properties: list[Property] = field(default_factory=list[Property])
 
     def place(self, names: tuple[str, ...]) -> Property:
-        """The property of one of the names.
+        """Find the one property whose name is among `names`.
 
         Raises:
-            MeshError: There is none.
+            MeshError: The table has no such property, or more than one.
         """
         found = [each for each in self.properties if each.name in names]
         if len(found) != 1:
@@ -51,37 +51,37 @@ class Element:
 
     @property
     def kept(self) -> tuple[str, ...]:
-        """The names of the properties that make the surface."""
+        """The names of the properties that describe the surface."""
         return {"vertex": POINT, "face": LISTS}.get(self.name, ())
 
     @property
     def lists(self) -> bool:
-        """Whether rows hold lists, so that they may differ in length."""
+        """Whether any property is a list, so that rows may differ in length."""
         return any(each.count_kind is not None for each in self.properties)
 
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What follows a header, and from which byte on."""
+    """The tables of a PLY file, and the byte where the header ends."""
 
     order: str
-    """Byte order, or `=` for text."""
+    """Byte order of the numbers, `<` or `>`, or `=` for a text file."""
     elements: list[Element]
     end: int
 
 
 def read_header(data: bytes) -> Header:
-    """The header of a PLY file.
+    """Read the header of a PLY file.
 
     Raises:
-        MeshError: It breaks a rule, or has no vertices or faces.
+        MeshError: The header breaks a rule, or announces no vertices or no faces.
     """
     found = END.search(data[:LONGEST_HEADER])
     if not found:
         broken("header", "expected `end_header`")
     order, elements = _lines(data[: found.start()])
     if not order:
-        broken("header", "expected a format")
+        broken("header", "expected a line such as `format ascii 1.0`")
     for element in elements:
         _check_element(element)
     tables = {each.name: each for each in elements}
@@ -95,7 +95,7 @@ def _lines(text: bytes) -> tuple[str, list[Element]]:
     first, *lines = [line.split() for line in text.decode("ascii", "replace").splitlines()]
     order, elements = "", list[Element]()
     if first != ["ply"]:
-        broken("header", "expected the word ply")
+        broken("header", "expected the first line `ply`")
     for number, words in enumerate(lines, 2):
         where = f"header line {number}"
         match words:
@@ -108,7 +108,9 @@ def _lines(text: bytes) -> tuple[str, list[Element]]:
             case ["property", first, *others] if elements:
                 elements[-1].properties.append(_property([first, *others], where))
             case _:
-                broken(where, f"got {shown(' '.join(words))!r}")
+                broken(
+                    where, f"expected format, element or property, got {shown(' '.join(words))!r}"
+                )
     return order, elements
 
 
@@ -123,16 +125,16 @@ def _check_properties(vertex: Element, face: Element) -> None:
 def _check_element(element: Element) -> None:
     names = [element.name, *(each.name for each in element.properties)]
     if not all(NAME.fullmatch(name) for name in names) or len(names[1:]) > len(set(names[1:])):
-        broken("header", "names must be of letters and digits, and differ")
+        broken("header", "names must be letters, digits and _, and differ within an element")
     if element.rows < 0 or not element.properties:
-        broken("header", f"element {element.name} needs properties, and a count from 0 on")
+        broken("header", f"element {element.name} needs properties and a count from 0 on")
 
 
 def _property(said: list[str], where: str) -> Property:
     lists = said[0] == "list"
     kinds = said[1:-1] if lists else said[:-1]
     if len(kinds) != 1 + lists or not TYPES.keys() >= set(kinds):
-        broken(where, f"got the property {shown(' '.join(said))!r}")
+        broken(where, f"expected `TYPE NAME` or a list, got {shown(' '.join(said))!r}")
     if lists and TYPES[kinds[0]].startswith("f"):
         broken(where, "the length of a list must be a whole number")
     return Property(said[-1], TYPES[kinds[-1]], TYPES[kinds[0]] if lists else None)

@@ -1,4 +1,4 @@
-"""Turns vertices and polygons as a file lists them into triangles, if fans give the polygons."""
+"""Turns the vertices and polygons of a mesh file into triangles: a fan around each first corner."""
 
 from array import array
 from collections.abc import Sequence
@@ -14,9 +14,9 @@ from grasp_core.mesh_files.refusals import broken, outside
 CORNERS = 3
 QUAD = 4
 FOLDED = 1e-9
-"""A triangle of a fan counts as backwards beyond this share of its polygon."""
+"""A fan's triangle is folded back if its projection is below minus this share of the polygon."""
 FLATTEST = 0.5
-"""Least area of a polygon seen along its normal, relative to that of its triangles."""
+"""Least area of a polygon projected along its normal, relative to the sum of its triangles."""
 
 
 def _no_triangles() -> "array[int]":
@@ -25,26 +25,26 @@ def _no_triangles() -> "array[int]":
 
 @dataclass(slots=True)
 class Polygons:
-    """The polygons that were read so far, as triangles: 24 bytes for each of them."""
+    """Collects the polygons of a file as triangles, at 24 bytes each."""
 
     most: int
-    """Triangles that may be."""
+    """Most triangles allowed."""
     first: int = 0
-    """The number that the file gives to its first vertex, for messages."""
+    """The number of the file's first vertex, 0 or 1, for messages."""
     triangles: "array[int]" = field(default_factory=_no_triangles)
-    """Three corners of each triangle."""
+    """Vertex numbers, three for each triangle, in one flat array."""
     large: list[tuple[str, Sequence[int]]] = field(default_factory=list[tuple[str, Sequence[int]]])
-    """Polygons of four corners and more, with where they are written."""
+    """Polygons with four or more corners, each with its place in the file."""
     lowest: tuple[int, str] = (0, "")
-    """The least corner below 0, and where it is written."""
+    """The lowest vertex number below 0 so far, and its place in the file."""
     highest: tuple[int, str] = (-1, "")
-    """The largest corner, and where it is written."""
+    """The highest vertex number so far, and its place in the file."""
 
     def add(self, corners: Sequence[int], where: str) -> None:
-        """Add a polygon, by the numbers of its vertices from 0 on.
+        """Add a polygon, given by vertex numbers that count from 0.
 
         Raises:
-            MeshError: It has fewer than three corners, or there are too many triangles.
+            MeshError: The polygon has fewer than three corners, or there are too many triangles.
         """
         if len(corners) < CORNERS:
             broken(where, f"a face needs three corners, got {len(corners)}")
@@ -66,10 +66,10 @@ class Polygons:
             self.large.append((where, corners))
 
     def on(self, points: Array) -> tuple[Array, Indices]:
-        """Vertices (n, 3), as given, and triangles (t, 3).
+        """Return the given vertices (n, 3) and the triangles (t, 3), after checking every corner.
 
         Raises:
-            MeshError: A corner names a missing vertex, or a fan folds back on its polygon.
+            MeshError: A corner names a missing vertex, or a polygon's fan folds back on itself.
         """
         for (corner, where), wrong in (
             (self.lowest, self.lowest[0] < 0),
@@ -83,22 +83,22 @@ class Polygons:
 
 
 def points_of(coordinates: "array[float]") -> Array:
-    """Vertices (n, 3) of coordinates one after another, which are not copied."""
+    """View a flat array of coordinates as vertices (n, 3), without a copy."""
     return np.frombuffer(coordinates, dtype=np.float64).reshape(-1, 3)
 
 
 def too_many(triangles: int, most: int) -> None:
-    """Refuse a file for its number of triangles.
+    """Refuse a file that has too many triangles.
 
     Raises:
         MeshError: Always.
     """
-    message = f"{triangles} triangles or more, the limit is {most}; simplify the mesh"
+    message = f"the mesh has {triangles} or more triangles, the limit is {most}; simplify the mesh"
     raise MeshError(MeshRefusal.TOO_MANY, message)
 
 
 def _check_fan(corners: Array, where: str) -> None:
-    """Refuse a polygon that is not the fan around its first corner."""
+    """Refuse a polygon whose fan of triangles around the first corner overlaps or leaves it."""
     with np.errstate(over="ignore", invalid="ignore"):  # sizes are judged later
         spokes = corners[1:] - corners[0]
         crosses = np.cross(spokes[:-1], spokes[1:])
@@ -108,5 +108,5 @@ def _check_fan(corners: Array, where: str) -> None:
         winds = np.arctan2(areas, dots).sum() > 2.0 * np.pi + FOLDED
         flat = np.linalg.norm(whole) < FLATTEST * areas.sum()
     if folds or winds or flat:
-        message = f"{where}: a face with a dent, which can be cut in several ways; export triangles"
+        message = f"{where}: a face is dented or bent, so its shape is ambiguous; export triangles"
         raise MeshError(MeshRefusal.POLYGON, message)

@@ -1,4 +1,4 @@
-"""A mesh file is a regular file of a known kind, read once, by the rules of its format.
+"""Reads a mesh file: one regular file, by the rules of the format that its ending names.
 
 Reading takes time and memory in proportion to the bytes of the file, and no more triangles than are
 allowed are kept: `MeshLimits` bounds both.
@@ -20,15 +20,15 @@ OTHER_FILES = {
     b"\x28\xb5\x2f\xfd": "a zstd archive", b"<?xml": "an XML file", b"<!DOCTYPE": "an HTML file",
     b"%PDF": "a PDF file", b"\x89PNG": "a picture", b"DRACO": "a Draco file",
 }  # fmt: skip
-"""Beginnings of files of other kinds, and what to call them."""
+"""The first bytes of files that are not meshes, with a name for the message."""
 MAGIC = {"ply": b"ply", "glb": b"glTF"}
 
 
 def read_triangles(path: Path, limits: MeshLimits) -> tuple[Array, Indices, bytes]:
-    """Vertices (n, 3) in the file's unit, triangles (t, 3), and the bytes of the file.
+    """Read a mesh file: vertices (n, 3) in its unit, triangles (t, 3), and its bytes.
 
     Raises:
-        MeshError: The file is not a whole mesh of a known format, or is larger than is allowed.
+        MeshError: The file is not a complete mesh of a known format, or exceeds a limit.
     """
     try:
         kind = mesh_kind(path)
@@ -42,33 +42,33 @@ def read_triangles(path: Path, limits: MeshLimits) -> tuple[Array, Indices, byte
 
 
 def mesh_kind(path: Path) -> str:
-    """The format of a file, by its ending.
+    """Name the format of a mesh file by its ending.
 
     Raises:
-        MeshError: The ending is not that of a format that is read.
+        MeshError: The ending belongs to no format that is read.
     """
     kind = path.suffix.lower().lstrip(".")
     if kind not in FORMATS:
-        message = f"the ending must be one of {', '.join(FORMATS)}, got {kind!r}"
+        message = f"the file's ending must be one of {', '.join(FORMATS)}, got {kind!r}"
         raise MeshError(MeshRefusal.FORMAT, message)
     return kind
 
 
 def triangles_of(kind: str, data: bytes, most: int) -> tuple[Array, Indices]:
-    """Vertices (n, 3) in the file's unit and triangles (t, 3).
+    """Convert the bytes of a mesh file to vertices (n, 3) in its unit and triangles (t, 3).
 
     Args:
         kind: One of `FORMATS`.
         data: The file's bytes.
-        most: Triangles that may be.
+        most: Most triangles allowed.
 
     Raises:
-        MeshError: It is no whole file of its kind, has no triangles, or more than `most`.
+        MeshError: The file breaks its format, has no triangles, or more than `most`.
     """
     check_beginning(kind, data)
     points, triangles = READERS[kind](data, most)
     if not len(triangles):
-        raise MeshError(MeshRefusal.EMPTY, "holds no triangles; export surfaces")
+        raise MeshError(MeshRefusal.EMPTY, "the file holds no triangles; export a surface mesh")
     return points, triangles
 
 
@@ -76,10 +76,10 @@ def _bytes_of(path: Path, limits: MeshLimits) -> bytes:
     try:
         data = bounded_bytes(path, limits.max_bytes)
     except OSError as error:
-        message = f"cannot be read ({error.strerror}); check the path and its rights"
+        message = f"cannot be read ({error.strerror}); check the path and its permissions"
         raise MeshError(MeshRefusal.UNREADABLE, message) from error
     if len(data) > limits.max_bytes:
-        message = f"over {limits.max_bytes} bytes, the limit; simplify the mesh"
+        message = f"the file is over the limit of {limits.max_bytes} bytes; simplify the mesh"
         raise MeshError(MeshRefusal.TOO_MANY, message)
     if not data:
         raise MeshError(MeshRefusal.EMPTY, "the file is empty; export it again")
@@ -87,7 +87,7 @@ def _bytes_of(path: Path, limits: MeshLimits) -> bytes:
 
 
 def check_beginning(kind: str, data: bytes) -> None:
-    """Refuse bytes that do not begin as files of a kind do.
+    """Refuse bytes that do not begin like a file of the given format.
 
     Raises:
         MeshError: The bytes begin otherwise.
@@ -103,8 +103,9 @@ def check_beginning(kind: str, data: bytes) -> None:
     if kind == "stl" and not stl.is_text(data) and not stl.is_binary(data):
         counted = int.from_bytes(data[stl.HEADER : stl.HEADER + 4], "little")
         message = (
-            f"is neither a text nor a binary STL file: it says {counted} triangles, which is "
-            f"{stl.HEADER + 4 + stl.TRIANGLE * counted} bytes, and has {len(data)}; export it again"
+            f"is neither a text nor a binary STL file: its count of {counted} triangles would be "
+            f"{stl.HEADER + 4 + stl.TRIANGLE * counted} bytes, but it has {len(data)}; "
+            "export it again"
         )
         raise MeshError(MeshRefusal.UNREADABLE, message)
     if not data.startswith(MAGIC.get(kind, b"")):

@@ -1,15 +1,15 @@
-"""Raises the refusals of mesh files, each with a message of one line."""
+"""Raises the errors for mesh files that are refused, each with a message of one line."""
 
 from typing import NoReturn
 
 from grasp_core.errors import MeshError, MeshRefusal
 
 LONGEST = 60
-"""Most characters of a file that a message shows."""
+"""Most characters of a file that a message quotes."""
 
 
 def shown(value: object) -> str:
-    """Part of a file for a message: short, and without characters that could steer a terminal."""
+    """Shorten a value for a message, and replace characters that could steer a terminal."""
     text = value.decode("latin-1") if isinstance(value, bytes) else str(value)
     return "".join(c if c.isascii() and c.isprintable() else "?" for c in text[:LONGEST])
 
@@ -24,7 +24,7 @@ def broken(where: str, said: str) -> NoReturn:
 
 
 def unsupported(said: str, remedy: str) -> NoReturn:
-    """Refuse a file that uses a part of its format that is not read: geometry would be lost.
+    """Refuse a file that uses a feature of its format that is not read, so that no shape is lost.
 
     Raises:
         MeshError: Always.
@@ -33,10 +33,10 @@ def unsupported(said: str, remedy: str) -> NoReturn:
 
 
 def outside(where: str, corner: int, vertices: int) -> NoReturn:
-    """Refuse a triangle that names a missing vertex.
+    """Refuse a triangle that refers to a missing vertex.
 
     Raises:
         MeshError: Always.
     """
-    message = f"{where}: names vertex {corner}, the file has {vertices}; export it again"
+    message = f"{where}: refers to vertex {corner}, but the file has {vertices}; export it again"
     raise MeshError(MeshRefusal.INDEX, message)

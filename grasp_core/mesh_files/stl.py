@@ -1,4 +1,4 @@
-"""Reads STL, binary or text; normals are ignored, as many programs write none."""
+"""Reads STL files, binary or text; their normals are ignored, as many programs write none."""
 
 from array import array
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ from grasp_core.mesh_files.refusals import broken, shown
 from grasp_core.mesh_files.words import numbers, plain_text, worded_lines
 
 HEADER, TRIANGLE = 80, 50
-"""Bytes of a binary file before the number of triangles, and bytes of each triangle."""
+"""Bytes before the number of triangles in a binary file, and bytes of each triangle."""
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 FLOATS_OF_TRIANGLE = 9
 FLOATS = 3
@@ -22,18 +22,18 @@ Words = Iterator[tuple[int, bytes]]
 
 
 def is_binary(data: bytes) -> bool:
-    """Whether there are as many bytes as the count of triangles says."""
+    """Tell whether the length of the file fits the triangle count of a binary STL."""
     counted = int.from_bytes(data[HEADER : HEADER + 4], "little")
     return len(data) == HEADER + 4 + TRIANGLE * counted
 
 
 def is_text(data: bytes) -> bool:
-    """Whether the bytes begin as an STL text does."""
+    """Tell whether the bytes begin with `solid`, like a text STL."""
     return data.lstrip()[:5].lower() == b"solid"
 
 
 def read(data: bytes, most: int) -> tuple[Array, Indices]:
-    """Vertices (3 t, 3), three for each triangle, and triangles (t, 3).
+    """Read the vertices (3 t, 3), three for each triangle, and the triangles (t, 3) of an STL file.
 
     Raises:
         MeshError: The file breaks a rule, or has more than `most` triangles.
@@ -57,7 +57,7 @@ def _of_binary(data: bytes, most: int) -> Array:
 
 
 def _of_text(text: bytes, most: int) -> Array:
-    """Corners of all solids; words may stand in any lines, as the format does not part them."""
+    """Read the corners of all solids of a text STL; line breaks between words do not matter."""
     coordinates = array("d")
     lines = worded_lines(text)
     for number, words in lines:
@@ -72,7 +72,7 @@ def _of_text(text: bytes, most: int) -> Array:
 
 
 def _until_its_end(lines: Lines) -> Words:
-    """The words of a solid with the numbers of their lines; its name at the end is left out."""
+    """Yield the words of a solid with their line numbers; `endsolid` and its name are left out."""
     for number, words in lines:
         for word in words:
             if word.lower() == b"endsolid":
@@ -82,7 +82,7 @@ def _until_its_end(lines: Lines) -> Words:
 
 
 def _corners(words: Words) -> list[float]:
-    """The nine coordinates of a triangle."""
+    """Read the nine coordinates of one triangle of a text STL."""
     _expect(*_next(words), b"normal")
     number, word = _next(words)
     for _ in range(FLOATS):  # a normal, or none
@@ -96,7 +96,7 @@ def _corners(words: Words) -> list[float]:
         _expect(number, word, b"vertex")
         three = [_next(words)[1] for _ in range(FLOATS)]
         if not KEYWORDS.isdisjoint(three):
-            broken(f"line {number}", "a vertex needs three numbers")
+            broken(f"line {number}", "a vertex needs three numbers, got fewer")
         found += numbers(three, f"line {number}")
     _expect(*_next(words), b"endloop")
     _expect(*_next(words), b"endfacet")
@@ -106,7 +106,7 @@ def _corners(words: Words) -> list[float]:
 def _next(words: Words) -> tuple[int, bytes]:
     word = next(words, None)
     if word is None:
-        broken("the end", "the last triangle is not whole")
+        broken("the end", "the last triangle is incomplete")
     return word
 
 

@@ -1,4 +1,4 @@
-"""Lines of text as words, words as numbers, in ASCII only; time and memory grow with the bytes."""
+"""Splits the text of mesh files into lines, words and numbers, in time linear in the bytes."""
 
 import io
 import math
@@ -14,23 +14,23 @@ UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 CONTROL = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 OTHER_ALPHABETS = bytes(range(128)) + b"?" * 128
 NUMBER = re.compile(rb"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d{1,9})?")
-"""No run of digits is tried twice: else a long word that is no number would take hours."""
+"""A decimal number; possessive groups (`++`) keep long wrong words from taking quadratic time."""
 WHOLE = re.compile(rb"[+-]?\d{1,18}")
 NOT_FINITE = re.compile(rb"[+-]?(nan|inf(inity)?)", re.IGNORECASE)
 Where = str
 
 
 def plain_text(data: bytes, start: int = 0) -> bytes:
-    """Text with one byte a character and lines that end in a line feed.
+    """Convert the bytes of a text file to ASCII with line-feed line ends.
 
-    Letters of other alphabets, as in comments and names, become `?`.
+    Letters outside ASCII, as in comments and names, become `?`.
 
     Args:
         data: The bytes of a file.
         start: Where the text begins.
 
     Raises:
-        MeshError: It is UTF-16, or holds control characters.
+        MeshError: The text is UTF-16, or holds control characters.
     """
     if data.startswith(UTF_16):
         broken("byte 0", "expected UTF-8 text, got UTF-16")
@@ -42,23 +42,23 @@ def plain_text(data: bytes, start: int = 0) -> bytes:
 
 
 def numbered_lines(text: bytes) -> Iterator[tuple[int, bytes]]:
-    """Each line with its number from 1 on, one after another: text is not held as words.
+    """Yield each line with its number, from 1 on, one at a time to save memory.
 
     Raises:
         MeshError: A line is too long.
     """
     for number, line in enumerate(io.BytesIO(text), 1):
         if len(line) > LONGEST_LINE:
-            broken(f"line {number}", f"is longer than {LONGEST_LINE} bytes")
+            broken(f"line {number}", f"the line is longer than {LONGEST_LINE} bytes")
         yield number, line
 
 
 def worded_lines(text: bytes, *, comments: bool = False) -> Iterator[tuple[int, list[bytes]]]:
-    """The words of each line that has some, with the number of the line.
+    """Yield the words of each line that is not blank, with the number of the line.
 
     Args:
-        text: Lines.
-        comments: Whether what follows a `#` is left out.
+        text: The text of a file.
+        comments: Whether to leave out what follows a `#`.
 
     Raises:
         MeshError: A line is too long.

@@ -11,13 +11,13 @@ class Exit(IntEnum):
 
     GOOD = 0
     NEGATIVE = 1
-    """The command ran, and a verdict is negative."""
+    """The command ran, and at least one grasp or check failed."""
     USAGE = 2
     INTERNAL = 3
     INPUT = 4
-    """An input was refused."""
+    """The input was refused: a file, a flag or a value."""
     NONE = 5
-    """No grasp exists."""
+    """The object has no grasp, as far as was asked."""
     PARTIAL = 6
     INTERRUPTED = 130
 

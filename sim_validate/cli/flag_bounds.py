@@ -1,4 +1,4 @@
-"""Which values a flag takes: bounds written into its type, and the check of all flags at once."""
+"""Bounds on the values of command-line flags, written into their types, and the check of them."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -10,7 +10,7 @@ from grasp_core.errors import InputError
 
 
 class FlagsError(InputError):
-    """Flags contradict each other."""
+    """Two flags that contradict each other were given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ def ends_in(*endings: str) -> Bound:
 
 
 def not_zero(least: float, most: float) -> Bound:
-    """Bound for vectors by the size of their largest part."""
+    """Bound for vectors: their largest component in size lies from `least` to `most`."""
     says = f"must not be zero: the largest part is from {least:g} to {most:g}"
     return Bound(says, lambda vector: least <= max(abs(part) for part in vector) <= most)
 
@@ -71,7 +71,7 @@ def check(flags: object) -> None:
 
 
 def _bounded(kind: Any, value: Any) -> Iterator[tuple[Bound, Any]]:
-    """Yield the bounds in a type, each with the part of a value that it is for."""
+    """Yield each bound in a flag's type, with the part of the value that it applies to."""
     inner = get_args(kind)
     if value is None:
         return

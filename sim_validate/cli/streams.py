@@ -12,7 +12,7 @@ from typing import TextIO
 
 
 class _Read(io.FileIO):
-    """A stream for results that drops what is written after its reader left."""
+    """A wrapper for standard output that drops text after its reader closed the pipe."""
 
     def write(self, data: object, /) -> int:
         try:
@@ -22,7 +22,7 @@ class _Read(io.FileIO):
 
 
 class _Told(io.FileIO):
-    """A stream for messages that drops what it cannot write."""
+    """A wrapper for standard error that ignores messages it cannot write."""
 
     def write(self, data: object, /) -> int:
         try:
@@ -32,7 +32,7 @@ class _Told(io.FileIO):
 
 
 def steady() -> None:
-    """Replace the standard streams of this process by such streams; missing ones stay missing."""
+    """Replace standard output and error by streams that survive a closed reader."""
     sys.stdout = _over(sys.stdout, _Read)
     sys.stderr = _over(sys.stderr, _Told)
 

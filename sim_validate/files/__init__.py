@@ -1,5 +1,4 @@
 """How are bytes, text, tables and folders read and written?
 
-This room reads and writes text, arrays and locked folders by their paths; it knows nothing about
-grasps.
+Modules here read and write text, arrays and locked folders by path; none knows about grasps.
 """

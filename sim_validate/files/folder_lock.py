@@ -1,4 +1,4 @@
-"""A folder for results, to which only one command at a time writes.
+"""Locks a folder of results, so that only one command at a time writes to it.
 
 The folder itself is locked, without a lock file: the lock ends with the process, however that ends.
 """
@@ -22,7 +22,7 @@ PARTS = ("scenes", "traces", "proofs", *PAGES, *(f"{REPORT}/{part}" for part in 
 
 @contextmanager
 def alone_in(folder: Path | None) -> Generator[None]:
-    """Lock a folder, make it if needed, and remove unfinished files of killed commands.
+    """Lock a folder, making it if needed, and remove unfinished files of interrupted commands.
 
     Enter this context before work begins, so that a folder that takes no files is refused at once,
     and not after the work. Without a folder it does nothing.
@@ -74,7 +74,7 @@ def _locked(folder: Path) -> Generator[list[Path]]:
 
 
 def _taken(folder: Path) -> tuple[int, list[Path]]:
-    """Open and lock the folder of a given name, and list the folders that are new.
+    """Open and lock a folder, making it if needed, and list the folders that are new.
 
     The loop repeats if another command removes the folder between the two steps.
     """
@@ -101,6 +101,6 @@ def _lock(handle: int, folder: Path) -> None:
     except OSError as error:
         if error.errno == errno.EWOULDBLOCK:
             raise InputError(
-                f"{folder}: another command is at work in it; wait for it, or give another --out"
+                f"{folder}: another command is writing to it; wait, or give another --out"
             ) from error
         # otherwise the file system has no locks, and its users must take care

@@ -1,4 +1,4 @@
-"""The bytes of an npz file -> arrays, each checked before anything large is allocated.
+"""Reads arrays from npz files, each checked before much memory is used.
 
 An archive may claim any size, hold a name twice, or have members with wrong headers. Only arrays of
 numbers, truth values and text are read, with exactly as many bytes as their shapes need.
@@ -19,16 +19,16 @@ from grasp_core.files.strict_json import shown
 from sim_validate.files.reading import read_bytes
 
 MOST_BYTES = 256 * 2**20
-"""Largest size of all arrays of a file."""
+"""Largest total size of the arrays in a file."""
 MOST_MEMBERS = 256
 MOST_HEADER = 10_000
-"""Largest number of letters in an array's header, the limit that numpy sets."""
+"""Largest number of characters in an array's header, a limit of numpy's."""
 KINDS = "biufU"
 """Kinds of arrays that are read: truth values, numbers, text."""
 BEGINNING, ENDING = b"PK\x03\x04", ".npy"
-"""First bytes of an archive, and ending of the names in it."""
+"""First bytes of a zip archive, and ending of the array names inside it."""
 LARGEST_LETTER, FIRST_HALF, LAST_HALF = 0x10FFFF, 0xD800, 0xDFFF
-"""Largest code of a letter, and the range of surrogates, which are halves of letters."""
+"""Largest Unicode code point, and the range of surrogates, which are halves of characters."""
 
 
 def read_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[Any]]:
@@ -51,7 +51,9 @@ def arrays_of(data: bytes, names: Collection[str]) -> dict[str, NDArray[Any]]:
         InputError: The file is too large, or holds anything but plain arrays.
     """
     if not data.startswith(BEGINNING):
-        raise InputError("cannot be read as npz (it does not begin as archives do)")
+        raise InputError(
+            "expected an npz file, which begins as a zip archive does; save it with numpy.savez"
+        )
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = _checked(archive.infolist())
@@ -63,11 +65,13 @@ def arrays_of(data: bytes, names: Collection[str]) -> dict[str, NDArray[Any]]:
     except InputError:
         raise
     except Exception as error:  # a damaged file can make zipfile and numpy raise anything
-        raise InputError(f"cannot be read as npz ({shown(str(error))}); write it again") from error
+        raise InputError(
+            f"cannot be read as npz ({shown(str(error))}); save it again with numpy.savez"
+        ) from error
 
 
 def _checked(listed: list[zipfile.ZipInfo]) -> dict[str, zipfile.ZipInfo]:
-    """Index the members of an archive by name, and refuse what they claim if it is too much."""
+    """Index the arrays of an archive by name, and refuse an archive that claims too much."""
     if len(listed) > MOST_MEMBERS:
         raise InputError(f"{len(listed)} members; an npz file has up to {MOST_MEMBERS} arrays")
     claimed = sum(each.file_size for each in listed)
@@ -101,10 +105,10 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> NDAr
 
 
 def _check_letters(array: NDArray[Any], name: str) -> None:
-    """Refuse text with codes that are no letters, which numpy would pass on."""
+    """Refuse text that holds invalid Unicode code points, which numpy would accept."""
     if array.dtype.kind != "U" or not array.size or not array.dtype.itemsize:
         return
     codes = np.frombuffer(array.tobytes(), array.dtype.str[0].replace("|", "=") + "u4")
     halves = (codes >= FIRST_HALF) & (codes <= LAST_HALF)
     if codes.max() > LARGEST_LETTER or halves.any():
-        raise InputError(f"{name}: holds codes that are no letters; write it again")
+        raise InputError(f"{name}: its text has invalid Unicode characters; write it again")

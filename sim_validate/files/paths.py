@@ -1,4 +1,4 @@
-"""A path that a file names -> a path that stays in the folder of that file."""
+"""Checks that a path written in a file stays inside that file's folder."""
 
 from pathlib import Path, PurePosixPath
 
@@ -6,7 +6,7 @@ from grasp_core.errors import InputError
 from grasp_core.files.strict_json import shown
 
 LONGEST = 500
-"""Largest number of letters of a path in a file."""
+"""Largest number of characters of a path in a file."""
 
 
 def require_inside(name: object, field: str) -> str:
@@ -35,7 +35,7 @@ def path_inside(folder: Path, name: str) -> Path:
     """
     path = folder / require_inside(name, "path")
     if not path.resolve().is_relative_to(folder.resolve()):
-        raise InputError(f"{path}: leads out of {folder}; copy the file into it")
+        raise InputError(f"{path}: this link leads out of {folder}; copy the file into the folder")
     return path
 
 

@@ -1,4 +1,4 @@
-"""Reading bounded files, and writing files that are complete or absent."""
+"""Reads files up to a size limit, and writes files so that they are complete or absent."""
 
 import io
 import shutil
@@ -21,11 +21,11 @@ MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
 
 
 class NotTextError(InputError):
-    """Bytes are not UTF-8 text."""
+    """The bytes of a file are not UTF-8 text."""
 
 
 def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
-    """Read a regular file; a pipe or a device, which may have no end, is refused.
+    """Read a regular file; pipes and devices are refused, because they may never end.
 
     Raises:
         InputError: The file cannot be read, is no regular file, or is larger than `most` bytes.
@@ -33,7 +33,9 @@ def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
     try:
         data = bounded_bytes(path, most)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give a file") from error
+        raise InputError(
+            f"{path}: cannot be read ({error.strerror}); give a readable file"
+        ) from error
     if len(data) > most:
         raise InputError(f"{path}: larger than {most} bytes; give a smaller file")
     return data

@@ -1,4 +1,4 @@
-"""The text of a TOML file -> its tables, checked as the values of JSON files are."""
+"""Reads TOML files into tables, with limits on size and nesting."""
 
 import re
 import tomllib
@@ -10,13 +10,13 @@ from grasp_core.files.strict_json import DEEPEST, check_values
 from sim_validate.files.reading import read_text
 
 MOST_LETTERS = 2**20
-"""Largest number of letters of a file of settings, which are short."""
+"""Largest number of characters of a settings file, which is usually short."""
 ASIDE = re.compile(
     r'''"""(?:[^\\]|\\.)*?(?:"""|\\?\Z)|"(?:[^"\\\n]|\\.)*(?:"|\n|\\?\Z)|'''
     r"""'''.*?(?:'''|\Z)|'[^'\n]*(?:'|\n|\Z)|\#[^\n]*""",
     re.DOTALL,
 )
-"""Pattern of quoted texts and comments, each up to its end or that of the line or file."""
+"""Pattern of quoted text and comments, in which dots are no key separators."""
 LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
 """Pattern of a key `a.b.c` with too many parts. The time of tomllib grows with the cube of their
 number: two minutes for a hundred kilobytes."""
@@ -43,14 +43,16 @@ def tables_of_toml(text: str) -> dict[str, Any]:
         InputError: The text is not TOML, or holds a value that no setting can have.
     """
     if LONG_KEY.search(ASIDE.sub(lambda found: "q" if found[0][0] != "#" else "", text)):
-        raise InputError(f"not TOML that can be read here: a key has more than {DEEPEST} parts")
+        raise InputError(
+            f"not TOML that is read: a key has more than {DEEPEST} parts; use shorter keys"
+        )
     try:
         found = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"not TOML: {_printable(str(error))}") from error
     except RecursionError as error:
         raise InputError(
-            "not TOML that can be read here: values are too deep inside others"
+            "not TOML that is read: values are nested too deeply; use fewer levels"
         ) from error
     except ValueError as error:  # numbers of thousands of digits, days that do not exist
         raise InputError(f"not TOML: {_printable(str(error))}") from error

@@ -1,4 +1,4 @@
-"""Regions certified for many grasps, in parallel."""
+"""Certifies contact regions of many grasps in parallel: polygons in which each finger may stand."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -16,12 +16,12 @@ from grasp_core.values import Grasp
 from sim_validate.parallel.processes import each
 
 Found: TypeAlias = tuple[Grasp, CertifiedRegions | str]
-"""A grasp with its regions, or why it has none."""
+"""A grasp, with its certified regions or the reason why it has none."""
 
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """How regions are certified; see `certify_regions`."""
+    """How to certify regions; the fields are those of `grasp_core.certify_regions`."""
 
     friction: float
     reserve: float = 0.0
@@ -33,7 +33,7 @@ class Asked:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Task:
-    """One grasp, as it is sent to a worker."""
+    """One grasp whose regions are to be certified, as it is sent to a worker process."""
 
     body: Polyhedron
     grasp: Grasp
@@ -44,7 +44,7 @@ def certified(
     body: Polyhedron, grasps: Sequence[Grasp], asked: Asked, *, jobs: int,
     progress: Callable[[int, int], None],
 ) -> Iterator[Found]:  # fmt: skip
-    """Yield each grasp with its regions, or why there are none, in order.
+    """Yield each grasp, in order, with its certified regions or the reason why it has none.
 
     Args:
         body: The object.

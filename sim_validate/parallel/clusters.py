@@ -1,4 +1,4 @@
-"""Work units on a Ray or Dask cluster, which may be started here; the only user of both.
+"""Runs work units on a Ray or Dask cluster, which may be started here.
 
 Neither cluster repeats a unit by itself, because one place decides for all engines when to give up
 on a unit. Without `address`, Ray and Dask start workers on this machine and stop them afterwards.

@@ -1,4 +1,4 @@
-"""Moving the grasps of a plan to better contacts on their faces, in parallel."""
+"""Moves the contacts of a plan's grasps on their faces to raise their quality, in parallel."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,13 +14,13 @@ from grasp_core.values import Grasp
 from sim_validate.parallel.processes import each
 
 SAME_CONTACTS = 0.01
-"""Distance below which contacts are the same optimum, in object radii; searches end some
-thousandths from it."""
+"""Distance below which two optimized contacts count as the same [object radii]; searches for one
+optimum end some thousandths from it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Task:
-    """One grasp to move, as it is sent to a worker."""
+    """One grasp whose contacts are to be moved, as it is sent to a worker process."""
 
     body: Polyhedron
     grasp: Grasp
@@ -35,7 +35,7 @@ def improved(
     body: Polyhedron, found: Plan, *, finger_radius: float | None, parts: int | None, jobs: int,
     progress: Callable[[int, int, str], None],
 ) -> tuple[Plan, tuple[Moved, ...]]:  # fmt: skip
-    """Move the grasps of a plan; return the plan, best quality first, and how each grasp changed.
+    """Improve each grasp of a plan; return the new plan, best first, and how each grasp changed.
 
     The plan keeps only one of several grasps that end at the same contacts.
 

@@ -1,4 +1,4 @@
-"""Interrupts that are not lost: one that a library swallows is raised again at the next step.
+"""Keeps keyboard interrupts that a library swallows, and raises them again at the next step.
 
 Python raises `KeyboardInterrupt` wherever the program is. Some compiled libraries clear errors that
 are not their own, and the program would run on. A request to end (SIGTERM) counts as an interrupt.
@@ -19,7 +19,7 @@ _noted = threading.Event()
 
 @contextmanager
 def noted() -> Generator[None, None, None]:
-    """Record interrupts, beside raising them, as long as the context lasts."""
+    """Record interrupts, besides raising them, while the context is open."""
     if threading.current_thread() is not threading.main_thread():
         yield  # Python handles signals in its main thread only
         return
@@ -35,7 +35,7 @@ def noted() -> Generator[None, None, None]:
 
 
 def _but_interrupts(tell: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Report errors that cannot be raised where they occur; interrupts are recorded instead."""
+    """Report errors that cannot be raised where they occur, and record interrupts instead."""
     return lambda error: None if error.exc_type is KeyboardInterrupt else tell(error)
 
 

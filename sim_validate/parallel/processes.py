@@ -1,4 +1,4 @@
-"""Work units on processes of this machine, in order or one by one; the only user of pebble.
+"""Runs work units in processes of this machine.
 
 Results do not depend on the number of processes: a unit sees only its own arguments.
 """
@@ -15,11 +15,10 @@ Unit = TypeVar("Unit")
 Result = TypeVar("Result")
 
 SHARE = Path("/sys/fs/cgroup/cpu.max")
-"""File in which Linux says how much of its processors a container may use: microseconds of use, per
-how many."""
+"""The Linux file that limits a container's processor time: microseconds of use per period."""
 UNITS_PER_PROCESS = 8
-"""Number of units per process from which on a further process pays: it takes about a second to
-start, as long as eight validations."""
+"""Number of units for which one more process is worth starting: the start takes about a second, as
+long as eight validations."""
 
 
 def available_cores() -> int:
@@ -33,7 +32,7 @@ def available_cores() -> int:
 
 
 def processes(units: int, jobs: int) -> int:
-    """Number of processes that pays for a number of units, at least one."""
+    """The number of processes worth starting for a number of units, at least one."""
     return max(1, min(jobs, units // UNITS_PER_PROCESS))
 
 

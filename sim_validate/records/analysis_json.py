@@ -1,4 +1,4 @@
-"""Analyses -> one JSON document with units in the keys; wrenches are about each grasp's centre."""
+"""Writes analyses of contact sets as one JSON document, with units in the keys."""
 
 import math
 from collections import Counter
@@ -15,7 +15,7 @@ from sim_validate.contact_analysis import Analysis, Bounds, Outcome, Question, R
 def analyses_to_document(
     source: str, question: Question, analyses: Sequence[Analysis], *, complete: bool
 ) -> dict[str, object]:
-    """The document of a file's grasps; equal analyses give equal documents.
+    """Build the JSON document of all analyses of a file; equal analyses give equal documents.
 
     Args:
         source: The name of the file that the contacts were read from.
@@ -97,7 +97,7 @@ def _resisted_record(found: Resisted | None) -> dict[str, object] | None:
 
 
 def _number(value: float | None) -> float | None:
-    """A number for JSON: None where it is unknown or infinite, and no minus zero."""
+    """Convert a number for JSON: None if it is unknown or infinite, and 0.0 for minus zero."""
     return None if value is None or not math.isfinite(value) else value + 0.0
 
 

@@ -1,4 +1,4 @@
-"""Reading a file of grasps, with the file's name in every refusal."""
+"""Reads `grasps.json`; every error message names the file."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -26,7 +26,7 @@ def read_grasps(path: Path) -> SavedGrasps:
 
 
 def grasp_with_id(path: Path, saved: SavedGrasps, wanted: str | None) -> Grasp:
-    """Find the grasp with an id; the only grasp of a file needs none.
+    """Find the grasp with an id; the id may be left out if the file has one grasp only.
 
     Raises:
         InputError: The grasp is not there; the message begins with the path and lists some that
@@ -42,7 +42,7 @@ def grasp_with_id(path: Path, saved: SavedGrasps, wanted: str | None) -> Grasp:
 
 
 def some(names: Iterable[str]) -> str:
-    """The first of many names, for a message."""
+    """List the first few of many names for a message."""
     listed = list(names)
     more = f" and {len(listed) - NAMED} more" if len(listed) > NAMED else ""
     return (", ".join(listed[:NAMED]) or "none") + more

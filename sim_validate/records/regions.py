@@ -1,4 +1,4 @@
-"""Certified regions in files: one proof per grasp, and one document for all."""
+"""Writes and reads certified regions: one proof file per grasp, and one `regions.json`."""
 
 import hashlib
 import json
@@ -35,11 +35,11 @@ SHAPES: Mapping[str, tuple[int | None, ...]] = {
     "open_radius_m": (),
     **dict.fromkeys((*POLYGONS, *BORDERS), (None, 3)),
 }  # fmt: skip
-"""Shapes of the arrays of a proof, None for any length."""
+"""Shape of each array in a proof file; None stands for any length."""
 MOST_CORNERS = 1000
 """Largest number of corners of a region's polygon in a file."""
 SMALLEST_SCALE, LARGEST = 1e-6, 1e6
-"""Least and largest length that proofs are relative to, and largest length in a proof [m]."""
+"""Smallest and largest unit of length of a proof, and largest coordinate in it [m]."""
 
 
 def write_regions(
@@ -48,7 +48,7 @@ def write_regions(
     asked: Asked,
     found: Iterable[Found],
 ) -> Mapping[str, Any]:
-    """Write each proof as it comes, then the document; without a folder nothing is written.
+    """Write each proof when it is ready, then `regions.json`; write nothing if `folder` is None.
 
     Args:
         folder: Folder for regions.json and the proofs, or None.
@@ -80,7 +80,7 @@ def write_regions(
 def _record(
     grasp: Grasp, proved: CertifiedRegions | str, body: Polyhedron, folder: Path | None
 ) -> Mapping[str, Any]:
-    """The record of one grasp; its proof is written, or an earlier proof is removed."""
+    """Build the record of one grasp, and write its proof or remove an earlier one."""
     named = {
         "id": grasp.id,
         "contacts_sha256": contacts_sha256(grasp.contacts),
@@ -161,7 +161,9 @@ def read_regions(path: str | Path) -> CertifiedRegions:
     try:
         return regions_of(read_arrays(path, SHAPES))
     except InputError as error:
-        raise InputError(f"{path}: not the proof of a grasp's regions: {error}") from error
+        raise InputError(
+            f"{path}: expected a proof file as `graspproof regions` writes it: {error}"
+        ) from error
 
 
 def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
@@ -171,7 +173,9 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
         InputError: An array is missing, or has another shape.
     """
     if missing := [name for name in SHAPES if name not in kept]:
-        raise InputError(f"no array {missing[0]}; `graspproof regions` writes it")
+        raise InputError(
+            f"the array {missing[0]} is missing; certify again with `graspproof regions`"
+        )
     limit = np.asarray(kept["open_radius_m"])  # infinite where no open choice was found
     finite = {
         **kept,

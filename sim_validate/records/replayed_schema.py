@@ -1,4 +1,4 @@
-"""The fields of a `verdicts.json` that a replay needs, with their types."""
+"""The fields of `verdicts.json` that are needed to simulate one of its trials again."""
 
 from typing import Annotated, Any
 
@@ -55,7 +55,7 @@ class _Settings(_Record):
 
 
 class VerdictToReplay(_Record):
-    """One verdict of the file."""
+    """The fields of one grasp's verdict that a replay needs."""
 
     id: str
     contacts_sha256: str
@@ -66,7 +66,7 @@ class VerdictToReplay(_Record):
 
 
 class VerdictsToReplay(_Record):
-    """The content of `verdicts.json`, as `validate` writes it."""
+    """The fields of a whole `verdicts.json` that a replay needs."""
 
     object: _Object
     friction: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]

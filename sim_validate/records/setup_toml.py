@@ -1,4 +1,7 @@
-"""A setup in TOML: tables `physics`, `fingers`, `hold`, `limit`, `friction`, all optional."""
+"""Reads and writes simulation settings as TOML.
+
+The tables are `physics`, `fingers`, `hold`, `limit` and `friction`; all are optional.
+"""
 
 import json
 from collections.abc import Mapping
@@ -18,7 +21,7 @@ from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, Lim
 from sim_validate.simulation.setup import Setup
 
 OURS = ("drive", "indentation")
-"""Fields of the fingers that trials set themselves, so that no file may."""
+"""Finger settings that each trial chooses itself, so that a file may not set them."""
 OF_USERS = {
     table: tuple(field.name for field in fields(kind) if field.name not in OURS)
     for table, kind in (
@@ -29,11 +32,11 @@ OF_USERS = {
         ("friction", FrictionProtocol),
     )
 }
-"""The fields that a file may set, by table."""
+"""The settings that a file may change, by table."""
 
 
 def setup_from_file(path: Path, setup: Setup) -> Setup:
-    """Replace numbers of a setup by those of a file.
+    """Read settings from a file and put them in place of those in `setup`.
 
     Args:
         path: A TOML file.
@@ -46,7 +49,7 @@ def setup_from_file(path: Path, setup: Setup) -> Setup:
 
 
 def setup_from_tables(tables: Mapping[str, Any], setup: Setup, path: str) -> Setup:
-    """Replace numbers of a setup by those of tables.
+    """Put the settings in TOML tables in place of those in `setup`.
 
     Args:
         tables: The settings by table.
@@ -69,7 +72,7 @@ def setup_from_tables(tables: Mapping[str, Any], setup: Setup, path: str) -> Set
 
 
 def tables_of(setup: Setup) -> dict[str, dict[str, Any]]:
-    """The tables of a file that would give this setup."""
+    """Write a setup as the TOML tables that would reproduce it."""
     return {
         table: {name: getattr(getattr(setup, table), name) for name in names}
         for table, names in OF_USERS.items()
@@ -77,7 +80,7 @@ def tables_of(setup: Setup) -> dict[str, dict[str, Any]]:
 
 
 def _filled(path: str, table: str, values: Any, given: dict[str, Any]) -> Any:
-    """Replace some fields of a frozen value, each checked against its type."""
+    """Replace the given fields of a settings value, each checked against its type."""
     for name in given:
         if name not in OF_USERS[table]:
             raise InputError(

@@ -1,4 +1,4 @@
-"""Verdicts -> JSON text, with units in the keys and every setting that was in force."""
+"""Writes verdicts as `verdicts.json`, with units in the keys and all settings that were used."""
 
 import json
 import math
@@ -24,7 +24,7 @@ SCHEMA = 1
 def verdicts_to_json(
     body: Polyhedron, friction: float, verdicts: Iterable[Verdict], gate: Gate, *, complete: bool
 ) -> str:
-    """The text of `verdicts.json`; equal verdicts give equal texts.
+    """Write the text of `verdicts.json`; equal verdicts give equal texts.
 
     Args:
         body: The object.
@@ -51,7 +51,7 @@ def verdicts_to_json(
 
 
 def gate_record(gate: Gate) -> dict[str, object]:
-    """The record of the gate's checks."""
+    """Record the gate's results: checks of the simulator on cases with known answers."""
     return {
         "passed": gate.passed,
         "mujoco": gate.mujoco,
@@ -69,7 +69,7 @@ def finite(value: Any) -> Any:
 
 
 def summary(verdicts: Iterable[Verdict]) -> dict[str, int]:
-    """Count grasps and controls, how many of each held or let go, and the contradictions."""
+    """Count grasps that held, negative controls that let go, and contradictions."""
     listed = list(verdicts)
     controls = [control for verdict in listed for control in verdict.controls]
     return {
@@ -193,7 +193,7 @@ def _settings(verdict: Verdict) -> dict[str, object]:
 
 
 def trace_arrays(verdict: Verdict) -> dict[str, Array]:
-    """Motion of every contact in the trials of a grasp: arrays by trial and quantity."""
+    """Collect the recorded motion of every contact as arrays, named by trial and quantity."""
     fields = ("times_s", "displacements_m", "shifts_m", "rotations_rad", "slips_m", "gaps_m")
     kept: Sequence[tuple[str, Any]] = [
         *((trial.name, trial.trace) for trial in verdict.wrenches if trial.trace is not None),

@@ -14,7 +14,7 @@ Count = Annotated[int, Field(ge=0)]
 
 
 class _Record(BaseModel):
-    """A record that keeps fields without a declared type as they are."""
+    """Base class of records that keep unknown fields unchanged."""
 
     model_config = ConfigDict(frozen=True, extra="allow", strict=True)
 

@@ -1,4 +1,4 @@
-"""A task's wrenches in JSON, which a grasp must hold as they are.
+"""Reads a file of the wrenches that a task needs, each of which a grasp must hold in full.
 
     {"wrenches": [{"name": "lift", "force_n": [0, 0, -3], "torque_n_m": [0, 0, 0]}, ...]}
 
@@ -76,7 +76,7 @@ def _named(given: _Given, number: int) -> NamedWrench:
 def weights(
     weight_n: float, downs: tuple[tuple[float, float, float], ...]
 ) -> tuple[NamedWrench, ...]:
-    """The object's weight at its centre of mass, as one wrench for each direction of gravity.
+    """Turn the object's weight into wrenches, one for each direction of gravity.
 
     Args:
         weight_n: The weight [N].

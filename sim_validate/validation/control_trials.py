@@ -1,9 +1,9 @@
-"""Trials of negative controls: contact sets proved open must not hold what nothing can balance.
+"""Simulates negative controls: contact sets that are proved unable to hold the object.
 
-A control is loaded with the separating wrench of its certificate, which no contact force within the
-cones opposes. Where not even the bare squeeze can be balanced, the control is also tried without a
-load. The fingers do their best: they apply forces that need the least friction, or where nothing
-balances, the closest forces.
+A proof that contacts are not in force closure is a separating wrench: no contact forces within the
+friction cones oppose it. The control is loaded with this wrench. If contact forces cannot balance
+even the bare squeeze, it is also tried without a load. The fingers do their best: they apply the
+forces that need the least friction or, if none balance, those closest to balance.
 """
 
 from dataclasses import dataclass, replace
@@ -24,45 +24,45 @@ from sim_validate.simulation.traces import Trace
 from sim_validate.validation.controls import Control
 
 SEPARATING = "separating"
-"""Name of the wrench that a control's certificate says is not resisted."""
+"""Name of the trial with the separating wrench, which the contacts provably cannot resist."""
 UNLOADED = "unloaded"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlLoad:
-    """A load under which a control must let go."""
+    """A load under which a negative control must let go of the object."""
 
     name: str
     load: Load
     settling: float
-    """Friction while the object settles."""
+    """Friction coefficient while the object settles, before the load is applied."""
     required_friction: float | None
-    """Friction that the planned forces need; None where no forces balance the wrench."""
+    """Friction coefficient that the planned forces need; None if no forces balance the wrench."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlTrial:
-    """One simulated load on a control."""
+    """One simulated trial of a negative control under one load."""
 
     name: str
     wrench: Array
     """Applied external wrench, (6,) [N, N m], torque about the centre of mass."""
     required_friction: float | None
-    """Friction that the planned forces need; None where no forces balance the wrench."""
+    """Friction coefficient that the planned forces need; None if no forces balance the wrench."""
     hold: HoldVerdict
     trace: Trace | None
-    """Motion in the trial; kept on request."""
+    """Recorded motion in the trial; kept only if asked for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlVerdict:
-    """A contact set proved not to be force-closed, and how it ended in simulation."""
+    """How a negative control, a contact set proved not to be force-closed, ended in simulation."""
 
     control: Control
     tried: tuple[ControlTrial, ...]
     """Trials of the loads that no contact forces can balance."""
     accepted_by: dict[str, bool]
-    """Whether each rule of another tool accepts the control, by name."""
+    """For each acceptance rule of another tool, whether it would accept the control."""
 
     @property
     def held(self) -> bool:
@@ -76,7 +76,7 @@ class ControlVerdict:
 
 
 def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup) -> ControlVerdict:
-    """Simulate a control under the loads that it must not hold.
+    """Simulate a negative control under the loads that it must not hold.
 
     Args:
         body: The object.
@@ -126,7 +126,7 @@ def control_case(
 
 
 def _hopeless(body: Polyhedron, control: Control, setup: Setup) -> list[tuple[str, Array]]:
-    """The separating wrench, and no wrench at all where the bare squeeze cannot be balanced."""
+    """The separating wrench, and a zero wrench if no forces balance the bare squeeze."""
     # The separating wrench is a linear function of wrenches. With torques measured in object
     # radii its coefficients are times the scale; the wrench along them is times it once more.
     scale = np.array([1.0] * 3 + [body.radius] * 3)
@@ -139,7 +139,7 @@ def _hopeless(body: Polyhedron, control: Control, setup: Setup) -> list[tuple[st
 
 
 def _pulls(body: Polyhedron, control: Control, setup: Setup) -> tuple[ControlLoad, ...]:
-    """The six forces that other tools apply, as large as the separating wrench."""
+    """Six axis-parallel forces, as other tools apply them, as large as the separating wrench."""
     plan = _Planner(body, control, setup)
     size = setup.hold.control_load * setup.fingers.max_normal_force_n
     named = zip(AXIS_NAMES, axis_wrenches(body.radius), strict=True)
@@ -147,7 +147,7 @@ def _pulls(body: Polyhedron, control: Control, setup: Setup) -> tuple[ControlLoa
 
 
 class _Planner:
-    """Plans forces for a control: those that need least friction, or those closest to balance."""
+    """Plans finger forces on a negative control: of least friction, or nearest to balance."""
 
     def __init__(self, body: Polyhedron, control: Control, setup: Setup) -> None:
         self.contacts = (
@@ -166,7 +166,7 @@ class _Planner:
         return ControlLoad(name, Load(wrench, forces), settling, needed)
 
     def _forces(self, wrench: Array) -> tuple[Array, float | None]:
-        """Planned forces, (k, 3) [N], and the friction they need; None where nothing balances."""
+        """Planned forces, (k, 3) [N], and their friction; None if none balance."""
         limits, center = self.limits, self.center
         balanced = least_friction_forces(*self.contacts, wrench, normal_force=limits, center=center)
         if balanced is not None:

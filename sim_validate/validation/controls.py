@@ -1,8 +1,8 @@
-"""Negative controls: contact sets made from a grasp that are proved not to be force-closed.
+"""Makes negative controls: contact sets derived from a grasp that are proved not force-closed.
 
-A validator that cannot say no proves nothing. Each control carries the certificate that it is open.
-The certificate's separating wrench is the first load that the control is tested with: no contact
-force within the cones can oppose it, whatever the fingers do.
+A validator that never rejects anything proves nothing. Each control therefore carries a proof: a
+separating wrench that no contact forces within the friction cones oppose, whatever the fingers do.
+This wrench is the first load that the control is tested with.
 """
 
 import math
@@ -22,18 +22,18 @@ from grasp_core.values import Contact, Grasp
 from sim_validate.validation.paper_as_printed import uncorrected_contacts
 
 FRICTION_SHARE = 0.9
-"""Friction of the low-friction control, relative to the critical friction."""
+"""Friction of the low-friction control, relative to the lowest at which the grasp is in closure."""
 LEAST_FRICTION = 1e-4
-"""Lowest friction of a control; the simulator's friction cannot be lower than 1e-5."""
+"""Lowest friction of a negative control; the simulator's own limit is 1e-5."""
 SEARCH = 64
-"""Number of random displacements of the contacts that are tried."""
+"""Number of random displacements of the contacts that are tried to lose force closure."""
 TOWARD_CORNER = 0.95
-"""How far towards a corner of its face a moved contact goes, as a share of the way."""
+"""How far a moved contact goes towards a corner of its face, as a share of the way."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Control:
-    """Contacts that must not hold, with the proof."""
+    """A negative control: contacts that must not hold, with the proof that they cannot."""
 
     name: str
     contacts: tuple[Contact, ...]
@@ -41,7 +41,7 @@ class Control:
     certificate: ClosureCertificate
 
     def separating_wrench(self, center: Array) -> Array:
-        """The certificate's wrench with its torque about a centre, (6,)."""
+        """The wrench that the contacts provably cannot resist, (6,), with torque about `center`."""
         wrench = self.certificate.separating_wrench
         assert wrench is not None  # noqa: S101 - controls are refuted by construction
         return np.concatenate([wrench[:3] + np.cross(wrench[3:], center), wrench[3:]])
@@ -50,7 +50,7 @@ class Control:
 def negative_controls(
     body: Polyhedron, grasp: Grasp, friction: float, seed: int
 ) -> tuple[Control, ...]:
-    """Make the controls that exist for a grasp, at most one of each kind.
+    """Make the negative controls that exist for a grasp, at most one of each kind.
 
     The kinds are friction below the critical one, fingers removed, a normal flipped, contacts moved
     on their faces, which takes them out of the grasp's region, and the paper's uncorrected
@@ -74,7 +74,7 @@ def _low_friction(grasp: Grasp) -> Iterator[Control]:
 
 
 def _fingers_removed(grasp: Grasp, friction: float) -> Iterator[Control]:
-    """Remove one finger, lowering the friction if that is needed to open the rest, or else two.
+    """Yield a negative control with one finger fewer, at lower friction if needed, or two fewer.
 
     Without friction no three contacts are in closure, so any three are open below some friction.
     Two contacts are open at any friction, because the object can always turn about the line between
@@ -92,7 +92,7 @@ def _fingers_removed(grasp: Grasp, friction: float) -> Iterator[Control]:
 
 
 def _critical(contacts: Sequence[Contact]) -> float:
-    """The critical friction of contacts; infinite where it is undecided."""
+    """The lowest friction at which contacts are force-closed; infinity if it is not known."""
     try:
         return critical_friction(*stacked(contacts))
     except (SolverError, UndecidedError):
@@ -108,7 +108,7 @@ def _normal_flipped(grasp: Grasp, friction: float) -> Iterator[Control]:
 
 
 def _uncorrected(body: Polyhedron, grasp: Grasp, friction: float) -> Iterator[Control]:
-    """Contacts that the paper's programs as printed take for a grasp, but that are open."""
+    """Yield contacts that the paper's printed programs accept, but that are not closed."""
     try:
         for supposed, contacts in uncorrected_contacts(body, grasp, friction):
             yield from _refuted("uncorrected", contacts, supposed)
@@ -136,7 +136,7 @@ def _near_corner(pieces: Sequence[Array], rng: np.random.Generator) -> Array:
 
 
 def _refuted(name: str, contacts: Sequence[Contact], friction: float) -> Iterator[Control]:
-    """Yield the control if the analysis proves that it is not in force closure."""
+    """Yield the negative control if the analysis proves that it is not force-closed."""
     try:
         certificate = force_closure(*stacked(contacts), friction)
     except UndecidedError:

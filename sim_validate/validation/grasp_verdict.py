@@ -1,4 +1,4 @@
-"""The verdict on a grasp: every wrench, every control, and each contradiction of the analysis."""
+"""The verdict on a grasp: its trials, negative controls, and contradictions of the analysis."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ from sim_validate.validation.wrench_verdict import AGREEMENT, WrenchVerdict
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Verdict:
-    """What simulation says about a grasp."""
+    """The result of simulating a grasp: what it held, and whether that fits the analysis."""
 
     id: str
     contacts: tuple[Contact, ...]
@@ -25,11 +25,11 @@ class Verdict:
     wrenches: tuple[WrenchVerdict, ...]
     controls: tuple[ControlVerdict, ...]
     bounds: Bounds | None
-    """Bounds found without planned forces, if asked for."""
+    """Bounds on the wrenches held by fingers without planned forces; None if not asked for."""
     robustness: Robustness | None
     """How often the grasp holds with noise, if asked for."""
     accepted_by: dict[str, bool]
-    """Whether each rule of another tool accepts the grasp, by name."""
+    """For each acceptance rule of another tool, whether it would accept the grasp."""
     gate: Gate
     scene: Scene
     setup: Setup
@@ -52,12 +52,12 @@ class Verdict:
 
     @property
     def controls_failed(self) -> bool:
-        """Whether the simulator let go of every control."""
+        """Whether every negative control let go of the object, as it must."""
         return all(control.failed for control in self.controls)
 
     @property
     def mismatches(self) -> tuple[str, ...]:
-        """Where simulation contradicts the analysis, in words."""
+        """Where simulation contradicts the analysis, one sentence each."""
         found = [trial.contradiction for trial in self.wrenches if trial.contradiction]
         if self.agenda.critical_friction and (fault := _disagreement(self.critical_friction)):
             found.append(f"critical friction: {fault}")
@@ -72,12 +72,12 @@ class Verdict:
 
     @property
     def good(self) -> bool:
-        """Whether every wrench held, every control was let go, and nothing was contradicted."""
+        """Whether all wrenches held, negative controls let go, and nothing was contradicted."""
         return self.held and self.controls_failed and not self.mismatches
 
 
 def _disagreement(friction: CriticalFriction) -> str:
-    """What is wrong with a simulated critical friction; empty if nothing is."""
+    """Describe how simulated and predicted critical friction differ; empty if they agree."""
     simulated, predicted = friction.simulated, friction.predicted
     if simulated is None:
         return "not found near the predicted one"

@@ -1,4 +1,4 @@
-"""Grasps of one object, validated one after another or by several processes, in order."""
+"""Validates several grasps of one object, in one process or in several, with results in order."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ class Job:
 
 
 def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
-    """Yield verdicts in the order of the jobs as they become ready; `processors` changes none.
+    """Yield one verdict per job, in order; the number of processors does not change the results.
 
     Args:
         jobs: The grasps to validate.
@@ -32,7 +32,7 @@ def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
 
     Raises:
         InputError: A grasp is refused.
-        UnfaithfulError: The simulator fails the gate.
+        UnfaithfulError: The simulator fails its checks on cases with known answers.
     """
     return each(verdict_of, with_threads(jobs, processors), jobs=processors)
 
@@ -48,6 +48,6 @@ def verdict_of(job: Job) -> Verdict:
 
     Raises:
         InputError: The grasp is refused.
-        UnfaithfulError: The simulator fails the gate.
+        UnfaithfulError: The simulator fails its checks on cases with known answers.
     """
     return validate(job.body, job.grasp, job.friction, agenda=job.agenda, setup=job.setup)

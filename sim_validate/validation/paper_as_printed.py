@@ -1,10 +1,11 @@
-"""The paper's pencil and regulus programs as printed: a source of negative controls.
+"""Solves the paper's programs exactly as printed, as a source of negative controls.
 
-Sections 3.2 and 3.3 of Sudsang & Ponce read simpler than the constructions in `grasp_core`. The
-printed pencil program leaves the order of the foci open, so its discs hold contacts out of
-equilibrium. The printed regulus program lacks the equation of equal pitch, so its four lines are
-independent and often cannot balance. Their answers look like grasps, which makes them good
-controls. Nothing but controls and tests may use them.
+Sections 3.2 and 3.3 of Sudsang & Ponce leave conditions out that the constructions in `grasp_core`
+have. The printed pencil program (force lines in two flat pencils) leaves the order of the two foci
+open, so its discs hold contacts out of equilibrium. The printed regulus program (four lines of one
+ruled quadric) lacks the equation of equal pitch, so its lines are often independent and cannot
+balance. Their answers look like grasps, which makes them good negative controls. Nothing else may
+use them.
 """
 
 import math
@@ -25,9 +26,9 @@ from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.values import Contact, ForceCone, Grasp
 
 LEAST = 1e-3
-"""Smallest radius of a disc in the printed pencil program, in object radii."""
+"""Smallest disc radius accepted from the printed pencil program, in object radii."""
 PAIR = (0, 0, 1, 1)
-"""Index of each finger's pair, from zero."""
+"""The pair, 0 or 1, to which each of the four fingers belongs."""
 BELOW_SPAN = 0.99
 """Largest half-angle of the cones, relative to the angle at which the normals stop spanning."""
 

@@ -1,10 +1,10 @@
-"""How often a grasp holds although nothing is quite as planned: repeats with seeded noise.
+"""Repeats the trials of a grasp with seeded noise, and counts how often the grasp still holds.
 
-Each repeat draws noise, lets the analysis say which of the nominal loads are still resisted, and
-simulates them all with forces planned for the disturbed contacts. It asks whether the grasp can
-still hold, not whether fingers notice the change. Contacts that lost force closure are loaded like
-a negative control. Analysis and simulation must agree in every repeat. How many repeats hold is a
-count, and comes with an interval.
+Each repeat disturbs the contacts, friction and mass. The analysis says which loads the disturbed
+grasp resists, and simulation applies them all with forces planned for the disturbed contacts. So a
+repeat asks whether the grasp can still hold, not whether fingers notice the change. Contacts that
+noise takes out of force closure are tested as a negative control: they must let go. Analysis and
+simulation must agree in every repeat. The share that holds has a confidence interval.
 """
 
 import importlib
@@ -33,7 +33,7 @@ from sim_validate.validation.wrench_verdict import AGREEMENT, WrenchVerdict
 NamedLoad: TypeAlias = tuple[str, Array]
 """A name with a wrench, (6,) [N, N m], torque about the centre of mass."""
 OPEN = "noise"
-"""Name of the control made of contacts that noise has opened."""
+"""Name of the negative control made of contacts that noise took out of force closure."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ def robustness(
 
 
 def for_repeats(setup: Setup, scene: Scene) -> Setup:
-    """The setup of repeats: the fingertips of the grasp itself, on leaning pads."""
+    """The setup for repeats: the undisturbed grasp's fingertips, on pads that may lean."""
     fingers = replace(setup.fingers, radius_m=scene.layout.drive.radius_m)
     return replace(setup, fingers=fingers, surface="pads")
 
@@ -123,7 +123,7 @@ def disturbed_in(
 def noisy_trial(
     body: Polyhedron, case: Disturbed, loads: Sequence[NamedLoad], number: int, setup: Setup
 ) -> NoisyTrial:
-    """Simulate one repeat of all loads, or of the contacts as a control if noise opened them."""
+    """Simulate one repeat: hold all loads, or let go if noise took the contacts out of closure."""
     if case.missed:
         reason = f"finger {case.missed[0]} misses its face"
         return NoisyTrial(number, False, Outcome.LOST_CONTACT, "", reason, ())
@@ -150,7 +150,7 @@ def noisy_trial(
 
 
 def _silent(outcome: Outcome) -> tuple[str, ...]:
-    """Report an outcome that says nothing about the object, unless fingertips only lack room."""
+    """Describe an outcome that decides nothing; fingertips without room are not reported."""
     says = (Outcome.HELD, *LET_GO, Outcome.INVALID_START)
     return () if outcome in says else (f"{outcome.value}: neither held nor let go",)
 
@@ -198,10 +198,10 @@ def heavier(scene: Scene, factor: float) -> Scene:
 
 
 def _opened(body: Polyhedron, control: Control, number: int, setup: Setup) -> NoisyTrial:
-    """Try contacts that are not in force closure as a control, which must let go."""
+    """Simulate contacts that are not force-closed as a negative control, which must let go."""
     verdict = try_control(body, control, Agenda(), setup)
     if verdict.held:
-        wrong = ("contacts without force closure held",)
+        wrong = ("contacts that are proved not force-closed held the object",)
         return NoisyTrial(number, False, Outcome.HELD, "", "", wrong)
     first = verdict.tried[0]
     ended = first.hold.outcome

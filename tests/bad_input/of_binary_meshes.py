@@ -90,7 +90,7 @@ OFFS = {
     "a corner beyond": (off(faces=[(0, 2, 9), *TRIANGLES[1:]]), "vertex 9"),
     "a corner before": (off(faces=[(0, 2, -1), *TRIANGLES[1:]]), "vertex -1"),
     "a face of two": (off(faces=[(0, 2), *TRIANGLES[1:]]), "three corners"),
-    "a face that lies": (off().replace("3 0 2 1", "9 0 2 1"), "9 corners lists 3"),
+    "a face that lies": (off().replace("3 0 2 1", "9 0 2 1"), "says 9 corners lists 3"),
     "nan": (off().replace("0.1", "nan", 1), "finite"),
     "1e999": (off().replace("0.1", "1e999", 1), "finite"),
     "two coordinates": (off().replace("0.1 0.0 0.0", "0.1 0.0"), "three numbers"),
@@ -182,7 +182,7 @@ GLBS = {
     "lines": (changed("meshes.0.primitives.0.mode", 1), "mode 1|triangles"),
     "points": (changed("meshes.0.primitives.0.mode", 0), "mode 0|triangles"),
     "fans": (changed("meshes.0.primitives.0.mode", 6), "mode 6|triangles"),
-    "11 corners": (changed("accessors.1.count", 11), "whole triangles"),
+    "11 corners": (changed("accessors.1.count", 11), "multiple of three"),
     "Draco": (
         changed("extensionsRequired", ["KHR_draco_mesh_compression"]), "draco|compression"),
     "quantized numbers": (changed("extensionsUsed", ["KHR_mesh_quantization"]), "compression"),

@@ -55,7 +55,7 @@ def test_a_folder_that_another_command_is_at_work_in_is_refused(tmp_path, capsys
         for command in ([*PLAN], ["run", "tetrahedron", "-q"], ["report", str(tmp_path)]):
             asked = command if command[0] == "report" else [*command, "--out", str(tmp_path)]
             assert main(asked) == 4
-            assert "another command is at work in it" in capsys.readouterr().err
+            assert "another command is writing to it" in capsys.readouterr().err
     finally:
         os.close(handle)
     assert main([*PLAN, "--out", str(tmp_path)]) == 0

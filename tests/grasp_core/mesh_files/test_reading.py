@@ -286,7 +286,7 @@ def test_a_comment_that_could_swallow_a_vertex_is_refused():
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (ply().replace(b"float x", b"uchar x"), "vertex 1: x is no whole number of its type"),
+        (ply().replace(b"float x", b"uchar x"), "vertex 1: x does not fit its whole-number type"),
         (ply().replace(b"uchar int", b"uchar char").replace(b"3 0 2 1", b"3 0 2 300"), "corners"),
         (ply().replace(b"float z", b"float z\nproperty float w").replace(b" 0.0\n", b" 0.0 w\n"),
          "expected numbers"),
