@@ -30,8 +30,8 @@ DOORS = {
     "pebble": "sim_validate/parallel/processes.py",
     "ray": "sim_validate/parallel/clusters.py",
     "distributed": "sim_validate/parallel/clusters.py",
-    "pyarrow": "sim_validate/datasets/parquet.py",
-    "h5py": "sim_validate/datasets/exports/hdf5.py",
+    "pyarrow": ("sim_validate/datasets/parquet.py", "sim_validate/datasets/exports/tables.py"),
+    "h5py": "sim_validate/datasets/exports/tables.py",
 }
 
 

@@ -24,7 +24,7 @@ from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.describing.card import CARD
 from sim_validate.datasets.describing.croissant import CROISSANT
 from sim_validate.datasets.manifest import MANIFEST, read_manifest
-from sim_validate.datasets.parquet import require_pyarrow
+from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.units import WorkUnit, units_of, units_sha256
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.paths import path_inside
@@ -70,7 +70,7 @@ def build(
         UnfaithfulError: The simulator fails the gate.
         WorkerError: A worker cannot compute units for this driver.
     """
-    require_pyarrow()
+    pyarrow()  # before any work, so that a missing library is named at once
     units = units_of(config)
     _refuse_sources_inside(units, config, folder)
     with alone_in(folder):

@@ -20,7 +20,7 @@ from sim_validate.datasets.describing.card import CARD, card_text
 from sim_validate.datasets.describing.croissant import CROISSANT, croissant_text
 from sim_validate.datasets.given_contacts import given_text
 from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest, listed, write_manifest
-from sim_validate.datasets.parquet import TableFiles
+from sim_validate.datasets.table_files import TableFiles
 from sim_validate.datasets.units import WorkUnit, provenance, units_sha256
 from sim_validate.files.reading import write_text
 
