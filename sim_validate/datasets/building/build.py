@@ -22,7 +22,6 @@ from sim_validate.datasets.building.write_tables import (
 from sim_validate.datasets.columns import Name
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.describing.card import CARD
-from sim_validate.datasets.describing.croissant import CROISSANT
 from sim_validate.datasets.manifest import MANIFEST, read_manifest
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.units import WorkUnit, units_of, units_sha256
@@ -32,7 +31,7 @@ from sim_validate.files.reading import read_text, write_text
 from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.setup import Setup
 
-OWN = ("staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, CROISSANT, MANIFEST)
+OWN = ("staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST)
 """Names of all files and folders that a dataset's folder may hold."""
 
 

@@ -17,7 +17,6 @@ from sim_validate.datasets.building.staging import Finished, Staging
 from sim_validate.datasets.columns import TABLES
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.describing.card import CARD, card_text
-from sim_validate.datasets.describing.croissant import CROISSANT, croissant_text
 from sim_validate.datasets.given_contacts import given_text
 from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest, listed, write_manifest
 from sim_validate.datasets.table_files import TableFiles
@@ -65,10 +64,8 @@ def finish(
         quarantined=len(quarantined),
         files=(*tables, *(listed(folder, path) for path in others)),
     )
-    for name, text_of in ((CARD, card_text), (CROISSANT, croissant_text)):
-        written = write_text(folder / name, text_of(config, manifest))
-        manifest = replace(manifest, files=(*manifest.files, listed(folder, written)))
-    write_manifest(folder, manifest)
+    card = write_text(folder / CARD, card_text(config, manifest))
+    write_manifest(folder, replace(manifest, files=(*manifest.files, listed(folder, card))))
     staging.remove()
 
 
