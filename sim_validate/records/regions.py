@@ -1,15 +1,13 @@
-"""Certified regions in files: one proof per grasp, and one document for all, with its fields."""
+"""Certified regions in files: one proof per grasp, and one document for all."""
 
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, NotRequired
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, with_config
-from typing_extensions import TypedDict
 
 from grasp_core.arrays import Array, frozen, frozen_indices, frozen_units
 from grasp_core.checked import path_of
@@ -25,7 +23,14 @@ from grasp_core.values import FINGERS, ContactRegion, Grasp, four
 from sim_validate.files.npz import read_arrays
 from sim_validate.files.reading import write_arrays, write_text
 from sim_validate.parallel.certifying import Asked, Found
-from sim_validate.records.verdicts_schema import Finite, ObjectRecord, Positive
+
+if TYPE_CHECKING:  # planning needs no schema
+    from sim_validate.records.regions_schema import (
+        GraspRecord,
+        NamedGrasp,
+        ProofRecord,
+        RegionsFile,
+    )
 
 SCHEMA = 3
 REGIONS, PROOFS = "regions.json", "proofs"
@@ -45,68 +50,12 @@ SMALLEST_SCALE, LARGEST = 1e-6, 1e6
 """Least and largest length that proofs are relative to, and largest length in a proof [m]."""
 
 
-class RegionRecord(TypedDict):
-    """The region of one finger."""
-
-    kind: NotRequired[str]
-    polygon_m: Annotated[list[tuple[Finite, Finite, Finite]], Field(min_length=FEWEST_CORNERS)]
-    inscribed_radius_m: Finite
-    area_m2: NotRequired[Finite]
-
-
-class ProofRecord(TypedDict):
-    """The file that proves a grasp's regions."""
-
-    file: Annotated[str, Field(pattern=r"^proofs/[A-Za-z0-9][A-Za-z0-9_-]{0,99}\.npz$")]
-    """Path of the proof, relative to the folder of the document."""
-    sha256: NotRequired[str]
-
-
-class NamedGrasp(TypedDict):
-    """The grasp that regions belong to."""
-
-    id: str
-    contacts_sha256: str
-    family: NotRequired[str]
-    planned_radius_m: NotRequired[Finite]
-
-
-class GraspRecord(NamedGrasp):
-    """The regions of one grasp, or the reason why there are none."""
-
-    disc_radius_m: Finite | None
-    centers_m: NotRequired[list[list[Finite]]]
-    friction: NotRequired[list[Finite]]
-    open_radius_m: NotRequired[Finite | None]
-    open_choice_m: NotRequired[list[list[Finite]] | None]
-    cones: NotRequired[int]
-    proof: NotRequired[ProofRecord | None]
-    regions: Annotated[list[RegionRecord], Field(min_length=FINGERS, max_length=FINGERS)] | None
-    reason: NotRequired[str]
-
-
-@with_config(ConfigDict(strict=True, extra="allow"))
-class RegionsFile(TypedDict):
-    """The content of `regions.json`; type checking holds its writer to it."""
-
-    schema: Literal[3]
-    object: ObjectRecord
-    friction: Positive
-    reserve: NotRequired[Finite]
-    balance: NotRequired[str]
-    recenter: NotRequired[bool]
-    edge_clearance_m: NotRequired[Finite]
-    cones: NotRequired[int]
-    versions: NotRequired[dict[str, str]]
-    grasps: list[GraspRecord]
-
-
 def write_regions(
     folder: Path | None,
     body: Polyhedron,
     asked: Asked,
     found: Iterable[Found],
-) -> RegionsFile:
+) -> "RegionsFile":
     """Write each proof as it comes, then the document; without a folder nothing is written.
 
     Args:
@@ -138,7 +87,7 @@ def write_regions(
 
 def _record(
     grasp: Grasp, proved: CertifiedRegions | str, body: Polyhedron, folder: Path | None
-) -> GraspRecord:
+) -> "GraspRecord":
     """The record of one grasp; its proof is written, or an earlier proof is removed."""
     named: NamedGrasp = {
         "id": grasp.id,

@@ -10,8 +10,9 @@ from grasp_core.files.complaints import record_of
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.files.reading import read_text
 from sim_validate.records.grasps import read_grasps
-from sim_validate.records.regions import REGIONS, RegionsFile
+from sim_validate.records.regions import REGIONS
 from sim_validate.records.regions import SCHEMA as REGIONS_SCHEMA
+from sim_validate.records.regions_schema import RegionsFile
 from sim_validate.records.verdicts_schema import SCHEMA as VERDICTS_SCHEMA
 from sim_validate.records.verdicts_schema import VerdictsFile
 from sim_validate.reports.agreement import BAD, Record, said_of

@@ -24,7 +24,7 @@ from sim_validate.datasets.manifest import Listed, Manifest, manifest_from_json,
 from sim_validate.datasets.quarantine import left_out_from
 from sim_validate.files.reading import text_of
 from sim_validate.files.toml_tables import tables_of_toml
-from sim_validate.records.regions import RegionsFile
+from sim_validate.records.regions_schema import RegionsFile
 from sim_validate.records.setup_toml import setup_from_tables, tables_of
 from sim_validate.records.verdicts_schema import VerdictsFile
 from sim_validate.records.wrenches import wrenches_from_json
