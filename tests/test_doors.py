@@ -21,6 +21,7 @@ DOORS = {
     "highspy": "grasp_core/solvers/lp.py",
     "clarabel": "grasp_core/solvers/conic.py",
     "qpsolvers": "grasp_core/solvers/qp.py",
+    "scipy.sparse": "grasp_core/geometry/connectivity.py",
     "scipy.optimize": "grasp_core/solvers/nearest_point.py",
     "mujoco": ("sim_validate/simulation/simulate.py", "scenes/drawing/frames.py"),
     "PIL": "scenes/drawing/frames.py",
@@ -70,8 +71,7 @@ HEAVY = (
     "numpy", "scipy", "numba", "highspy", "clarabel", "qpsolvers", "manifold3d", "trimesh",
     "mujoco", "pydantic", "matplotlib",
 )  # fmt: skip
-NOT_TO_PLAN = ("mujoco", "trimesh", "qpsolvers", "pydantic", "scipy.spatial", "scipy.optimize",
-              "scipy.sparse")  # fmt: skip
+NOT_TO_PLAN = ("mujoco", "trimesh", "qpsolvers", "pydantic", "scipy.spatial", "scipy.optimize")
 
 
 def imported(code, among, **environment):
