@@ -21,6 +21,7 @@ DOORS = {
     "highspy": "grasp_core/solvers/lp.py",
     "clarabel": "grasp_core/solvers/conic.py",
     "qpsolvers": "grasp_core/solvers/qp.py",
+    "scipy.sparse": "grasp_core/geometry/connectivity.py",
     "scipy.optimize": "grasp_core/solvers/nearest_point.py",
     "mujoco": ("sim_validate/simulation/simulate.py", "scenes/drawing/frames.py"),
     "PIL": "scenes/drawing/frames.py",
@@ -30,8 +31,8 @@ DOORS = {
     "pebble": "sim_validate/parallel/processes.py",
     "ray": "sim_validate/parallel/clusters.py",
     "distributed": "sim_validate/parallel/clusters.py",
-    "pyarrow": "sim_validate/datasets/parquet.py",
-    "h5py": "sim_validate/datasets/exports/hdf5.py",
+    "pyarrow": ("sim_validate/datasets/parquet.py", "sim_validate/datasets/exports/tables.py"),
+    "h5py": "sim_validate/datasets/exports/tables.py",
 }
 
 
@@ -70,8 +71,7 @@ HEAVY = (
     "numpy", "scipy", "numba", "highspy", "clarabel", "qpsolvers", "manifold3d", "trimesh",
     "mujoco", "pydantic", "matplotlib",
 )  # fmt: skip
-NOT_TO_PLAN = ("mujoco", "trimesh", "qpsolvers", "pydantic", "scipy.spatial", "scipy.optimize",
-              "scipy.sparse")  # fmt: skip
+NOT_TO_PLAN = ("mujoco", "trimesh", "qpsolvers", "pydantic", "scipy.spatial", "scipy.optimize")
 
 
 def imported(code, among, **environment):

@@ -7,9 +7,9 @@ from grasp_core.errors import InputError
 from grasp_core.files.strict_json import object_of, place, shown
 
 if TYPE_CHECKING:
-    from pydantic import BaseModel, ValidationError
+    from pydantic import ValidationError
 
-Model = TypeVar("Model", bound="BaseModel")
+Record = TypeVar("Record")
 BOUNDS = {"too_short": ("at least", "min_length"), "too_long": ("at most", "max_length")}
 """Wording and limit of errors about the number of items, by their type."""
 UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
@@ -25,12 +25,12 @@ OURS = {
 
 
 def record_of(
-    kind: type[Model], text: str, wanted: str, *, schema: int | None = None, nulls: bool = True
-) -> Model:
+    kind: type[Record], text: str, wanted: str, *, schema: int | None = None, nulls: bool = True
+) -> Record:
     """Read a checked record from the text of a JSON file.
 
     Args:
-        kind: Class of the record, with its fields.
+        kind: Class of the record with its fields: a model, or a typed dictionary.
         text: Text of the file.
         wanted: What the file should be, for messages.
         schema: The version that it must have; None for files that have none.
@@ -39,11 +39,11 @@ def record_of(
     Raises:
         InputError: The text is not such a file; the message names the field.
     """
-    from pydantic import ValidationError
+    from pydantic import TypeAdapter, ValidationError
 
     object_of(text, wanted, schema=schema, nulls=nulls)
     try:
-        return kind.model_validate_json(text)
+        return TypeAdapter(kind).validate_json(text)
     except ValidationError as error:
         raise InputError(complaint(error, kind)) from error
 

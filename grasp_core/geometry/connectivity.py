@@ -1,7 +1,7 @@
 """Points that are close to each other, and the sets that links join into one piece.
 
-Numpy alone does this: a library for graphs takes longer to import than a small object to plan on.
-Scipy's tree is used only where points crowd.
+Scipy joins links into pieces; its graphs take 20 ms to import. Its search tree takes another 60 ms,
+so close points are found by numpy, and by the tree only where they crowd.
 """
 
 import importlib
@@ -66,16 +66,13 @@ def _pairs_of_tree(points: Array, reach: float) -> Indices:
 def components(count: int, links: Indices) -> Indices:
     """Return for each thing the least index among those it is connected with, (count,).
 
-    Labels only fall: along links, then to the label of a label, until all links join equal labels.
-
     Args:
         count: Number of things.
         links: Pairs of indices of linked things, (k, 2).
     """
-    label = np.arange(count)
-    while (label[links[:, 0]] != label[links[:, 1]]).any():
-        ends = label[links]
-        np.minimum.at(label, ends, ends.min(axis=1, keepdims=True))
-        while (label[label] != label).any():
-            label = label[label]
-    return label
+    sparse: Any = importlib.import_module("scipy.sparse")
+    csgraph: Any = importlib.import_module("scipy.sparse.csgraph")
+    graph = sparse.coo_array((np.ones(len(links)), links.T), shape=(count, count))
+    label = csgraph.connected_components(graph, directed=False)[1]
+    _, first, place = np.unique(label, return_index=True, return_inverse=True)
+    return first[place]

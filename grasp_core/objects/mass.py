@@ -4,6 +4,9 @@ By the divergence theorem volume and centre are integrals over the surface, of x
 x_i^2 n_i / 2. On a triangle with corners a, b, c they are polynomials in the corners. Second
 moments are summed over the tetrahedra between the centre and the triangles.
 
+Trimesh has the same integrals and judges these in tests. It is not used here because it takes
+180 ms to import, a fourth of what a small object takes to plan on in a fresh process.
+
 Source: Eberly, "Polyhedral mass properties (revisited)", 2002.
 """
 

@@ -14,8 +14,8 @@ from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.building.build import build
 from sim_validate.datasets.building.driver import Engine
 from sim_validate.datasets.building.worker import Limits
-from sim_validate.datasets.config import DatasetConfig, config_from_toml
-from sim_validate.datasets.describing.croissant import CROISSANT, missing_fields
+from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_toml
+from sim_validate.datasets.describing.card import CARD
 from sim_validate.datasets.exports.formats import export
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.verifying.redo import Sample
@@ -102,12 +102,12 @@ def export_dataset(command: dataset_flags.Export, reporter: Reporter) -> int:
 
 
 def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
-    """Warn before the work about what the description will lack: it cannot be added later."""
-    missing = missing_fields(config)
+    """Warn before the work about what the card will lack: it cannot be added later."""
+    missing = [name for name in CREDITS if not getattr(config, name)]
     if missing and not reporter.quiet:
-        given = ", ".join(f"--{setting}" for setting in missing.values())
+        given = ", ".join(f"--{name}" for name in missing)
         reporter.warn(
-            f"{CROISSANT} will lack {', '.join(missing)}, which Croissant requires: give {given}, "
+            f"{CARD} will lack {', '.join(missing)}, which data catalogues ask for: give {given}, "
             "or the same settings in a TOML file"
         )
 

@@ -1,6 +1,6 @@
 """What is a dataset of grasps?
 
 A configuration names many objects and several frictions; the tables of a dataset hold objects,
-grasps and trials. `building` makes them, `verifying` checks them, `describing` documents them for
-people and catalogues, and `exports` writes them for other programs.
+grasps and trials. `building` makes them, `verifying` checks them, `describing` documents them, and
+`exports` writes them for other programs.
 """

@@ -10,7 +10,7 @@ from grasp_core.errors import InputError
 from sim_validate.datasets.columns import TABLES, Name
 from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_toml
 from sim_validate.datasets.manifest import Listed, Manifest, listed, read_manifest
-from sim_validate.datasets.parquet import Columns, each_row, read_columns
+from sim_validate.datasets.parquet import Columns, each_batch, read_columns
 from sim_validate.datasets.rows import SPLITS
 from sim_validate.files.paths import path_inside
 
@@ -41,11 +41,20 @@ class Selection:
         Raises:
             InputError: A file is damaged, or its number of rows differs from the manifest's.
         """
+        for batch in self.batches(name):
+            yield from batch.to_pylist()
+
+    def batches(self, name: Name) -> Iterator[Any]:
+        """Yield the rows of a table as Arrow's record batches.
+
+        Raises:
+            InputError: A file is damaged, or its number of rows differs from the manifest's.
+        """
         for each in self._listed(name):
             found = 0
-            for row in each_row(path_inside(self.folder, each.path), name):
-                found += 1
-                yield row
+            for batch in each_batch(path_inside(self.folder, each.path), name):
+                found += batch.num_rows
+                yield batch
             if found != each.rows:
                 raise InputError(f"{each.path}: {found} rows, but the manifest lists {each.rows}")
 

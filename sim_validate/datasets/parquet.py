@@ -1,4 +1,4 @@
-"""Rows <-> Parquet files, equal for equal rows; the only module that uses pyarrow.
+"""Rows of a table <-> the bytes of a Parquet file, equal for equal rows.
 
 Every page carries a checksum, and reading checks it: without that, a flipped bit goes unnoticed.
 Units and meanings are in the metadata of the columns.
@@ -9,11 +9,10 @@ import io
 import itertools
 import math
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any, BinaryIO, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +26,7 @@ TYPES = {"text": "string", "bool": "bool_", "int": "int64", "float": "float64"}
 MISSING: Mapping[str, float] = {"float": math.nan, "int": -1}
 """What stands for null in arrays."""
 GROUP_ROWS = 20_000
-"""Number of rows that are written at a time, some tens of megabytes in memory."""
-FILE_ROWS = 500_000
-"""Number of rows at which a file is ended and the next one begun, about 100 MB of grasps."""
+"""Number of rows that are written or read at a time, some tens of megabytes in memory."""
 MOST_ROWS, MOST_GROUP_BYTES = 10_000_000, 2**30
 """Largest number of rows of a file, and of bytes in a group, that are read: twenty times what is
 written."""
@@ -40,13 +37,23 @@ PAGES: Mapping[str, Any] = {
 }
 
 
-def require_pyarrow() -> None:
-    """Check that tables can be written and read on this machine.
+def pyarrow() -> Any:
+    """The library that reads and writes Parquet.
 
     Raises:
-        InputError: pyarrow is not installed.
+        InputError: It is not installed.
     """
-    _pyarrow()
+    try:
+        return importlib.import_module("pyarrow")
+    except ImportError as error:
+        raise InputError(
+            "datasets are Parquet files, which need pyarrow: pip install 'graspproof[dataset]'"
+        ) from error
+
+
+def pyarrow_parquet() -> Any:
+    """The part of pyarrow that knows Parquet."""
+    return importlib.import_module("pyarrow.parquet")
 
 
 def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[str, str]) -> bytes:
@@ -61,12 +68,12 @@ def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[
     Raises:
         InputError: Two rows have the same key, or a cell is not of its column's type.
     """
-    arrow, parquet = _pyarrow(), _parquet()
+    arrow, parquet = pyarrow(), pyarrow_parquet()
     listed = sorted(rows, key=lambda row: _key(name, row))
     for one, other in itertools.pairwise(listed):
         if _key(name, one) == _key(name, other):
             raise InputError(f"{name}: two rows have the key {_key(name, one)}")
-    schema = _schema(name).with_metadata(dict(sorted(about.items())))
+    schema = schema_of(name).with_metadata(dict(sorted(about.items())))
     columns = [[_cell(row.get(column.name)) for row in listed] for column in TABLES[name]]
     try:
         arrays = [arrow.array(values, type=each.type)
@@ -81,8 +88,8 @@ def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[
 
 def as_read(name: Name, rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """The rows as they come back from a file: sorted, with null for numbers that are not finite."""
-    held = _pyarrow().BufferReader(parquet_bytes(name, rows, {}))
-    return _parquet().ParquetFile(held).read().to_pylist()
+    held = pyarrow().BufferReader(parquet_bytes(name, rows, {}))
+    return pyarrow_parquet().ParquetFile(held).read().to_pylist()
 
 
 def read_rows(path: Path, name: Name | None = None) -> list[dict[str, Any]]:
@@ -91,11 +98,21 @@ def read_rows(path: Path, name: Name | None = None) -> list[dict[str, Any]]:
     Raises:
         InputError: The file is not that of a table, or is damaged.
     """
-    return _read(path, name).to_pylist()
+    return read_table(path, name).to_pylist()
 
 
-def each_row(path: Path, name: Name | None = None) -> Iterator[dict[str, Any]]:
-    """Yield the rows of a file as `read_rows` does, without holding all of them in memory.
+def each_batch(path: Path, name: Name) -> Iterator[Any]:
+    """Yield the rows of a file as Arrow's record batches, without holding all of them in memory.
+
+    Raises:
+        InputError: The file is not that of the table, or is damaged.
+    """
+    with _opened(path, name) as file:
+        yield from file.iter_batches(GROUP_ROWS)
+
+
+def read_table(path: Path, name: Name | None = None) -> Any:
+    """Read a file as an Arrow table and check all of its checksums.
 
     Args:
         path: Path of the file.
@@ -104,12 +121,6 @@ def each_row(path: Path, name: Name | None = None) -> Iterator[dict[str, Any]]:
     Raises:
         InputError: The file is not that of a table, or is damaged.
     """
-    with _opened(path, name) as file:
-        for part in file.iter_batches(GROUP_ROWS):
-            yield from part.to_pylist()
-
-
-def _read(path: Path, name: Name | None = None) -> Any:
     with _opened(path, name) as file:
         return file.read()
 
@@ -121,7 +132,7 @@ def _opened(path: Path, name: Name | None = None) -> Generator[Any]:
     Raises:
         InputError: The file is not that of a table, has other columns, or is damaged.
     """
-    arrow, parquet = _pyarrow(), _parquet()
+    arrow, parquet = pyarrow(), pyarrow_parquet()
     try:
         with parquet.ParquetFile(path, page_checksum_verification=True) as file:
             _check_columns(path, file.schema_arrow, list(TABLES) if name is None else [name])
@@ -136,7 +147,7 @@ def _opened(path: Path, name: Name | None = None) -> Generator[Any]:
 def _check_columns(path: Path, came: Any, names: Sequence[Name]) -> None:
     known = [[column.name for column in TABLES[name]] for name in names]
     if any(
-        came.names == columns and came.types == _schema(name).types
+        came.names == columns and came.types == schema_of(name).types
         for name, columns in zip(names, known, strict=True)
     ):
         return
@@ -153,116 +164,6 @@ def _check_size(path: Path, claimed: Any) -> None:
             f"{path}: claims {rows} rows, and {largest} bytes in one group of them; the limits are "
             f"{MOST_ROWS} and {MOST_GROUP_BYTES}"
         )
-
-
-@dataclass(frozen=True, slots=True)
-class WrittenTable:
-    """A finished file of a table."""
-
-    name: Name
-    split: str
-    path: Path
-    rows: int
-
-
-class TableFiles:
-    """Writes the files of all tables, one after another for each table and split.
-
-    Rows are kept back until there are enough for a group of rows, so memory does not grow. Use it
-    in a `with` block; at its end no file is open, whatever happens.
-    """
-
-    def __init__(self, folder: Path, about: Mapping[str, str]) -> None:
-        self._folder = folder
-        self._about = dict(sorted(about.items()))
-        self._parts: dict[tuple[Name, str], _Part] = {}
-
-    def __enter__(self) -> "TableFiles":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for part in self._parts.values():
-            part.abandon()
-
-    def add(self, name: Name, split: str, paths: Iterable[Path]) -> None:
-        """Add the rows of some files; their keys must come after all that were added before.
-
-        Raises:
-            InputError: A file is damaged, or two rows have the same key.
-        """
-        arrow, keys = _pyarrow(), list(KEYS[name])
-        table = arrow.concat_tables([_read(path) for path in paths])
-        table = table.sort_by([(key, "ascending") for key in keys])
-        if table.group_by(keys).aggregate([]).num_rows < table.num_rows:
-            raise InputError(f"{name}: two rows have the same {' and '.join(keys)}")
-        if not table.num_rows:
-            return
-        part = self._parts.setdefault((name, split), _Part(self._folder / name, split))
-        part.add(table.replace_schema_metadata(self._about))
-
-    def close(self) -> list[WrittenTable]:
-        """Write the rows that wait, and list the files."""
-        return [
-            WrittenTable(name, split, path, rows)
-            for (name, split), part in sorted(self._parts.items())
-            for path, rows in part.close()
-        ]
-
-
-class _Part:
-    """Writes the files of one table and split."""
-
-    def __init__(self, folder: Path, split: str) -> None:
-        self._folder, self._split = folder, split
-        self._waiting: list[Any] = []
-        self._writer: Any = None
-        self._stream: BinaryIO | None = None
-        self._rows: list[int] = []
-        folder.mkdir(parents=True, exist_ok=True)
-
-    def add(self, table: Any) -> None:
-        self._waiting.append(table)
-        if sum(each.num_rows for each in self._waiting) >= GROUP_ROWS:
-            self._flush()
-
-    def close(self) -> list[tuple[Path, int]]:
-        if self._waiting:
-            self._flush()
-        self._end_file()
-        files = len(self._rows)
-        named = [self._folder / f"{self._split}-{i:05}-of-{files:05}.parquet" for i in range(files)]
-        return [
-            (self._path(i).rename(path), rows)
-            for i, (path, rows) in enumerate(zip(named, self._rows, strict=True))
-        ]
-
-    def _path(self, number: int) -> Path:
-        return self._folder / f".{self._split}-{number:05}"
-
-    def _flush(self) -> None:
-        table = _pyarrow().concat_tables(self._waiting)
-        self._waiting.clear()
-        if self._writer is None:
-            path = self._path(len(self._rows))
-            self._stream = path.open("wb")
-            self._writer = _parquet().ParquetWriter(self._stream, table.schema, **PAGES)
-            self._rows.append(0)
-        self._writer.write_table(table, row_group_size=table.num_rows)
-        self._rows[-1] += table.num_rows
-        if self._rows[-1] >= FILE_ROWS:
-            self._end_file()
-
-    def _end_file(self) -> None:
-        if self._writer is not None and self._stream is not None:
-            self._writer.close()
-            self._stream.close()
-            self._writer = self._stream = None
-
-    def abandon(self) -> None:
-        """Close the open file after a failure such as a full disk."""
-        if self._stream is not None:
-            with suppress(OSError):
-                self._stream.close()
 
 
 def read_columns(paths: Sequence[Path], name: Name) -> Columns:
@@ -302,28 +203,16 @@ def _cell(value: Any) -> Any:
 
 
 @cache
-def _schema(name: Name) -> Any:
-    arrow = _pyarrow()
+def schema_of(name: Name) -> Any:
+    """The columns of a table as an Arrow schema, with units and meanings as metadata."""
+    arrow = pyarrow()
     return arrow.schema([_field(column) for column in TABLES[name]])
 
 
 def _field(column: Column) -> Any:
-    arrow = _pyarrow()
+    arrow = pyarrow()
     kind = getattr(arrow, TYPES[column.kind])()
     for size in reversed(column.shape):
         kind = arrow.list_(kind, size)
     about = {"meaning": column.meaning} | ({"unit": column.unit} if column.unit else {})
     return arrow.field(column.name, kind, metadata=about)
-
-
-def _pyarrow() -> Any:
-    try:
-        return importlib.import_module("pyarrow")
-    except ImportError as error:
-        raise InputError(
-            "datasets are Parquet files, which need pyarrow: pip install 'graspproof[dataset]'"
-        ) from error
-
-
-def _parquet() -> Any:
-    return importlib.import_module("pyarrow.parquet")

@@ -1,5 +1,7 @@
 """The lines of a dataset's `quarantine.jsonl`: which units have no rows, and why."""
 
+import json
+from collections.abc import Iterable
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
@@ -20,6 +22,11 @@ class LeftOut(BaseModel):
     given: list[str]
     """Ids of the given grasps that are missing, if the unit is about given grasps."""
     reason: str
+
+
+def left_out_text(units: Iterable[LeftOut]) -> str:
+    """The text of the file, one line per unit."""
+    return "".join(json.dumps(each.model_dump(), sort_keys=True) + "\n" for each in units)
 
 
 def read_left_out(path: Path) -> list[LeftOut]:

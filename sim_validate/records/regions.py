@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,14 @@ from grasp_core.values import FINGERS, ContactRegion, Grasp, four
 from sim_validate.files.npz import read_arrays
 from sim_validate.files.reading import write_arrays, write_text
 from sim_validate.parallel.certifying import Asked, Found
+
+if TYPE_CHECKING:  # planning needs no schema
+    from sim_validate.records.regions_schema import (
+        GraspRecord,
+        NamedGrasp,
+        ProofRecord,
+        RegionsFile,
+    )
 
 SCHEMA = 3
 REGIONS, PROOFS = "regions.json", "proofs"
@@ -47,7 +55,7 @@ def write_regions(
     body: Polyhedron,
     asked: Asked,
     found: Iterable[Found],
-) -> Mapping[str, Any]:
+) -> "RegionsFile":
     """Write each proof when it is ready, then `regions.json`; write nothing if `folder` is None.
 
     Args:
@@ -60,7 +68,7 @@ def write_regions(
         The content of regions.json.
     """
     records = [_record(grasp, proved, body, folder) for grasp, proved in found]
-    document = {
+    document: RegionsFile = {
         "schema": SCHEMA,
         "object": {"name": body.name, "content_sha256": body.content_sha256},
         "friction": asked.friction,
@@ -79,9 +87,9 @@ def write_regions(
 
 def _record(
     grasp: Grasp, proved: CertifiedRegions | str, body: Polyhedron, folder: Path | None
-) -> Mapping[str, Any]:
+) -> "GraspRecord":
     """Build the record of one grasp, and write its proof or remove an earlier one."""
-    named = {
+    named: NamedGrasp = {
         "id": grasp.id,
         "contacts_sha256": contacts_sha256(grasp.contacts),
         "family": grasp.family,
@@ -92,7 +100,7 @@ def _record(
         if folder is not None:
             (folder / name).unlink(missing_ok=True)
         return {**named, "disc_radius_m": None, "regions": None, "reason": proved}
-    proof = None
+    proof: ProofRecord | None = None
     if folder is not None:
         path = write_arrays(folder / name, proof_arrays(proved, grasp, body))
         proof = {"file": name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}

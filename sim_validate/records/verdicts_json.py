@@ -11,14 +11,25 @@ from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from sim_validate.records.setup_toml import OF_USERS
+from sim_validate.records.verdicts_schema import (
+    SCHEMA,
+    ControlRecord,
+    FingersRecord,
+    GateRecord,
+    HoldRecord,
+    RobustnessRecord,
+    SettingsRecord,
+    Summary,
+    TrialRecord,
+    VerdictRecord,
+    VerdictsFile,
+)
 from sim_validate.simulation.gate.gate import Gate
 from sim_validate.simulation.hold_verdict import HoldVerdict, Outcome
 from sim_validate.validation.control_trials import ControlVerdict
 from sim_validate.validation.grasp_verdict import Verdict
 from sim_validate.validation.repeats import Robustness
 from sim_validate.validation.wrench_verdict import WrenchVerdict
-
-SCHEMA = 1
 
 
 def verdicts_to_json(
@@ -34,7 +45,7 @@ def verdicts_to_json(
         complete: Whether every grasp of the plan was tested.
     """
     listed = list(verdicts)
-    document = {
+    document: VerdictsFile = {
         "schema": SCHEMA,
         "object": {
             "name": body.name,
@@ -50,12 +61,15 @@ def verdicts_to_json(
     return json.dumps(finite(document), allow_nan=False, indent=1) + "\n"
 
 
-def gate_record(gate: Gate) -> dict[str, object]:
+def gate_record(gate: Gate) -> GateRecord:
     """Record the gate's results: checks of the simulator on cases with known answers."""
     return {
         "passed": gate.passed,
         "mujoco": gate.mujoco,
-        "checks": [asdict(check) for check in gate.checks],
+        "checks": [
+            {"name": each.name, "value": each.value, "least": each.least, "largest": each.largest}
+            for each in gate.checks
+        ],
     }
 
 
@@ -68,7 +82,7 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def summary(verdicts: Iterable[Verdict]) -> dict[str, int]:
+def summary(verdicts: Iterable[Verdict]) -> Summary:
     """Count grasps that held, negative controls that let go, and contradictions."""
     listed = list(verdicts)
     controls = [control for verdict in listed for control in verdict.controls]
@@ -82,15 +96,19 @@ def summary(verdicts: Iterable[Verdict]) -> dict[str, int]:
     }
 
 
-def _verdict_record(body: Polyhedron, verdict: Verdict) -> dict[str, object]:
-    bounds = verdict.bounds
+def _verdict_record(body: Polyhedron, verdict: Verdict) -> VerdictRecord:
+    bounds, friction = verdict.bounds, verdict.critical_friction
     return {
         "id": verdict.id,
         "contacts_sha256": contacts_sha256(verdict.contacts),
-        "outcome": verdict.outcome.value,
+        "outcome": verdict.outcome,
         "held": verdict.held,
         "mismatches": list(verdict.mismatches),
-        "critical_friction": asdict(verdict.critical_friction),
+        "critical_friction": {
+            "predicted": friction.predicted,
+            "simulated": friction.simulated,
+            "bracket": friction.bracket,
+        },
         "wrenches": [_wrench_record(trial) for trial in verdict.wrenches],
         "controls": {
             control.control.name: _control_record(body, control) for control in verdict.controls
@@ -99,11 +117,11 @@ def _verdict_record(body: Polyhedron, verdict: Verdict) -> dict[str, object]:
         "robustness": _robustness_record(verdict.robustness),
         "accepted_by": verdict.accepted_by,
         "settings": _settings(verdict),
-        "versions": versions(),
+        "versions": {**versions()},
     }
 
 
-def _wrench_record(trial: WrenchVerdict) -> dict[str, object]:
+def _wrench_record(trial: WrenchVerdict) -> TrialRecord:
     found, predicted = trial.simulated_limit, trial.predicted_limit
     return {
         "name": trial.name,
@@ -111,16 +129,16 @@ def _wrench_record(trial: WrenchVerdict) -> dict[str, object]:
         "predicted_limit": predicted,
         "simulated_limit": None if found is None else found.share * predicted,
         "simulated_limit_bracket": (
-            None if found is None else [found.lower * predicted, found.upper * predicted]
+            None if found is None else (found.lower * predicted, found.upper * predicted)
         ),
         "required_friction": trial.required_friction,
         **_hold_record(trial.hold),
     }
 
 
-def _hold_record(hold: HoldVerdict) -> dict[str, object]:
+def _hold_record(hold: HoldVerdict) -> HoldRecord:
     return {
-        "outcome": hold.outcome.value,
+        "outcome": hold.outcome,
         "reason": hold.reason,
         "displacement_m": hold.displacement_m,
         "start_displacement_m": hold.start_displacement_m,
@@ -130,7 +148,7 @@ def _hold_record(hold: HoldVerdict) -> dict[str, object]:
     }
 
 
-def _control_record(body: Polyhedron, verdict: ControlVerdict) -> dict[str, object]:
+def _control_record(body: Polyhedron, verdict: ControlVerdict) -> ControlRecord:
     control = verdict.control
     return {
         "held": verdict.held,
@@ -154,7 +172,7 @@ def _control_record(body: Polyhedron, verdict: ControlVerdict) -> dict[str, obje
     }
 
 
-def _robustness_record(found: Robustness | None) -> dict[str, object] | None:
+def _robustness_record(found: Robustness | None) -> RobustnessRecord | None:
     if found is None:
         return None
     return {
@@ -162,21 +180,22 @@ def _robustness_record(found: Robustness | None) -> dict[str, object] | None:
         "held": found.held,
         "predicted": found.predicted,
         "pass_rate": found.held / len(found.trials),
-        "pass_rate_interval": list(found.interval),
+        "pass_rate_interval": found.interval,
         "noise": asdict(found.noise),
         "not_held": [
-            {"trial": each.number, "predicted": each.predicted, "outcome": each.outcome.value,
+            {"trial": each.number, "predicted": each.predicted, "outcome": each.outcome,
              "wrench": each.wrench, "reason": each.reason}
             for each in found.trials if each.outcome is not Outcome.HELD
         ],
     }  # fmt: skip
 
 
-def _settings(verdict: Verdict) -> dict[str, object]:
+def _settings(verdict: Verdict) -> SettingsRecord:
     layout, setup = verdict.scene.layout, verdict.setup
+    fingers = {name: getattr(setup.fingers, name) for name in OF_USERS["fingers"]}
     return {
         "physics": asdict(setup.physics),
-        "fingers": {name: getattr(setup.fingers, name) for name in OF_USERS["fingers"]},
+        "fingers": cast("FingersRecord", fingers),
         "hold": asdict(setup.hold),
         "limit": asdict(setup.limit),
         "friction": asdict(setup.friction),

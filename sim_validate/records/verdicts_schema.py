@@ -1,135 +1,192 @@
-"""The fields of `verdicts.json` and `regions.json` that reports use, with their types."""
+"""The fields of `verdicts.json` with their types, for its writer and for all of its readers.
 
-from typing import Annotated, Literal
+Type checking holds the writer to these fields; reading checks every one that is there, and keeps
+keys that are not listed. Fields that may be absent are those that no reader relies on.
+"""
 
-from pydantic import BaseModel, ConfigDict, Field
+from typing import Annotated, Any, Literal, NotRequired
 
+from pydantic import ConfigDict, Field, with_config
+from typing_extensions import TypedDict
+
+from grasp_core.checked import MOST_RANDOM_WRENCHES
+from scenes.mjcf import Surface
 from sim_validate.simulation.hold_verdict import Outcome
 
+SCHEMA = 1
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Triple = tuple[Finite, Finite, Finite]
 Wrench = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0)]
 
 
-class _Record(BaseModel):
-    """Base class of records that keep unknown fields unchanged."""
+class ObjectRecord(TypedDict):
+    """The object that a file is about."""
 
-    model_config = ConfigDict(frozen=True, extra="allow", strict=True)
-
-
-class _Object(_Record):
+    name: NotRequired[str]
+    source_sha256: NotRequired[str | None]
     content_sha256: str
 
 
-class _Check(_Record):
+class CheckRecord(TypedDict):
+    """One figure of the simulator on a known case, and the interval in which it must lie."""
+
     name: str
     value: Finite
     least: Finite
     largest: Finite
 
 
-class _Gate(_Record):
-    checks: list[_Check]
+class GateRecord(TypedDict):
+    """The checks of the simulator."""
+
+    passed: NotRequired[bool]
+    mujoco: NotRequired[str]
+    checks: list[CheckRecord]
 
 
-class _Summary(_Record):
+class Summary(TypedDict):
+    """The number of grasps and controls, and of those that held or let go."""
+
     grasps: Count
     grasps_held: Count
     controls: Count
+    controls_held: Count
     controls_let_go: Count
     mismatches: Count
 
 
-class _CriticalFriction(_Record):
+class CriticalFrictionRecord(TypedDict):
+    """The critical friction by analysis and in simulation."""
+
     predicted: Finite
     simulated: Finite | None
+    bracket: NotRequired[tuple[Finite, Finite] | None]
 
 
-class _ControlTrial(_Record):
+class HoldRecord(TypedDict):
+    """How a trial ended."""
+
+    outcome: Outcome
+    reason: NotRequired[str]
+    displacement_m: Finite | None
+    start_displacement_m: NotRequired[Finite | None]
+    rotation_rad: NotRequired[Finite | None]
+    slip_m: NotRequired[list[Finite | None]]
+    failed_after_s: NotRequired[Finite | None]
+
+
+class ControlTrialRecord(HoldRecord):
+    """A trial of a negative control."""
+
     name: str
     wrench: Wrench
-    outcome: Outcome
+    required_friction: NotRequired[Finite | None]
 
 
-class _Trial(_ControlTrial):
+class TrialRecord(HoldRecord):
+    """A trial of a grasp; limits are multiples of the wrench."""
+
+    name: str
+    wrench: Wrench
     predicted_limit: Finite | None
     simulated_limit: Finite | None
+    simulated_limit_bracket: NotRequired[tuple[Finite | None, Finite | None] | None]
     required_friction: Finite | None
-    displacement_m: Finite | None
 
 
-class _Control(_Record):
+class ContactRecord(TypedDict):
+    """A contact in the object's frame."""
+
+    position_m: tuple[Finite, Finite, Finite]
+    normal: tuple[Finite, Finite, Finite]
+
+
+class ControlRecord(TypedDict):
+    """A negative control and its trials."""
+
     held: bool
     friction: Finite
-    wrenches: Annotated[list[_ControlTrial], Field(min_length=1)]
+    contacts: NotRequired[list[ContactRecord]]
+    closure_margin: NotRequired[Finite | None]
+    separating_wrench: NotRequired[Wrench]
+    wrenches: Annotated[list[ControlTrialRecord], Field(min_length=1)]
+    accepted_by: NotRequired[dict[str, bool]]
 
 
-class _Fingers(_Record):
+class LostRecord(TypedDict):
+    """A repeat with noise that was not held."""
+
+    trial: Count
+    predicted: NotRequired[bool | None]
+    outcome: Outcome
+    wrench: str
+    reason: NotRequired[str]
+
+
+class RobustnessRecord(TypedDict):
+    """The repeats with noise."""
+
+    trials: Count
+    held: Count
+    predicted: NotRequired[Count]
+    pass_rate: NotRequired[Finite]
+    pass_rate_interval: tuple[Finite, Finite]
+    noise: dict[str, Finite]
+    not_held: list[LostRecord]
+
+
+class FingersRecord(TypedDict):
+    """The settings of fingertips; a replay checks the others by their names."""
+
     max_normal_force_n: Positive
 
 
-class _Settings(_Record):
-    fingers: _Fingers
+class SettingsRecord(TypedDict):
+    """The settings of a verdict's trials, with tables that `--setup` accepts."""
+
+    physics: dict[str, Any]
+    fingers: FingersRecord
+    hold: dict[str, Any]
+    limit: dict[str, Any]
+    friction: dict[str, Any]
+    flags: NotRequired[dict[str, str]]
+    drive: NotRequired[dict[str, Any]]
+    surface: Surface
     grasp_size_m: Positive
+    object_mass_kg: NotRequired[Finite]
+    object_inertia_kg_m2: NotRequired[list[list[Finite]]]
+    random_wrenches: Annotated[int, Field(ge=0, le=MOST_RANDOM_WRENCHES)]
+    limits: NotRequired[str]
+    seed: Count
 
 
-class _Robustness(_Record):
-    trials: Count
-    held: Count
-    pass_rate_interval: tuple[Finite, Finite]
+class VerdictRecord(TypedDict):
+    """The verdict on one grasp."""
 
-
-class _Verdict(_Record):
     id: str
     contacts_sha256: str
     outcome: Outcome
     held: bool
     mismatches: list[str]
-    critical_friction: _CriticalFriction
-    wrenches: list[_Trial]
-    controls: dict[str, _Control]
-    robustness: _Robustness | None = None
-    settings: _Settings
+    critical_friction: CriticalFrictionRecord
+    wrenches: list[TrialRecord]
+    controls: dict[str, ControlRecord]
+    bounds: NotRequired[dict[str, Any] | None]
+    robustness: NotRequired[RobustnessRecord | None]
+    accepted_by: NotRequired[dict[str, bool]]
+    settings: SettingsRecord
     versions: dict[str, str | None]
 
 
-class VerdictsFile(_Record):
+@with_config(ConfigDict(strict=True, extra="allow"))
+class VerdictsFile(TypedDict):
     """The content of `verdicts.json`, as `validate` writes it."""
 
-    schema_: Literal[1] = Field(alias="schema")
-    object: _Object
+    schema: Literal[1]
+    object: ObjectRecord
     friction: Positive
     complete: bool
-    gate: _Gate
-    summary: _Summary
-    verdicts: list[_Verdict]
-
-
-class _Region(_Record):
-    polygon_m: Annotated[list[Triple], Field(min_length=3)]
-    inscribed_radius_m: Finite
-
-
-class _Proof(_Record):
-    file: Annotated[str, Field(pattern=r"^proofs/[A-Za-z0-9][A-Za-z0-9_-]{0,99}\.npz$")]
-    """Path of the proof, relative to the folder of the document."""
-
-
-class _GraspRegions(_Record):
-    id: str
-    contacts_sha256: str
-    disc_radius_m: Finite | None
-    regions: Annotated[list[_Region], Field(min_length=4, max_length=4)] | None
-    reason: str = ""
-    proof: _Proof | None = None
-
-
-class RegionsFile(_Record):
-    """The content of `regions.json`, as `regions` writes it."""
-
-    schema_: Literal[3] = Field(alias="schema")
-    object: _Object
-    friction: Positive
-    grasps: list[_GraspRegions]
+    gate: GateRecord
+    summary: Summary
+    verdicts: list[VerdictRecord]

@@ -10,9 +10,8 @@ from grasp_core.files.complaints import record_of
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.settings import noise_from_table
 from sim_validate.records.grasps import grasp_with_id, some
-from sim_validate.records.replayed_schema import VerdictsToReplay
 from sim_validate.records.setup_toml import OF_USERS, setup_from_tables
-from sim_validate.records.verdicts_json import SCHEMA
+from sim_validate.records.verdicts_schema import SCHEMA, VerdictsFile
 from sim_validate.replaying.from_grasps import (
     grasps_behind,
     of_grasp,
@@ -39,7 +38,7 @@ def from_verdicts(path: Path, text: str, wanted: Wanted) -> Recorded:
         InputError: The file is not what `validate` writes, or does not hold what is wanted.
     """
     try:
-        record = record_of(VerdictsToReplay, text, "verdicts.json", schema=SCHEMA).model_dump()
+        record = record_of(VerdictsFile, text, "verdicts.json", schema=SCHEMA)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     grasps = wanted.grasps or path.parent / GRASPS
@@ -99,7 +98,7 @@ def _with_outcomes(
     """Add how the trials of a contact set ended."""
     if wanted.trial is not None:
         nothing: Mapping[str, Any] = {"trials": 0, "not_held": []}
-        repeats: Mapping[str, Any] = verdict["robustness"] or nothing
+        repeats: Mapping[str, Any] = verdict.get("robustness") or nothing
         require_repeat(path, wanted.trial, repeats["trials"])
         for each in repeats["not_held"]:
             if each["trial"] == wanted.trial:

@@ -4,8 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pydantic import BaseModel
-
 from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
@@ -14,8 +12,9 @@ from sim_validate.files.reading import read_text
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.regions import REGIONS
 from sim_validate.records.regions import SCHEMA as REGIONS_SCHEMA
-from sim_validate.records.verdicts_json import SCHEMA as VERDICTS_SCHEMA
-from sim_validate.records.verdicts_schema import RegionsFile, VerdictsFile
+from sim_validate.records.regions_schema import RegionsFile
+from sim_validate.records.verdicts_schema import SCHEMA as VERDICTS_SCHEMA
+from sim_validate.records.verdicts_schema import VerdictsFile
 from sim_validate.reports.agreement import BAD, Record, said_of
 from sim_validate.simulation.hold_verdict import Outcome
 
@@ -154,14 +153,14 @@ def _check_summary(path: Path, summary: Record, verdicts: Sequence[Record]) -> N
             )
 
 
-def _read(path: Path, kind: type[BaseModel], saved: SavedGrasps) -> Record | None:
+def _read(path: Path, kind: type[Record], saved: SavedGrasps) -> Record | None:
     """Read a file about the same object; None where the file does not exist."""
     if not path.is_file():
         return None
     schema = SCHEMAS[path.name]
     try:
         text = read_text(path)
-        found = record_of(kind, text, path.name, schema=schema).model_dump()
+        found = record_of(kind, text, path.name, schema=schema)
     except InputError as error:
         raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
     if found["object"]["content_sha256"] != saved.body.content_sha256:

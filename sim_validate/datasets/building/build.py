@@ -22,9 +22,8 @@ from sim_validate.datasets.building.write_tables import (
 from sim_validate.datasets.columns import Name
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.describing.card import CARD
-from sim_validate.datasets.describing.croissant import CROISSANT
 from sim_validate.datasets.manifest import MANIFEST, read_manifest
-from sim_validate.datasets.parquet import require_pyarrow
+from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.units import WorkUnit, units_of, units_sha256
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.paths import path_inside
@@ -32,7 +31,7 @@ from sim_validate.files.reading import read_text, write_text
 from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.setup import Setup
 
-OWN = ("staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, CROISSANT, MANIFEST)
+OWN = ("staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST)
 """Names of all files and folders that a dataset's folder may hold."""
 
 
@@ -70,7 +69,7 @@ def build(
         UnfaithfulError: The simulator fails the gate.
         WorkerError: A worker cannot compute units for this driver.
     """
-    require_pyarrow()
+    pyarrow()  # before any work, so that a missing library is named at once
     units = units_of(config)
     _refuse_sources_inside(units, config, folder)
     with alone_in(folder):

@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -81,12 +81,11 @@ class Staging:
         """Keep the rows and files of a finished unit."""
         tables = {_file(name): parquet_bytes(name, made.rows[name], {}) for name in TABLES}
         others = {f"{OTHERS}/{path}": text.encode() for path, text in made.files.items()}
-        about = {"object_id": made.object_id, "split": made.split}
-        self._put(unit, {**tables, **others}, about)
+        self._put(unit, {**tables, **others}, object_id=made.object_id, split=made.split)
 
     def quarantine(self, unit: WorkUnit, reason: str) -> None:
         """Record that a unit cannot be computed."""
-        self._put(unit, {}, {"reason": reason})
+        self._put(unit, {}, reason=reason)
 
     def result(self, unit: WorkUnit) -> Finished | str:
         """Look up the result of a unit: its object and split, or why it has no rows.
@@ -134,7 +133,7 @@ class Staging:
     def _of(self, unit: WorkUnit) -> Path:
         return self.folder / unit.id
 
-    def _record(self, unit: WorkUnit) -> "UnitRecord":
+    def _record(self, unit: WorkUnit) -> UnitRecord:
         path = self._of(unit) / RECORD
         text = read_text(path)
         try:
@@ -142,16 +141,12 @@ class Staging:
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
 
-    def _put(self, unit: WorkUnit, files: Mapping[str, bytes], more: Mapping[str, str]) -> None:
-        record = {
-            "object": unit.object,
-            "friction": unit.friction,
-            "files": {name: _sha256(data) for name, data in files.items()},
-            **more,
-        }
+    def _put(self, unit: WorkUnit, files: Mapping[str, bytes], **more: Any) -> None:
+        hashes = {name: _sha256(data) for name, data in files.items()}
+        record = UnitRecord(object=unit.object, friction=unit.friction, files=hashes, **more)
         made = Path(tempfile.mkdtemp(dir=self.folder, prefix=f"{UNFINISHED}{unit.id}."))
         try:
-            for name, data in {**files, RECORD: json.dumps(record).encode()}.items():
+            for name, data in {**files, RECORD: json.dumps(record.model_dump()).encode()}.items():
                 path = made / name
                 path.parent.mkdir(parents=True, exist_ok=True)
                 with path.open("wb") as stream:

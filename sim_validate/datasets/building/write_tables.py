@@ -5,7 +5,6 @@ in which run each unit was computed. Only the rows of one object, and rows that 
 are in memory.
 """
 
-import json
 import shutil
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,10 +16,10 @@ from sim_validate.datasets.building.staging import Finished, Staging
 from sim_validate.datasets.columns import TABLES
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.describing.card import CARD, card_text
-from sim_validate.datasets.describing.croissant import CROISSANT, croissant_text
 from sim_validate.datasets.given_contacts import given_text
 from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest, listed, write_manifest
-from sim_validate.datasets.parquet import TableFiles
+from sim_validate.datasets.quarantine import LeftOut, left_out_text
+from sim_validate.datasets.table_files import TableFiles
 from sim_validate.datasets.units import WorkUnit, provenance, units_sha256
 from sim_validate.files.reading import write_text
 
@@ -45,14 +44,13 @@ def finish(
     tables = _write_tables(config, good, staging, folder)
     for each in good:
         staging.copy_files(each.unit, folder)
-    lines = "".join(json.dumps(each, sort_keys=True) + "\n" for each in quarantined)
     given = {each.id: each for unit in units for each in unit.given}
     if given:
         in_order = [given[name] for name in sorted(given)]
         write_text(folder / CONTACTS, given_text(in_order))
     others = [
         write_text(folder / CONFIG, config_to_toml(config)),
-        write_text(folder / QUARANTINE, lines),
+        write_text(folder / QUARANTINE, left_out_text(quarantined)),
         *([folder / CONTACTS] if given else []),
         *(path for name in EXTRAS for path in sorted((folder / name).glob("*"))),
     ]
@@ -65,18 +63,16 @@ def finish(
         quarantined=len(quarantined),
         files=(*tables, *(listed(folder, path) for path in others)),
     )
-    for name, text_of in ((CARD, card_text), (CROISSANT, croissant_text)):
-        written = write_text(folder / name, text_of(config, manifest))
-        manifest = replace(manifest, files=(*manifest.files, listed(folder, written)))
-    write_manifest(folder, manifest)
+    card = write_text(folder / CARD, card_text(config, manifest))
+    write_manifest(folder, replace(manifest, files=(*manifest.files, listed(folder, card))))
     staging.remove()
 
 
 def _sorted_out(
     units: Sequence[WorkUnit], staging: Staging
-) -> tuple[list[Finished], list[dict[str, object]]]:
-    """Units with rows of their own, sorted by object, and records of why the others have none."""
-    good, quarantined = list[Finished](), list[dict[str, object]]()
+) -> tuple[list[Finished], list[LeftOut]]:
+    """Units with rows of their own, sorted by object, and why the others have none."""
+    good, quarantined = list[Finished](), list[LeftOut]()
     first: dict[tuple[str, float], str] = {}
     for unit in sorted(units, key=lambda each: (each.object, each.friction)):
         found = staging.result(unit)
@@ -87,13 +83,13 @@ def _sorted_out(
                 continue
             found = f"{TWIN} {other}"
         quarantined.append(
-            {
-                "object": unit.object,
-                "source_sha256": unit.source_sha256,
-                "friction": unit.friction,
-                "given": [each.id for each in unit.given],
-                "reason": found,
-            }
+            LeftOut(
+                object=unit.object,
+                source_sha256=unit.source_sha256,
+                friction=unit.friction,
+                given=[each.id for each in unit.given],
+                reason=found,
+            )
         )
     return sorted(good, key=lambda each: (each.object_id, each.unit.friction)), quarantined
 

@@ -1,4 +1,4 @@
 """What does a dataset say about itself?
 
-This room writes the card of a finished dataset, and its description for catalogues.
+This room writes the card of a finished dataset.
 """

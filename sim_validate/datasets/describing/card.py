@@ -8,7 +8,6 @@ from collections.abc import Iterable
 
 from sim_validate.datasets.columns import KEYS, REFERENCES, TABLES, Column, Name
 from sim_validate.datasets.config import DatasetConfig, config_to_toml, quoted
-from sim_validate.datasets.describing.licenses import known_license
 from sim_validate.datasets.describing.statements import (
     CONVENTIONS,
     KEYWORDS,
@@ -36,6 +35,20 @@ SIZES = (
 LARGEST = "10B<n<100B"
 MARKS = frozenset("\\`*_[]<>|~&#!$@")
 """Letters that can begin Markdown or HTML within a line."""
+NAMED_ALIKE = (
+    "CC0-1.0", "CC-BY-3.0", "CC-BY-4.0", "CC-BY-SA-3.0", "CC-BY-SA-4.0", "CC-BY-NC-3.0",
+    "CC-BY-NC-4.0", "CC-BY-ND-4.0", "CC-BY-NC-ND-3.0", "CC-BY-NC-ND-4.0", "CC-BY-NC-SA-3.0",
+    "CC-BY-NC-SA-4.0", "CDLA-Permissive-1.0", "CDLA-Permissive-2.0", "CDLA-Sharing-1.0",
+    "Apache-2.0", "BSD-2-Clause", "BSD-3-Clause", "MIT", "Unlicense",
+)  # fmt: skip
+"""SPDX names of licences whose names on the Hub differ only by small letters."""
+LICENSES = {
+    **{name: name.lower() for name in NAMED_ALIKE},
+    "ODbL-1.0": "odbl",
+    "ODC-By-1.0": "odc-by",
+    "PDDL-1.0": "pddl",
+}
+"""Usual licences of data: their names on the Hub, by their names in SPDX."""
 ADDRESS = re.compile(r"https?://[^\s<>\"'`\\|{}^]+")
 """Pattern of an address that can be a link as it is."""
 
@@ -81,9 +94,15 @@ def _header(config: DatasetConfig, manifest: Manifest) -> str:
 def _license_lines(name: str) -> list[str]:
     if not name:
         return []
-    if (known := known_license(name)) is not None:
-        return [f"license: {quoted(known.hub)}"]
+    if (known := _known_license(name)) is not None:
+        return [f"license: {quoted(LICENSES[known])}"]
     return [f"license: {quoted('other')}", f"license_name: {quoted(name)}"]
+
+
+def _known_license(name: str) -> str | None:
+    """The SPDX name of a licence, given in any letters by either name; None if it is unusual."""
+    wanted = name.lower()
+    return next((spdx for spdx, hub in LICENSES.items() if wanted in (spdx.lower(), hub)), None)
 
 
 def _config_lines(name: Name, manifest: Manifest) -> list[str]:
@@ -112,8 +131,7 @@ def _size(rows: int) -> str:
 
 def _credits(config: DatasetConfig) -> str:
     """The user's statements about the dataset, as a list."""
-    known = known_license(config.license)
-    name = config.license if known is None else known.spdx
+    name = _known_license(config.license) or config.license
     said = {
         "By": _as_markdown(config.creator),
         "At": f"<{config.url}>" if _is_address(config.url) else _as_markdown(config.url),

@@ -1,4 +1,4 @@
-"""Statements that the card and `croissant.json` of a dataset share."""
+"""The prose of a dataset's card: what its rows are, how they were made, and their limits."""
 
 from collections.abc import Mapping
 

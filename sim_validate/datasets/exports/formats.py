@@ -2,25 +2,30 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
 from grasp_core.errors import InputError
 from sim_validate.datasets.columns import ExportFormat, Name, SplitName
-from sim_validate.datasets.exports.array_files import write_npz
-from sim_validate.datasets.exports.flat_files import write_csv, write_jsonl
-from sim_validate.datasets.exports.hdf5 import write_hdf5
 from sim_validate.datasets.exports.isaac import write_isaac
 from sim_validate.datasets.exports.mjcf import write_mjcf
+from sim_validate.datasets.exports.tables import (
+    archive,
+    csv_file,
+    json_lines,
+    write_hdf5,
+    write_tables,
+)
 from sim_validate.datasets.open_dataset import Selection, select
-from sim_validate.datasets.parquet import require_pyarrow
+from sim_validate.datasets.parquet import pyarrow
 from sim_validate.files.reading import whole_folder
 
 Exporter: TypeAlias = Callable[[Selection, Path, Callable[[int, int], None]], dict[Name, int]]
 EXPORTERS: Mapping[ExportFormat, Exporter] = {
-    "csv": write_csv,
-    "jsonl": write_jsonl,
-    "npz": write_npz,
+    "csv": partial(write_tables, csv_file),
+    "jsonl": partial(write_tables, json_lines),
+    "npz": partial(write_tables, archive),
     "hdf5": write_hdf5,
     "isaac": write_isaac,
     "mjcf": write_mjcf,
@@ -58,7 +63,7 @@ def export(
         InputError: The dataset is missing, unfinished or damaged, the folder to make is inside it
             or holds something, or a package that the format needs is not installed.
     """
-    require_pyarrow()
+    pyarrow()  # before any work, so that a missing library is named at once
     chosen = select(folder, split)
     if out.resolve().is_relative_to(folder.resolve()):
         raise InputError(f"{out}: is in the dataset, which holds nothing else; give another --out")

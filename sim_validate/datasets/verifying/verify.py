@@ -18,7 +18,7 @@ from sim_validate.datasets.config import config_from_toml
 from sim_validate.datasets.manifest import MANIFEST, Listed, Manifest, listed, read_manifest
 from sim_validate.datasets.meshes import stored_surface
 from sim_validate.datasets.open_dataset import Selection
-from sim_validate.datasets.parquet import require_pyarrow
+from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.quarantine import read_left_out
 from sim_validate.datasets.rows import GIVEN, NOT_TRIED
 from sim_validate.datasets.verifying.redo import Sample, sample_faults
@@ -49,7 +49,7 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
     Raises:
         InputError: The folder holds no finished dataset, or pyarrow is not installed.
     """
-    require_pyarrow()
+    pyarrow()  # before any work, so that a missing library is named at once
     manifest = read_manifest(folder)
     if faults := list(_file_faults(folder, manifest.files)):
         return faults

@@ -7,7 +7,11 @@ import pytest
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 
-BEHIND = '{"schema": 1, "verdicts": [], "object": {"content_sha256": ""}, "friction": 1}'
+COUNTS = ("grasps", "grasps_held", "controls", "controls_held", "controls_let_go", "mismatches")
+HEAD = {"schema": 1, "verdicts": [], "object": {"content_sha256": ""}, "friction": 1}
+NO_VERDICTS = HEAD | {
+    "complete": True, "gate": {"checks": []}, "summary": dict.fromkeys(COUNTS, 0)
+}  # fmt: skip
 NOISE = ("--noise-shift", ".02", "--noise-turn-deg", "3", "--noise-friction", ".3")
 
 
@@ -155,11 +159,8 @@ def test_dataset_rows(tmp_path, replay, capsys):
         ("x.json", "[]", "expected a baseline, verdicts or grasps"),
         ("x.json", "{}", "expected a baseline, verdicts or grasps"),
         ("x.json", '{"verdicts": []}', "schema: missing; expected 1"),
-        (
-            "x.json",
-            '{"schema": 1, "verdicts": [], "object": {"content_sha256": ""}, "friction": 1}',
-            "is missing",
-        ),
+        ("x.json", json.dumps(HEAD), "complete: missing"),
+        ("x.json", json.dumps(NO_VERDICTS), "is missing"),
     ],
 )
 def test_other_files_are_refused(tmp_path, capsys, name, text, message):

@@ -3,12 +3,14 @@ import re
 
 import pytest
 
+from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.columns import TABLES
 from sim_validate.datasets.describing.card import CARD, card_text
 from sim_validate.datasets.describing.statements import LABELS
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.parquet import read_rows
 from sim_validate.datasets.verifying.verify import verify
+from sim_validate.main import main
 from tests.sim_validate.datasets.small import SMALL, build_small
 
 pytest.importorskip("pyarrow")
@@ -148,3 +150,30 @@ def test_sizes_are_those_of_the_hub(manifest, rows, size):
     large = dataclasses.replace(manifest, files=(dataclasses.replace(one, rows=rows),))
     header, _ = split_card(card_text(SMALL, large))
     assert header["size_categories"] == [size]
+
+
+@pytest.mark.parametrize(
+    ("given", "hub", "said"),
+    [
+        ("cc0-1.0", 'license: "cc0-1.0"', "Licence: CC0-1.0"),
+        ("ODBL", 'license: "odbl"', "Licence: ODbL-1.0"),
+        ("https://example.org/terms", 'license: "other"', "Licence: <https://example.org/terms>"),
+    ],
+)
+def test_licences_have_their_usual_names_where_they_are_known(manifest, given, hub, said):
+    lines = card_text(dataclasses.replace(SMALL, license=given), manifest).splitlines()
+    assert hub in lines
+    assert f"- {said}" in lines
+
+
+def test_a_build_says_once_which_flags_are_missing(tmp_path, capsys):
+    names = ["dataset", "build", "tetrahedron", "--family", "concurrent", "--limit", "1"]
+    flags = ["--license", "MIT", "--creator", "A", "--url", "https://a.b", "--published"]
+    assert main([*names, "--out", str(tmp_path / "a")]) == Exit.GOOD
+    said = capsys.readouterr().err
+    assert said.count(f"{CARD} will lack") == 1
+    assert all(flag in said for flag in flags if flag.startswith("--"))
+    assert main([*names, "--out", str(tmp_path / "b"), *flags, "2026-11-22"]) == Exit.GOOD
+    assert CARD not in capsys.readouterr().err
+    assert main([*names, "--out", str(tmp_path / "c"), *flags, "soon"]) == Exit.INPUT
+    assert "2026-11-22" in capsys.readouterr().err

@@ -39,7 +39,7 @@ def written(rows, tmp_path):
 def test_a_file_of_another_version_is_refused(written, monkeypatch):
     table = TABLES["objects"]
     monkeypatch.setitem(tables.TABLES, "objects", (*table, Column("taste", "text", "new")))
-    for read in (read_rows, lambda path: list(tables.each_row(path))):
+    for read in (read_rows, lambda path: list(tables.each_batch(path, "objects"))):
         with pytest.raises(gc.InputError, match="other columns"):
             read(written["objects"])
 

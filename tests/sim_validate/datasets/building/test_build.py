@@ -13,7 +13,7 @@ import trimesh
 
 import grasp_core as gc
 import sim_validate
-from sim_validate.datasets import parquet as tables
+from sim_validate.datasets import table_files
 from sim_validate.datasets.building import build as build_module
 from sim_validate.datasets.building.build import build
 from sim_validate.datasets.building.worker import Limits
@@ -322,8 +322,8 @@ def test_scenes_are_written_on_request(dataset, tmp_path):
 
 
 def test_many_rows_take_several_files(dataset, tmp_path, monkeypatch):
-    monkeypatch.setattr(tables, "GROUP_ROWS", 5)
-    monkeypatch.setattr(tables, "FILE_ROWS", 12)
+    monkeypatch.setattr(table_files, "GROUP_ROWS", 5)
+    monkeypatch.setattr(table_files, "FILE_ROWS", 12)
     build(CONFIG, tmp_path / "ds", Here(), silent)
     assert verify(tmp_path / "ds") == []
     files = sorted((tmp_path / "ds" / "data" / "trials").glob("*.parquet"))
