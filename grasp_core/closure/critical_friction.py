@@ -152,8 +152,7 @@ def _at_once(points: Array, normals: Array) -> _Quick:
     units = np.array(normals)  # writable, like all that the search is compiled for
     forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))
     bounds, found = np.zeros((len(arms), 2)), np.zeros(len(arms), dtype=bool)
-    if kernel := compiled(KERNEL):
-        kernel.search(arms, units, SEARCHED * FRICTION_ACCURACY, forces, twists, bounds)
+    compiled(KERNEL).search(arms, units, SEARCHED * FRICTION_ACCURACY, forces, twists, bounds)
     # (2): the friction for which the search says that its twists separate
     lower = bounds[:, 0]
     bounded = (lower > FRICTIONLESS) & (lower < 0.5 * LARGEST_FRICTION)

@@ -147,12 +147,9 @@ def _many_pyramid_wrenches(points: Array, normals: Array, friction: Array, edges
 def _at_once(W: Array) -> Array:
     """Find metrics of wrenches (g, N, 6) by the kernel, (g,); NaN where an answer fails."""
     found = np.full(len(W), math.nan)
-    kernel = compiled(KERNEL)
-    if kernel is None:
-        return found
     (count, N), y = W.shape[:2], np.empty((len(W), WRENCH))
     multipliers, rows = np.empty((count, WRENCH)), np.empty((count, WRENCH), dtype=np.int64)
-    kernel.vertices(W, y, multipliers, rows)
+    compiled(KERNEL).vertices(W, y, multipliers, rows)
     c = W.sum(axis=1)
     values = np.einsum("gw,gw->g", c, y)
     reached = values[:, None] - N * np.einsum("gnw,gw->gn", W, y)

@@ -138,15 +138,6 @@ def test_weights_of_degenerate_sets_are_left_to_the_reference():
     assert found[1] == pytest.approx(gc.min_weight(TETRA_CENTERS, TETRA_NORMALS), abs=1e-12)
 
 
-def test_without_compiled_code_weights_come_from_the_reference(without_kernels):
-    positions, normals = contact_sets(np.random.default_rng(6), 20)
-    quick = gc.min_weights(positions, normals)
-    without_kernels()
-    W = metrics._many_pyramid_wrenches(positions, normals, np.full((20, 4), 0.5), 8)
-    assert np.isnan(metrics._at_once(W)).all()
-    np.testing.assert_allclose(gc.min_weights(positions, normals), quick, atol=1e-9)
-
-
 @pytest.mark.parametrize("spoil", ["twists", "multipliers", "rows", "numbers"])
 def test_wrong_vertices_are_left_to_the_reference(monkeypatch, spoil):
     def vertices(W, twists, multipliers, rows):

@@ -9,7 +9,6 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from grasp_core.compiled import compiled
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.on_faces import within
 from grasp_core.regions.certify_regions import certify_regions
@@ -22,12 +21,6 @@ CASES = [
     ("tetrahedron", "concurrent"), ("wedge", "pencil"), ("mug", "regulus"), ("box", "concurrent"),
     ("chamfered-box", "regulus"), ("hex-nut", "pencil"), ("cross", "free"),
 ]  # fmt: skip
-
-
-needs_kernels = pytest.mark.skipif(
-    compiled("grasp_core.regions.cover_kernel") is None,
-    reason="only compiled searches look for open choices",
-)
 
 
 @cache
@@ -98,7 +91,6 @@ def test_more_cones_give_larger_regions():
     assert radii[0] < radii[1] < radii[2]
 
 
-@needs_kernels
 @pytest.mark.parametrize(("name", "family"), [CASES[0], CASES[2], CASES[3]])
 def test_not_much_larger_discs_have_an_open_choice(name, family):
     """The other side of the proof, by contacts that the exact test refutes."""
@@ -279,14 +271,6 @@ def test_moving_centres_never_makes_discs_smaller():
         fixed = found("wedge", "concurrent", cones=cones)[2]
         moved = found("wedge", "concurrent", cones=cones, recenter=True)[2]
         assert least_inscribed(moved) >= 0.98 * least_inscribed(fixed)
-
-
-def test_without_compiled_loops_there_are_regions_too(monkeypatch):
-    compiled = found("wedge", "pencil", cones=500)[2]
-    monkeypatch.setattr("grasp_core.regions.cover_search.compiled", lambda _: None)
-    plain = found("wedge", "pencil", cones=500)[2]
-    assert plain.verify()
-    assert plain.radius == pytest.approx(compiled.radius, rel=0.02)
 
 
 def test_radii_centres_and_the_open_choice_belong_to_the_proof():
