@@ -6,7 +6,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure import critical_friction as critical
 from grasp_core.closure import friction_search
-from grasp_core.closure.contact_arrays import unit_sizes
+from grasp_core.closure.contact_arrays import unit_size
 from grasp_core.compiled import compiled
 from scenes.example_objects import example_object
 from tests.grasp_core.bodies import BODIES
@@ -100,7 +100,7 @@ def test_many_at_once_and_one_by_one_give_intervals_that_overlap(count):
 def test_what_the_search_finds_proves_both_ends():
     """Unit twists miss the cones, and forces lie in them and balance, all but for rounding."""
     positions, normals = contact_sets()
-    arms, _, _ = unit_sizes(positions)
+    arms, _, _ = unit_size(positions)
     forces, twists, bounds = np.zeros_like(arms), np.zeros((len(arms), 6)), np.zeros((len(arms), 2))
     compiled(critical.KERNEL).search(arms, normals, 5e-8, forces, twists, bounds)
     proved = 0

@@ -99,7 +99,7 @@ def test_a_program_that_fails_leaves_its_attempt_to_the_search(monkeypatch):
 
     def sometimes(program, cutoff):
         calls.append(program)
-        if len(calls) % 40 == 0:
+        if len(calls) % 10 == 0:
             raise SolverError("a program's answer failed its check")
         return solve(program, cutoff)
 
@@ -107,6 +107,6 @@ def test_a_program_that_fails_leaves_its_attempt_to_the_search(monkeypatch):
     monkeypatch.setattr(AttemptBounds, "of", lambda *args: np.full(len(args[2].faces), np.inf))
     monkeypatch.setattr(largest_discs, "maximize_above", sometimes)
     plan = gc.plan(body, 0.4, families="concurrent", limit=5)
-    assert len(calls) >= 80
+    assert len(calls) >= 20
     assert len(plan.grasps) == 5
     assert {grasp.id for grasp in plan.grasps} & {grasp.id for grasp in expected}
