@@ -60,9 +60,9 @@ def moved(rng, body, grasp):
 def test_regions_do_not_depend_on_last_digits(name, family, more):
     body, grasp = planned(name, family)
     rng = np.random.default_rng(0)
-    own = gc.certify_regions(body, grasp, 0.5, cones=CONES, **more)
+    own = gc.certify_regions(body, grasp, 0.5, max_cones=CONES, **more)
     for _ in range(TRIALS if not more else 1):
-        found = gc.certify_regions(body, moved(rng, body, grasp), 0.5, cones=CONES, **more)
+        found = gc.certify_regions(body, moved(rng, body, grasp), 0.5, max_cones=CONES, **more)
         assert found.verify()
         np.testing.assert_array_equal(found.cover.codes, own.cover.codes)
         assert found.radius == pytest.approx(own.radius, rel=SAME)
