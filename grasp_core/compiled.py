@@ -1,12 +1,11 @@
-"""Compiled inner loops are loaded here; each stands beside its module as `NAME_kernel.py`.
+"""The door to numba: how inner loops are declared, compiled, kept and loaded.
 
-A kernel is plain arithmetic on arrays of programs, directions or contacts. A result that makes a
-claim, such as a placement, a closure or a quality, is checked by the module that asks for it; that
-module has a slower way of its own, the reference, for results that fail the check. Results that
-only say where to search are not checked: spanning quadruples, tilted cones, and bounds on discs,
-whose multipliers are checked in compiled code. Tests compare these with the reference. The
-reference does everything where numba cannot compile or keep kernels, or the environment says
-`GRASPPROOF_KERNELS=off`.
+A kernel, `NAME_kernel.py` beside the module `NAME.py`, is plain arithmetic on arrays of programs,
+directions or contacts. Kernels are loaded on first use, since numba takes half a second to import.
+A result that makes a claim, such as a placement, a closure or a quality, is checked by the module
+that asks for it; what fails the check goes to a solver such as HiGHS or Clarabel. Results that only
+say where to search are not checked: spanning quadruples, tilted cones, and bounds on discs, whose
+multipliers are checked in compiled code. Tests compare these with reference implementations.
 
 Numba keeps a compiled module together with what it calls from others, and looks only at the file
 of that module to see whether it changed: after a change of one kernel, remove the files kept for
@@ -14,44 +13,63 @@ the others (`*.nbi` and `*.nbc` in `__pycache__`).
 """
 
 import importlib
-import os
+from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, Literal, TypeVar
 
 from grasp_core.errors import InputError
 
-SWITCH = "GRASPPROOF_KERNELS"
-"""Name of the environment variable; its value `off` leaves everything to the reference."""
-SETTINGS = ("on", "off")
+Loop = TypeVar("Loop", bound=Callable[..., Any])
+
+
+def loop(division: Literal["python", "numpy"] = "python") -> Callable[[Loop], Loop]:
+    """Declare a function that numba compiles on first use and keeps for later processes.
+
+    Where no folder can be written, neither `__pycache__` beside the module nor a cache folder of
+    the user, every process compiles the function again.
+
+    Args:
+        division: What dividing by zero does: raise an error, or give infinity or NaN as NumPy does.
+    """
+    numba: Any = importlib.import_module("numba")
+
+    def declared(function: Loop) -> Loop:
+        try:
+            return numba.njit(function, cache=True, error_model=division)
+        except RuntimeError:  # numba found no folder
+            return numba.njit(function, error_model=division)
+
+    return declared
 
 
 @cache
 def compiled(name: str) -> Any:
-    """Load a kernel module and run its `try_out`; None where kernels are off or do not work.
+    """Load a kernel module.
 
     Args:
         name: The module's full name, `grasp_core.ROOM.NAME_kernel`.
 
     Raises:
-        InputError: The environment variable is neither `on` nor `off`.
+        InputError: Numba refuses its settings or cannot be loaded.
     """
-    asked = os.environ.get(SWITCH) or "on"
-    if asked not in SETTINGS:
-        raise InputError(
-            f"environment variable {SWITCH}: expected {' or '.join(SETTINGS)}, or none, got "
-            f"{asked!r}; unset it"
-        )
-    if asked == "off":
-        return None
     try:
-        failures: Any = importlib.import_module("numba.core.errors")
-        kernel: Any = importlib.import_module(name)
-    except (ImportError, RuntimeError, OSError, ValueError) as error:  # the last: numba's settings
+        return importlib.import_module(name)
+    except (ImportError, RuntimeError, OSError, ValueError) as error:
         if str(getattr(error, "name", "")).startswith("grasp_core"):
             raise
-        return None
-    try:
-        kernel.try_out()
-    except (failures.NumbaError, RuntimeError, OSError):
-        return None
-    return kernel
+        raise InputError(
+            f"inner loops: expected that numba can be loaded, got: {error}; unset the environment "
+            f"variables that begin with NUMBA_, or install numba again"
+        ) from error
+
+
+def state_of(function: Any) -> Literal["kept", "not kept", "interpreted"]:
+    """Tell how a function of a kernel runs.
+
+    Returns:
+        Whether later processes find it compiled, or no folder keeps it, or Python runs it because
+        the environment variable NUMBA_DISABLE_JIT says so.
+    """
+    if not hasattr(function, "stats"):
+        return "interpreted"
+    return "kept" if function.stats.cache_path else "not kept"

@@ -54,7 +54,7 @@ def grasp():
 def regions():
     """Certified regions of a regulus, for which the paper has none."""
     body, grasp = best("octahedron", "regulus", FRICTION)
-    found = gc.certify_regions(body, grasp, FRICTION, cones=1250)
+    found = gc.certify_regions(body, grasp, FRICTION, max_cones=1250)
     record = {"regions": [{"polygon_m": region.polygon,
                            "inscribed_radius_m": region.inscribed_radius}
                           for region in found.regions]}  # fmt: skip

@@ -77,7 +77,7 @@ def page():
 def small(folder, page, tmp_path_factory):
     """A small proof, which the page confirms."""
     out = tmp_path_factory.mktemp("small")
-    asked = ["regions", str(folder / "grasps.json"), "--limit", "1", "--cones", "64"]
+    asked = ["regions", str(folder / "grasps.json"), "--limit", "1", "--max-cones", "64"]
     assert main([*asked, "--out", str(out), "-q"]) == Exit.GOOD
     with np.load(next((out / "proofs").iterdir()), allow_pickle=False) as kept:
         proof = {key: kept[key] for key in kept.files}
@@ -132,7 +132,9 @@ def test_flags_and_arguments_are_those_of_the_page():
     flags = {each.name.replace("_", "-") for each in dataclasses.fields(command_flags.Regions)}
     for flag in re.findall(r"^\| `--([\w-]+)", PAGE, re.MULTILINE):
         assert flag in flags
-    (cones,) = (each for each in dataclasses.fields(command_flags.Regions) if each.name == "cones")
+    (cones,) = (
+        each for each in dataclasses.fields(command_flags.Regions) if each.name == "max_cones"
+    )
     assert cones.default == CONES
     kept = {each.name for each in dataclasses.fields(CertifiedRegions)}
     assert {"limit", "open_choice"} <= kept

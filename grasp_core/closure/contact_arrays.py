@@ -13,6 +13,9 @@ from grasp_core.checked import LARGEST_FRICTION, instance, several, shown
 from grasp_core.errors import InputError
 from grasp_core.values import FINGERS, Contact, Grasp
 
+FEWEST = 2
+"""Fewest contacts that can balance anything."""
+
 
 def stacked(contacts: Iterable[Contact]) -> tuple[Array, Array]:
     """Return the positions [m] and inward normals of contacts, each (k, 3)."""
@@ -21,24 +24,43 @@ def stacked(contacts: Iterable[Contact]) -> tuple[Array, Array]:
     return positions, np.array([contact.normal for contact in listed])
 
 
-def contact_arrays(positions: ArrayLike | Grasp, normals: ArrayLike | None) -> tuple[Array, Array]:
-    """Return checked positions and inward normals, each (k, 3), of a grasp or of two arrays.
+def contact_arrays(
+    positions: ArrayLike | Grasp | Iterable[Grasp], normals: ArrayLike | None, *, many: bool = False
+) -> tuple[Array, Array]:
+    """Return checked positions and inward normals of a set of contacts, or of many of equal size.
+
+    Args:
+        positions: Contact points, (k, 3) [m], or a Grasp; for many sets (g, k, 3), or grasps.
+        normals: Unit vectors into the object, of the same shape; None where grasps are given.
+        many: Whether there is an axis of sets.
 
     Raises:
         InputError: Shapes differ, a normal is not a unit vector, or there are fewer than two
-            contacts.
+            contacts in a set.
     """
-    if isinstance(positions, Grasp):
+    given: Any = positions
+    if isinstance(positions, Grasp) and not many:
         if normals is not None:
             raise InputError(f"normals must be None where a Grasp is given, got {shown(normals)}")
         return positions.positions, positions.normals
+    if normals is None and many:
+        return _of_grasps((given,) if isinstance(given, Grasp) else given)
     if normals is None:
         raise InputError("normals are missing: pass positions and normals, or a Grasp")
-    points = frozen(positions, (None, 3), "positions")
-    if len(points) < 2:  # noqa: PLR2004 - one contact alone can balance nothing
-        raise InputError(f"positions: at least two contacts are needed, got {len(points)}")
-    check_spread(np.ptp(points, axis=0))
-    return points, frozen_units(normals, (len(points), 3), "normals")
+    points = frozen(given, (None, None, 3) if many else (None, 3), "positions")
+    if points.shape[-2] < FEWEST:
+        raise InputError(f"positions: at least two contacts are needed, got {points.shape[-2]}")
+    check_spread(np.ptp(points, axis=-2))
+    return points, frozen_units(normals, points.shape, "normals")
+
+
+def _of_grasps(given: Any) -> tuple[Array, Array]:
+    check = partial(instance, kind=Grasp, name="positions", remedy="or give normals")
+    grasps = several(given, check, "positions", "Grasp values")
+    shape = (len(grasps), FINGERS, 3)
+    points = np.array([grasp.positions for grasp in grasps], dtype=np.float64).reshape(shape)
+    units = np.array([grasp.normals for grasp in grasps], dtype=np.float64).reshape(shape)
+    return points, units
 
 
 def check_spread(extents: Array, name: str = "positions") -> None:
@@ -61,9 +83,21 @@ def check_spread(extents: Array, name: str = "positions") -> None:
         )
 
 
-def contact_frictions(friction: ArrayLike, count: int) -> Array:
-    """Return one checked Coulomb coefficient per contact, (count,), of one for all or one each."""
-    mu = frozen_each(friction, count, "friction")
+def contact_frictions(friction: ArrayLike, shape: int | tuple[int, int]) -> Array:
+    """Return one checked Coulomb coefficient for each contact.
+
+    Args:
+        friction: One coefficient for all contacts; one each, (k,); or one each of all sets, (g, k).
+        shape: Number of contacts k, or numbers of sets and of contacts in each, (g, k).
+
+    Raises:
+        InputError: The shape differs, or a coefficient is negative or too large.
+    """
+    sizes = (shape,) if isinstance(shape, int) else shape
+    values = real_array(friction, "friction")
+    if values.ndim < len(sizes):
+        values = np.broadcast_to(frozen_each(values, sizes[-1], "friction"), sizes)
+    mu = frozen(values, sizes, "friction")
     if (mu < 0.0).any():
         raise InputError(f"friction must not be negative, got {float(mu.min()):.6g}")
     if (mu > LARGEST_FRICTION).any():
@@ -73,72 +107,18 @@ def contact_frictions(friction: ArrayLike, count: int) -> Array:
     return mu
 
 
-FEWEST = 2
-NO_NORMALS = "or give normals"
+def unit_size(points: Array) -> tuple[Array, Array, Array]:
+    """Scale contacts (..., k, 3) so that the longest arm from their mean has length one.
 
-
-def many_contact_arrays(
-    positions: ArrayLike | Iterable[Grasp], normals: ArrayLike | None
-) -> tuple[Array, Array]:
-    """Return checked positions and inward normals, each (g, k, 3), of grasps or of two arrays.
-
-    Raises:
-        InputError: Shapes differ, a normal is not a unit vector, or there are fewer than two
-            contacts in a set.
+    Returns:
+        Arms from the mean contact over the longest, (..., k, 3); that centre, (..., 3) [m]; and
+        that length, (...) [m], which is one where all contacts are in one place.
     """
-    given: Any = positions
-    if normals is None:
-        grasps = (given,) if isinstance(given, Grasp) else several(
-            given, partial(instance, kind=Grasp, name="positions", remedy=NO_NORMALS),
-            "positions", "Grasp values",
-        )  # fmt: skip
-        both = np.array([contact_arrays(grasp, None) for grasp in grasps], dtype=np.float64)
-        points, units = np.moveaxis(both.reshape(-1, 2, FINGERS, 3), 1, 0)
-        return points, units
-    points = frozen(given, (None, None, 3), "positions")
-    if points.shape[1] < FEWEST:
-        raise InputError(f"positions: at least two contacts are needed, got {points.shape[1]}")
-    check_spread(np.ptp(points, axis=1))
-    return points, frozen_units(normals, points.shape, "normals")
-
-
-def many_frictions(friction: ArrayLike, shape: tuple[int, int]) -> Array:
-    """Return one checked Coulomb coefficient for each of (g, k) contacts.
-
-    Args:
-        friction: One coefficient for all contacts, or one each, (k,) or (g, k).
-        shape: Number of sets and of contacts in each, (g, k).
-
-    Raises:
-        InputError: The shape differs, or a coefficient is negative or too large.
-    """
-    values = real_array(friction, "friction")
-    if values.ndim < len(shape):
-        return np.broadcast_to(contact_frictions(values, shape[1]), shape)
-    return contact_frictions(frozen(values, shape, "friction").ravel(), values.size).reshape(shape)
-
-
-def many_frames(normals: Array) -> Array:
-    """Orthonormal frames of many sets of normals (g, k, 3), each as by `contact_frames`."""
-    x, y, z = np.moveaxis(normals, -1, 0)
-    # the axis nearest to square to the normal gives the longest cross product; x wins ties, then y
-    nothing, least = np.zeros_like(x), np.abs(normals).min(axis=-1)
-    crossed = np.stack([-y, x, nothing], axis=-1)
-    crossed[np.abs(y) == least] = np.stack([z, nothing, -x], axis=-1)[np.abs(y) == least]
-    crossed[np.abs(x) == least] = np.stack([nothing, -z, y], axis=-1)[np.abs(x) == least]
-    first = crossed / np.linalg.norm(crossed, axis=-1, keepdims=True)
-    frames = np.empty((*normals.shape, 3))
-    frames[..., 0], frames[..., 1], frames[..., 2] = normals, first, np.cross(normals, first)
-    return frames
-
-
-def unit_sizes(points: Array) -> tuple[Array, Array, Array]:
-    """Arms, centres (g, 3) and lengths (g,) of many sets of points (g, k, 3), as by `unit_size`."""
-    centers = points.mean(axis=1)
-    arms = points - centers[:, None]
-    sizes = np.linalg.norm(arms, axis=2).max(axis=1)
-    sizes[sizes == 0.0] = 1.0
-    return arms / sizes[:, None, None], centers, sizes
+    centers: Array = points.mean(axis=-2)
+    arms = points - centers[..., None, :]
+    lengths: Array = np.linalg.norm(arms, axis=-1).max(axis=-1)
+    sizes = np.where(lengths > 0.0, lengths, 1.0)
+    return arms / sizes[..., None, None], centers, sizes
 
 
 def contacts_sha256(contacts: Iterable[Contact]) -> str:

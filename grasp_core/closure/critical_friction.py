@@ -31,11 +31,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.checked import LARGEST_FRICTION
-from grasp_core.closure.contact_arrays import contact_arrays, many_contact_arrays, unit_sizes
+from grasp_core.closure.contact_arrays import contact_arrays, unit_size
 from grasp_core.closure.friction_interval import FRICTIONLESS, REPORTED_AS_ZERO, FrictionInterval
 from grasp_core.closure.friction_search import FRICTION_ACCURACY, SHAVED, Ends, search_interval
 from grasp_core.closure.margin_program import ROUNDING, deepest_forces
-from grasp_core.closure.proofs import RANK, many_prove_closure, proves_closure
+from grasp_core.closure.proofs import RANK, proves_closure
 from grasp_core.closure.wrenches import WRENCH, normal_and_tangential
 from grasp_core.compiled import compiled
 from grasp_core.values import Grasp
@@ -89,7 +89,7 @@ def critical_frictions(
     Raises:
         InputError: Shapes or lengths are wrong.
     """
-    return _upper_ends(*many_contact_arrays(positions, normals))
+    return _upper_ends(*contact_arrays(positions, normals, many=True))
 
 
 def critical_friction_interval(
@@ -124,7 +124,7 @@ def critical_friction_interval(
 
 def _upper_ends(points: Array, units: Array) -> Array:
     quick = _at_once(points, units)
-    upper, arms = quick.upper.copy(), unit_sizes(points)[0]
+    upper, arms = quick.upper.copy(), unit_size(points)[0]
     for i in np.flatnonzero(~quick.found):
         easy = _close_without_friction(arms[i], units[i])
         upper[i] = 0.0 if easy else search_interval(points[i], units[i]).upper
@@ -148,12 +148,11 @@ class _Quick:
 
 def _at_once(points: Array, normals: Array) -> _Quick:
     """Search in compiled code for narrow intervals, and prove both of their ends."""
-    arms, _, _ = unit_sizes(points)
+    arms, _, _ = unit_size(points)
     units = np.array(normals)  # writable, like all that the search is compiled for
     forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))
     bounds, found = np.zeros((len(arms), 2)), np.zeros(len(arms), dtype=bool)
-    if kernel := compiled(KERNEL):
-        kernel.search(arms, units, SEARCHED * FRICTION_ACCURACY, forces, twists, bounds)
+    compiled(KERNEL).search(arms, units, SEARCHED * FRICTION_ACCURACY, forces, twists, bounds)
     # (2): the friction for which the search says that its twists separate
     lower = bounds[:, 0]
     bounded = (lower > FRICTIONLESS) & (lower < 0.5 * LARGEST_FRICTION)
@@ -164,12 +163,12 @@ def _at_once(points: Array, normals: Array) -> _Quick:
     # (1): the friction that the forces need, raised by a tenth of the width so that they lie inside
     upper = (across / np.maximum(along, NO_FORCE)).max(axis=1) * (1.0 + 0.1 * FRICTION_ACCURACY)
     near = np.flatnonzero(bounded & (upper <= highest))
-    found[near] = many_prove_closure(forces[near], arms[near], units[near], upper[near])
+    found[near] = proves_closure(forces[near], arms[near], units[near], upper[near, None])
     # where these forces do not prove closure, the deepest ones at the highest allowed end may
     left = np.flatnonzero(bounded & ~found)
     upper[left] = highest[left]
     forces[left], _, _ = deepest_forces(arms[left], units[left], highest[left])
-    found[left] = many_prove_closure(forces[left], arms[left], units[left], highest[left])
+    found[left] = proves_closure(forces[left], arms[left], units[left], highest[left, None])
     return _Quick(found, upper, forces, twists)
 
 
@@ -199,4 +198,4 @@ def _close_without_friction(arms: Array, normals: Array) -> bool:
     if pushes.min(initial=math.inf) <= 0.0:
         return False
     forces = (pushes / pushes.sum())[:, None] * normals
-    return proves_closure(forces, arms, normals, np.full(len(arms), FRICTIONLESS))
+    return bool(proves_closure(forces, arms, normals, np.full(len(arms), FRICTIONLESS)))

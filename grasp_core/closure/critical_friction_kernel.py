@@ -14,10 +14,10 @@ Newton's method says where to try next, first on the one side and then on the ot
 import math
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array
 from grasp_core.closure.margin_kernel import SHARE, WRENCH, least_cone_sum
+from grasp_core.compiled import loop
 
 FIRST_TRIAL = 0.5
 MOST_TRIALS = 30
@@ -36,15 +36,7 @@ EVEN = 1e-10
 """An optimum this close to one shows nothing: ten times the gap that is left, for rounding."""
 
 
-def try_out() -> None:
-    """Search for the friction of a regular tetrahedron's face centres."""
-    corners = np.array([[[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]]) / math.sqrt(3.0)
-    forces, twists, bounds = np.empty_like(corners), np.empty((1, WRENCH)), np.empty((1, 2))
-    search(-corners, corners, 1e-3, forces, twists, bounds)
-    deepest((-corners, corners, np.ones(1)), SHARE, forces, twists, bounds)
-
-
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def search(
     arms: Array, normals: Array, width: float, forces: Array, twists: Array, bounds: Array
 ) -> None:
@@ -91,7 +83,7 @@ def search(
         bounds[g, 0], bounds[g, 1] = lower, upper
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def deepest(
     contacts: tuple[Array, Array, Array], share: float, forces: Array, twists: Array, values: Array
 ) -> None:
@@ -117,7 +109,7 @@ def deepest(
         _in_space(pair, primal, frictions[g], axes, forces[g])
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _set_up(arms: Array, normals: Array, axes: Array, rows: Array, mean: Array) -> None:
     """Fill in the contacts' axes, their wrenches, (k, 3, 6), and the normals' mean wrench."""
     for w in range(WRENCH):
@@ -133,7 +125,7 @@ def _set_up(arms: Array, normals: Array, axes: Array, rows: Array, mean: Array) 
             mean[w] += rows[i, 0, w] / len(arms)
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _orthonormal(normal: Array, axes: Array) -> None:
     """Fill in a unit normal and two tangents, (3, 3)."""
     far = 0
@@ -148,7 +140,7 @@ def _orthonormal(normal: Array, axes: Array) -> None:
         axes[2, j] = axes[0, u] * axes[1, v] - axes[0, v] * axes[1, u]
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _at_friction(rows: Array, mean: Array, friction: float, columns: Array) -> None:
     for i in range(len(rows)):
         for w in range(WRENCH):
@@ -156,7 +148,7 @@ def _at_friction(rows: Array, mean: Array, friction: float, columns: Array) -> N
             columns[i, 1, w], columns[i, 2, w] = friction * rows[i, 1, w], friction * rows[i, 2, w]
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _needed(pair: Array, primal: float, friction: float) -> float:
     """Return the most friction that any of the forces needs; infinite if one of them pulls."""
     share, needed = (1.0 - primal) / pair.shape[1], 0.0
@@ -168,7 +160,7 @@ def _needed(pair: Array, primal: float, friction: float) -> float:
     return needed
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _in_space(pair: Array, primal: float, friction: float, axes: Array, forces: Array) -> None:
     share = (1.0 - primal) / len(axes)
     for i in range(len(axes)):
@@ -178,7 +170,7 @@ def _in_space(pair: Array, primal: float, friction: float, axes: Array, forces: 
             )
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _separates(rows: Array, z: Array, span: Array, twist: Array) -> float:
     """Return up to which friction a twist separates, once contacts nearly at rest are at rest."""
     still = 0.0
@@ -194,7 +186,7 @@ def _separates(rows: Array, z: Array, span: Array, twist: Array) -> float:
     return _least_ratio(rows, z, still, twist) if spanned < WRENCH else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _least_ratio(rows: Array, z: Array, still: float, twist: Array) -> float:
     """Return the least ratio of leaving to sliding over the contacts that are not at rest."""
     least = LARGEST
@@ -209,7 +201,7 @@ def _least_ratio(rows: Array, z: Array, still: float, twist: Array) -> float:
     return least
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _add(row: Array, span: Array, spanned: int) -> int:
     """Add a row to an orthonormal basis, unless it is in its span already; return the new size."""
     if spanned == WRENCH:
@@ -228,20 +220,20 @@ def _add(row: Array, span: Array, spanned: int) -> int:
     return spanned + 1
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _take_off(vector: Array, unit: Array) -> None:
     share = _dot(vector, unit)
     for w in range(WRENCH):
         vector[w] -= share * unit[w]
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _copy(source: Array, target: Array) -> None:
     for w in range(WRENCH):
         target[w] = source[w]
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _dot(a: Array, b: Array) -> float:
     total = 0.0
     for w in range(WRENCH):
@@ -249,7 +241,7 @@ def _dot(a: Array, b: Array) -> float:
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _next(
     pair: Array, value: float, friction: float, lower: float, upper: float, width: float
 ) -> float:

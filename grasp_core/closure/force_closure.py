@@ -32,8 +32,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import SMALLEST_SIZE, Array, real_array
-from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions
-from grasp_core.closure.proofs import decide, margin_ceiling, proved_margin
+from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions, unit_size
+from grasp_core.closure.decision import decide
+from grasp_core.closure.proofs import margin_ceiling, proved_margin
 from grasp_core.closure.wrenches import normal_and_tangential
 from grasp_core.errors import UndecidedError
 from grasp_core.fields import are_frictions, are_units, is_array, is_number
@@ -197,16 +198,6 @@ def _why_undecided(margin: float) -> str:
     )
 
 
-def unit_size(points: Array) -> tuple[Array, Array, float]:
-    """Return arms from the mean contact over the longest, (k, 3), that centre and that length."""
-    center = points.mean(axis=0)
-    arms = points - center
-    # contacts in one place have no size of their own
-    size = float(np.linalg.norm(arms, axis=1).max())
-    size = size if size > 0.0 else 1.0
-    return arms / size, center, size
-
-
-def _about_origin(twist: Array, center: Array, size: float) -> Array:
+def _about_origin(twist: Array, center: Array, size: Array) -> Array:
     turning = twist[3:] / size
     return np.concatenate([twist[:3] - np.cross(turning, center), turning])

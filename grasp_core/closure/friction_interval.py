@@ -16,13 +16,11 @@ import numpy as np
 
 from grasp_core.arrays import Array, real_array
 from grasp_core.checked import LARGEST_FRICTION
-from grasp_core.closure.force_closure import unit_size
+from grasp_core.closure.contact_arrays import FEWEST, unit_size
 from grasp_core.closure.rational_proofs import closes, separates
 from grasp_core.closure.wrenches import WRENCH
 from grasp_core.fields import are_units, is_array, is_number
 
-FEWEST = 2
-"""Fewest contacts that can balance anything."""
 FRICTIONLESS = 1e-6
 """Smallest friction at which closure is sought: the contacts of a file with six digits are not
 placed better than that."""

@@ -15,11 +15,12 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.checked import LARGEST_FRICTION
+from grasp_core.closure.contact_arrays import unit_size
+from grasp_core.closure.decision import Answer, decide
 from grasp_core.closure.extreme_frictions import hopeless_twist, pushing_forces, rounds
-from grasp_core.closure.force_closure import unit_size
 from grasp_core.closure.friction_interval import FRICTIONLESS, FrictionInterval, at_the_first
 from grasp_core.closure.margin_program import margin_program
-from grasp_core.closure.proofs import Answer, decide, proves_closure
+from grasp_core.closure.proofs import proves_closure
 from grasp_core.closure.rational_proofs import NEARLY_AT_REST, closes, closing_forces, separates
 from grasp_core.closure.wrenches import WRENCH, grasp_map, normal_and_tangential
 from grasp_core.errors import SolverError

@@ -28,9 +28,9 @@ Source: Vandenberghe, "The CVXOPT linear and quadratic cone program solvers" (20
 import math
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array
+from grasp_core.compiled import loop
 
 WRENCH = 6
 MOST_STEPS = 40
@@ -45,7 +45,7 @@ SHORTER = 0.99
 """Share of the way to the border of the cones that a step may take."""
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def least_cone_sum(
     columns: Array, mean: Array, share: float, pair: Array, y: Array
 ) -> tuple[float, float]:
@@ -89,7 +89,7 @@ def least_cone_sum(
     return primal, dual
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _start(pair: Array, y: Array) -> None:
     for i in range(pair.shape[1]):
         for j in range(3):
@@ -98,7 +98,7 @@ def _start(pair: Array, y: Array) -> None:
         y[w] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _values(mean: Array, pair: Array, y: Array) -> tuple[float, float, float]:
     """Return the values of (1) and (2), and the sum of s_i.z_i."""
     primal = dual = gap = 0.0
@@ -111,7 +111,7 @@ def _values(mean: Array, pair: Array, y: Array) -> tuple[float, float, float]:
     return primal, dual, gap
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _missing(columns: Array, mean: Array, pair: Array, missing: Array) -> float:
     """Fill in what the forces lack to balance; return its largest part."""
     for w in range(WRENCH):
@@ -126,14 +126,14 @@ def _missing(columns: Array, mean: Array, pair: Array, missing: Array) -> float:
     return largest
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _depth(v: Array, i: int) -> float:
     """Return v_0^2 - |(v_1, v_2)|^2 of the i-th vector; it is not positive outside the cone."""
     across = math.sqrt(v[i, 1] ** 2 + v[i, 2] ** 2)
     return (v[i, 0] - across) * (v[i, 0] + across) if v[i, 0] > 0.0 else -1.0
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _scale(pair: Array, W: Array, middle: Array) -> bool:
     """Fill in symmetric maps W_i of K and their inverses: W_i z_i = inverse(W_i) s_i = middle_i.
 
@@ -167,7 +167,7 @@ def _scale(pair: Array, W: Array, middle: Array) -> bool:
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _factor(columns: Array, W: Array, V: Array, R: Array) -> bool:
     """Find reflections 1 - v v' that bring all A_i W_i, side by side, to the triangle R.
 
@@ -199,7 +199,7 @@ def _factor(columns: Array, W: Array, V: Array, R: Array) -> bool:
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _reflect(V: Array, v: int, X: Array, x: int) -> None:
     """Reflect the x-th of some vectors by the v-th reflection."""
     share = _dot(V, v, X, x)
@@ -208,7 +208,7 @@ def _reflect(V: Array, v: int, X: Array, x: int) -> None:
             X[x, i, j] -= share * V[v, i, j]
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _dot(V: Array, v: int, X: Array, x: int) -> float:
     total = 0.0
     for i in range(V.shape[1]):
@@ -216,7 +216,7 @@ def _dot(V: Array, v: int, X: Array, x: int) -> float:
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _direct(V: Array, R: Array, missing: Array, wanted: Array, step: Array, turn: Array) -> None:
     """Find the step whose scaled parts for s and z sum to `wanted`, and its part `turn` for y.
 
@@ -239,7 +239,7 @@ def _direct(V: Array, R: Array, missing: Array, wanted: Array, step: Array, turn
     _solve_upper(R, turn)
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _solve_lower(R: Array, b: Array, x: Array) -> None:
     """Solve R'x = b."""
     for w in range(WRENCH):
@@ -249,7 +249,7 @@ def _solve_lower(R: Array, b: Array, x: Array) -> None:
         x[w] /= R[w, w]
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _solve_upper(R: Array, x: Array) -> None:
     """Solve R x = b in place."""
     for w in range(WRENCH - 1, -1, -1):
@@ -258,14 +258,14 @@ def _solve_upper(R: Array, x: Array) -> None:
         x[w] /= R[w, w]
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _towards_the_border(middle: Array, wanted: Array) -> None:
     for i in range(len(wanted)):
         for j in range(3):
             wanted[i, j] = -middle[i, j]
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _towards_the_middle(middle: Array, ahead: Array, product: float, wanted: Array) -> None:
     """Aim where the products become `product` e, given those of the step ahead."""
     s, z = ahead[0], ahead[1]
@@ -279,7 +279,7 @@ def _towards_the_middle(middle: Array, ahead: Array, product: float, wanted: Arr
         wanted[i, 0], wanted[i, 1], wanted[i, 2] = x, (d1 - x * m1) / m0, (d2 - x * m2) / m0
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _longest(middle: Array, step: Array) -> float:
     """Return how many times a step can be taken before s or z leaves the cones."""
     longest = np.inf
@@ -302,7 +302,7 @@ def _longest(middle: Array, step: Array) -> float:
     return longest
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _move(pair: Array, W: Array, step: Array, share: float) -> None:
     for side in range(2):
         for i in range(pair.shape[1]):

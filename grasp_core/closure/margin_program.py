@@ -39,13 +39,12 @@ def deepest_forces(
         Forces, (g, k, 3); twists, (g, 6), on which the supports are at most the margin over the
         friction; and lower and upper bounds of the margin, (g, 2), where the forces balance. A
         search that broke down, as it does on degenerate contacts, ends with bounds that have
-        crossed or are not numbers. Without kernels all of these are zero.
+        crossed or are not numbers.
     """
     forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))
     values = np.ones((len(arms), 2))
-    if kernel := compiled(KERNEL):
-        given = tuple(np.array(each) for each in (arms, normals, friction))  # writable
-        kernel.deepest(given, share, forces, twists, values)
+    given = tuple(np.array(each) for each in (arms, normals, friction))  # writable
+    compiled(KERNEL).deepest(given, share, forces, twists, values)
     contacts = arms.shape[1]
     return forces, twists / contacts, friction[:, None] / contacts * (1.0 - values)
 

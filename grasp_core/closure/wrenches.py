@@ -43,9 +43,10 @@ def cross_matrix(vector: Array) -> Array:
 
 
 def contact_frames(normals: Array) -> Array:
-    """Build orthonormal frames with the columns (normal, tangent, tangent), (k, 3, 3)."""
-    columns = [((x, y, z), *plane_tangents(x, y, z)) for x, y, z in normals.tolist()]
-    return np.array(columns).transpose(0, 2, 1)
+    """Build orthonormal frames with the columns (normal, tangent, tangent), (..., 3, 3)."""
+    rows = normals.reshape(-1, 3).tolist()
+    columns = [((x, y, z), *plane_tangents(x, y, z)) for x, y, z in rows]
+    return np.array(columns).reshape(*normals.shape, 3).swapaxes(-1, -2)
 
 
 def normal_and_tangential(forces: Array, normals: Array) -> tuple[Array, Array]:

@@ -39,7 +39,7 @@ LARGEST_SPAN_ANGLE = math.asin(1.0 / 3.0)
 """Largest span angle, which only the regular tetrahedron reaches [rad]."""
 KERNEL = "grasp_core.cones.spanning_kernel"
 FEW = 30
-"""Number of directions up to which enumerating is faster than loading compiled code."""
+"""Number of directions up to which trying all quadruples is faster than loading compiled code."""
 GUESS = 2
 """Quadruples per pair of directions that there is room for before they are counted."""
 OTHERS = ([1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2])
@@ -68,9 +68,9 @@ def span_angle(normals: ArrayLike) -> float:
 def count_spanning(normals: ArrayLike, least: float) -> int:
     """Count the quadruples of unit vectors (n, 3) that span at an angle [rad], without a list."""
     units = frozen_units(normals, (None, 3), "normals")
-    kernel = compiled(KERNEL) if len(units) > FEW else None
-    if kernel is None:
-        return len(spanning_quadruples(units, least).indices)
+    if len(units) <= FEW:
+        every = np.array(list(combinations(units, 4))).reshape(-1, 4, 3)
+        return int(np.count_nonzero(span_sines(every) > math.sin(least)))
     table = SpanningTable(units, least)
     return sum(table.count(newest) for newest in range(len(units)))
 
@@ -221,8 +221,6 @@ def spanning_quadruples(normals: Array, least_angle: float) -> SpanningQuadruple
         normals: Unit vectors, (n, 3).
         least_angle: Angle that theta* must exceed [rad].
     """
-    if len(normals) <= FEW:
-        return _spanning_by_pairs(normals, math.sin(least_angle))
     return SpanningTable(normals, least_angle).quadruples(0, len(normals))
 
 
@@ -232,15 +230,10 @@ class SpanningTable:
     def __init__(self, normals: Array, least_angle: float) -> None:
         self.units, self.least = np.ascontiguousarray(normals), math.sin(least_angle)
         self.kernel = compiled(KERNEL)
-        self.size = 0
-        self.bits = None if self.kernel is None else self.kernel.empty_table(len(normals))
+        self.size, self.bits = 0, self.kernel.empty_table(len(normals))
 
     def quadruples(self, start: int, end: int) -> SpanningQuadruples:
         """List the quadruples whose last direction is one of start .. end - 1."""
-        if self.kernel is None:
-            every = _spanning_by_pairs(self.units[:end], self.least)
-            last = every.indices[:, 3] >= start
-            return SpanningQuadruples(every.indices[last], every.span_angles[last])
         self._extend(end)
         indices = _sorted([self._ending_in(newest) for newest in range(start, end)], end)
         sines = np.empty(len(indices))
@@ -248,7 +241,7 @@ class SpanningTable:
         return SpanningQuadruples(indices, np.arcsin(sines))
 
     def count(self, newest: int) -> int:
-        """Count the quadruples that end in a direction; compiled code is needed for this."""
+        """Count the quadruples that end in a direction."""
         self._extend(newest + 1)
         return int(self.kernel.quadruples(self.bits, newest, np.empty((0, 4), dtype=np.int64)))
 
@@ -272,38 +265,6 @@ def _sorted(parts: Sequence[Indices], count: int) -> Indices:
     places = count ** np.arange(3, -1, -1)
     keys = np.sort(np.concatenate(parts) @ places)
     return keys[:, None] // places % count
-
-
-def _spanning_by_pairs(normals: Array, least: float) -> SpanningQuadruples:
-    """List all quadruples that span above a least sine, without compiled code.
-
-    A table of signed triple sines decides each quadruple. With i < j fixed, the faces fall
-    into those to the left of the plane (i, j) and those to its right; a positively spanning
-    quadruple takes one of each, so only those pairs are tested, as one array operation.
-    """
-    count = len(normals)
-    table = np.array([triple_sine(normal, normals[:, None], normals[None]) for normal in normals])
-    found: list[Indices] = []
-    sines: list[Array] = []
-    for i, j in combinations(range(count), 2):
-        left = j + 1 + np.flatnonzero(table[i, j, j + 1 :] > least)
-        right = j + 1 + np.flatnonzero(table[i, j, j + 1 :] < -least)
-        if not (left.size and right.size):
-            continue
-        a, b = left[:, None], right[None, :]
-        sine = np.minimum(
-            np.minimum(table[i, a, b], table[j, b, a]),
-            np.minimum(table[i, j, a], table[j, i, b]),
-        )
-        rows, columns = np.nonzero(sine > least)
-        pair = np.sort(np.column_stack([left[rows], right[columns]]), axis=1)
-        found.append(np.column_stack([np.full((len(pair), 2), (i, j)), pair]))
-        sines.append(sine[rows, columns])
-    if not found:
-        return SpanningQuadruples(np.empty((0, 4), dtype=np.int64), np.empty(0))
-    indices, sine = np.concatenate(found), np.concatenate(sines)
-    order = np.lexsort(indices.T[::-1])
-    return SpanningQuadruples(indices[order], np.arcsin(sine[order]))
 
 
 _TINY = float(np.finfo(np.float64).tiny)

@@ -9,23 +9,14 @@ of its rows, and are found 64 at a time.
 """
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import loop
 
 WORD = 64
 DEPENDENT = 1e-12
 """Triples of unit vectors with a smaller determinant are coplanar."""
-
-
-def try_out() -> None:
-    """Fill a tiny table."""
-    table = empty_table(4)
-    extend(table, np.eye(4, 3), 0, 4, 0.5)
-    found = np.empty((1, 4), dtype=np.int64)
-    quadruples(table, 3, found)
-    least_sines(np.eye(4, 3), np.zeros_like(found), np.empty(1))
 
 
 def empty_table(count: int) -> NDArray[np.uint64]:
@@ -33,7 +24,7 @@ def empty_table(count: int) -> NDArray[np.uint64]:
     return np.zeros((count, count, (count + WORD - 1) // WORD), dtype=np.uint64)
 
 
-@njit(cache=True)
+@loop()
 def extend(table: NDArray[np.uint64], units: Array, start: int, end: int, least: float) -> None:
     """Put the directions start .. end - 1 into the table.
 
@@ -60,7 +51,7 @@ def extend(table: NDArray[np.uint64], units: Array, start: int, end: int, least:
                     _mark(table, j, i, k)
 
 
-@njit(cache=True)
+@loop()
 def quadruples(table: NDArray[np.uint64], newest: int, found: Indices) -> int:
     """List the quadruples of one direction and three before it.
 
@@ -83,7 +74,7 @@ def quadruples(table: NDArray[np.uint64], newest: int, found: Indices) -> int:
     return count
 
 
-@njit(cache=True)
+@loop()
 def least_sines(units: Array, found: Indices, sines: Array) -> None:
     """Fill in sines of the angles below which quadruples of directions span, (q,)."""
     for row in range(len(found)):
@@ -92,7 +83,7 @@ def least_sines(units: Array, found: Indices, sines: Array) -> None:
         sines[row] = min(min(_sine(a, b, c), _sine(a, b, d)), min(_sine(a, c, d), _sine(b, c, d)))
 
 
-@njit(cache=True)
+@loop()
 def _completed(
     table: NDArray[np.uint64],
     pair: tuple[int, int],
@@ -123,7 +114,7 @@ def _completed(
     return count
 
 
-@njit(cache=True)
+@loop()
 def _place(bit: np.uint64) -> int:
     """Return which bit of a word is set."""
     place, size = 0, 32
@@ -135,7 +126,7 @@ def _place(bit: np.uint64) -> int:
     return place
 
 
-@njit(cache=True)
+@loop()
 def _mark(table: NDArray[np.uint64], i: int, j: int, k: int) -> None:
     """Mark that (i, j, k) turns this way, and with it (j, k, i) and (k, i, j)."""
     one = np.uint64(1)
@@ -144,7 +135,7 @@ def _mark(table: NDArray[np.uint64], i: int, j: int, k: int) -> None:
     table[k, i, j // WORD] |= one << np.uint64(j % WORD)
 
 
-@njit(cache=True)
+@loop()
 def _sine(u: Array, v: Array, w: Array) -> float:
     """Return the size of `triple_sine` of `spanning`."""
     x, y, z = _crossed(v, w)
@@ -154,7 +145,7 @@ def _sine(u: Array, v: Array, w: Array) -> float:
     return determinant / np.sqrt(_longest_squared(_dotted(u, v), _dotted(v, w), _dotted(w, u)))
 
 
-@njit(cache=True)
+@loop()
 def _longest_squared(g: float, h: float, k: float) -> float:
     """Return the longest |+-(v x w) +-(w x u) +-(u x v)|^2 from the cosines u.v, v.w and w.u."""
     a, b, c = h * k - g, g * k - h, g * h - k
@@ -162,12 +153,12 @@ def _longest_squared(g: float, h: float, k: float) -> float:
     return 3.0 - g * g - h * h - k * k + 2.0 * most
 
 
-@njit(cache=True)
+@loop()
 def _dotted(u: Array, v: Array) -> float:
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
-@njit(cache=True)
+@loop()
 def _crossed(u: Array, v: Array) -> tuple[float, float, float]:
     return (
         u[1] * v[2] - u[2] * v[1],

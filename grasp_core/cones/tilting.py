@@ -31,13 +31,12 @@ Source: this project's; P3 with its closed form is explained in `spanning`.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations, pairwise, product
+from itertools import pairwise, product
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
-from grasp_core.cones.spanning import OTHERS, angles_between, span_sines
 from grasp_core.values import FINGERS
 
 KERNEL = "grasp_core.cones.tilting_kernel"
@@ -102,31 +101,12 @@ def widest_half_angles(normals: Array, thetas: Array, sines: Array) -> Array:
         thetas: Half-angles of the friction cones, (q, 4) [rad].
         sines: Sines of theta*, not positive where the normals do not span, (q,).
     """
-    if kernel := compiled(KERNEL):
-        lowest = np.empty(len(normals))
-        kernel.lowest_heights(np.ascontiguousarray(normals), lowest)
-    else:
-        lowest = _lowest_heights(normals)
+    lowest = np.empty(len(normals))
+    compiled(KERNEL).lowest_heights(np.ascontiguousarray(normals), lowest)
     heights = np.where(sines > 0.0, sines, np.minimum(lowest, 0.0))
     # (2), for the largest theta_i and the best m; psi is no more than any theta_i, by (1)
     widest = 0.5 * (thetas.max(axis=1) + np.arcsin(np.clip(heights, -1.0, 1.0)))
     return np.minimum(widest + SLIGHT, thetas.min(axis=1))
-
-
-def _lowest_heights(normals: Array) -> Array:
-    """Return the least max_i -n_i.m over the middles m of two normals or three, (q,)."""
-    lowest = np.full(len(normals), np.inf)
-    units = np.moveaxis(normals, 1, 0)
-    middles = [one + other for one, other in combinations(units, 2)]
-    for one, two, three in combinations(units, 3):
-        # both directions square to the plane of the three tips are equally far from all three
-        across = np.cross(two - one, three - one)
-        middles += [across, -across]
-    for middle in middles:
-        length = np.linalg.norm(middle, axis=1)
-        heights = -np.einsum("fqi,qi->qf", units, middle).min(axis=1) / np.maximum(length, SLIGHT)
-        lowest = np.where(length > SLIGHT, np.minimum(lowest, heights), lowest)
-    return lowest
 
 
 def widened(directions: Array, normals: Array, thetas: Array) -> TiltedCones:
@@ -202,26 +182,15 @@ def _bent(normals: Array, thetas: Array) -> Iterator[Array]:
 
 def half_angle(axes: Array, normals: Array, thetas: Array) -> Array:
     """Return the largest psi that (1) allows, (q,) [rad]; negative where the axes do not span."""
-    if kernel := compiled(KERNEL):
-        reached = np.empty(len(axes))
-        kernel.half_angles(*map(np.ascontiguousarray, (axes, normals, thetas)), reached)
-        return reached
-    # theta* of the axes, then what the lean of each axis leaves of its friction cone
-    sines = span_sines(axes)
-    spans = np.where(sines > 0.0, np.arcsin(np.clip(sines, 0.0, 1.0)), sines)
-    return np.minimum(spans, (thetas - angles_between(axes, normals)).min(axis=1))
+    reached = np.empty(len(axes))
+    compiled(KERNEL).half_angles(*map(np.ascontiguousarray, (axes, normals, thetas)), reached)
+    return reached
 
 
 def _balanced(normals: Array, caps: Array) -> Array:
     """Point unit vectors, within caps around the normals, each against the sum of the others."""
     axes = np.array(normals, order="C")
-    if kernel := compiled(KERNEL):
-        kernel.balance(axes, axes.copy(), np.ascontiguousarray(caps), SWEEPS, SLIGHT)
-        return axes
-    for _ in range(SWEEPS):
-        for finger, others in enumerate(OTHERS):
-            against = -axes[:, others].sum(axis=1)
-            axes[:, finger] = _into_cap(against, normals[:, finger], caps[:, finger])
+    compiled(KERNEL).balance(axes, axes.copy(), np.ascontiguousarray(caps), SWEEPS, SLIGHT)
     return axes
 
 
@@ -245,23 +214,9 @@ def _improved(axes: Array, normals: Array, thetas: Array) -> tuple[Array, Array]
     # one seed for all quadruples: equal ones get equal moves, wherever they are listed
     moves = np.random.default_rng(0).normal(size=(MOVES, FINGERS, 2))
     first, second = _aside(axes)
-    if kernel := compiled(KERNEL):
-        axes, reached = np.array(axes, order="C"), np.empty(len(axes))
-        given = map(np.ascontiguousarray, (normals, thetas, np.stack([first, second])))
-        kernel.improve((axes, reached), *given, moves, np.array(PACE))
-        return axes, reached
-    reached = half_angle(axes, normals, thetas)
-    # steps are in units of each quadruple's own narrowest friction cone
-    steps = FIRST_MOVE * thetas.min(axis=1)
-    for move in moves:
-        sideways = move[:, :1] * first + move[:, 1:] * second
-        moved = axes + steps[:, None, None] * sideways
-        moved /= np.linalg.norm(moved, axis=-1, keepdims=True)
-        now = half_angle(moved, normals, thetas)
-        better = now > reached + SLIGHT
-        axes = np.where(better[:, None, None], moved, axes)
-        reached = np.where(better, now, reached)
-        steps = steps * np.where(better, GROWTH, DECAY)
+    axes, reached = np.array(axes, order="C"), np.empty(len(axes))
+    given = map(np.ascontiguousarray, (normals, thetas, np.stack([first, second])))
+    compiled(KERNEL).improve((axes, reached), *given, moves, np.array(PACE))
     return axes, reached
 
 

@@ -1,9 +1,9 @@
 """Force cones are tilted until they span, for many quadruples (see `tilting`)."""
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array
+from grasp_core.compiled import loop
 from grasp_core.geometry.vectors_kernel import cross, dotted
 
 FINGERS = 4
@@ -13,25 +13,14 @@ SLIGHT = 1e-6
 """Size below which nothing is decided, as in `grasp_core.cones.tilting`."""
 
 
-def try_out() -> None:
-    """Tilt one quadruple."""
-    axes, thetas = np.ones((1, FINGERS, 3)), np.ones((1, FINGERS))
-    half_angles(axes, axes, thetas, np.empty(1))
-    lowest_heights(axes, np.empty(1))
-    balance(axes.copy(), axes, thetas, 1, 1e-6)
-    frames = np.ones((2, 1, FINGERS, 3))
-    moves, pace = np.ones((1, FINGERS, 2)), np.ones(4)
-    improve((axes.copy(), np.empty(1)), axes, thetas, frames, moves, pace)
-
-
-@njit(cache=True)
+@loop()
 def half_angles(axes: Array, normals: Array, thetas: Array, reached: Array) -> None:
     """Fill in the largest psi that axes allow, (q,) [rad]; negative where they do not span."""
     for q in range(len(axes)):
         reached[q] = _half_angle(axes[q], normals[q], thetas[q], -np.inf)
 
 
-@njit(cache=True)
+@loop()
 def lowest_heights(normals: Array, lowest: Array) -> None:
     """Fill in the least max_i -n_i.m over the middles m of two normals or three, (q,)."""
     middle, one, other = np.empty(3), np.empty(3), np.empty(3)
@@ -49,7 +38,7 @@ def lowest_heights(normals: Array, lowest: Array) -> None:
                     lowest[q] = min(lowest[q], _height(n, middle, 1.0), _height(n, middle, -1.0))
 
 
-@njit(cache=True)
+@loop()
 def _height(normals: Array, middle: Array, side: float) -> float:
     """Return the largest -n_i.m, for m along a vector or against it; infinite without direction."""
     length, least = np.sqrt(dotted(middle, middle)), np.inf
@@ -60,7 +49,7 @@ def _height(normals: Array, middle: Array, side: float) -> float:
     return -least / length
 
 
-@njit(cache=True)
+@loop()
 def balance(axes: Array, normals: Array, caps: Array, sweeps: int, slight: float) -> None:
     """Point each axis in turn against the sum of the others, within a cap around its normal.
 
@@ -90,7 +79,7 @@ def balance(axes: Array, normals: Array, caps: Array, sweeps: int, slight: float
                 )
 
 
-@njit(cache=True)
+@loop()
 def improve(
     cones: tuple[Array, Array],
     normals: Array,
@@ -135,7 +124,7 @@ def improve(
                 step *= pace[2]
 
 
-@njit(cache=True)
+@loop()
 def _half_angle(axes: Array, normals: Array, thetas: Array, floor: float) -> float:
     """Return the largest psi; where that is no larger than a floor, anything up to the floor."""
     sine, least = _span_sine(axes), np.inf
@@ -150,7 +139,7 @@ def _half_angle(axes: Array, normals: Array, thetas: Array, floor: float) -> flo
     return min(least, span)
 
 
-@njit(cache=True)
+@loop()
 def _span_sine(axes: Array) -> float:
     """Compute `span_sines` of `grasp_core.cones.spanning` for one quadruple."""
     ab, ac, ad = _cosine(axes, 0, 1), _cosine(axes, 0, 2), _cosine(axes, 0, 3)
@@ -169,12 +158,12 @@ def _span_sine(axes: Array) -> float:
     return min(min(one, two), min(three, four))
 
 
-@njit(cache=True)
+@loop()
 def _cosine(axes: Array, i: int, j: int) -> float:
     return axes[i, 0] * axes[j, 0] + axes[i, 1] * axes[j, 1] + axes[i, 2] * axes[j, 2]
 
 
-@njit(cache=True)
+@loop()
 def _determinant(axes: Array, i: int, j: int, k: int) -> float:
     x = axes[j, 1] * axes[k, 2] - axes[j, 2] * axes[k, 1]
     y = axes[j, 2] * axes[k, 0] - axes[j, 0] * axes[k, 2]
@@ -182,7 +171,7 @@ def _determinant(axes: Array, i: int, j: int, k: int) -> float:
     return axes[i, 0] * x + axes[i, 1] * y + axes[i, 2] * z
 
 
-@njit(cache=True)
+@loop()
 def _sine(determinant: float, g: float, h: float, k: float) -> float:
     """Return the sine at which three cones first touch one plane, from cosines between axes."""
     a, b, c = h * k - g, g * k - h, g * h - k
@@ -190,7 +179,7 @@ def _sine(determinant: float, g: float, h: float, k: float) -> float:
     return abs(determinant) / np.sqrt(3.0 - g * g - h * h - k * k + 2.0 * most)
 
 
-@njit(cache=True)
+@loop()
 def _into_cap(
     vector: Array, center: Array, cosine: float, sine: float, slight: float, unit: Array
 ) -> None:

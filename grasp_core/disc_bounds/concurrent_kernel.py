@@ -6,9 +6,9 @@ focus before and behind all fingers; numbers in comments are those of its deriva
 """
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array
+from grasp_core.compiled import loop
 from grasp_core.disc_bounds.corner_bounds_kernel import reaches
 from grasp_core.families.attempts_kernel import (
     FINGERS,
@@ -16,7 +16,6 @@ from grasp_core.families.attempts_kernel import (
     edges_of,
     facet_sines,
     room_for,
-    tilted_faces,
 )
 from grasp_core.families.kernel_tables import Attempts, Corners, FaceTable
 from grasp_core.geometry.vectors_kernel import across
@@ -25,12 +24,7 @@ from grasp_core.solvers.lp_kernel import Rows
 VARIABLES = 12  # x0 (3), y (4 x 2), r
 
 
-def try_out() -> None:
-    """Bound one attempt, so that everything here is compiled."""
-    concurrent_bounds(*tilted_faces(), np.ones((16, 2)), 0.0, np.empty(1))
-
-
-@njit(cache=True)
+@loop()
 def concurrent_bounds(
     faces: FaceTable, attempts: Attempts, turns: Array, least: float, bounds: Array
 ) -> None:
@@ -62,7 +56,7 @@ def concurrent_bounds(
             bounds[a] = max(bounds[a], bounded(rows, max(least, bounds[a])))
 
 
-@njit(cache=True)
+@loop()
 def _aim_rows(
     faces: FaceTable,
     attempts: Attempts,
@@ -97,7 +91,7 @@ def _aim_rows(
     return row
 
 
-@njit(cache=True)
+@loop()
 def _inside_rows(faces: FaceTable, face: int, finger: int, rows: Rows, row: int) -> int:
     """Fill in rows (2): a disc stays inside its face."""
     y, r = 3 + 2 * finger, VARIABLES - 1

@@ -26,8 +26,8 @@ it makes the left side of (3) larger by
 
     r |N.a_m| / tan(psi / 2).                                                                 (4)
 
-Only compiled code uses (3) and (4): they spare programs that would find discs below the least
-radius, or below those already found.
+(3) and (4) spare programs that would find discs below the least radius, or below those already
+found.
 """
 
 from itertools import combinations
@@ -36,7 +36,6 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
-from grasp_core.cones.spanning import balancing_weights
 from grasp_core.families.concurrent import concurrent_radius_bounds
 from grasp_core.families.constructions import PAIRINGS
 from grasp_core.families.kernel_tables import Corners
@@ -77,14 +76,8 @@ def disc_limits(
         Upper bounds on the smallest of four discs: in a concurrent grasp, then in a pencil in
         each of the `PAIRINGS`. They are in units of the corners.
     """
-    kernel = compiled(KERNEL)
-    if kernel is None:
-        points, angles = corners.points[faces], np.maximum(half_angles, 0.0)
-        reaches, widths = _reaches(points, axes), _widths(points, axes)
-        concurrent = concurrent_radius_bounds(reaches, widths, angles)
-        return np.hstack([concurrent, pencil_radius_bounds(reaches, widths, angles, PAIRINGS)])
     limits = np.empty((len(faces), 1 + len(PAIRINGS)))
-    kernel.fill(
+    compiled(KERNEL).fill(
         corners, np.ascontiguousarray(normals), np.ascontiguousarray(faces),
         np.ascontiguousarray(axes), np.ascontiguousarray(half_angles), limits,
     )  # fmt: skip
@@ -131,29 +124,5 @@ def widths_apart(faces: Indices, apart: Array, halves: Array, leaning: Array) ->
         # |a_i - a_j| is twice the sine of half the angle between them
         sines = np.sin(np.maximum(halves[pair] - leaning, 0.0))
         bound = np.where(sines > PARALLEL, apart[pair] / np.maximum(sines, PARALLEL), np.inf)
-        widths[:, i, j] = widths[:, j, i] = bound
-    return widths
-
-
-def _reaches(corners: Array, axes: Array) -> Array:
-    """The bound (1) on the mean distance of a focus before or behind its contacts, (q,)."""
-    heights = np.einsum("qfki,qfi->qfk", corners, axes)
-    weights = balancing_weights(axes)
-    # (1) holds for whichever side the focus is on: the larger bound covers both
-    before = -np.einsum("qf,qf->q", weights, heights.min(axis=2, initial=np.inf))
-    behind = np.einsum("qf,qf->q", weights, heights.max(axis=2, initial=-np.inf))
-    return np.maximum(before, behind)
-
-
-def _widths(corners: Array, axes: Array) -> Array:
-    """The bound (2) on s_i + s_j for contacts i and j of one focus, (q, 4, 4)."""
-    widths = np.full((len(axes), FINGERS, FINGERS), np.inf)
-    for i, j in combinations(range(FINGERS), 2):
-        apart = axes[:, i] - axes[:, j]
-        low = np.einsum("qki,qi->qk", corners[:, i], apart).min(axis=1, initial=np.inf)
-        high = np.einsum("qki,qi->qk", corners[:, j], apart).max(axis=1, initial=-np.inf)
-        # 1 - a_i.a_j of (2) is half of |a_i - a_j|^2
-        share = 0.5 * np.einsum("qi,qi->q", apart, apart)
-        bound = np.where(share > PARALLEL, (high - low) / np.maximum(share, PARALLEL), np.inf)
         widths[:, i, j] = widths[:, j, i] = bound
     return widths

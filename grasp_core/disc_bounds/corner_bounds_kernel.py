@@ -4,9 +4,9 @@ Numbers in comments are those of the derivation in `disc_bounds.corner_bounds`.
 """
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import loop
 from grasp_core.families.kernel_tables import Corners
 from grasp_core.geometry.vectors_kernel import balancing_weights, cross, dotted
 
@@ -16,14 +16,7 @@ PARALLEL = 1e-6
 """Axes with 1 - a_i.a_j, or with a cross product, below this are nearly parallel: no bound."""
 
 
-def try_out() -> None:
-    """Bound one quadruple, so that everything here is compiled."""
-    corners = Corners(np.zeros((4, 1, 3)), np.ones(4, dtype=np.int64))
-    faces, axes = np.arange(4)[None], np.ones((1, 4, 3))
-    fill(corners, np.ones((4, 3)), faces, axes, np.ones(1), np.empty((1, 4)))
-
-
-@njit(cache=True)
+@loop()
 def fill(
     corners: Corners,
     normals: Array,
@@ -62,7 +55,7 @@ def fill(
             limits[q, 1 + pairing] = limit
 
 
-@njit(cache=True)
+@loop()
 def reaches(corners: Corners, faces: Indices, axes: Array) -> tuple[float, float]:
     """The bound (1) on the mean distance of a focus before, and behind, its contacts."""
     weights, before, behind = np.empty(FINGERS), 0.0, 0.0
@@ -73,7 +66,7 @@ def reaches(corners: Corners, faces: Indices, axes: Array) -> tuple[float, float
     return before, behind
 
 
-@njit(cache=True)
+@loop()
 def _width(corners: Corners, faces: Indices, axes: Array, pair: tuple[int, int]) -> float:
     """The bound (2) on s_i + s_j."""
     (i, j), apart = pair, np.empty(3)
@@ -85,7 +78,7 @@ def _width(corners: Corners, faces: Indices, axes: Array, pair: tuple[int, int])
     return (_extent(corners, faces[j], apart)[1] - _extent(corners, faces[i], apart)[0]) / share
 
 
-@njit(cache=True)
+@loop()
 def _across(
     corners: Corners,
     normals: Array,
@@ -122,13 +115,13 @@ def _across(
     return limit
 
 
-@njit(cache=True)
+@loop()
 def _lean(normal: Array, N: Array) -> float:
     """|T'N|: how far a disc of radius one reaches along N."""
     return np.sqrt(max(1.0 - dotted(normal, N) ** 2, 0.0))
 
 
-@njit(cache=True)
+@loop()
 def _extent(corners: Corners, face: int, direction: Array) -> tuple[float, float]:
     """Least and largest height of a face's corners along a direction."""
     low, high = np.inf, -np.inf

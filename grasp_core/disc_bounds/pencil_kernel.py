@@ -7,15 +7,14 @@ enough.
 """
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array
+from grasp_core.compiled import loop
 from grasp_core.families.attempts_kernel import (
     FINGERS,
     bounded,
     edges_of,
     room_for,
-    tilted_faces,
 )
 from grasp_core.families.kernel_tables import Attempts, FaceTable
 from grasp_core.geometry.vectors_kernel import angle_between, dotted, focus_direction
@@ -27,12 +26,7 @@ CELL_A, CELL_B = -1.0, 1.0
 """Sign of k u in the focus of the first two fingers."""
 
 
-def try_out() -> None:
-    """Bound one attempt, so that everything here is compiled."""
-    pencil_bounds(*tilted_faces(), 0.0, 0.0, np.empty(1))
-
-
-@njit(cache=True)
+@loop()
 def pencil_bounds(
     faces: FaceTable, attempts: Attempts, least_gap: float, least: float, bounds: Array
 ) -> None:
@@ -63,7 +57,7 @@ def pencil_bounds(
             bounds[a] = max(bounds[a], bounded(rows, max(least, bounds[a])))
 
 
-@njit(cache=True)
+@loop()
 def _depth_along(
     faces: FaceTable, attempts: Attempts, place: tuple[int, int], cell: float, u: Array
 ) -> tuple[Array, float, float]:
@@ -79,7 +73,7 @@ def _depth_along(
     return s, -dotted(n, o) / along, sign
 
 
-@njit(cache=True)
+@loop()
 def _ball_row(
     faces: FaceTable,
     attempts: Attempts,
@@ -102,7 +96,7 @@ def _ball_row(
     return row + 1
 
 
-@njit(cache=True)
+@loop()
 def _edge_rows(
     faces: FaceTable,
     attempts: Attempts,
@@ -133,7 +127,7 @@ def _edge_rows(
     return row
 
 
-@njit(cache=True)
+@loop()
 def _near_row(
     faces: FaceTable,
     attempts: Attempts,

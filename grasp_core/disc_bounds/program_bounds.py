@@ -3,9 +3,7 @@
 An attempt is four faces in the order of the fingers, with a force cone each. Where a construction
 has discs, the bound is the value of the first program of `largest_discs`, which maximises the
 smallest radius, on the convex hulls of the faces: no choice of their pieces offers more. For
-reguli the bound only says whether any slopes are feasible on the hulls. Without kernels the
-constructions themselves are solved for discs, at a hundred times the cost, and reguli are not
-bounded.
+reguli the bound only says whether any slopes are feasible on the hulls.
 """
 
 from dataclasses import dataclass
@@ -15,16 +13,14 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
-from grasp_core.errors import SolverError
 from grasp_core.families.concurrent import PYRAMID_SIDES, facet_turns
 from grasp_core.families.constructions import LEAST_RADIUS, Construction
 from grasp_core.families.face_tables import face_table
 from grasp_core.families.kernel_tables import Attempts, FaceTable
-from grasp_core.families.placements import Placement
 from grasp_core.families.regulus import regulus_bounds
-from grasp_core.objects.face_pieces import FacePiece, Shapes
+from grasp_core.objects.face_pieces import Shapes
 from grasp_core.solvers.lp import RESIDUAL
-from grasp_core.values import Family, ForceCone, four
+from grasp_core.values import Family
 
 KERNELS: dict[Family, str] = {
     "concurrent": "grasp_core.disc_bounds.concurrent_kernel",
@@ -57,8 +53,6 @@ class AttemptBounds:
             return self._of_reguli(attempts)
         # hulls stand for faces of several pieces: they offer no less than any piece
         kernel = compiled(KERNELS[construction.family])
-        if kernel is None:
-            return self._by_constructions(construction, attempts, least)
         bounds = np.empty(len(attempts.faces))
         if construction.family == "pencil":
             kernel.pencil_bounds(self._table, attempts, LEAST_RADIUS, least, bounds)
@@ -70,34 +64,10 @@ class AttemptBounds:
 
     def _of_reguli(self, attempts: Attempts) -> Array:
         bounds = np.full(len(attempts.faces), np.inf)
-        known = regulus_bounds(self._table, attempts, -np.inf)
-        if known is not None:
-            # merits are no radii: only a proof that excludes all slopes tells anything
-            merits, _ = known
-            bounds[merits == -np.inf] = -np.inf
+        merits, _ = regulus_bounds(self._table, attempts, -np.inf)
+        # merits are no radii: only a proof that excludes all slopes tells anything
+        bounds[merits == -np.inf] = -np.inf
         return bounds
-
-    def _by_constructions(
-        self, construction: Construction, attempts: Attempts, least: float
-    ) -> Array:
-        bounds = np.empty(len(attempts.faces))
-        for place, (faces, axes, half_angle) in enumerate(zip(*attempts, strict=True)):
-            hulls = [self._hull(int(face)) for face in faces]
-            cones = four(ForceCone(axis, float(half_angle)) for axis in axes)
-            try:
-                found = construction.place(hulls, cones, least)
-            except SolverError:
-                # undecided: only infinity is a safe bound
-                bounds[place] = np.inf
-                continue
-            bounds[place] = found.merit if isinstance(found, Placement) else found.bound
-        return bounds + RESIDUAL
-
-    def _hull(self, face: int) -> FacePiece:
-        shape = self.shapes[face]
-        if shape is None:
-            raise IndexError(f"face {face} has no room for a contact")
-        return shape.hull
 
     @cached_property
     def _table(self) -> FaceTable:

@@ -7,9 +7,9 @@ multipliers alone, checked here, bound every radius.
 """
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array
+from grasp_core.compiled import loop
 from grasp_core.families.kernel_tables import Attempts, FaceTable
 from grasp_core.solvers.lp_kernel import LOST, Rows, Vertex, proved_bound, solve
 
@@ -19,18 +19,7 @@ ACCURACY = 1e-12
 away, this is worth less than the accuracy of a program's answer."""
 
 
-def tilted_faces() -> tuple[FaceTable, Attempts]:
-    """Four tilted square faces and an attempt on them, to try kernels out."""
-    square = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
-    n = np.array([[0.0, 0.0, 1.0], [0.9, 0.0, -0.4], [-0.5, 0.8, -0.4], [-0.5, -0.8, -0.4]])
-    frames = np.repeat(np.eye(3, 2)[None], 4, axis=0)
-    squares, ones = np.repeat(square[None], 4, axis=0), np.ones((4, 4))
-    corners = np.zeros((4, 4, 3))
-    faces = FaceTable(n, -n, frames, squares, ones, np.full(4, 4), corners, np.zeros(4))
-    return faces, Attempts(np.arange(4)[None], n[None].copy(), np.full(1, 0.1))
-
-
-@njit(cache=True)
+@loop()
 def edges_of(faces: FaceTable, attempts: Attempts, a: int) -> int:
     """Number of edges of the four faces of an attempt."""
     count = 0
@@ -39,14 +28,14 @@ def edges_of(faces: FaceTable, attempts: Attempts, a: int) -> int:
     return count
 
 
-@njit(cache=True)
+@loop()
 def facet_sines(half_angle: float, sides: int) -> tuple[float, float]:
     """Sine and cosine of the half-angle of the cone that an inscribed pyramid's facets touch."""
     tangent = np.tan(half_angle) * np.cos(np.pi / sides)
     return tangent / np.hypot(1.0, tangent), 1.0 / np.hypot(1.0, tangent)
 
 
-@njit(cache=True)
+@loop()
 def room_for(room: Array, n: int, count: int) -> Rows:
     """Empty rows of a program of n variables, in memory that is reused."""
     At = room[: n * count].reshape(n, count)
@@ -55,7 +44,7 @@ def room_for(room: Array, n: int, count: int) -> Rows:
     return Rows(At, b, norms, 0)
 
 
-@njit(cache=True)
+@loop()
 def bounded(rows: Rows, least: float) -> float:
     """An upper bound on the radius; where it is above `least`, the tightest one."""
     c, vertex = np.zeros(len(rows.At)), vertex_of(len(rows.At))
@@ -66,13 +55,13 @@ def bounded(rows: Rows, least: float) -> float:
     return np.inf if status == LOST else proved_bound(c, rows, vertex, ACCURACY)
 
 
-@njit(cache=True)
+@loop()
 def vertex_of(n: int) -> Vertex:
     """Room for one vertex of a program with n variables."""
     return Vertex(np.empty(n, dtype=np.int64), np.empty(n), np.empty(n))
 
 
-@njit(cache=True)
+@loop()
 def measure(rows: Rows) -> None:
     """Fill in the lengths of the rows, by which the solver measures violations."""
     rows.norms[:] = 0.0

@@ -122,8 +122,8 @@ def place_regulus(
 
 def regulus_bounds(
     table: FaceTable, attempts: Attempts, enough: float = -SAME_OFFSET
-) -> tuple[Array, Indices] | None:
-    """Bound the merit of reguli for many attempts in compiled code; None where there is none.
+) -> tuple[Array, Indices]:
+    """Bound the merit of reguli for many attempts in compiled code.
 
     Args:
         table: The faces.
@@ -134,31 +134,25 @@ def regulus_bounds(
         The merits of the best choices, (a,): minus infinity where a proof excludes every choice,
         infinity where a choice was not decided. Then these choices, (a, 3), -1 where there is none.
     """
-    kernel = compiled(KERNEL)
-    if kernel is None:
-        return None
     turns, shares = np.array(facet_turns(PYRAMID_SIDES)), np.array(SLOPES)
     terms = RegulusTerms(turns, shares, LEAST_DEPTH, LEAST_INSET, LEAST_GAP, SAME_OFFSET, enough)
     bounds = np.empty(len(attempts.faces))
     chosen = np.empty((len(bounds), 3), dtype=np.int64)
-    kernel.regulus_bounds(table, attempts, terms, bounds, chosen)
+    compiled(KERNEL).regulus_bounds(table, attempts, terms, bounds, chosen)
     return bounds, chosen
 
 
 def _best_choice(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone]
 ) -> tuple[float, tuple[Choice, ...]] | None:
-    """The best choice, if there is any, and its merit; None if compiled code cannot tell."""
+    """The best choice, if there is any, and its merit; None if the half-angles differ."""
     half_angle = cones[0].half_angle
     if any(cone.half_angle != half_angle for cone in cones):
         return None
     attempt = Attempts(
         np.arange(FINGERS)[None], np.array([[cone.axis for cone in cones]]), np.array([half_angle])
     )
-    known = regulus_bounds(face_table(pieces), attempt)
-    if known is None:
-        return None
-    (merit,), (chosen,) = known
+    (merit,), (chosen,) = regulus_bounds(face_table(pieces), attempt)
     first, second, side = (int(each) for each in chosen)
     return float(merit), ((first, second, side),) if first >= 0 else ()
 

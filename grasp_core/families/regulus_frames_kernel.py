@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
+from grasp_core.compiled import loop
 from grasp_core.families.attempts_kernel import facet_sines
 from grasp_core.families.kernel_tables import Attempts, FaceTable, RegulusTerms
 from grasp_core.geometry.vectors_kernel import across, angle_between, cross, dotted, focus_direction
@@ -33,7 +33,7 @@ class PairFrames(NamedTuple):
     """Whether these rows leave anything between them, (2, slopes)."""
 
 
-@njit(cache=True)
+@loop()
 def pair_frames(faces: FaceTable, attempts: Attempts, a: int, terms: RegulusTerms) -> PairFrames:
     """Frames of one attempt; slopes of pairs that are too far from symmetric are not usable."""
     axes, slopes = attempts.axes[a], len(terms.shares)
@@ -69,7 +69,7 @@ def pair_frames(faces: FaceTable, attempts: Attempts, a: int, terms: RegulusTerm
     return frames
 
 
-@njit(cache=True)
+@loop()
 def _facets(
     faces: FaceTable, attempts: Attempts, place: tuple[int, int], frames: PairFrames, turns: Array
 ) -> Array:
@@ -89,7 +89,7 @@ def _facets(
     return found
 
 
-@njit(cache=True)
+@loop()
 def _tightest(facets: Array, resultant: float, tau: float, tight: Array) -> bool:
     """Find the rows alpha x + beta z >= 0 that bound z / |x|, for x on the resultant's side.
 

@@ -10,15 +10,14 @@ solves the best one again. Numbers in comments are those of its derivation.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import loop
 from grasp_core.families.attempts_kernel import (
     FINGERS,
     edges_of,
     measure,
     room_for,
-    tilted_faces,
     vertex_of,
 )
 from grasp_core.families.kernel_tables import Attempts, FaceTable, RegulusTerms
@@ -57,13 +56,7 @@ class _Line(NamedTuple):
     """Change of F with z of the pair, (3,)."""
 
 
-def try_out() -> None:
-    """Bound one attempt, so that everything here is compiled."""
-    terms = RegulusTerms(np.ones((16, 2)), np.ones(1), 0.0, 0.0, 0.0, 0.0, 0.0)
-    regulus_bounds(*tilted_faces(), terms, np.empty(1), np.empty((1, 3), dtype=np.int64))
-
-
-@njit(cache=True)
+@loop()
 def regulus_bounds(
     faces: FaceTable,
     attempts: Attempts,
@@ -103,7 +96,7 @@ def regulus_bounds(
                     chosen[a, 0], chosen[a, 1], chosen[a, 2] = i, j, side
 
 
-@njit(cache=True)
+@loop()
 def _best_side(
     rows: Rows, gap: float, tie: float, worth: float, vertex: Vertex
 ) -> tuple[float, int]:
@@ -124,7 +117,7 @@ def _best_side(
     return (minus, MINUS) if minus > worth else (plus, PLUS)
 
 
-@njit(cache=True)
+@loop()
 def _bounded(rows: Rows, worth: float, vertex: Vertex) -> float:
     """Upper bound of a program: minus infinity if proved infeasible, infinity if undecided."""
     c = np.zeros(VARIABLES)
@@ -136,7 +129,7 @@ def _bounded(rows: Rows, worth: float, vertex: Vertex) -> float:
     return np.inf if status == LOST else proved_bound(c, rows, vertex, ACCURACY)
 
 
-@njit(cache=True)
+@loop()
 def _fill(
     faces: FaceTable,
     quadruple: Indices,
@@ -169,7 +162,7 @@ def _fill(
             row += 1
 
 
-@njit(cache=True)
+@loop()
 def _edge_rows(faces: FaceTable, face: int, line: _Line, inset: float, rows: Rows, row: int) -> int:
     """Fill in the rows (4), which keep the contact D - F of a line inside its face."""
     edge, frame = np.empty(3), faces.frames[face]
@@ -182,7 +175,7 @@ def _edge_rows(faces: FaceTable, face: int, line: _Line, inset: float, rows: Row
     return row
 
 
-@njit(cache=True)
+@loop()
 def _offset_rows(faces: FaceTable, face: int, line: _Line, rows: Rows, row: int) -> int:
     """Fill in the rows (5), which make t the largest offset from the middle of the face."""
     along = np.empty(3)
@@ -196,7 +189,7 @@ def _offset_rows(faces: FaceTable, face: int, line: _Line, rows: Rows, row: int)
     return row
 
 
-@njit(cache=True)
+@loop()
 def _line(frames: PairFrames, slopes: tuple[int, int], finger: int) -> _Line:
     pair, side = finger // 2, 1.0 if finger % 2 == 0 else -1.0
     resultant, other = (1.0 if pair == 0 else -1.0), 1 - pair
@@ -210,7 +203,7 @@ def _line(frames: PairFrames, slopes: tuple[int, int], finger: int) -> _Line:
     return line
 
 
-@njit(cache=True)
+@loop()
 def _add(line: _Line, d: Array, shares: tuple[float, float], rows: Rows, row: int) -> None:
     """Fill in a row with passing d.D + force d.F, for `shares` = (passing, force)."""
     passing, force = shares

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
-from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions
-from grasp_core.closure.force_closure import unit_size
+from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions, unit_size
 from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
 from grasp_core.errors import NoForcesError, SolverError
 from grasp_core.solvers.conic import ConicProgram, minimize

@@ -1,18 +1,18 @@
 """Products of vectors in space, compiled for other kernels."""
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array
+from grasp_core.compiled import loop
 
 
-@njit(cache=True)
+@loop()
 def dotted(u: Array, v: Array) -> float:
     """Return the dot product of two vectors."""
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
-@njit(cache=True)
+@loop()
 def cross(u: Array, v: Array, crossed: Array) -> None:
     """Fill in the cross product of two vectors."""
     crossed[0] = u[1] * v[2] - u[2] * v[1]
@@ -20,7 +20,7 @@ def cross(u: Array, v: Array, crossed: Array) -> None:
     crossed[2] = u[0] * v[1] - u[1] * v[0]
 
 
-@njit(cache=True)
+@loop()
 def angle_between(u: Array, v: Array) -> float:
     """Return the angle between two vectors [rad], as exact for nearly equal ones as for others."""
     crossed = np.empty(3)
@@ -28,7 +28,7 @@ def angle_between(u: Array, v: Array) -> float:
     return np.arctan2(np.sqrt(dotted(crossed, crossed)), dotted(u, v))
 
 
-@njit(cache=True)
+@loop()
 def balancing_weights(axes: Array, weights: Array) -> None:
     """Fill in weights of sum w_i a_i = 0, (4,), like those of `grasp_core.cones.spanning`."""
     front, back, total = np.empty(3), np.empty(3), 0.0
@@ -44,7 +44,7 @@ def balancing_weights(axes: Array, weights: Array) -> None:
         weights[i] *= scale
 
 
-@njit(cache=True)
+@loop()
 def focus_direction(axes: Array) -> Array:
     """Compute the same as `focus_direction` of `grasp_core.families.placements`."""
     weights, u = np.empty(4), np.empty(3)
@@ -57,7 +57,7 @@ def focus_direction(axes: Array) -> Array:
     return u
 
 
-@njit(cache=True)
+@loop()
 def across(axis: Array, T: Array) -> tuple[Array, Array]:
     """Return two unit vectors across an axis, the first leaning as the first of a face's frame."""
     first, second, along = np.empty(3), np.empty(3), 0.0

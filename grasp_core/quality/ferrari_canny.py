@@ -19,8 +19,8 @@ is found by a cone program; its forces bound the distance from above, its direct
 Without closure, Q of `l1` is negative; that of `linf` is zero, since fingers may then rest.
 
 Both proofs are kept and can be checked again in plain arithmetic; `inner_polytope` explains the one
-of the lower bound. A compiled kernel grows the polytopes. `growing_hull` grows those that the
-kernel gives up or whose proof fails, and all of them without kernels (`GRASPPROOF_KERNELS=off`).
+of the lower bound. A compiled kernel grows the polytopes; one whose proof fails counts for nothing,
+and the bounds are then those of (1) and (3).
 
 Source: Ferrari & Canny 1992; the growing polytope is the expanding-polytope algorithm of
 collision detection in six dimensions (also Zheng 2013 for this metric).
@@ -37,9 +37,7 @@ from grasp_core.closure.nearest_wrench import nearest_wrench
 from grasp_core.closure.wrench_sets import Norm, WrenchSet
 from grasp_core.closure.wrenches import WRENCH
 from grasp_core.compiled import compiled
-from grasp_core.errors import SolverError
 from grasp_core.fields import are_units, is_a, is_array, is_number
-from grasp_core.quality.growing_hull import ABOVE, FLAT, MOST_POINTS, GrowingHull, spread_simplex
 from grasp_core.quality.inner_polytope import InnerPolytope
 from grasp_core.values import Grasp
 
@@ -47,8 +45,13 @@ GAP = 1e-4
 """Default of the largest (upper - lower) / upper."""
 FINEST_GAP = 1e-7
 """Smallest gap: below it, rounding of the planes of tiny simplices costs more than they gain."""
-MOST_SIMPLICES = 60_000
-"""Simplices at which the polytope stops growing; its bounds hold all the same, farther apart."""
+MOST_SIMPLICES, MOST_POINTS = 60_000, 4096
+"""Simplices and corners at which the polytope stops growing; its bounds hold all the same, farther
+apart."""
+FLAT = 1e-9
+"""Points closer than this to a common plane, relative to their extent, span nothing more."""
+ABOVE = 1e-12
+"""Height from which on a point sees a simplex, relative to the extent: some thousand roundings."""
 ROUNDING = 1e-12
 """Slack of the plain-arithmetic checks, relative to the longest wrench."""
 KERNEL = "grasp_core.quality.ferrari_canny_kernel"
@@ -147,27 +150,6 @@ def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
 
 def wrench_set_quality(wrenches: WrenchSet, gap: float = GAP) -> FerrariCanny:
     """Bound the signed distance of zero from the boundary of a wrench set, with its proof."""
-    found = _by_kernel(wrenches, gap) if compiled(KERNEL) is not None else None
-    if found is not None:
-        return found
-    direction, polytope = _grown(wrenches, gap)
-    if direction is not None and polytope is not None:
-        radius = polytope.radius(wrenches)
-        if radius > ROUNDING * wrenches.size:
-            return _inside(wrenches, direction, polytope, radius)
-    return _outside(wrenches, direction)
-
-
-def _inside(
-    wrenches: WrenchSet, direction: Array, polytope: InnerPolytope, radius: float
-) -> FerrariCanny:
-    upper = wrenches.support(direction)[0]
-    lower = min(radius - ROUNDING * wrenches.size, upper)
-    return FerrariCanny(lower, upper, wrenches, direction, polytope, None)
-
-
-def _by_kernel(wrenches: WrenchSet, gap: float) -> FerrariCanny | None:
-    """Find bounds with the compiled polytope; None where they are not proved."""
     kernel = compiled(KERNEL)
     linf = wrenches.norm == "linf"
     cones = kernel.Cones(np.array(wrenches.G, order="C"), np.array(wrenches.friction), linf)
@@ -178,40 +160,10 @@ def _by_kernel(wrenches: WrenchSet, gap: float) -> FerrariCanny | None:
         polytope = InnerPolytope(forces, corners, normals)
         radius = polytope.proved_radius(wrenches)
         if radius > slack:
-            return _inside(wrenches, weakest, polytope, radius)
-    # no polytope encloses zero: that is an answer only if the nearest wrench proves it
-    try:
-        outside = _outside(wrenches, weakest if weakest.any() else None)
-    except SolverError:
-        return None
-    return outside if outside.upper <= slack else None
-
-
-def _grown(wrenches: WrenchSet, gap: float) -> tuple[Array | None, InnerPolytope | None]:
-    """Find the weakest direction, and a polytope that shows there is no much weaker one."""
-    edges = wrenches.edges()
-    points = edges @ wrenches.G.T
-    start = spread_simplex(points)
-    if start is None:
-        return None, None
-    hull, forces = GrowingHull(points[start]), list(edges[start])
-    upper, weakest = np.inf, None
-    while True:
-        normal, offset = hull.lowest()
-        support, force = wrenches.support(normal)
-        # (1) in the direction of the nearest plane, whose farthest point is the next corner
-        if support < upper:
-            upper, weakest = support, normal.copy()
-        full = len(forces) == MOST_POINTS or hull.size > MOST_SIMPLICES
-        if upper <= 0.0 or full or upper - offset <= gap * upper:
-            break
-        if not hull.add(wrenches.G @ force):
-            break
-        forces.append(force)
-    if upper <= 0.0 or hull.lowest()[1] <= 0.0:
-        return weakest, None
-    normals, corners = hull.simplices()
-    return weakest, InnerPolytope(np.array(forces), corners, normals)
+            upper = wrenches.support(weakest)[0]
+            lower = min(radius - slack, upper)
+            return FerrariCanny(lower, upper, wrenches, weakest, polytope, None)
+    return _outside(wrenches, weakest if weakest.any() else None)
 
 
 def _outside(wrenches: WrenchSet, direction: Array | None) -> FerrariCanny:

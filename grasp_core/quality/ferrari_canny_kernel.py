@@ -8,9 +8,9 @@ checks that these simplices enclose zero and takes its bounds from them.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import loop
 from grasp_core.solvers.hull_kernel import (
     DEAD,
     D,
@@ -53,13 +53,7 @@ class Limits(NamedTuple):
     """Height from which on a point sees a simplex, relative to the extent."""
 
 
-def try_out() -> None:
-    """Grow a tiny polytope."""
-    limits = Limits(0.5, 100, 100, 1e-9, 1e-12)
-    grow(Cones(np.eye(D), np.ones(2), False), np.ones((1, D)), limits)
-
-
-@njit(cache=True)
+@loop()
 def grow(cones: Cones, edges: Array, limits: Limits) -> tuple[int, Array, Indices, Array, Array]:
     """Grow a polytope inside the set of wrenches, around zero if that is inside.
 
@@ -101,7 +95,7 @@ def grow(cones: Cones, edges: Array, limits: Limits) -> tuple[int, Array, Indice
     return status, forces[:count].copy(), hull.corners[live], hull.normals[live], weakest
 
 
-@njit(cache=True)
+@loop()
 def _support(cones: Cones, y: Array, force: Array) -> float:
     """Return the support of the set in the direction y; fill in local forces that attain it."""
     total, best, at = 0.0, -np.inf, np.empty(3)
@@ -127,7 +121,7 @@ def _support(cones: Cones, y: Array, force: Array) -> float:
     return total if cones.linf else best
 
 
-@njit(cache=True)
+@loop()
 def _wrench(G: Array, force: Array, point: Array) -> None:
     point.fill(0.0)
     for i in range(len(force)):
@@ -136,7 +130,7 @@ def _wrench(G: Array, force: Array, point: Array) -> None:
                 point[row] += G[row, i] * force[i]
 
 
-@njit(cache=True)
+@loop()
 def _begin(G: Array, edges: Array, limits: Limits, forces: Array, points: Array) -> float:
     """Fill in seven widely spread points, each farthest from the affine hull of those before it.
 
@@ -165,7 +159,7 @@ def _begin(G: Array, edges: Array, limits: Limits, forces: Array, points: Array)
     return limits.above * _extent(points)
 
 
-@njit(cache=True)
+@loop()
 def _shift(wrenches: Array, origin: Array, rest: Array) -> float:
     """Fill in the wrenches as seen from an origin; return the largest of their components."""
     largest = 0.0
@@ -176,7 +170,7 @@ def _shift(wrenches: Array, origin: Array, rest: Array) -> float:
     return largest
 
 
-@njit(cache=True)
+@loop()
 def _farthest(rest: Array) -> tuple[int, float]:
     farthest, largest = 0, -1.0
     for i in range(len(rest)):
@@ -188,7 +182,7 @@ def _farthest(rest: Array) -> tuple[int, float]:
     return farthest, largest
 
 
-@njit(cache=True)
+@loop()
 def _flatten(rest: Array, chosen: int, length: float) -> None:
     """Take away from each row its component along a chosen one."""
     unit = np.empty(D)
@@ -202,7 +196,7 @@ def _flatten(rest: Array, chosen: int, length: float) -> None:
             rest[i, j] -= along * unit[j]
 
 
-@njit(cache=True)
+@loop()
 def _extent(points: Array) -> float:
     """Return the extent of the first seven points, along the axis where it is largest."""
     extent = 0.0

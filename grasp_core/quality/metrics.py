@@ -16,16 +16,9 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.checked import MOST_EDGES, whole
-from grasp_core.closure.contact_arrays import (
-    contact_arrays,
-    many_contact_arrays,
-    many_frames,
-    many_frictions,
-    unit_sizes,
-)
-from grasp_core.closure.force_closure import unit_size
+from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions, unit_size
 from grasp_core.closure.wrench_sets import WrenchSet, scaled_arms
-from grasp_core.closure.wrenches import WRENCH, grasp_map
+from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map
 from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
 from grasp_core.solvers.lp import RESIDUAL, LinearProgram, Optimum, maximize
@@ -96,7 +89,7 @@ def min_weight(
     """
     points, units = contact_arrays(positions, normals)
     _, center, size = unit_size(points)
-    wrenches = WrenchSet.of(points, units, friction, center=center, torque_scale=size)
+    wrenches = WrenchSet.of(points, units, friction, center=center, torque_scale=float(size))
     return _min_weight(pyramid_wrenches(wrenches, edges))
 
 
@@ -125,8 +118,8 @@ def min_weights(
         InputError: Shapes, lengths or signs are wrong.
         SolverError: A program's answer failed its check.
     """
-    points, units = many_contact_arrays(positions, normals)
-    W = _many_pyramid_wrenches(points, units, many_frictions(friction, points.shape[:2]), edges)
+    points, units = contact_arrays(positions, normals, many=True)
+    W = _many_pyramid_wrenches(points, units, contact_frictions(friction, points.shape[:2]), edges)
     found = _at_once(W)
     for i in np.flatnonzero(np.isnan(found)):
         found[i] = _min_weight(W[i])
@@ -135,8 +128,8 @@ def min_weights(
 
 def _many_pyramid_wrenches(points: Array, normals: Array, friction: Array, edges: int) -> Array:
     """Return wrenches of pyramid edges, (g, k edges, 6), about the centres and at unit size."""
-    circle, (arms, _, _) = _circle(edges), unit_sizes(points)
-    frames = many_frames(normals)
+    circle, (arms, _, _) = _circle(edges), unit_size(points)
+    frames = contact_frames(normals)
     forces = np.matmul(circle[:, 1:], frames[..., 1:].swapaxes(-1, -2)) * friction[..., None, None]
     forces += normals[..., None, :]
     W = np.empty((*forces.shape[:-1], WRENCH))
@@ -147,12 +140,9 @@ def _many_pyramid_wrenches(points: Array, normals: Array, friction: Array, edges
 def _at_once(W: Array) -> Array:
     """Find metrics of wrenches (g, N, 6) by the kernel, (g,); NaN where an answer fails."""
     found = np.full(len(W), math.nan)
-    kernel = compiled(KERNEL)
-    if kernel is None:
-        return found
     (count, N), y = W.shape[:2], np.empty((len(W), WRENCH))
     multipliers, rows = np.empty((count, WRENCH)), np.empty((count, WRENCH), dtype=np.int64)
-    kernel.vertices(W, y, multipliers, rows)
+    compiled(KERNEL).vertices(W, y, multipliers, rows)
     c = W.sum(axis=1)
     values = np.einsum("gw,gw->g", c, y)
     reached = values[:, None] - N * np.einsum("gnw,gw->gn", W, y)

@@ -9,22 +9,15 @@ vertex and the multipliers are solved for afresh, by elimination.
 """
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import loop
 from grasp_core.solvers.lp_kernel import OPTIMAL, Rows, Vertex, solve
 
 WRENCH = 6
 
 
-def try_out() -> None:
-    """Solve the program of wrenches along all axes."""
-    wrenches = np.concatenate([np.eye(WRENCH), -np.eye(WRENCH)])[None]
-    places = np.empty((1, WRENCH))
-    vertices(wrenches, places, places.copy(), np.empty((1, WRENCH), dtype=np.int64))
-
-
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def vertices(wrenches: Array, twists: Array, multipliers: Array, rows: Indices) -> None:
     """Find a best vertex of each program.
 
@@ -54,7 +47,7 @@ def vertices(wrenches: Array, twists: Array, multipliers: Array, rows: Indices) 
         _eliminate(M, multipliers[g])
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _program(W: Array, c: Array, At: Array, norms: Array) -> None:
     """Fill in the objective, the rows as columns, and their lengths."""
     count = len(W)
@@ -70,7 +63,7 @@ def _program(W: Array, c: Array, At: Array, norms: Array) -> None:
         norms[j] = np.sqrt(square)
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _eliminate(M: Array, x: Array) -> None:
     """Solve M x = b in place; NaN or infinity if M is singular."""
     n = len(x)

@@ -21,6 +21,7 @@ from grasp_core.checked import (
     coefficient,
     number,
     one_of,
+    shown,
     switch,
     whole,
 )
@@ -69,7 +70,8 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     balance: Balance = "radius",
     recenter: bool = False,
     clearance: float = 0.0,
-    cones: int = CONES,
+    max_cones: int = CONES,
+    cones: object = None,
 ) -> CertifiedRegions | None:
     """Find regions around the contacts of a grasp, as large as a proof is found for.
 
@@ -84,8 +86,9 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
             then be outside of their regions.
         clearance: Distance of regions from the edges of their faces [m]. The region of a contact
             nearer to an edge is centred at the nearest place that keeps it.
-        cones: Most cones of one attempt at a proof, at least `FEWEST`. With more, radii grow by
+        max_cones: Most cones of one attempt at a proof, at least `FEWEST`. With more, radii grow by
             some hundredths, or not at all where they are as large as can be.
+        cones: The former name of `max_cones`, which is refused.
 
     Returns:
         The regions; None if no radius could be proved.
@@ -101,7 +104,9 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     one_of(balance, get_args(Balance), "balance")
     switch(recenter, "recenter")
     number(clearance, "clearance", least=0.0, below=body.radius, where=", the object's radius in m")
-    whole(cones, "cones", least=FEWEST, most=MOST_CONES)
+    if cones is not None:
+        raise InputError(f"cones is now called max_cones: pass max_cones={shown(cones)}")
+    whole(max_cones, "max_cones", least=FEWEST, most=MOST_CONES)
     left = coefficient(friction) * (1.0 - reserve)
     positions, normals = stacked(grasp.contacts)
     if not force_closure(positions, normals, left).closed:
@@ -115,7 +120,7 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     if pieces is None or least <= 0.0:
         return None
     leaning = [math.tan(math.atan(left) - p.spread) if p.spread else left for p in pieces]
-    grounds = Grounds(pieces, np.array(leaning), cones)
+    grounds = Grounds(pieces, np.array(leaning), max_cones)
     ys = np.array([
         nearest_point(piece.corners, on_grid(piece.frame.T @ (x - piece.origin), PLACE_DIGITS))
         for piece, x in zip(pieces, unit.at(positions), strict=True)

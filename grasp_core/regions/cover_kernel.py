@@ -10,9 +10,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import loop
 from grasp_core.regions.motions_kernel import MOTIONS, is_open, longest, lowest, velocity
 from grasp_core.regions.proof import LEAF, TWIST
 from grasp_core.regions.sites import AHEAD, ANSWERS, EVEN, ROUNDS, TINY, Sites
@@ -32,7 +32,7 @@ class Tree(NamedTuple):
     """Shifts from the points, along the frames, that leave a twist unresisted, (k, 3)."""
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def pivot(ids: Indices, weights: Array, motions: Array, i: int, most: float) -> tuple[float, float]:
     """The tangential part of a contact's force along the axis of the mean twist, if allowed.
 
@@ -48,7 +48,7 @@ def pivot(ids: Indices, weights: Array, motions: Array, i: int, most: float) -> 
     return longest(f * along, g * along, most)
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def answer(
     ids: Indices, weights: Array, motions: Array, sites: Sites, i: int
 ) -> tuple[float, float, float]:
@@ -78,7 +78,7 @@ def answer(
     return best, best_f, best_g
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def together(ids: Indices, motions: Array, sites: Sites, forces: Array, clear: Array) -> bool:
     """Whether some forces have power together on the rays of a cone: h > 0 in (2)."""
     least, needed = np.inf, 0.0
@@ -95,7 +95,7 @@ def together(ids: Indices, motions: Array, sites: Sites, forces: Array, clear: A
     return least > needed
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def dot(u: Array, v: Array) -> float:
     """Inner product of two lists of six numbers, summed in one order on all machines."""
     total = 0.0
@@ -104,7 +104,7 @@ def dot(u: Array, v: Array) -> float:
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def reweigh(regrets: Array, powers: Array, weights: Array) -> None:
     """Move weight to rays by the power they have lacked so far, counting the last round twice."""
     mean, total = dot(weights, powers), 0.0
@@ -118,7 +118,7 @@ def reweigh(regrets: Array, powers: Array, weights: Array) -> None:
         weights /= total
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def find_forces(
     ids: Indices, motions: Array, sites: Sites, clear: Array, forces: Array, weights: Array
 ) -> bool:
@@ -151,7 +151,7 @@ def find_forces(
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def fill_motions(ray: int, rays: Array, sites: Sites, axes: Array, motions: Array) -> None:
     """Fill in how the twist of a ray moves each contact, for a twist of length one."""
     twist = np.empty(RAYS)
@@ -171,7 +171,7 @@ def fill_motions(ray: int, rays: Array, sites: Sites, axes: Array, motions: Arra
             motions[ray, i, 3 + (c + 2) % 3] = turning  # tangents first
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def edge_to_cut(ids: Indices, rays: Array, weights: Array) -> tuple[int, int, int]:
     """Number and ends of the edge to cut: long, between rays that weigh much."""
     longest, chosen, number, first, last = -1.0, 0, 0, 0, 0
@@ -191,7 +191,7 @@ def edge_to_cut(ids: Indices, rays: Array, weights: Array) -> tuple[int, int, in
     return chosen, first, last
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def orthants(rays: Array, sites: Sites, axes: Array, motions: Array, cones: Indices) -> None:
     """Fill in the first rays, which are the axes and their opposites, and the cones they span."""
     for ray in range(2 * RAYS):
@@ -202,7 +202,7 @@ def orthants(rays: Array, sites: Sites, axes: Array, motions: Array, cones: Indi
             cones[signs, j] = 2 * j + (signs >> j & 1)
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def search(sites: Sites, axes: Array, needs: tuple[int, Array], tree: Tree) -> tuple[int, int]:
     """Cut cones until each is covered, one ray is refuted, or there are too many.
 
@@ -245,15 +245,3 @@ def search(sites: Sites, axes: Array, needs: tuple[int, Array], tree: Tree) -> t
             count, made = count + 2, made + 1
         done += 1
     return COVERED, done
-
-
-def try_out() -> None:
-    """Compile for the types in use, on contacts for which nothing is covered."""
-    k, most = 4, 1 << RAYS
-    tree = Tree(np.zeros(most, np.int64), np.zeros((most, k, 3)), np.zeros((k, 3)))
-    frames = np.zeros((k, 3, 3)) + np.eye(3)
-    points, corners = np.zeros((k, 3)), np.zeros((k, 1, 2))
-    search(
-        Sites(points, frames, np.ones(k), corners, np.zeros(k), np.zeros(k)),
-        np.eye(RAYS), (most, np.zeros(k)), tree,
-    )  # fmt: skip

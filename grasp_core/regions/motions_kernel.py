@@ -7,9 +7,9 @@ along its normal and two tangents, and the rate of turning about these tangents 
 import math
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array
+from grasp_core.compiled import loop
 from grasp_core.regions.sites import AHEAD, TINY, Sites
 
 MOTIONS = 6
@@ -17,7 +17,7 @@ STEPS = 40
 """Most steps towards the place of a contact where a twist is resisted least."""
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def lowest(
     motion: Array, sites: Sites, i: int, force: tuple[float, float]
 ) -> tuple[float, float, float, float]:
@@ -38,7 +38,7 @@ def lowest(
     return motion[0] + f * motion[1] + g * motion[2] + least + out * w, out, x, y
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def velocity(
     motion: Array, place: Array | tuple[float, float, float]
 ) -> tuple[float, float, float]:
@@ -51,14 +51,14 @@ def velocity(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def longest(f: float, g: float, most: float) -> tuple[float, float]:
     """The tangential part in a direction, as long as friction allows."""
     length = math.sqrt(f * f + g * g)
     return (f * most / length, g * most / length) if length > 0.0 else (0.0, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def holds(sites: Sites, i: int, x: float, y: float) -> bool:
     """Whether a place in its plane is in a contact's polygon or in its disc."""
     if x * x + y * y <= sites.radii[i] ** 2:
@@ -73,7 +73,7 @@ def holds(sites: Sites, i: int, x: float, y: float) -> bool:
     return sides > 0
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def resists(motion: Array, sites: Sites, i: int, shift: Array) -> bool:
     """Whether a contact resists a twist wherever it is; if not, `shift` is where it may not.
 
@@ -104,7 +104,7 @@ def resists(motion: Array, sites: Sites, i: int, shift: Array) -> bool:
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def is_open(motions: Array, sites: Sites, shifts: Array) -> bool:
     """Whether no contact resists a twist at the places `shifts`, which are filled in."""
     for i in range(len(sites.points)):

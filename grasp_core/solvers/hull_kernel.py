@@ -20,9 +20,9 @@ Numba's copy of `ferrari_canny_kernel` does not notice a change here; touch that
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import loop
 
 D = 6
 """Number of coordinates of a point."""
@@ -60,7 +60,7 @@ class Hull(NamedTuple):
     """How many places were ever used, and how many of them are free, (2,)."""
 
 
-@njit(cache=True)
+@loop()
 def vacant_hull(room: int) -> Hull:
     """Make an empty hull with room for `room` simplices."""
     return Hull(
@@ -71,7 +71,7 @@ def vacant_hull(room: int) -> Hull:
     )  # fmt: skip
 
 
-@njit(cache=True)
+@loop()
 def larger(hull: Hull) -> Hull:
     """Copy a hull with room for all that one point can add, and for twice as many simplices."""
     room = 2 * len(hull.offsets) + D * hull.counts[0]
@@ -83,7 +83,7 @@ def larger(hull: Hull) -> Hull:
     )  # fmt: skip
 
 
-@njit(cache=True)
+@loop()
 def _wider(table: Any, room: int) -> Any:
     larger = np.empty((room, D), table.dtype)
     for i in range(len(table)):
@@ -92,7 +92,7 @@ def _wider(table: Any, room: int) -> Any:
     return larger
 
 
-@njit(cache=True)
+@loop()
 def _longer(column: Any, room: int) -> Any:
     larger = np.empty(room, column.dtype)
     for i in range(len(column)):
@@ -100,7 +100,7 @@ def _longer(column: Any, room: int) -> Any:
     return larger
 
 
-@njit(cache=True)
+@loop()
 def enclose(hull: Hull, points: Array) -> bool:
     """Put the seven simplices around the first points; false if these are nearly flat.
 
@@ -126,7 +126,7 @@ def enclose(hull: Hull, points: Array) -> bool:
     return True
 
 
-@njit(cache=True)
+@loop()
 def _eliminate(A: Array) -> bool:
     """Turn (A, 1) into (1, inv(A)); return false if A is nearly singular."""
     for i in range(len(A)):
@@ -144,7 +144,7 @@ def _eliminate(A: Array) -> bool:
     return True
 
 
-@njit(cache=True)
+@loop()
 def _clear(A: Array, i: int) -> None:
     """Take multiples of row i from the others, so that column i is zero there."""
     for k in range(len(A)):
@@ -154,7 +154,7 @@ def _clear(A: Array, i: int) -> None:
                 A[k, j] -= share * A[i, j]
 
 
-@njit(cache=True)
+@loop()
 def lowest(hull: Hull) -> int:
     """Return the simplex with the least offset."""
     offsets, found = hull.offsets, 0
@@ -164,7 +164,7 @@ def lowest(hull: Hull) -> int:
     return found
 
 
-@njit(cache=True)
+@loop()
 def look(hull: Hull, point: Array, first: int, slack: float, now: int) -> tuple[int, int]:
     """Fill in what the point sees; return the number of simplices and of ridges around them."""
     normals, offsets, neighbors = hull.normals, hull.offsets, hull.neighbors
@@ -189,7 +189,7 @@ def look(hull: Hull, point: Array, first: int, slack: float, now: int) -> tuple[
     return count, ridges
 
 
-@njit(cache=True)
+@loop()
 def _height(normals: Array, offsets: Array, i: int, point: Array) -> float:
     along = 0.0
     for j in range(D):
@@ -197,7 +197,7 @@ def _height(normals: Array, offsets: Array, i: int, point: Array) -> float:
     return along - offsets[i]
 
 
-@njit(cache=True)
+@loop()
 def extend(hull: Hull, count: int, point: int, slack: float) -> bool:
     """Replace the first `count` seen simplices by new ones with the point; false if that fails."""
     seen = hull.seen[:count]
@@ -207,7 +207,7 @@ def extend(hull: Hull, count: int, point: int, slack: float) -> bool:
     return joined
 
 
-@njit(cache=True)
+@loop()
 def _raise(hull: Hull, seen: Indices, point: int, slack: float) -> None:
     """Make a new simplex wherever a seen one has a neighbour that is not seen."""
     normals, offsets, corners, neighbors = hull.normals, hull.offsets, hull.corners, hull.neighbors
@@ -232,7 +232,7 @@ def _raise(hull: Hull, seen: Indices, point: int, slack: float) -> None:
             corners[new, j], hull.rounds[new] = point, 0
 
 
-@njit(cache=True)
+@loop()
 def _vacant(free: Indices, counts: Indices) -> int:
     """Return a place for a new simplex: that of a removed one, or one at the end."""
     if counts[1] > 0:
@@ -242,7 +242,7 @@ def _vacant(free: Indices, counts: Indices) -> int:
     return counts[0] - 1
 
 
-@njit(cache=True)
+@loop()
 def _normalize(normals: Array, offsets: Array, i: int) -> None:
     square = 0.0
     for j in range(D):
@@ -253,7 +253,7 @@ def _normalize(normals: Array, offsets: Array, i: int) -> None:
     offsets[i] *= shrink
 
 
-@njit(cache=True)
+@loop()
 def _join(hull: Hull, seen: Indices, slack: float) -> bool:
     """Make new simplices neighbours; return false if one of them has none."""
     corners, neighbors, made = hull.corners, hull.neighbors, hull.made
@@ -281,7 +281,7 @@ def _join(hull: Hull, seen: Indices, slack: float) -> bool:
     return True
 
 
-@njit(cache=True)
+@loop()
 def _bury(hull: Hull, seen: Indices) -> None:
     """Free the places of simplices that are removed."""
     for f in seen:
@@ -290,7 +290,7 @@ def _bury(hull: Hull, seen: Indices) -> None:
         hull.counts[1] += 1
 
 
-@njit(cache=True)
+@loop()
 def _place(corners: Indices, i: int, corner: int) -> int:
     """Return where a simplex has a corner; 0 if nowhere, which checks of the answer find out."""
     place = 0

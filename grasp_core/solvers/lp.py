@@ -9,7 +9,7 @@ plain arithmetic before they are returned; the solver's status is not believed.
 
 Programs go to a compiled dual simplex method first; it names the rows of a best vertex, and the
 vertex and its multipliers are solved for afresh. HiGHS solves the programs that it leaves or gets
-wrong, and all programs where there are no kernels (`GRASPPROOF_KERNELS=off`).
+wrong.
 """
 
 import importlib
@@ -108,12 +108,10 @@ def maximize_above(program: LinearProgram, cutoff: float) -> Optimum | Infeasibl
     Raises:
         SolverError: The solver's answer failed our check, or the program is unbounded.
     """
-    if compiled(KERNEL) is not None:
-        try:
-            return _by_simplex(program, cutoff)
-        except (SolverError, np.linalg.LinAlgError):
-            pass
-    return _by_highs(program)
+    try:
+        return _by_simplex(program, cutoff)
+    except (SolverError, np.linalg.LinAlgError):
+        return _by_highs(program)
 
 
 def _by_highs(program: LinearProgram) -> Optimum | Infeasible:

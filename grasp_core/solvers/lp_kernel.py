@@ -18,10 +18,10 @@ ends as LOST.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import loop
 
 BOX = 1e3
 """Half the side of the starting box: programs are of order one, and one that ends at the box is
@@ -39,13 +39,6 @@ REFINEMENTS = 3
 NEGLIGIBLE = 1e-12
 """Multipliers of at most this size are zero but for rounding."""
 OPTIMAL, INFEASIBLE, BELOW, LOST = 0, 1, 2, 3
-
-
-def try_out() -> None:
-    """Solve a tiny program."""
-    one = np.ones(1)
-    vertex = Vertex(np.empty(1, dtype=np.int64), np.empty(1), np.empty(1))
-    solve(one, Rows(np.ones((1, 1)), one, one, 0), -np.inf, vertex)
 
 
 class Rows(NamedTuple):
@@ -72,7 +65,7 @@ class Vertex(NamedTuple):
     """Point where the rows of the basis meet, (n,)."""
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex) -> tuple[int, int]:
     """Find a best vertex.
 
@@ -120,7 +113,7 @@ def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex) -> tuple[int, int
     return LOST, -1
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def proved_bound(c: Array, rows: Rows, vertex: Vertex, accuracy: float) -> float:
     """Return y.b, a bound of feasible values, if y >= 0 gives c to an accuracy; else infinity."""
     bound, left = 0.0, c.copy()
@@ -136,7 +129,7 @@ def proved_bound(c: Array, rows: Rows, vertex: Vertex, accuracy: float) -> float
     return bound if proved else np.inf
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def proved_empty(rows: Rows, vertex: Vertex, against: int, farthest: float) -> bool:
     """Return whether a row and the basis that it contradicts exclude all |x|_1 up to `farthest`.
 
@@ -155,14 +148,14 @@ def proved_empty(rows: Rows, vertex: Vertex, against: int, farthest: float) -> b
     return gap > farthest * np.abs(left).max() + VIOLATED
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _may_weigh(share: float, k: int, rows: Rows) -> bool:
     """Return whether a proof may use a row this much: never the box, equalities always."""
     count = len(rows.b)
     return k < count and (share > 0.0 or k >= count - rows.equalities)
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _corner(c: Array, count: int, vertex: Vertex) -> tuple[Array, float]:
     """Return the corner of the box on the side of c: the inverse of its basis, and c.x."""
     n = len(c)
@@ -175,7 +168,7 @@ def _corner(c: Array, count: int, vertex: Vertex) -> tuple[Array, float]:
     return inverse, value
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _leans_on_box(y: Array, basis: Indices, count: int) -> bool:
     leans = False
     for j in range(len(y)):
@@ -183,7 +176,7 @@ def _leans_on_box(y: Array, basis: Indices, count: int) -> bool:
     return leans
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _exceeded(x: Array, rows: Rows, excess: Array) -> None:
     """Fill in how far x is beyond each row."""
     for k in range(len(excess)):
@@ -194,7 +187,7 @@ def _exceeded(x: Array, rows: Rows, excess: Array) -> None:
             excess[k] += column[k] * at
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _violated(excess: Array, rows: Rows, inside: NDArray[np.bool_], first: bool) -> int:
     """Return the row that is violated most, or the first one; -1 if none is."""
     worst, found, inequalities = VIOLATED, -1, len(excess) - rows.equalities
@@ -207,7 +200,7 @@ def _violated(excess: Array, rows: Rows, inside: NDArray[np.bool_], first: bool)
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _turn(rows: Rows, k: int) -> None:
     """Turn an equality, so that points beneath it are beyond it."""
     rows.b[k] = -rows.b[k]
@@ -215,7 +208,7 @@ def _turn(rows: Rows, k: int) -> None:
         rows.At[i, k] = -rows.At[i, k]
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _combined(rows: Rows, entering: int, inverse: Array, alpha: Array) -> None:
     """Write a row as a combination of the rows of the basis."""
     alpha[:] = 0.0
@@ -226,7 +219,7 @@ def _combined(rows: Rows, entering: int, inverse: Array, alpha: Array) -> None:
                 alpha[j] += share * inverse[i, j]
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _refine(c: Array, rows: Rows, basis: Indices, inverse: Array, y: Array) -> None:
     """Compute the multipliers afresh: rounding errors have added up over the steps."""
     y[:] = 0.0
@@ -239,7 +232,7 @@ def _refine(c: Array, rows: Rows, basis: Indices, inverse: Array, y: Array) -> N
                 y[j] += left[i] * inverse[i, j]
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _subtract(left: Array, share: float, rows: Rows, k: int) -> None:
     """Take a share of a row away from `left`; the row may be a side of the box."""
     side = k - len(rows.b)
@@ -250,7 +243,7 @@ def _subtract(left: Array, share: float, rows: Rows, k: int) -> None:
         left[i] -= share * rows.At[i, k]
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _leaving(y: Array, alpha: Array, basis: Indices, rows: Rows) -> int:
     """Return the place of least y / alpha, the largest alpha among equals; -1 if none is positive.
 
@@ -267,7 +260,7 @@ def _leaving(y: Array, alpha: Array, basis: Indices, rows: Rows) -> int:
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@loop("numpy")
 def _exchange(inverse: Array, x: Array, alpha: Array, leaving: int, excess: float) -> None:
     """Put a row in the place of another: the point moves onto it along the others."""
     n = len(x)

@@ -4,8 +4,7 @@ Solved: minimise |x| subject to C x <= d, for every row d of D.
 
 A point x is nearest iff C x <= d and x = -C'u for some u >= 0 that vanishes off the active rows,
 where equality holds. A compiled dual active-set method finds x and u. Where it fails, or its x and
-u miss these conditions, least squares find u (Lawson & Hanson), as they always do where there are
-no kernels (`GRASPPROOF_KERNELS=off`): with the residual (y, s) of
+u miss these conditions, least squares find u (Lawson & Hanson): with the residual (y, s) of
 
     minimise |C'v|^2 + (1 + d.v)^2  over  v >= 0
 
@@ -51,9 +50,7 @@ def least_distance(C: Array, D: Array, *, accuracy: float = EXACT) -> Array:
     outside = np.flatnonzero(D.min(axis=1) < 0.0)
     sizes = -D[outside].min(axis=1)[:, None]
     alike = D[outside] / sizes
-    near, proved = np.zeros((len(alike), C.shape[1])), np.zeros(len(alike), dtype=bool)
-    if compiled(KERNEL) is not None:
-        near, proved = _by_kernel(C, alike, accuracy)
+    near, proved = _by_kernel(C, alike, accuracy)
     if not proved.all():
         near[~proved] = _by_least_squares(C, alike[~proved])
     X[outside] = sizes * near

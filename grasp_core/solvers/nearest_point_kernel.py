@@ -20,10 +20,10 @@ programs", Mathematical Programming 27, 1983.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit  # pyright: ignore[reportUnknownVariableType, reportMissingTypeStubs]
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import loop
 
 VIOLATED = 1e-13
 """Distance from a row, relative to x or one, above which a point violates it."""
@@ -54,13 +54,7 @@ class Active(NamedTuple):
     """Shares of the active rows in the entering row, (v,)."""
 
 
-def try_out() -> None:
-    """Solve a tiny program."""
-    one = np.ones((1, 1))
-    solve(one, -one, np.zeros((1, 1)), np.zeros((1, 1)))
-
-
-@njit(cache=True)
+@loop()
 def solve(C: Array, D: Array, X: Array, U: Array) -> None:
     """Find nearest points.
 
@@ -88,7 +82,7 @@ def solve(C: Array, D: Array, X: Array, U: Array) -> None:
             U[i, active.rows[j]] = active.u[j]
 
 
-@njit(cache=True)
+@loop()
 def _solve(C: Array, d: Array, norms: Array, active: Active, x: Array) -> int:
     """Find the nearest point; return how many rows are active there, -1 if none was found."""
     count = 0
@@ -105,7 +99,7 @@ def _solve(C: Array, d: Array, norms: Array, active: Active, x: Array) -> int:
     return -1
 
 
-@njit(cache=True)
+@loop()
 def _enter(C: Array, active: Active, count: int, excess: float, least: float, x: Array) -> int:
     """Step until the row after the active ones is active; return how many then are, -1 if it fails.
 
@@ -132,7 +126,7 @@ def _enter(C: Array, active: Active, count: int, excess: float, least: float, x:
     return -1
 
 
-@njit(cache=True)
+@loop()
 def _violated(
     C: Array, d: Array, norms: Array, inside: NDArray[np.bool_], x: Array
 ) -> tuple[int, float]:
@@ -148,7 +142,7 @@ def _violated(
     return found, most
 
 
-@njit(cache=True)
+@loop()
 def _split(row: Array, active: Active, count: int) -> float:
     """Write a row as R[:, count] on Q and a rest z orthogonal to it; return the square of the rest.
 
@@ -166,7 +160,7 @@ def _split(row: Array, active: Active, count: int) -> float:
     return _dot(z, z)
 
 
-@njit(cache=True)
+@loop()
 def _append(active: Active, count: int, square: float) -> None:
     """Add the rest z, with its square, to the orthonormal rows."""
     length = max(np.sqrt(square), TINY)
@@ -175,7 +169,7 @@ def _append(active: Active, count: int, square: float) -> None:
         active.Q[count, j] = active.z[j] / length
 
 
-@njit(cache=True)
+@loop()
 def _leaving(active: Active, count: int) -> tuple[int, float]:
     """Return the active row whose multiplier vanishes first, and after which step; fill in r."""
     R, r, u, found, least = active.R, active.r, active.u, -1, np.inf
@@ -190,7 +184,7 @@ def _leaving(active: Active, count: int) -> tuple[int, float]:
     return found, least
 
 
-@njit(cache=True)
+@loop()
 def _move(active: Active, count: int, step: float) -> None:
     """Change the multipliers of the active rows and of the one that enters."""
     for j in range(count):
@@ -198,7 +192,7 @@ def _move(active: Active, count: int, step: float) -> None:
     active.u[count] += step
 
 
-@njit(cache=True)
+@loop()
 def _drop(C: Array, active: Active, count: int, leaving: int) -> int:
     """Remove a row from the active ones; return how many are left."""
     active.inside[active.rows[leaving]] = False
@@ -209,7 +203,7 @@ def _drop(C: Array, active: Active, count: int, leaving: int) -> int:
     return count - 1
 
 
-@njit(cache=True)
+@loop()
 def _recompute(d: Array, active: Active, count: int, x: Array) -> None:
     """Compute the point where the active rows hold with equality: Q'y with R'y = d, R u = -y."""
     rows, Q, R, u = active.rows, active.Q, active.R, active.u
@@ -228,7 +222,7 @@ def _recompute(d: Array, active: Active, count: int, x: Array) -> None:
         u[i] /= R[i, i]
 
 
-@njit(cache=True)
+@loop()
 def _dot(a: Array, b: Array) -> float:
     total = 0.0
     for i in range(len(a)):

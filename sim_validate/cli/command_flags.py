@@ -119,7 +119,7 @@ class Regions:
     outside their regions."""
     edge_clearance_m: NotNegative = 0.0
     """How far regions stay from the edges of their faces [m]."""
-    cones: Annotated[int, at_least(64, up_to=1_000_000)] = 10_000
+    max_cones: Annotated[int, at_least(64, up_to=1_000_000)] = 10_000
     """Effort: the number of cones that one attempt at a proof may use. More cones enlarge radii by
     some hundredths, or not at all where they are as large as possible."""
     jobs: Count = field(default_factory=available_cores)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.compiled import SWITCH, compiled
+from grasp_core.compiled import compiled, state_of
 from grasp_core.families.concurrent import PYRAMID_SIDES
 from grasp_core.families.discs import KEPT
 from grasp_core.objects.polyhedron import Polyhedron
@@ -28,7 +28,16 @@ from sim_validate.validation.validation import validate
 AS_PLANNED = 2.0 * KEPT
 """Relative tolerance of a planned radius against the closed form; programs give up half of it."""
 USUAL_KERNEL = "grasp_core.solvers.lp_kernel"
-"""A kernel to try; if it can be compiled, all can."""
+"""A kernel whose state stands for all."""
+LOOPS = {
+    "kept": "yes",
+    "not kept": (
+        "yes, but each process spends a minute on compiling them again: make the packages' "
+        "__pycache__ or NUMBA_CACHE_DIR writable"
+    ),
+    "interpreted": "no, NUMBA_DISABLE_JIT says so: unset it, planning is a hundred times slower",
+}
+"""Reports on inner loops, by their state."""
 GATE = "gate: "
 """Prefix of the names of the gate's checks."""
 
@@ -83,19 +92,13 @@ def _machine() -> Mapping[str, str]:
         graphics = f"MuJoCo draws with {available_graphics() or 'its default'}"
     except GraphicsError as error:
         graphics = f"none ({error}); pictures and reports need none, clips do: {remedy()}"
-    loops = "yes"
-    if compiled(USUAL_KERNEL) is None:
-        loops = f"no, {SWITCH} says so" if os.environ.get(SWITCH) == "off" else (
-            "no, numba cannot compile, or keep, them here; planning takes ten times as long: "
-            "make its packages' __pycache__ or NUMBA_CACHE_DIR writable"
-        )  # fmt: skip
     viewer = (
         "yes" if has_display() else "no; use `graspproof view` with --picture, --page or --clip"
     )
     return {
         "Python": sys.executable,
         "cores": f"{available_cores()} to use (--jobs), of {os.cpu_count()}",
-        "compiled loops": loops,
+        "compiled loops": LOOPS[state_of(compiled(USUAL_KERNEL).solve)],
         "graphics": graphics,
         "display for the viewer": viewer,
     }

@@ -25,7 +25,8 @@ def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
         raise InputError(f"{command.grasps}: no grasp {command.grasp or ''}")
     asked = Asked(
         saved.friction if command.friction is None else command.friction,
-        command.reserve, command.balance, command.recenter, command.edge_clearance_m, command.cones,
+        command.reserve, command.balance, command.recenter, command.edge_clearance_m,
+        command.max_cones,
     )  # fmt: skip
     with alone_in(command.out):
         if command.out is not None:

@@ -28,7 +28,7 @@ class Asked:
     balance: Balance = "radius"
     recenter: bool = False
     clearance: float = 0.0
-    cones: int = CONES
+    max_cones: int = CONES
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +67,7 @@ def _certify(task: _Task) -> CertifiedRegions | str:
             return f"not in force closure at friction {left:.6g}"
         proved = certify_regions(
             task.body, grasp, asked.friction, reserve=asked.reserve, balance=asked.balance,
-            recenter=asked.recenter, clearance=asked.clearance, cones=asked.cones,
+            recenter=asked.recenter, clearance=asked.clearance, max_cones=asked.max_cones,
         )  # fmt: skip
     except (UndecidedError, SolverError) as error:
         return str(error)

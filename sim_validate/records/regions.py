@@ -76,7 +76,7 @@ def write_regions(
         "balance": asked.balance,
         "recenter": asked.recenter,
         "edge_clearance_m": asked.clearance,
-        "cones": asked.cones,
+        "cones": asked.max_cones,
         "versions": versions(),
         "grasps": records,
     }

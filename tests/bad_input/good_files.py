@@ -17,7 +17,7 @@ def _folder() -> TemporaryDirectory[str]:
     asked = "--random-wrenches 0 --no-report --limit 1 -q"
     assert main(["run", "tetrahedron", *asked.split(), "--out", str(out)]) == 0
     assert main(
-        ["regions", str(out / "grasps.json"), "--cones", "64", "--out", str(out), "-q"]
+        ["regions", str(out / "grasps.json"), "--max-cones", "64", "--out", str(out), "-q"]
     ) in {0, 1}
     record = ["baseline", "record", str(out / "grasps.json"), "-o", str(out / "a.baseline.json")]
     assert main([*record, "-q"]) == 0

@@ -42,7 +42,7 @@ ON_GRASPS = {
     "inspect http://localhost/part.obj": "part.obj",
 }
 WORDS = {
-    "GRASPPROOF_KERNELS=banana": ("plan tetrahedron --limit 1", "GRASPPROOF_KERNELS|off"),
+    "NUMBA_NUM_THREADS=0": ("plan tetrahedron --limit 1", "NUMBA_|unset"),
 }
 
 

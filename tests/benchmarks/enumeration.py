@@ -5,8 +5,9 @@ from itertools import combinations
 
 import numpy as np
 
-from grasp_core.cones.spanning import SpanningTable, _spanning_by_pairs, span_sines
+from grasp_core.cones.spanning import SpanningTable, span_sines
 from tests.benchmarks.timing import compared, once
+from tests.grasp_core.cones.reference_spanning import spanning_by_pairs
 
 ANGLE = math.radians(10.0)
 SIZES, LARGE = (12, 30, 100), (200, 400)
@@ -23,7 +24,7 @@ def by_table(units):
 
 
 def by_pairs(units):
-    return _spanning_by_pairs(units, math.sin(ANGLE)).indices
+    return spanning_by_pairs(units, math.sin(ANGLE)).indices
 
 
 def by_formula(units):

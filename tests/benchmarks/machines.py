@@ -116,7 +116,7 @@ def simulated(body, grasp, friction):
 
 
 def regions(body, grasp, friction):
-    found = gc.certify_regions(body, grasp, friction, cones=CONES)
+    found = gc.certify_regions(body, grasp, friction, max_cones=CONES)
     if found is None:
         return {"exact": None, "figures": [], "places": []}
     polygons = [region.polygon for region in found.regions]

@@ -10,7 +10,6 @@ Then a sample is timed, all contenders in turn on each block of programs, so tha
 slows all of them alike. Ratios are medians over the blocks.
 """
 
-import importlib
 import sys
 import time
 from collections import Counter
@@ -21,8 +20,8 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 import grasp_core as gc
-from grasp_core.disc_bounds import program_bounds as attempt_bounds
-from grasp_core.families import regulus as regulus_grasps
+from grasp_core.disc_bounds.program_bounds import AttemptBounds
+from grasp_core.families import discs, regulus
 from grasp_core.solvers import lp
 from scenes.example_objects import example_object
 
@@ -51,20 +50,18 @@ def programs(count):
             raise EnoughError
         return solve(program, cutoff)
 
-    doors = [importlib.import_module(f"grasp_core.{name}") for name in ("lp", "largest_discs")]
-    for door in doors:
-        door.maximize_above = record
-    kernels = attempt_bounds.compiled
-    attempt_bounds.compiled = regulus_grasps.compiled = lambda _: None  # by whole programs
+    lp.maximize_above = discs.maximize_above = record
+    bounds, choice = AttemptBounds.of, regulus._best_choice
+    AttemptBounds.of = lambda *args: np.full(len(args[2].faces), np.inf)  # by whole programs
+    regulus._best_choice = lambda *_: None
     try:
         for name, friction in PLANS:
             gc.plan(example_object(name), friction)
     except EnoughError:
         pass
     finally:
-        attempt_bounds.compiled = regulus_grasps.compiled = kernels
-        for door in doors:
-            door.maximize_above = solve
+        AttemptBounds.of, regulus._best_choice = bounds, choice
+        lp.maximize_above = discs.maximize_above = solve
     return found
 
 

@@ -39,8 +39,8 @@ WALKS = np.concatenate([[0.95, 1.0], np.arange(1.02, 1.2, 0.02), np.arange(1.2, 
 """How far contacts walk, relative to the border."""
 WAYS = {
     "discs": {},
-    "fast": {"cones": CONES // 8},
-    "more cones": {"cones": 5 * CONES},
+    "fast": {"max_cones": CONES // 8},
+    "more cones": {"max_cones": 5 * CONES},
     "recentered": {"recenter": True},
     "area": {"balance": "area"},
 }
@@ -125,7 +125,7 @@ def examine(given):
         if way != "discs" and not task.closely:
             continue
         begun = time.perf_counter()
-        cones = {} if task.closely else {"cones": task.cones}
+        cones = {} if task.closely else {"max_cones": task.cones}
         found = certify_regions(body, grasp, FRICTION, **cones | settings)
         if found is not None:
             sizes[way] = (*size(found, body), time.perf_counter() - begun)

@@ -35,7 +35,7 @@ def planned(tmp_path_factory):
         ([*PLAN, "--regions", "--out", "OUT"], 3, 5),
         (["validate", "GRASPS", "--traces", "--jobs", "1", "-q", "--out", "OUT"], 5, 2),
         (["scene", "GRASPS", "-q", "--out", "OUT"], 6, 1),
-        (["regions", "GRASPS", "--cones", "64", "-q", "--out", "OUT"], 5, 2),
+        (["regions", "GRASPS", "--max-cones", "64", "-q", "--out", "OUT"], 5, 2),
         (
             ["baseline", "record", "GRASPS", "--jobs", "1", "-q", "--out", "OUT/a.baseline.json"],
             2,

@@ -144,6 +144,7 @@ CALLS = [
         "balance": WORD,
         "recenter": SWITCH,
         "clearance": NOT_NEGATIVE | {"larger than the object": 1.0},
-        "cones": COUNT | {"few": 63},
+        "max_cones": COUNT | {"few": 63},
+        "cones": {"a count": 1000, "text": "many"},
     }),
 ]  # fmt: skip

@@ -99,7 +99,7 @@ def ceiling(seed):
 def regions(seed):
     body, friction, grasps = planned(seed)
     return certify_regions(
-        body, grasps[seed // len(PLANNED) % len(grasps)], friction, cones=200,
+        body, grasps[seed // len(PLANNED) % len(grasps)], friction, max_cones=200,
         recenter=seed % 3 == 1, clearance=0.02 * body.radius * (seed % 2),
     )  # fmt: skip
 

@@ -6,12 +6,10 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.lines import plucker_vectors
-from grasp_core.compiled import compiled
 from grasp_core.families import regulus as regulus_grasps
 from grasp_core.families.placements import NoPlacement, Placement
 from grasp_core.families.regulus import (
     CHOICES,
-    KERNEL,
     LEAST_DEPTH,
     _best_choice,
     _best_of,
@@ -121,8 +119,6 @@ def test_pairings_that_are_dropped_unseen_have_no_regulus():
 
 
 def test_compiled_code_chooses_the_slopes_that_all_programs_choose():
-    if compiled(KERNEL) is None:
-        pytest.skip("no compiled code here")
     tried = Counter()
     for name in OBJECTS:
         for quad, cones in paired_quadruples(name, math.radians(10.0), 30):
@@ -162,15 +158,3 @@ def test_what_compiled_code_gets_wrong_is_found_by_all_programs(monkeypatch, lie
             assert found.merit == pytest.approx(expected.merit, abs=1e-8)
             placed += 1
     assert placed >= 4
-
-
-def test_without_compiled_code_reguli_are_the_same(without_kernels):
-    pairs = list(paired_quadruples("random-30-1", math.radians(10.0), 12))
-    quick = [place_regulus(*pair) for pair in pairs]
-    without_kernels()
-    slow = [place_regulus(*pair) for pair in pairs]
-    assert len({type(one) for one in quick}) == 2
-    for one, other in zip(quick, slow, strict=True):
-        assert type(one) is type(other)
-        if isinstance(one, Placement):
-            np.testing.assert_allclose(one.positions, other.positions, atol=1e-7)

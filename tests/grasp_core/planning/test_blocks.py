@@ -7,14 +7,16 @@ import numpy as np
 import pytest
 
 from grasp_core.cones.spanning import span_sines
-from grasp_core.cones.tilting import tilted_cones, widest_half_angles
-from grasp_core.disc_bounds.corner_bounds import _widths, corners_of, widths_apart
+from grasp_core.cones.tilting import SLIGHT, tilted_cones, widest_half_angles
+from grasp_core.disc_bounds.corner_bounds import corners_of, widths_apart
 from grasp_core.families.constructions import LEAST_RADIUS
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning.blocks import LARGEST_BLOCK, all_blocks, spanning_blocks
 from grasp_core.planning.candidates import LEAST_SPAN_ANGLE, TILTED, PlannedCones
 from scenes.example_objects import example_object
 from tests.benchmarks.planning import sphere_hull
+from tests.grasp_core.cones.reference_tilting import lowest_heights
+from tests.grasp_core.disc_bounds.reference_corner_bounds import widths
 
 NONE = np.empty((0, 4), dtype=np.int64)
 BODIES = ("random-14-1", "chamfered-box", "l-bracket", "double-wedge-bar")
@@ -56,7 +58,7 @@ def test_the_blocks_of_800_faces_are_not_listed_before_they_are_asked_for():
     assert np.sort(order[-4:]).tolist() in last.faces.tolist()
 
 
-def test_no_tilted_cones_are_wider_than_what_bounds_them(without_kernels):
+def test_no_tilted_cones_are_wider_than_what_bounds_them():
     rng, tested = np.random.default_rng(0), 0
     normals = rng.normal(size=(3000, 4, 3))
     normals[:1000, :, 2] *= 0.1  # nearly in a plane
@@ -71,8 +73,9 @@ def test_no_tilted_cones_are_wider_than_what_bounds_them(without_kernels):
     assert (found[usable] <= quick[usable]).all()
     tested = usable.sum(), (quick < LEAST_SPAN_ANGLE).sum()
     assert min(tested) >= 500
-    without_kernels()
-    np.testing.assert_allclose(widest_half_angles(normals, thetas, sines), quick, atol=1e-12)
+    heights = np.where(sines > 0.0, sines, np.minimum(lowest_heights(normals), 0.0))
+    widest = 0.5 * (thetas.max(axis=1) + np.arcsin(np.clip(heights, -1.0, 1.0))) + SLIGHT
+    np.testing.assert_allclose(quick, np.minimum(widest, thetas.min(axis=1)), atol=1e-12)
 
 
 def test_the_widest_half_angle_is_that_of_the_definition():
@@ -138,9 +141,9 @@ def test_widths_from_distances_bound_those_from_corners_however_axes_lean():
     faces, axes = candidates.faces[held], candidates.axes[held, TILTED]
     leaning = np.arccos(np.clip((axes * candidates.normals[held]).sum(axis=-1), -1.0, 1.0))
     bounds = widths_apart(faces, cones._distances, cones._halves, leaning.max(axis=1))
-    widths = _widths(corners_of(body).points[faces], axes)
+    bounded = widths(corners_of(body).points[faces], axes)
     pairs = np.triu_indices(4, 1)
-    assert (widths[:, *pairs] <= bounds[:, *pairs] * (1.0 + 1e-9)).all()
+    assert (bounded[:, *pairs] <= bounds[:, *pairs] * (1.0 + 1e-9)).all()
     finite = np.isfinite(bounds[:, *pairs])
     assert finite.sum() >= 1000
     assert LEAST_RADIUS < np.median(bounds[:, *pairs][finite]) < 5.0

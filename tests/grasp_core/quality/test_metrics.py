@@ -6,7 +6,6 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
 import grasp_core as gc
-from grasp_core.closure.contact_arrays import many_frames
 from grasp_core.closure.wrenches import contact_frames
 from grasp_core.compiled import compiled
 from grasp_core.quality import metrics
@@ -123,7 +122,7 @@ def test_frames_of_many_contacts_are_those_of_one_set():
     grasps = gc.plan(example_object("random-12-1"), 0.5, limit=20).grasps
     normals = np.array([grasp.normals for grasp in grasps])
     normals = np.concatenate([normals, np.eye(3)[[[0, 1, 2, 0]]], -np.eye(3)[[[0, 1, 2, 0]]]])
-    for frames, units in zip(many_frames(normals), normals, strict=True):
+    for frames, units in zip(contact_frames(normals), normals, strict=True):
         np.testing.assert_allclose(frames, contact_frames(units), atol=1e-15)
     assert len(normals) >= 20
 
@@ -136,15 +135,6 @@ def test_weights_of_degenerate_sets_are_left_to_the_reference():
     found = gc.min_weights(positions, np.array([normals, TETRA_NORMALS]))
     assert found[0] == -math.inf
     assert found[1] == pytest.approx(gc.min_weight(TETRA_CENTERS, TETRA_NORMALS), abs=1e-12)
-
-
-def test_without_compiled_code_weights_come_from_the_reference(without_kernels):
-    positions, normals = contact_sets(np.random.default_rng(6), 20)
-    quick = gc.min_weights(positions, normals)
-    without_kernels()
-    W = metrics._many_pyramid_wrenches(positions, normals, np.full((20, 4), 0.5), 8)
-    assert np.isnan(metrics._at_once(W)).all()
-    np.testing.assert_allclose(gc.min_weights(positions, normals), quick, atol=1e-9)
 
 
 @pytest.mark.parametrize("spoil", ["twists", "multipliers", "rows", "numbers"])

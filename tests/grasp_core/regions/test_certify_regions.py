@@ -9,7 +9,6 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from grasp_core.compiled import compiled
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.on_faces import within
 from grasp_core.regions.certify_regions import certify_regions
@@ -25,12 +24,6 @@ CASES = [
 ]  # fmt: skip
 
 
-needs_kernels = pytest.mark.skipif(
-    compiled("grasp_core.regions.cover_kernel") is None,
-    reason="only compiled searches look for open choices",
-)
-
-
 @cache
 def planned(name, family, friction):
     body = scenes.example_object(name)
@@ -39,7 +32,7 @@ def planned(name, family, friction):
 
 def found(name, family, friction=0.5, cones=FEW, **more):
     body, grasp = planned(name, family, friction)
-    return body, grasp, certify_regions(body, grasp, friction, cones=cones, **more)
+    return body, grasp, certify_regions(body, grasp, friction, max_cones=cones, **more)
 
 
 @pytest.mark.parametrize(("name", "family"), CASES)
@@ -99,7 +92,6 @@ def test_more_cones_give_larger_regions():
     assert radii[0] < radii[1] < radii[2]
 
 
-@needs_kernels
 @pytest.mark.parametrize(
     ("name", "family"), [CASES[0], CASES[2], pytest.param(*CASES[3], marks=MORE)]
 )
@@ -121,7 +113,7 @@ def test_where_whole_faces_are_proved_there_is_no_limit():
     reguli = gc.plan(body, 0.5, families="regulus", limit=40).grasps
     grasp = max(reguli, key=lambda each: round(each.span_angle, 6))
     assert math.sin(grasp.span_angle) == pytest.approx(1.0 / 3.0)
-    proved = certify_regions(body, grasp, 1.0, cones=FEW)
+    proved = certify_regions(body, grasp, 1.0, max_cones=FEW)
     assert proved.limit == math.inf
     assert proved.open_choice is None
     for region, index in zip(proved.regions, grasp.faces, strict=True):
@@ -165,7 +157,7 @@ def test_on_curved_surfaces_contacts_may_be_anywhere_over_the_regions():
     body = curved_body()
     tested = 0
     for grasp in gc.plan(body, 0.5, limit=4).grasps:
-        proved = certify_regions(body, grasp, 0.5, cones=FEW)
+        proved = certify_regions(body, grasp, 0.5, max_cones=FEW)
         if proved is None:
             continue
         assert proved.verify()
@@ -202,7 +194,7 @@ def test_regions_turn_and_grow_with_the_object():
         each for each in gc.plan(moved, 0.5, families=("pencil",)).grasps
         if np.allclose(each.positions, scale * grasp.positions @ rotation.T + shift, atol=1e-4)
     )  # fmt: skip
-    again = certify_regions(moved, same, 0.5, cones=FEW)
+    again = certify_regions(moved, same, 0.5, max_cones=FEW)
     assert again.radius == pytest.approx(scale * proved.radius, rel=0.15)
 
 
@@ -218,8 +210,10 @@ def test_what_cannot_be_is_refused():
     with pytest.raises(gc.InputError, match="balance"):
         certify_regions(body, grasp, 0.5, balance="sides")
     for cones in (63, -3, 100.5, math.nan):
-        with pytest.raises(gc.InputError, match="cones"):
-            certify_regions(body, grasp, 0.5, cones=cones)
+        with pytest.raises(gc.InputError, match="max_cones"):
+            certify_regions(body, grasp, 0.5, max_cones=cones)
+    with pytest.raises(gc.InputError, match="cones is now called max_cones: pass max_cones=500"):
+        certify_regions(body, grasp, 0.5, cones=500)
     for clearance in (-1.0, math.nan, math.inf):
         with pytest.raises(gc.InputError, match="clearance"):
             certify_regions(body, grasp, 0.5, clearance=clearance)
@@ -247,7 +241,7 @@ def test_contacts_on_edges_and_corners_have_regions_beside_them():
                 moved = dataclasses.replace(grasp, contacts=tuple(contacts))
                 if not gc.force_closure(moved.positions, moved.normals, 0.8).closed:
                     continue
-                proved = certify_regions(body, moved, 0.8, cones=300, balance="area")
+                proved = certify_regions(body, moved, 0.8, max_cones=300, balance="area")
                 if proved is not None:
                     assert proved.verify()
                     assert within(spot, proved.regions[finger].polygon, moved.normals[finger], 1e-9)
@@ -261,17 +255,19 @@ def test_small_and_large_objects(scale):
     factor = scale / body.radius
     sized = gc.Polyhedron.from_mesh(factor * body.vertices, body.triangles, name="sized")
     (same,) = gc.plan(sized, 0.5, families=("concurrent",), limit=1).grasps
-    again = certify_regions(sized, same, 0.5, cones=500)
+    again = certify_regions(sized, same, 0.5, max_cones=500)
     assert same.faces == grasp.faces
     assert again.radius == pytest.approx(factor * proved.radius, rel=0.02)
 
 
 def test_the_largest_friction_and_one_next_to_the_critical():
     body, grasp, _ = found("wedge", "concurrent", cones=64)
-    assert certify_regions(body, grasp, 1e3, cones=300).verify()
+    assert certify_regions(body, grasp, 1e3, max_cones=300).verify()
     for share in (1e-3, 1e-5, 1e-7):
         try:
-            proved = certify_regions(body, grasp, (1 + share) * grasp.critical_friction, cones=300)
+            proved = certify_regions(
+                body, grasp, (1 + share) * grasp.critical_friction, max_cones=300
+            )
         except gc.UndecidedError:
             continue
         assert proved is None or proved.verify()
@@ -282,14 +278,6 @@ def test_moving_centres_never_makes_discs_smaller():
         fixed = found("wedge", "concurrent", cones=cones)[2]
         moved = found("wedge", "concurrent", cones=cones, recenter=True)[2]
         assert least_inscribed(moved) >= 0.98 * least_inscribed(fixed)
-
-
-def test_without_compiled_loops_there_are_regions_too(monkeypatch):
-    compiled = found("wedge", "pencil", cones=500)[2]
-    monkeypatch.setattr("grasp_core.regions.cover_search.compiled", lambda _: None)
-    plain = found("wedge", "pencil", cones=500)[2]
-    assert plain.verify()
-    assert plain.radius == pytest.approx(compiled.radius, rel=0.02)
 
 
 def test_radii_centres_and_the_open_choice_belong_to_the_proof():

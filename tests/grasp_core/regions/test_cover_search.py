@@ -1,4 +1,4 @@
-"""The search for covers: compiled and plain ways agree, and what they find is so."""
+"""The search for covers agrees with its reference, and what it finds is so."""
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ import grasp_core.regions.cover_search as search
 from grasp_core.closure.wrenches import contact_frames
 from grasp_core.regions.proof import SLACK
 from grasp_core.regions.sites import Sites
+from tests.grasp_core.regions.reference_cover_search import reference_cover
 from tests.judges import random_rotation
 
 TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
@@ -45,16 +46,13 @@ def perturbed(seed):
 @pytest.mark.parametrize(
     "kind", [{"radius": 0.12}, {"radius": 0.1, "sides": 7}, {"radius": 0.08, "depth": 0.03}]
 )
-def test_compiled_and_plain_ways_cut_the_same_cones(kind, seed, monkeypatch):
+def test_the_compiled_search_cuts_the_cones_of_the_reference(kind, seed):
     sites = sites_around(*perturbed(seed), **kind)
-    if search.compiled(search.KERNEL) is None:
-        pytest.skip("there is only one way without compiled loops")
-    compiled = search.search_cover(sites, np.eye(6), CONES)
-    monkeypatch.setattr(search, "compiled", lambda _: None)
-    plain = search.search_cover(sites, np.eye(6), CONES)
-    assert compiled.cover is not None
-    np.testing.assert_array_equal(compiled.cover.codes, plain.cover.codes)
-    same = np.isclose(compiled.cover.forces, plain.cover.forces, atol=1e-6)
+    found = search.search_cover(sites, np.eye(6), CONES).cover
+    expected = reference_cover(sites, np.eye(6), CONES)
+    assert found is not None
+    np.testing.assert_array_equal(found.codes, expected.codes)
+    same = np.isclose(found.forces, expected.forces, atol=1e-6)
     assert same.mean() > 0.99  # ties between answers are broken by rounding
 
 
@@ -69,7 +67,6 @@ def test_a_cover_that_is_found_passes_its_check(seed):
     assert not found.cover.verify(larger, sites.frames[:, :, 0], sites.friction)
 
 
-@pytest.mark.skipif(search.compiled(search.KERNEL) is None, reason="only compiled searches look")
 @pytest.mark.parametrize("seed", range(6))
 def test_an_open_choice_is_open_and_in_the_sites(seed):
     points, normals = perturbed(seed)

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.compiled import compiled
 from grasp_core.objects.face_pieces import inset_piece, unit_pieces
 from grasp_core.optimizing import better_contacts as best_contacts
 from grasp_core.optimizing import ceiling as quality_ceilings
@@ -35,11 +34,6 @@ SAME = 1e-9
 TRIALS = 4
 CONES = 600
 
-needs_kernels = pytest.mark.skipif(
-    compiled("grasp_core.regions.cover_kernel") is None,
-    reason="the plain search sums in the order of a library",
-)
-
 
 @cache
 def planned(name, family):
@@ -61,15 +55,14 @@ def moved(rng, body, grasp):
     return replace(grasp, contacts=tuple(contacts))
 
 
-@needs_kernels
 @pytest.mark.parametrize(("name", "family"), [("octahedron", "concurrent"), ("wedge", "pencil")])
 @pytest.mark.parametrize("more", [{}, {"recenter": True}, {"balance": "area"}])
 def test_regions_do_not_depend_on_last_digits(name, family, more):
     body, grasp = planned(name, family)
     rng = np.random.default_rng(0)
-    own = gc.certify_regions(body, grasp, 0.5, cones=CONES, **more)
+    own = gc.certify_regions(body, grasp, 0.5, max_cones=CONES, **more)
     for _ in range(TRIALS if not more else 1):
-        found = gc.certify_regions(body, moved(rng, body, grasp), 0.5, cones=CONES, **more)
+        found = gc.certify_regions(body, moved(rng, body, grasp), 0.5, max_cones=CONES, **more)
         assert found.verify()
         np.testing.assert_array_equal(found.cover.codes, own.cover.codes)
         assert found.radius == pytest.approx(own.radius, rel=SAME)
@@ -77,7 +70,6 @@ def test_regions_do_not_depend_on_last_digits(name, family, more):
             np.testing.assert_allclose(one.polygon, two.polygon, atol=SAME * body.radius)
 
 
-@needs_kernels
 @pytest.mark.parametrize("corners", [0, 6])
 def test_covers_of_symmetric_contacts_share_all_bits(corners):
     """Contacts of a regular tetrahedron, with discs and with regular polygons."""

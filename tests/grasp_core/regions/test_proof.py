@@ -19,7 +19,7 @@ SMALL = 3_000
 def proved():
     body = scenes.example_object("wedge")
     (grasp,) = gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps
-    return certify_regions(body, grasp, 0.5, cones=SMALL)
+    return certify_regions(body, grasp, 0.5, max_cones=SMALL)
 
 
 def random_tree(rng, cuts):
@@ -85,7 +85,7 @@ def test_a_cover_holds_in_rational_arithmetic():
     """Every number as the fraction that it is: nothing is rounded, nothing allowed for."""
     body = scenes.example_object("wedge")
     (grasp,) = gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps
-    small = certify_regions(body, grasp, 0.5, cones=300)
+    small = certify_regions(body, grasp, 0.5, max_cones=300)
     cover, mu = small.cover, fractions(small.friction)
     axes, normals = fractions(cover.axes), fractions(small.normals)
     origin, scale = fractions(small.origin), Fraction(small.scale)

@@ -22,7 +22,15 @@ NAMES = ("axes", "codes", "forces")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("regions")
     assert main(["plan", "wedge", "--limit", "3", "--out", str(folder), "-q"]) == Exit.GOOD
-    asked = ["regions", str(folder / "grasps.json"), "--cones", "1000", "--out", str(folder), "-q"]
+    asked = [
+        "regions",
+        str(folder / "grasps.json"),
+        "--max-cones",
+        "1000",
+        "--out",
+        str(folder),
+        "-q",
+    ]
     assert main(asked) == Exit.GOOD
     return folder
 
@@ -60,14 +68,22 @@ def test_processes_and_runs_agree(folder, tmp_path):
     grasps = str(folder / "grasps.json")
     for jobs in ("1", "2"):
         out = tmp_path / jobs
-        asked = ["regions", grasps, "--cones", "1000", "--jobs", jobs, "--out", str(out), "-q"]
+        asked = ["regions", grasps, "--max-cones", "1000", "--jobs", jobs, "--out", str(out), "-q"]
         assert main(asked) == Exit.GOOD
         assert (out / "regions.json").read_bytes() == (folder / "regions.json").read_bytes()
 
 
 def test_one_grasp_with_a_reserve(folder, capsys):
     name = json.loads((folder / "grasps.json").read_text())["grasps"][0]["id"]
-    asked = ["regions", str(folder / "grasps.json"), "--grasp", name, "--cones", "1000", "--json"]
+    asked = [
+        "regions",
+        str(folder / "grasps.json"),
+        "--grasp",
+        name,
+        "--max-cones",
+        "1000",
+        "--json",
+    ]
     assert main([*asked, "--reserve", ".4"]) == Exit.GOOD
     found = json.loads(capsys.readouterr().out)
     (grasp,) = found["grasps"]
@@ -81,7 +97,7 @@ def test_where_nothing_can_be_proved_it_is_said(folder, capsys):
     planned = json.loads((folder / "grasps.json").read_text())["grasps"]
     grasp = max(planned, key=lambda each: each["critical_friction"])
     barely = str(grasp["critical_friction"] * (1.0 + 1e-7))
-    asked = ["regions", str(folder / "grasps.json"), "--cones", "64"]
+    asked = ["regions", str(folder / "grasps.json"), "--max-cones", "64"]
     asked += ["--grasp", grasp["id"], "--friction", barely]
     assert main(asked) == Exit.NEGATIVE
     assert "no regions for 1 of 1 grasps: " in capsys.readouterr().out
@@ -91,13 +107,13 @@ def test_what_is_wrong_is_refused(folder, capsys):
     grasps = str(folder / "grasps.json")
     assert main(["regions", grasps, "--grasp", "none"]) == Exit.INPUT
     assert "no grasp none" in capsys.readouterr().err
-    assert main(["regions", grasps, "--cones", "1"]) == Exit.USAGE
+    assert main(["regions", grasps, "--max-cones", "1"]) == Exit.USAGE
 
 
 def test_grasps_that_are_not_closed_do_not_stop_the_others(folder, tmp_path, capsys):
     grasps = json.loads((folder / "grasps.json").read_text())["grasps"]
     frictions = sorted(grasp["critical_friction"] for grasp in grasps)
-    asked = ["regions", str(folder / "grasps.json"), "--cones", "8000", "--out", str(tmp_path)]
+    asked = ["regions", str(folder / "grasps.json"), "--max-cones", "8000", "--out", str(tmp_path)]
     between = str(0.99 * frictions[2])
     assert main([*asked, "--friction", between]) == Exit.NEGATIVE
     assert "no regions for 1 of 3 grasps: not in force closure" in capsys.readouterr().out
@@ -115,7 +131,7 @@ def test_a_proof_of_before_does_not_stay(folder, tmp_path):
     name = json.loads((folder / "grasps.json").read_text())["grasps"][0]["id"]
     asked = ["regions", str(folder / "grasps.json"), "--grasp", name, "--out", str(tmp_path), "-q"]
     kept = tmp_path / "proofs" / f"{name}.npz"
-    assert main([*asked, "--cones", "300"]) == Exit.GOOD
+    assert main([*asked, "--max-cones", "300"]) == Exit.GOOD
     assert kept.exists()
     assert main([*asked, "--friction", "0.001"]) == Exit.NEGATIVE
     assert not kept.exists()
@@ -186,7 +202,7 @@ def test_regions_of_plans_stay_clear_of_edges(tmp_path):
 
 def test_regions_stay_clear_of_edges_that_contacts_are_near_to(folder, tmp_path):
     saved = grasps_from_json((folder / "grasps.json").read_text())
-    asked = ["regions", str(folder / "grasps.json"), "--cones", "1000", "--out", str(tmp_path)]
+    asked = ["regions", str(folder / "grasps.json"), "--max-cones", "1000", "--out", str(tmp_path)]
     assert main([*asked, "--edge-clearance-m", "0.006", "-q"]) == Exit.GOOD
     near = 0
     for grasp in saved.grasps:
@@ -217,7 +233,7 @@ def test_fingers_on_one_face_and_certified_regions_do_not_go_together(capsys):
 
 @pytest.mark.parametrize("flags", [["--balance", "area"], ["--recenter"]])
 def test_other_balances_are_said_in_the_file(folder, flags, capsys):
-    asked = ["regions", str(folder / "grasps.json"), "--limit", "1", "--cones", "500", "--json"]
+    asked = ["regions", str(folder / "grasps.json"), "--limit", "1", "--max-cones", "500", "--json"]
     assert main([*asked, *flags]) == Exit.GOOD
     found = json.loads(capsys.readouterr().out)
     assert (found["balance"], found["recenter"]) == (

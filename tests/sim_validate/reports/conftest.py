@@ -14,7 +14,7 @@ def small_run(tmp_path_factory):
     asked = ["run", "wedge", "--limit", "3", "--family", "pencil", "--family", "concurrent"]
     asked += ["--limits", "ramp", "--trials", "2", "--no-report", "-q"]
     assert main([*asked, "--out", str(folder)]) == Exit.GOOD
-    certify = ["regions", str(folder / "grasps.json"), "--cones", "64", "-q"]
+    certify = ["regions", str(folder / "grasps.json"), "--max-cones", "64", "-q"]
     assert main([*certify, "--out", str(folder)]) == Exit.GOOD
     return folder
 

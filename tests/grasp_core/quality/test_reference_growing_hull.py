@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from grasp_core.quality.growing_hull import GrowingHull, spread_simplex
+from tests.grasp_core.quality.reference_growing_hull import GrowingHull, spread_simplex
 
 
 def grown(points):
