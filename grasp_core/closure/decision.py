@@ -16,7 +16,6 @@ from grasp_core.closure.margin_program import (
     deepest_forces,
     margin_program,
 )
-from grasp_core.closure.nearest_wrench import nearest_wrench
 from grasp_core.closure.proofs import (
     RANK,
     depths_in_cones,
@@ -25,7 +24,7 @@ from grasp_core.closure.proofs import (
     refutes_closure,
     without_giants,
 )
-from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.closure.wrench_sets import WrenchSet, nearest_wrench
 from grasp_core.closure.wrenches import (
     WRENCH,
     contact_frames,

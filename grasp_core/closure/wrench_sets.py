@@ -29,6 +29,7 @@ from grasp_core.closure.contact_arrays import check_spread, contact_arrays, cont
 from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
 from grasp_core.errors import InputError
 from grasp_core.fields import are_frictions, is_a, is_array
+from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.solvers.ties import on_grid
 from grasp_core.values import Grasp
 
@@ -190,3 +191,40 @@ class WrenchSet:
             bounded = pushes.max(axis=1) <= 1.0 + slack
         in_cones = (slides <= self.friction * pushes + slack).all(axis=1)
         return bool((bounded & in_cones & (pushes.min(axis=1) >= -slack)).all())
+
+
+def nearest_wrench(wrenches: WrenchSet) -> tuple[Array, Array]:
+    """Find the wrench nearest to zero that forces can apply whose normal parts sum to one.
+
+    A cone program that always has a solution finds it.
+
+    Returns:
+        Local forces of that wrench, (3k,), which show how near to balance the contacts come; and
+        the direction from it to zero, (m,), a twist in which no contact has more support than minus
+        the distance. If the distance is positive, it separates the contacts' wrenches from zero.
+    """
+    m, n = wrenches.G.shape
+    k = n // 3
+    q = np.append(np.zeros(n), 1.0)
+    share = np.append(np.tile([1.0, 0.0, 0.0], k), 0.0)
+    distance = np.vstack([-q, np.hstack([-wrenches.G / wrenches.size, np.zeros((m, 1))])])
+    sides = np.zeros((n, n + 1))
+    sides[np.arange(n), np.arange(n)] = -1.0
+    sides[::3, :n:3] = -np.diag(wrenches.friction)
+    pushes = np.hstack([-np.eye(n)[::3], np.zeros((k, 1))])
+    # rows: normal parts sum to one, are not negative, distance >= |wrench|, friction cones
+    A = np.vstack([share, pushes, distance, sides])
+    b = np.append(1.0, np.zeros(len(A) - 1))
+    answer = minimize(ConicProgram(q, A, b, 1, k, (m + 1, *(3,) * k)))
+    facing = answer.z[k + 2 : k + m + 2]
+    return _into_cones(answer.x[:n], wrenches.friction), facing
+
+
+def _into_cones(forces: Array, friction: Array) -> Array:
+    """Move forces into the cones and scale them so that their normal parts sum to one exactly."""
+    each = forces.reshape(-1, 3).copy()
+    each[:, 0] = np.maximum(each[:, 0], 0.0)
+    across, allowed = np.hypot(each[:, 1], each[:, 2]), friction * each[:, 0]
+    outside = across > allowed
+    each[outside, 1:] *= (allowed[outside] / across[outside])[:, None]
+    return each.ravel() / each[:, 0].sum()

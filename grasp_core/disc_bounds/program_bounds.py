@@ -13,7 +13,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
-from grasp_core.families.concurrent import PYRAMID_SIDES, facet_turns
+from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
 from grasp_core.families.constructions import LEAST_RADIUS, Construction
 from grasp_core.families.face_tables import face_table
 from grasp_core.families.kernel_tables import Attempts, FaceTable

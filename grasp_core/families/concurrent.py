@@ -42,13 +42,13 @@ Source: Sudsang & Ponce 1995, section 3.1 and Proposition 5; the far side is thi
 
 import math
 from collections.abc import Iterable, Sequence
-from functools import cache
 from itertools import product
 from typing import TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array, frozen
+from grasp_core.arrays import Array
+from grasp_core.cones.pyramids import inscribed_facets
 from grasp_core.cones.spanning import balancing_weights
 from grasp_core.families.discs import largest_discs
 from grasp_core.families.placements import NoPlacement, Placement, balanced_forces
@@ -57,8 +57,6 @@ from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.ties import surpassing
 from grasp_core.values import FINGERS, ForceCone, four
 
-PYRAMID_SIDES = 16
-"""An inscribed 16-sided pyramid loses 1.9 % of the cone's tangent, on the safe side."""
 RADII, SMALLEST = slice(11, 15), 15
 """Places of the four radii and of their lower bound r among the 16 variables."""
 
@@ -173,45 +171,6 @@ def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array, contact: Arr
     limits = G @ (focus - piece.origin) - piece.depth * np.abs(G @ piece.normal)
     flat = clip(piece.corners, G @ piece.frame, limits)
     return piece.origin + flat @ piece.frame.T
-
-
-def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES) -> Array:
-    """Inward unit normals g of a pyramid inscribed in a circular cone, (sides, 3).
-
-    The pyramid's edges lie on the cone, so {v : g.v >= 0 for all g} is inside the cone. Its
-    facets touch a cone of half-angle psi with tan(psi) = tan(half_angle) cos(pi / sides).
-
-    Args:
-        cone: The circular cone.
-        toward: Across the axis, the direction in which the pyramid's first edge leans, (3,).
-        sides: Number of facets.
-    """
-    return pyramid_facets(cone.axis, cone.half_angle, toward, sides)
-
-
-def pyramid_facets(axes: Array, half_angle: float, toward: Array, sides: int) -> Array:
-    """Inward unit normals of pyramids inscribed in equally wide cones, (..., sides, 3).
-
-    See `inscribed_facets` for what such a pyramid is.
-
-    Args:
-        axes: Unit vectors along the cones' axes, (..., 3).
-        half_angle: Half-angle of all cones [rad].
-        toward: Directions in which the first edges lean, (..., 3).
-        sides: Number of facets.
-    """
-    first = toward - np.sum(toward * axes, axis=-1, keepdims=True) * axes
-    first = first / np.linalg.norm(first, axis=-1, keepdims=True)
-    across = facet_turns(sides) @ np.stack([first, np.cross(axes, first)], axis=-2)
-    psi = float(np.arctan(np.tan(half_angle) * np.cos(np.pi / sides)))
-    return np.sin(psi) * axes[..., None, :] - np.cos(psi) * across
-
-
-@cache
-def facet_turns(sides: int) -> Array:
-    """Cosines and sines of the directions in which a pyramid's facets lean, (sides, 2)."""
-    turns = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
-    return frozen(np.column_stack([np.cos(turns), np.sin(turns)]), (sides, 2), "turns")
 
 
 def concurrent_radius_bounds(reaches: Array, _: Array, half_angles: Array) -> Array:

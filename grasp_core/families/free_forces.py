@@ -20,7 +20,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure.wrenches import grasp_map
-from grasp_core.families.concurrent import pyramid_facets
+from grasp_core.cones.pyramids import pyramid_facets
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.nearest_point import least_distance
 

@@ -50,8 +50,8 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
+from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns, inscribed_facets
 from grasp_core.cones.spanning import angles_between
-from grasp_core.families.concurrent import PYRAMID_SIDES, facet_turns, inscribed_facets
 from grasp_core.families.face_tables import face_table
 from grasp_core.families.kernel_tables import Attempts, FaceTable, RegulusTerms
 from grasp_core.families.placements import (

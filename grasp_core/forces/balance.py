@@ -22,9 +22,8 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.closure.wrenches import contact_frames, grasp_map, in_frames
+from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns, inscribed_share
 
-PYRAMID_SIDES = 16
-"""Sides of the inscribed pyramids: sixteen give away 1.9 % of the friction coefficient."""
 RESIDUAL = 1e-6
 """Largest imbalance and cone violation accepted, in units of the largest normal force: a
 hundred times the accuracy asked of ProxQP."""
@@ -118,11 +117,10 @@ class Balance:
         Args:
             friction: Coulomb coefficient of each contact, (k,).
         """
-        count, turns = len(friction), 2.0 * np.pi * (np.arange(PYRAMID_SIDES) + 0.5) / PYRAMID_SIDES
-        rows, each = np.zeros((count, PYRAMID_SIDES, count, 3)), np.arange(count)
-        # sides touch the cone between the corners of the pyramid, hence the cosine of half a side
-        rows[each, :, each, 0] = -friction[:, None] * math.cos(np.pi / PYRAMID_SIDES)
-        rows[each, :, each, 1], rows[each, :, each, 2] = np.cos(turns), np.sin(turns)
+        count, each = len(friction), np.arange(len(friction))
+        rows = np.zeros((count, PYRAMID_SIDES, count, 3))
+        rows[each, :, each, 0] = -friction[:, None] * inscribed_share()
+        rows[each, :, each, 1:] = facet_turns(PYRAMID_SIDES)
         return rows.reshape(count * PYRAMID_SIDES, 3 * count)
 
     def polyhedra(self, rows: Array) -> tuple[Array, Array]:

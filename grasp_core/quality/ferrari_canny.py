@@ -33,8 +33,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
 from grasp_core.checked import number
-from grasp_core.closure.nearest_wrench import nearest_wrench
-from grasp_core.closure.wrench_sets import Norm, WrenchSet
+from grasp_core.closure.wrench_sets import Norm, WrenchSet, nearest_wrench
 from grasp_core.closure.wrenches import WRENCH
 from grasp_core.compiled import compiled
 from grasp_core.fields import are_units, is_a, is_array, is_number

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.compiled import compiled, state_of
-from grasp_core.families.concurrent import PYRAMID_SIDES
+from grasp_core.cones.pyramids import inscribed_share
 from grasp_core.families.discs import KEPT
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planner import plan
@@ -69,7 +69,7 @@ def check_installation(_: command_flags.Doctor, reporter: Reporter) -> int:
 def _checks(body: Polyhedron, grasp: Grasp, gate: Gate) -> Mapping[str, bool]:
     """Every check by its name, and whether it passed."""
     verdict = validate(body, grasp) if gate.passed else None
-    cone = math.tan(grasp.force_cones[0].half_angle) * math.cos(math.pi / PYRAMID_SIDES)
+    cone = math.tan(grasp.force_cones[0].half_angle) * inscribed_share()
     return {
         "linear programs": math.isclose(3.0 * grasp.radius / body.radius, cone, rel_tol=AS_PLANNED),
         "conic programs": force_closure(grasp).verify(),

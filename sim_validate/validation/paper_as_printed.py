@@ -16,8 +16,8 @@ from itertools import product
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.cones.pyramids import inscribed_facets
 from grasp_core.cones.spanning import balancing_weights, span_angle
-from grasp_core.families.concurrent import inscribed_facets
 from grasp_core.families.constructions import PAIRINGS
 from grasp_core.families.regulus import LEAST_DEPTH
 from grasp_core.objects.face_pieces import FacePiece, unit_pieces

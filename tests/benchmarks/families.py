@@ -12,8 +12,9 @@ from itertools import combinations
 
 import numpy as np
 
+from grasp_core.cones.pyramids import inscribed_facets
 from grasp_core.disc_bounds.program_bounds import KERNELS, AttemptBounds
-from grasp_core.families.concurrent import BEFORE, BEHIND, inscribed_facets
+from grasp_core.families.concurrent import BEFORE, BEHIND
 from grasp_core.families.concurrent import _rows as concurrent_rows
 from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS
 from grasp_core.families.free import place_free

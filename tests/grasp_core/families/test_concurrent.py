@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.cones.pyramids import inscribed_facets
 from grasp_core.cones.spanning import balancing_weights, spanning_quadruples
 from grasp_core.families.concurrent import (
     concurrent_radius_bounds,
     cone_footprint,
-    inscribed_facets,
     place_concurrent,
 )
 from grasp_core.families.placements import NoPlacement, Placement

@@ -10,8 +10,9 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.lines import plucker_vectors
+from grasp_core.cones.pyramids import inscribed_facets
 from grasp_core.families import concurrent as concurrent_grasps
-from grasp_core.families.concurrent import inscribed_facets, place_concurrent
+from grasp_core.families.concurrent import place_concurrent
 from grasp_core.families.pencil import CELL_A, place_pencil
 from grasp_core.families.placements import NoPlacement, Placement
 from grasp_core.geometry.polygons import edge_rows, plane_frame

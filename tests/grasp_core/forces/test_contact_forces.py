@@ -8,8 +8,9 @@ from scipy.optimize import nnls
 
 import grasp_core as gc
 from grasp_core.closure.wrenches import contact_frames, grasp_map, normal_and_tangential
+from grasp_core.cones.pyramids import PYRAMID_SIDES
 from grasp_core.forces import contact_forces as forces_module
-from grasp_core.forces.balance import PYRAMID_SIDES, Balance
+from grasp_core.forces.balance import Balance
 from grasp_core.forces.cone_forces import least_norm_in_cones
 from grasp_core.forces.contact_forces import (
     NoForcesError,

@@ -1,0 +1,65 @@
+"""Pyramids inscribed in circular cones, which stand for the cones in linear programs.
+
+The edges of a pyramid with m sides lie on the cone, so the pyramid is inside: what is proved for it
+holds for the cone. Across the axis it is a regular polygon, whose sides are nearer to the middle
+than its corners by the factor cos(pi / m). So a pyramid in a cone of half-angle alpha holds the
+cone of half-angle psi with
+
+    tan(psi)  =  tan(alpha) cos(pi / m),                                                      (1)
+
+and gives away 1 - cos(pi / m) of the friction coefficient: 1.9 % with sixteen sides.
+"""
+
+import math
+from functools import cache
+
+import numpy as np
+
+from grasp_core.arrays import Array, frozen
+from grasp_core.values import ForceCone
+
+PYRAMID_SIDES = 16
+"""Sides of pyramids, unless a program asks for more."""
+
+
+def inscribed_share(sides: int = PYRAMID_SIDES) -> float:
+    """Return the share of a cone's tangent that its pyramid keeps in every direction, by (1)."""
+    return math.cos(math.pi / sides)
+
+
+def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES) -> Array:
+    """Inward unit normals g of a pyramid inscribed in a circular cone, (sides, 3).
+
+    All v with g.v >= 0 for all g are inside the cone.
+
+    Args:
+        cone: The circular cone.
+        toward: Across the axis, the direction in which the pyramid's first edge leans, (3,).
+        sides: Number of facets.
+    """
+    return pyramid_facets(cone.axis, cone.half_angle, toward, sides)
+
+
+def pyramid_facets(axes: Array, half_angle: float, toward: Array, sides: int) -> Array:
+    """Inward unit normals of pyramids inscribed in equally wide cones, (..., sides, 3).
+
+    See `inscribed_facets` for what such a pyramid is.
+
+    Args:
+        axes: Unit vectors along the cones' axes, (..., 3).
+        half_angle: Half-angle of all cones [rad].
+        toward: Directions in which the first edges lean, (..., 3).
+        sides: Number of facets.
+    """
+    first = toward - np.sum(toward * axes, axis=-1, keepdims=True) * axes
+    first = first / np.linalg.norm(first, axis=-1, keepdims=True)
+    across = facet_turns(sides) @ np.stack([first, np.cross(axes, first)], axis=-2)
+    psi = float(np.arctan(np.tan(half_angle) * inscribed_share(sides)))
+    return np.sin(psi) * axes[..., None, :] - np.cos(psi) * across
+
+
+@cache
+def facet_turns(sides: int) -> Array:
+    """Cosines and sines of the directions in which a pyramid's facets lean, (sides, 2)."""
+    turns = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
+    return frozen(np.column_stack([np.cos(turns), np.sin(turns)]), (sides, 2), "turns")
