@@ -22,7 +22,7 @@ from grasp_core.families.constructions import Construction
 from grasp_core.families.kernel_tables import Attempts
 from grasp_core.planning.blocks import Blocks
 from grasp_core.planning.quadruples import Attempt, ConedQuadruples, WideQuadruples
-from grasp_core.planning.tally import Tally
+from grasp_core.planning.result import Tally
 from grasp_core.solvers.ties import coarse
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 32, 2048

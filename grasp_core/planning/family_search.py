@@ -23,8 +23,7 @@ from grasp_core.planning.blocks import Blocks
 from grasp_core.planning.certify import Certified, certify, named
 from grasp_core.planning.quadruples import Attempt, Cones
 from grasp_core.planning.reach import Reach
-from grasp_core.planning.result import MethodCounts
-from grasp_core.planning.tally import Tally
+from grasp_core.planning.result import MethodCounts, Tally
 from grasp_core.solvers.ties import graded, surpassing
 from grasp_core.values import ContactRegion, FaceQuadruple, Method, four
 

@@ -15,7 +15,7 @@ from grasp_core.planning.blocks import Blocks
 from grasp_core.planning.family_search import SAME_MERIT
 from grasp_core.planning.methods import Searches
 from grasp_core.planning.request import PlanRequest
-from grasp_core.planning.tally import Tally
+from grasp_core.planning.result import Tally
 from scenes.example_objects import example_object
 from tests.grasp_core.curved import curved_body
 
