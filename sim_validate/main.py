@@ -60,6 +60,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if "" in arguments:
             said = "an argument is empty, perhaps from a variable that is not set"
             raise FlagsError(f"{said}; leave it out, or give a value")
+        if any(word.partition("=")[0] == "--cells" for word in arguments):
+            raise FlagsError("--cells is called --max-parts now; write --max-parts instead")
         flags = with_config(arguments, COMMANDS)
     except InputError as error:
         return _complain(str(error), exit_code(error))

@@ -8,9 +8,8 @@ or a quadruple is handed out. So no later quadruple has larger discs than one ha
 cones are tilted and few programs solved that were not needed to know this.
 """
 
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from functools import partial
 from heapq import heapify, heappop, heappush
 from typing import TypeAlias
@@ -21,149 +20,154 @@ from grasp_core.arrays import Array
 from grasp_core.disc_bounds.program_bounds import AttemptBounds
 from grasp_core.families.constructions import Construction
 from grasp_core.families.kernel_tables import Attempts
-from grasp_core.planning.blocks import Prospects
-from grasp_core.planning.ranking import Outlook, Quadruple, Ranking, outlook
+from grasp_core.planning.blocks import Blocks
+from grasp_core.planning.quadruples import Attempt, ConedQuadruples, WideQuadruples
+from grasp_core.planning.result import Tally
 from grasp_core.solvers.ties import coarse
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 32, 2048
 """Fewest and most quadruples whose bounds are tightened together."""
 SMALLEST_TILT = 512
 """Fewest quadruples whose cones are chosen together: smaller groups take hardly less time."""
+BLOCK, TABLE, QUADRUPLE = range(3)
+"""Kinds of items, in the order in which equal bounds come first."""
 
 
-@dataclass(frozen=True, slots=True)
-class Block:
-    """A group of quadruples that is listed only when it is needed."""
+@dataclass(frozen=True, slots=True, order=True)
+class Waiting:
+    """One item of the queue; items are ordered by their keys alone."""
 
-    room: float
-    """Upper bound on its discs; equal rooms are equal numbers (see `ties.coarse`)."""
-    make: Callable[[], Prospects]
+    key: tuple[float, int, tuple[int, ...]]
+    """Minus the coarse bound; then the kind, and places or faces, which break ties."""
+    expand: "Callable[[float, float], Iterator[Waiting]] | None" = field(compare=False)
+    """Replaces the item by closer ones, given the threshold and the next item's bound."""
+    attempts: Callable[[], tuple[Attempt, ...]] = field(compare=False, default=tuple)
+    """Lists the attempts on a single quadruple, which cannot be expanded."""
+
+    @property
+    def bound(self) -> float:
+        """Upper bound on the discs of the item [object radii]; equal bounds are equal numbers."""
+        return -self.key[0]
+
+
+Expanded: TypeAlias = Iterator[Waiting]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Rest:
-    """The rows of a list of quadruples that still wait, from `start` on."""
+class BestFirst:
+    """A search for the largest discs of one construction on one object."""
 
-    listed: Outlook | Ranking
-    best: Array
-    """Falling bounds of the quadruples, nearly equal ones made equal (see `ties.coarse`)."""
-    start: int
+    construction: Construction
+    bounded: AttemptBounds
+    """Bounds attempts on the object's faces by small programs."""
+    tally: Tally
+    """Counts quadruples whose bounds prove that they have no grasp at all."""
 
-    def until(self, bound: float) -> slice:
-        """Rows to look at more closely next: the ones with bounds above the rest of the queue."""
-        larger = int(np.searchsorted(-self.best[self.start :], -bound))
-        least = SMALLEST_TILT if isinstance(self.listed, Outlook) else SMALLEST_CHUNK
-        count = min(max(larger, least), LARGEST_CHUNK)
-        return slice(self.start, min(self.start + count, len(self.best)))
+    def over(
+        self, blocks: Blocks, least: Callable[[Construction], float]
+    ) -> Iterator[tuple[Attempt, ...]]:
+        """Yield the attempts on each quadruple with a bound above the threshold, best first.
+
+        Args:
+            blocks: Blocks of quadruples. The construction needs discs; see `in_rows`.
+            least: Returns the radius that discs must exceed at present.
+        """
+        queue = [
+            Waiting((-room, BLOCK, (place,)), partial(self._made, blocks, place))
+            for place, room in enumerate(blocks.rooms.tolist())
+        ]
+        heapify(queue)
+        while queue:
+            head = heappop(queue)
+            # the threshold rises while grasps are found: read it anew
+            worth = least(self.construction)
+            if head.bound <= worth:
+                return
+            if head.expand is None:
+                yield head.attempts()
+                continue
+            for item in head.expand(worth, queue[0].bound if queue else worth):
+                heappush(queue, item)
+
+    def in_rows(self, wide: WideQuadruples, worth: float) -> Iterator[tuple[Attempt, ...]]:
+        """Yield the attempts on quadruples with bounds above the threshold, in the table's order.
+
+        Args:
+            wide: Ranked quadruples.
+            worth: The merit that grasps must exceed.
+        """
+        for start in range(0, len(wide), SMALLEST_CHUNK):
+            rows = slice(start, start + SMALLEST_CHUNK)
+            coned, bounds = wide.coned(rows).ranked(self.construction)
+            for item in self._tightened(coned, bounds, slice(0, len(coned)), worth):
+                yield item.attempts()
+
+    def _made(self, blocks: Blocks, place: int, worth: float, _: float) -> Expanded:
+        wide, bounds = blocks.make(place).ranked(self.construction, worth)
+        yield from self._wide_rows(wide, coarse(bounds), (place,), 0)
+
+    def _wide_rows(
+        self, wide: WideQuadruples, best: Array, place: tuple[int, ...], start: int
+    ) -> Expanded:
+        """The rows from `start` on as one item: cones are chosen for the first of them."""
+
+        def expand(worth: float, beyond: float) -> Expanded:
+            rows = _until(best, start, beyond, SMALLEST_TILT)
+            coned, bounds = wide.coned(rows).ranked(self.construction)
+            closer = coarse(np.asarray(bounds.max(axis=(1, 2), initial=-np.inf)))
+            count = int((closer > worth).sum())
+            coned, at = coned.some(np.arange(count)), (*place, rows.start)
+            yield from self._coned_rows(coned, bounds[:count].copy(), closer[:count], at, 0)
+            yield from self._wide_rows(wide, best, place, rows.stop)
+
+        if start < len(best):
+            yield Waiting((-float(best[start]), TABLE, place), expand)
+
+    def _coned_rows(
+        self, coned: ConedQuadruples, bounds: Array, best: Array, place: tuple[int, ...], start: int
+    ) -> Expanded:
+        """The rows from `start` on as one item: the bounds of the first of them are tightened."""
+
+        def expand(worth: float, beyond: float) -> Expanded:
+            rows = _until(best, start, beyond, SMALLEST_CHUNK)
+            yield from self._tightened(coned, bounds, rows, worth)
+            yield from self._coned_rows(coned, bounds, best, place, rows.stop)
+
+        if start < len(best):
+            yield Waiting((-float(best[start]), TABLE, place), expand)
+
+    def _tightened(
+        self, coned: ConedQuadruples, bounds: Array, rows: slice, worth: float
+    ) -> Expanded:
+        """Tighten the bounds of some quadruples and yield the ones still above the threshold."""
+        construction, cheap = self.construction, bounds[rows]
+        solved = cheap > worth
+        row, kind, column = np.nonzero(solved)
+        order, at = np.array(construction.orders)[column], rows.start + row
+        tight = np.full(cheap.shape, -np.inf)
+        attempts = Attempts(
+            np.take_along_axis(coned.faces[at], order, axis=1),
+            np.take_along_axis(coned.axes[at, kind], order[:, :, None], axis=1),
+            coned.half_angles[at, kind],
+        )
+        tight[row, kind, column] = self.bounded.of(construction, attempts, worth)
+        # both are upper bounds: the smaller one holds
+        tight = np.minimum(tight, cheap)
+        # no discs even of the least radius: settled here, whatever was found elsewhere
+        none = solved.any(axis=1) & (tight.max(axis=1) <= construction.least)
+        choices = int(solved.transpose(0, 2, 1)[none].sum())
+        self.tally.exclude(int(none.sum()), choices)
+        tight[tight <= worth] = -np.inf
+        best = coarse(np.asarray(np.max(tight, axis=(1, 2)), dtype=np.float64))
+        for each in np.flatnonzero(best > -np.inf).tolist():
+            place = rows.start + each
+            faces = tuple(coned.faces[place].tolist())
+            make = partial(coned.attempts, place, construction, tight[each])
+            yield Waiting((-float(best[each]), QUADRUPLE, faces), None, make)
 
 
-_Waiting: TypeAlias = tuple[float, int, tuple[int, ...], Block | _Rest | Callable[[], Quadruple]]
-"""Minus the coarse bound, then kind and faces, which break ties; then the item itself."""
-BLOCK, REST, QUADRUPLE = range(3)
-
-
-def promising(
-    construction: Construction,
-    blocks: Sequence[Block],
-    bounded: AttemptBounds,
-    least: Callable[[Construction], float],
-    tally: Counter[str],
-) -> Iterator[Quadruple]:
-    """Yield quadruples with tight bounds above the threshold, best first.
-
-    Args:
-        construction: A construction with discs; `in_rows` is for constructions without.
-        blocks: Blocks of all quadruples.
-        bounded: Bounds attempts on the object's faces by small programs.
-        least: Returns the radius that discs must exceed at present.
-        tally: Counts quadruples whose bounds prove that they have no discs at all.
-    """
-    waiting: list[_Waiting] = [
-        (-block.room, BLOCK, (place,), block) for place, block in enumerate(blocks)
-    ]
-    heapify(waiting)
-    while waiting:
-        bound, _, place, item = heappop(waiting)
-        # the threshold rises while grasps are found: read it anew
-        worth = least(construction)
-        if -bound <= worth:
-            return
-        match item:
-            case Block():
-                listed = outlook(item.make(), construction, worth)
-                _put_back(waiting, _Rest(listed, coarse(listed.bounds), 0), place)
-            case _Rest():
-                rows = item.until(-waiting[0][0] if waiting else worth)
-                if isinstance(item.listed, Outlook):
-                    _put_back(waiting, _closer(item.listed, rows, worth), (*place, rows.start))
-                else:
-                    for one in _tightened(item.listed, rows, bounded, worth, tally):
-                        heappush(waiting, one)
-                _put_back(waiting, _Rest(item.listed, item.best, rows.stop), place)
-            case _:
-                yield item()
-
-
-def _closer(listed: Outlook, rows: slice, worth: float) -> _Rest:
-    """Choose cones for some quadruples and drop the ones whose bounds are not above `worth`."""
-    ranking = listed.ranking(rows)
-    bounds: Array = np.max(ranking.bounds, axis=(1, 2), initial=-np.inf)
-    best = coarse(bounds)
-    count = int((best > worth).sum())
-    return _Rest(ranking.first(count), best[:count], 0)
-
-
-def _put_back(waiting: list[_Waiting], rest: _Rest, place: tuple[int, ...]) -> None:
-    if rest.start < len(rest.best):
-        bound = float(rest.best[rest.start])
-        heappush(waiting, (-bound, REST, place, rest))
-
-
-def in_rows(
-    listed: Outlook, bounded: AttemptBounds, worth: float, tally: Counter[str]
-) -> Iterator[Quadruple]:
-    """Yield quadruples with bounds above the threshold, in the order of the list.
-
-    Args:
-        listed: The quadruples of one block.
-        bounded: Bounds attempts on the object's faces by small programs.
-        worth: The merit that grasps must exceed.
-        tally: Counts quadruples whose bounds prove that they have no grasp.
-    """
-    for start in range(0, len(listed), SMALLEST_CHUNK):
-        ranking = listed.ranking(slice(start, start + SMALLEST_CHUNK))
-        every = slice(0, len(ranking))
-        for _, _, _, make in _tightened(ranking, every, bounded, worth, tally):
-            yield make()
-
-
-def _tightened(
-    ranking: Ranking, rows: slice, bounded: AttemptBounds, worth: float, tally: Counter[str]
-) -> Iterator[tuple[float, int, tuple[int, ...], Callable[[], Quadruple]]]:
-    """Tighten the bounds of some quadruples and yield the ones still above the threshold."""
-    construction, candidates = ranking.construction, ranking.candidates
-    cheap = ranking.bounds[rows]
-    row, kind, column = np.nonzero(cheap > worth)
-    place = ranking.places[rows][row]
-    order = np.array(construction.orders)[column]
-    bounds = np.full(cheap.shape, -np.inf)
-    attempts = Attempts(
-        np.take_along_axis(candidates.faces[place], order, axis=1),
-        np.take_along_axis(candidates.axes[place, kind], order[:, :, None], axis=1),
-        candidates.half_angles[place, kind],
-    )
-    bounds[row, kind, column] = bounded.of(construction, attempts, worth)
-    # both are upper bounds: the smaller one holds
-    bounds = np.minimum(bounds, cheap)
-    solved = cheap > worth
-    # no discs even of the least radius: settled here, whatever was found elsewhere
-    none = solved.any(axis=1) & (bounds.max(axis=1) <= construction.least)
-    tally["tried"] += int(none.sum())
-    tally["infeasible"] += int(none.sum())
-    tally["solved"] += int(solved.transpose(0, 2, 1)[none].sum())
-    bounds[bounds <= worth] = -np.inf
-    best = coarse(np.asarray(np.max(bounds, axis=(1, 2)), dtype=np.float64))
-    faces = candidates.faces[ranking.places[rows]].tolist()
-    for each in np.flatnonzero(best > -np.inf).tolist():
-        make = partial(ranking.quadruple, rows.start + each, bounds[each])
-        yield -float(best[each]), QUADRUPLE, tuple(faces[each]), make
+def _until(best: Array, start: int, beyond: float, least: int) -> slice:
+    """Rows to look at more closely next: the ones with bounds above the rest of the queue."""
+    larger = int(np.searchsorted(-best[start:], -beyond))
+    count = min(max(larger, least), LARGEST_CHUNK)
+    return slice(start, min(start + count, len(best)))

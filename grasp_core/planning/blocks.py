@@ -9,12 +9,14 @@ first l.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.cones.spanning import SpanningTable
-from grasp_core.planning.candidates import LEAST_SPAN_ANGLE, Candidates, PlannedCones
+from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, PlannedCones
+from grasp_core.planning.quadruples import WideQuadruples
 from grasp_core.solvers.ties import coarse, graded
 from grasp_core.values import FINGERS
 
@@ -27,42 +29,24 @@ SPANNING_SHARE = 0.125
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Prospects:
-    """Face quadruples with upper bounds on their cones, before cones are chosen."""
-
-    cones: PlannedCones
-    faces: Indices
-    """Faces of each quadruple, (q, 4)."""
-    widest: Array
-    """Upper bound on the half-angle of any choice of force cones, (q,) [rad]."""
-
-    def __len__(self) -> int:
-        return len(self.faces)
-
-    @property
-    def rooms(self) -> Array:
-        """Radius of the largest disc that fits in each of the four faces, (q,)."""
-        return self.cones.rooms[self.faces].min(axis=1, initial=np.inf)
-
-    def some(self, places: Indices) -> "Prospects":
-        """The quadruples at the given places, in that order."""
-        return Prospects(self.cones, self.faces[places], self.widest[places])
-
-    def candidates(self, rows: slice) -> Candidates:
-        """Choose force cones for the quadruples in `rows`."""
-        return self.cones.candidates(self.faces[rows])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Blocks:
     """Blocks of quadruples that are made on request."""
 
     rooms: Array
     """Upper bound on the discs of each block, (blocks,) [object radii]."""
-    make: Callable[[int], Prospects]
+    make: Callable[[int], WideQuadruples]
 
     def __len__(self) -> int:
         return len(self.rooms)
+
+    def from_place(self, first: int, count: int) -> "Blocks":
+        """At most `count` blocks, beginning with the one at the place `first`."""
+        return Blocks(self.rooms[first : first + count], lambda place: self.make(first + place))
+
+    def keeping(self, count: int) -> "Blocks":
+        """The same blocks; the first `count` are kept once they are made."""
+        kept = cache(self.make)
+        return Blocks(self.rooms, lambda place: (kept if place < count else self.make)(place))
 
 
 def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
@@ -84,11 +68,11 @@ def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
         coarse(np.array([cones.rooms[part].min(axis=1).max() for part in parts])),
     ]
 
-    def make(place: int) -> Prospects:
+    def make(place: int) -> WideQuadruples:
         if place >= len(ends):
-            return _prospects(cones, parts[place - len(ends)])
+            return _quadruples(cones, parts[place - len(ends)])
         numbers = np.arange(int(starts[place]), int(ends[place]), dtype=np.int64)
-        return _prospects(cones, order[_unranked(numbers, len(order))])
+        return _quadruples(cones, order[_unranked(numbers, len(order))])
 
     return Blocks(np.concatenate(rooms), make)
 
@@ -101,8 +85,8 @@ def spanning_blocks(cones: PlannedCones, whole: int) -> Blocks:
     pairs = [pair for pair in zip([0, *cuts], cuts, strict=False) if pair[1] >= FINGERS]
     firsts = [max(start, FINGERS - 1) for start, _ in pairs]
 
-    def make(place: int) -> Prospects:
-        return _prospects(cones, order[table.quadruples(*pairs[place]).indices])
+    def make(place: int) -> WideQuadruples:
+        return _quadruples(cones, order[table.quadruples(*pairs[place]).indices])
 
     return Blocks(coarse(cones.rooms)[order][firsts], make)
 
@@ -111,10 +95,10 @@ def _by_room(cones: PlannedCones, whole: int) -> Indices:
     return np.argsort(-graded(cones.rooms[:whole]), kind="stable")
 
 
-def _prospects(cones: PlannedCones, quads: Indices) -> Prospects:
+def _quadruples(cones: PlannedCones, quads: Indices) -> WideQuadruples:
     quads = np.sort(quads.reshape(-1, FINGERS), axis=1)
     quads = quads[np.lexsort(quads.T[::-1])]
-    return Prospects(cones, quads, cones.widest(quads))
+    return WideQuadruples(cones, quads, cones.widest(quads))
 
 
 def _range_ends(count: int) -> Indices:

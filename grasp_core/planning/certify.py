@@ -23,6 +23,7 @@ from grasp_core.values import (
     Family,
     ForceCone,
     Grasp,
+    Method,
     Witness,
     four,
 )
@@ -46,6 +47,8 @@ class Certified:
     """Contact regions, one per finger, in the pieces' units."""
     placement: Placement
     margin: float
+    method: Method
+    """The method whose search found it: `free` may find grasps of any family."""
     ways_out: Array | None = None
     """Unit vectors along the fingers' free lines, away from the tips, (4, 3), if sought."""
 
@@ -77,7 +80,9 @@ def certify(  # noqa: PLR0913, PLR0917 - everything a grasp is made of
     if margin is None or fault is not None:
         return None
     angle = span_angle(normals)
-    return Certified(name, faces, family, angle, pieces, cones, regions, placement, margin)
+    return Certified(
+        name, faces, family, angle, pieces, cones, regions, placement, margin, method=family
+    )
 
 
 def closure_margin(

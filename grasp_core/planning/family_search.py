@@ -2,7 +2,6 @@
 
 import math
 from bisect import insort
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -19,22 +18,21 @@ from grasp_core.families.free import Absence
 from grasp_core.families.placements import Placement
 from grasp_core.families.true_surface import on_true_surface
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, Shapes, choices_near
-from grasp_core.planning.best_first import Block, in_rows, promising
+from grasp_core.planning.best_first import BestFirst
 from grasp_core.planning.blocks import Blocks
 from grasp_core.planning.certify import Certified, certify, named
-from grasp_core.planning.ranking import Attempt, Quadruple, outlook
+from grasp_core.planning.quadruples import Attempt, Cones
 from grasp_core.planning.reach import Reach
-from grasp_core.planning.result import MethodCounts
+from grasp_core.planning.result import MethodCounts, Tally
 from grasp_core.solvers.ties import graded, surpassing
-from grasp_core.values import ContactRegion, FaceQuadruple, ForceCone, four
+from grasp_core.values import ContactRegion, FaceQuadruple, Method, four
 
-Cones: TypeAlias = tuple[ForceCone, ForceCone, ForceCone, ForceCone]
 Found: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement]
 """Pieces, force cones and the placement on them."""
 
 MOST_CHOICES = 8
-"""Most choices of pieces tried on faces that are not convex; the free method multiplies it by its
-cells."""
+"""Most choices of pieces tried on faces that are not convex; the free method multiplies it by
+`max_parts`."""
 TOGETHER = 32
 """Blocks that are open at once: a million quadruples take some hundred megabytes."""
 SAME_MERIT = 1e-5
@@ -44,22 +42,11 @@ SAME_CONTACTS = 1e-6
 """Contacts closer than this, in object radii, count as one grasp found twice."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Case:
-    """A construction to be tried on four faces."""
-
-    construction: Construction
-    faces: FaceQuadruple
-    shapes: Sequence[FaceShape]
-    """Shapes of the four faces."""
-    friction: float
-    """Coulomb coefficient at every contact."""
-
-
 @dataclass(slots=True, eq=False)
-class Search:
+class MethodSearch:
     """The grasps, proofs and counts that one method has gathered so far."""
 
+    method: Method
     limit: int | None
     reach: Callable[[Certified], Reach]
     """Returns how fingers get to the contacts of a grasp, or why they do not."""
@@ -67,7 +54,7 @@ class Search:
     """At most `limit` grasps, best first."""
     held: set[FaceQuadruple] = field(default_factory=set[FaceQuadruple])
     """Ascending faces on which a grasp was found, whether it was kept or not."""
-    tally: Counter[str] = field(default_factory=Counter[str])
+    tally: Tally = field(default_factory=Tally)
     absences: dict[FaceQuadruple, tuple[Absence, ...]] = field(
         default_factory=dict[FaceQuadruple, tuple[Absence, ...]]
     )
@@ -77,8 +64,9 @@ class Search:
 
     @property
     def counts(self) -> MethodCounts:
-        """The tally as a frozen value."""
-        return MethodCounts(**self.tally)
+        """The tally as a frozen value, with the quadruples that are undecided so far."""
+        counts = self.tally.counts
+        return replace(counts, undecided=counts.undecided + len(self.undecided))
 
     @property
     def full(self) -> bool:
@@ -101,11 +89,11 @@ class Search:
         faces = four(sorted(found.faces))
         way = self.reach(found)
         if way.reason:
-            self.tally["unreachable"] += 1
+            self.tally.count("unreachable")
             self.unreached[faces] = way.reason
             return []
-        found = replace(found, ways_out=way.directions)
-        self.tally["found"] += 1
+        found = replace(found, method=self.method, ways_out=way.directions)
+        self.tally.count("found")
         self.held.add(faces)
         insort(self.best, found, key=best_first)
         if self.limit is not None:
@@ -123,45 +111,47 @@ def search_construction(
     shapes: Shapes,
     friction: float,
     blocks: Blocks,
-    search: Search,
+    search: MethodSearch,
 ) -> Iterator[list[Certified]]:
     """Go through blocks of quadruples, yielding the grasps kept from each promising quadruple.
 
     With a limit the search ends when no bound exceeds the worst grasp kept. A construction
     without bounds ends as soon as the limit is reached.
     """
-    for quadruple in _in_order(construction, AttemptBounds(shapes), blocks, search):
-        faces = quadruple.faces
-        case = Case(construction, faces, chosen_shapes(shapes, faces), friction)
+    for attempts in _in_order(construction, AttemptBounds(shapes), blocks, search):
         found: list[Certified] = []
-        for attempt in quadruple.attempts:
+        for attempt in attempts:
             # grasps kept meanwhile may have raised the threshold
-            if not search.may_gain(construction, attempt.bound):
+            if not search.may_gain(construction, attempt.bounds[0]):
                 continue
-            one = tried(case, attempt, search.least(construction), search.tally)
+            on_faces = chosen_shapes(shapes, attempt.faces)
+            one, tally = tried(
+                construction, attempt, on_faces, friction, search.least(construction)
+            )
+            search.tally.add(tally)
             found += [one] if one else []
-        found = _without_duplicates(found, search.tally)
-        yield [kept for one in found for kept in search.keep(one)]
+        kept = _without_duplicates(found)
+        search.tally.count("duplicates", len(found) - len(kept))
+        yield [one for each in kept for one in search.keep(each)]
 
 
 def _in_order(
-    construction: Construction, bounded: AttemptBounds, blocks: Blocks, search: Search
-) -> Iterator[Quadruple]:
-    """Quadruples to try: best first over many blocks if there is a limit, else block by block."""
+    construction: Construction, bounded: AttemptBounds, blocks: Blocks, search: MethodSearch
+) -> Iterator[tuple[Attempt, ...]]:
+    """Attempts to make, by quadruple: over many blocks if there is a limit, else block by block."""
+    best_first = BestFirst(construction, bounded, search.tally)
     if construction.limits is not None:
         size = 1 if search.limit is None else TOGETHER
         for start in range(0, len(blocks), size):
-            places = range(start, min(start + size, len(blocks)))
-            if not search.may_gain(construction, float(blocks.rooms[places].max())):
-                continue
-            some = [Block(float(blocks.rooms[at]), partial(blocks.make, at)) for at in places]
-            yield from promising(construction, some, bounded, search.least, search.tally)
+            some = blocks.from_place(start, size)
+            if search.may_gain(construction, float(some.rooms.max())):
+                yield from best_first.over(some, search.least)
         return
     for place in range(len(blocks)):
         if search.full:
             return
-        listed = outlook(blocks.make(place), construction, construction.least)
-        some = in_rows(listed, bounded, construction.least, search.tally)
+        wide, _ = blocks.make(place).ranked(construction, construction.least)
+        some = best_first.in_rows(wide, construction.least)
         yield from takewhile(lambda _: not search.full, some)
 
 
@@ -170,56 +160,59 @@ def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]
     return tuple(shape for face in faces if (shape := shapes[face]) is not None)
 
 
-def tried(case: Case, attempt: Attempt, least: float, tally: Counter[str]) -> Certified | None:
+def tried(
+    construction: Construction,
+    attempt: Attempt,
+    shapes: Sequence[FaceShape],
+    friction: float,
+    least: float,
+) -> tuple[Certified | None, Tally]:
     """Try a construction on four faces in one order of the fingers.
 
     Args:
-        case: The construction and the faces.
+        construction: The construction to try.
         attempt: Which of the faces each finger touches, and with which force cones.
+        shapes: Shapes of these faces, in finger order.
+        friction: Coulomb coefficient at every contact.
         least: The merit that a placement must exceed.
-        tally: Counts what became of the attempt.
 
     Returns:
-        The certified grasp, or None.
+        The certified grasp, or None, and what to count.
     """
-    faces = four(case.faces[finger] for finger in attempt.order)
-    ordered = [case.shapes[finger] for finger in attempt.order]
-    tally["tried"] += 1
+    tally, family = Tally(), construction.family
+    tally.count("tried")
     try:
-        settled = _settled(case.construction, ordered, attempt, tally, least)
+        settled = _settled(construction, shapes, attempt, tally, least)
     except SolverError:
-        tally["undecided"] += 1
-        return None
+        tally.count("undecided")
+        return None, tally
     if settled is None:
-        tally["infeasible"] += 1
-        return None
+        tally.count("infeasible")
+        return None, tally
     chosen, cones, placement, regions = settled
-    family = case.construction.family
-    certified = certify(
-        named(family[0], faces), faces, family, chosen, cones, placement, case.friction, regions
-    )
-    if certified is None or not cones_positively_span(
+    name = named(family[0], attempt.faces)
+    found = certify(name, attempt.faces, family, chosen, cones, placement, friction, regions)
+    if found is None or not cones_positively_span(
         [cone.axis for cone in cones], [cone.half_angle for cone in cones]
     ):
-        tally["rejected"] += 1
-        return None
-    return certified
+        tally.count("rejected")
+        return None, tally
+    return found, tally
 
 
 def _settled(
     construction: Construction,
     shapes: Sequence[FaceShape],
     attempt: Attempt,
-    tally: Counter[str],
+    tally: Tally,
     least: float,
 ) -> tuple[tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...]] | None:
     """The best placement over the choices of cones, with its regions, on the true surface."""
     placed = None
-    for choice in attempt.choices:
+    for cones, bound in zip(attempt.cones, attempt.bounds, strict=True):
         # choices come with falling bounds: the later ones cannot be better either
-        if choice.bound <= least:
+        if bound <= least:
             break
-        cones = four(choice.cones[finger] for finger in attempt.order)
         if found := _best_placement(construction, cones, shapes, least, tally):
             placed, least = found, surpassing(found[2].merit)
     if placed is None:
@@ -245,7 +238,7 @@ def _best_placement(
     cones: Cones,
     shapes: Sequence[FaceShape],
     least: float,
-    tally: Counter[str],
+    tally: Tally,
 ) -> Found | None:
     """The best placement over choices of one convex piece per face, None unless above `least`.
 
@@ -253,7 +246,7 @@ def _best_placement(
     does, and the contacts on the hulls show which pieces are likely to be best.
     """
     hulls = tuple(shape.hull for shape in shapes)
-    tally["solved"] += 1
+    tally.count("solved")
     whole = construction.place(hulls, cones, least)
     if not (isinstance(whole, Placement) and whole.merit > least):
         return None
@@ -261,7 +254,7 @@ def _best_placement(
         return hulls, cones, whole
     best = None
     for chosen in choices_near(shapes, whole.positions, MOST_CHOICES):
-        tally["solved"] += 1
+        tally.count("solved")
         if construction.limits is not None and min(piece.inradius for piece in chosen) < least:
             continue
         placed = construction.place(chosen, cones, least)
@@ -270,16 +263,14 @@ def _best_placement(
     return best
 
 
-def _without_duplicates(found: list[Certified], tally: Counter[str]) -> list[Certified]:
+def _without_duplicates(found: list[Certified]) -> list[Certified]:
     """Drop grasps with the contacts of a better one; all are on the same faces."""
     kept: list[Certified] = []
     for one in sorted(found, key=best_first):
         here = one.placement.positions[np.argsort(one.faces)]
-        if any(
-            np.abs(here - other.placement.positions[np.argsort(other.faces)]).max() < SAME_CONTACTS
+        if all(
+            np.abs(here - other.placement.positions[np.argsort(other.faces)]).max() >= SAME_CONTACTS
             for other in kept
         ):
-            tally["duplicates"] += 1
-        else:
             kept.append(one)
     return kept

@@ -5,7 +5,6 @@ cones are good axes for tilted force cones, so the constructions are tried once 
 """
 
 import math
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
@@ -21,17 +20,16 @@ from grasp_core.families.free import RESTARTS, Absence, Undecided, place_free
 from grasp_core.families.placements import Placement
 from grasp_core.families.true_surface import on_true_surface
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, Shapes, choices_near
-from grasp_core.planning.candidates import BELOW_SPAN_ANGLE, LEAST_SPAN_ANGLE, usable_half_angles
 from grasp_core.planning.certify import Certified, certify, named
 from grasp_core.planning.family_search import (
     MOST_CHOICES,
-    Case,
-    Search,
+    MethodSearch,
     best_first,
     chosen_shapes,
     tried,
 )
-from grasp_core.planning.ranking import Attempt, ConeChoice
+from grasp_core.planning.planned_cones import BELOW_SPAN_ANGLE, LEAST_SPAN_ANGLE, usable_half_angles
+from grasp_core.planning.quadruples import Attempt, Cones
 from grasp_core.values import FINGERS, FaceQuadruple, ForceCone, four
 
 BATCH = 64
@@ -50,7 +48,7 @@ class FreeRequest:
     theta: float
     """Half-angle of the friction cones to plan with [rad]."""
     seed: int
-    cells: int
+    max_parts: int
     """Most parts into which the faces of one quadruple may be cut."""
     upgrades: Sequence[Construction]
     """Constructions to try with force cones around the forces of each free grasp."""
@@ -76,14 +74,21 @@ def search_free(
     shapes: Shapes,
     quadruples: Iterator[FaceQuadruple],
     request: FreeRequest,
-    search: Search,
+    search: MethodSearch,
     held: AbstractSet[FaceQuadruple],
 ) -> Iterator[list[Certified]]:
     """Go through the quadruples that no family holds, until the limit is reached."""
     while batch := list(islice(quadruples, BATCH)):
         if search.full:
             return
-        placed = [_decide(shapes, faces, request, search, held) for faces in batch]
+        tried_now = [
+            faces not in held and len(chosen_shapes(shapes, faces)) == FINGERS for faces in batch
+        ]
+        search.tally.count("tried", sum(tried_now))
+        placed = [
+            _decide(shapes, faces, request, search) if now else None
+            for faces, now in zip(batch, tried_now, strict=True)
+        ]
         choices = iter(_cone_choices([each for each in placed if each], request))
         for each in placed:
             found = _certified(each, next(choices), request, search) if each else None
@@ -91,15 +96,12 @@ def search_free(
 
 
 def search_undecided(
-    shapes: Shapes, request: FreeRequest, search: Search
+    shapes: Shapes, request: FreeRequest, search: MethodSearch
 ) -> Iterator[list[Certified]]:
-    """Go once more, with more cells, through the quadruples that were left undecided."""
+    """Go once more, with more parts, through the quadruples that were left undecided."""
     for faces in tuple(search.undecided):
         del search.undecided[faces]
-        # they were counted the first time, and are counted again below
-        search.tally["undecided"] -= 1
-        search.tally["tried"] -= 1
-        placed = _decide(shapes, faces, request, search, frozenset())
+        placed = _decide(shapes, faces, request, search)
         found = None
         if placed is not None:
             (choices,) = _cone_choices([placed], request)
@@ -111,14 +113,10 @@ def _decide(
     shapes: Shapes,
     faces: FaceQuadruple,
     request: FreeRequest,
-    search: Search,
-    held: AbstractSet[FaceQuadruple],
+    search: MethodSearch,
 ) -> _Placed | None:
     """Find contacts on four faces; if there are none, record the proof or that it is undecided."""
     chosen = chosen_shapes(shapes, faces)
-    if faces in held or len(chosen) < FINGERS:
-        return None
-    search.tally["tried"] += 1
     answers = _answers(faces, chosen, request, search)
     pieces, last = answers[-1]
     if any(shape.facets is not None for shape in chosen):
@@ -129,27 +127,28 @@ def _decide(
         answers = [_whole(shapes, faces, request, search)]
     proofs = tuple(proof for _, proof in answers if isinstance(proof, Absence))
     if len(proofs) == len(answers):
-        search.tally["infeasible"] += 1
+        search.tally.count("infeasible")
         search.absences[faces] = proofs
     else:
-        search.tally["undecided"] += 1
         search.undecided[faces] = max(
             answer.open_share for _, answer in answers if isinstance(answer, Undecided)
         )
     return None
 
 
-def _whole(shapes: Shapes, faces: FaceQuadruple, request: FreeRequest, search: Search) -> Answer:
+def _whole(
+    shapes: Shapes, faces: FaceQuadruple, request: FreeRequest, search: MethodSearch
+) -> Answer:
     """Ask whether whole faces hold no grasp, where choices of their halves gave none."""
     whole = four(request.owners[face] for face in faces)
     hulls = tuple(shape.hull for shape in chosen_shapes(shapes, whole))
-    search.tally["solved"] += 1
+    search.tally.count("solved")
     answer = _place(hulls, request, np.random.default_rng([request.seed, *faces]), restarts=0)
     return hulls, answer if isinstance(answer, Absence) else Undecided(1, 1.0)
 
 
 def _answers(
-    faces: FaceQuadruple, shapes: Sequence[FaceShape], request: FreeRequest, search: Search
+    faces: FaceQuadruple, shapes: Sequence[FaceShape], request: FreeRequest, search: MethodSearch
 ) -> list[Answer]:
     """Answers that together decide four faces unless one is undecided; a placement comes last.
 
@@ -158,15 +157,15 @@ def _answers(
     """
     rng = np.random.default_rng([request.seed, *faces])
     hulls = tuple(shape.hull for shape in shapes)
-    search.tally["solved"] += 1
+    search.tally.count("solved")
     whole = _place(hulls, request, rng)
     if isinstance(whole, Absence) or all(len(shape.pieces) == 1 for shape in shapes):
         return [(hulls, whole)]
     at = whole.positions if isinstance(whole, Placement) else np.array([h.origin for h in hulls])
-    most = MOST_CHOICES * request.cells
+    most = MOST_CHOICES * request.max_parts
     answers: list[Answer] = []
     for pieces in choices_near(shapes, at, most):
-        search.tally["solved"] += 1
+        search.tally.count("solved")
         answers.append((pieces, _place(pieces, request, rng, restarts=0)))
         if isinstance(answers[-1][1], Placement):
             return answers
@@ -187,7 +186,7 @@ def _on_triangles(
     pieces: Pieces,
     answer: Placement | Absence | Undecided,
     request: FreeRequest,
-    search: Search,
+    search: MethodSearch,
 ) -> _Placed | None:
     """Contacts on the triangles of curved patches; planes without a grasp prove nothing here."""
     if isinstance(answer, Placement):
@@ -202,7 +201,6 @@ def _on_triangles(
         settled = on_true_surface(shapes, pieces, cones, answer, points, place)
         if settled is not None:
             return _Placed(faces, *settled)
-    search.tally["undecided"] += 1
     search.undecided[faces] = 1.0
     return None
 
@@ -213,12 +211,14 @@ def _place(
     spread = max(piece.spread for piece in pieces)
     theta = request.theta - spread if spread < request.theta else LEAST_SPAN_ANGLE
     try:
-        return place_free(pieces, math.tan(theta), rng=rng, cells=request.cells, restarts=restarts)
+        return place_free(
+            pieces, math.tan(theta), rng=rng, cells=request.max_parts, restarts=restarts
+        )
     except SolverError:
         return Undecided(1, 1.0)
 
 
-def _cone_choices(placed: Sequence[_Placed], request: FreeRequest) -> list[tuple[ConeChoice, ...]]:
+def _cone_choices(placed: Sequence[_Placed], request: FreeRequest) -> list[tuple[Cones, ...]]:
     """Tilted force cones: towards the faces' or the object's middle, or around the forces."""
     if not (placed and request.upgrades):
         return [()] * len(placed)
@@ -237,7 +237,7 @@ def _cone_choices(placed: Sequence[_Placed], request: FreeRequest) -> list[tuple
     )
     return [
         tuple(
-            ConeChoice(four(ForceCone(axis, angle) for axis in kind.axes[place]), math.inf)
+            four(ForceCone(axis, angle) for axis in kind.axes[place])
             for kind in kinds
             if (angle := BELOW_SPAN_ANGLE * float(kind.half_angles[place])) > LEAST_SPAN_ANGLE
         )
@@ -246,11 +246,11 @@ def _cone_choices(placed: Sequence[_Placed], request: FreeRequest) -> list[tuple
 
 
 def _certified(
-    placed: _Placed, choices: tuple[ConeChoice, ...], request: FreeRequest, search: Search
+    placed: _Placed, choices: tuple[Cones, ...], request: FreeRequest, search: MethodSearch
 ) -> Certified | None:
     """Certify contacts, with regions if a construction offers them around these forces."""
-    for construction, choice in product(request.upgrades, choices):
-        if better := _upgraded(placed, construction, choice, request.friction):
+    for construction, cones in product(request.upgrades, choices):
+        if better := _upgraded(placed, construction, cones, request.friction):
             return better
     cones = four(ForceCone(piece.normal, request.theta) for piece in placed.pieces)
     certified = certify(
@@ -258,16 +258,21 @@ def _certified(
         request.friction, regions_of(point_region, placed.pieces, cones, placed.placement),
     )  # fmt: skip
     if certified is None:
-        search.tally["rejected"] += 1
+        search.tally.count("rejected")
     return certified
 
 
 def _upgraded(
-    placed: _Placed, construction: Construction, choice: ConeChoice, friction: float
+    placed: _Placed, construction: Construction, cones: Cones, friction: float
 ) -> Certified | None:
     """The best grasp that a construction offers on the same pieces, or None."""
-    shapes = [FaceShape((piece,), piece) for piece in placed.pieces]
-    attempts = [Attempt(order, (choice,)) for order in construction.orders]
-    case = Case(construction, placed.faces, shapes, friction)
-    tries = [tried(case, attempt, construction.least, Counter[str]()) for attempt in attempts]
-    return min((one for one in tries if one is not None), key=best_first, default=None)
+    found: list[Certified] = []
+    for order in construction.orders:
+        faces = four(placed.faces[finger] for finger in order)
+        around = four(cones[finger] for finger in order)
+        pieces = [placed.pieces[finger] for finger in order]
+        shapes = [FaceShape((piece,), piece) for piece in pieces]
+        attempt = Attempt(faces, (around,), (math.inf,))
+        one, _ = tried(construction, attempt, shapes, friction, construction.least)
+        found += [one] if one else []
+    return min(found, key=best_first, default=None)

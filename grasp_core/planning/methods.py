@@ -13,13 +13,13 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import standard
 from grasp_core.objects.trimmed_faces import clear_of_edges, shared_quadruples, with_halves
 from grasp_core.planning.as_given import Place, absence_as_given, as_given
-from grasp_core.planning.blocks import Blocks, Prospects, all_blocks, spanning_blocks
-from grasp_core.planning.candidates import PlannedCones
+from grasp_core.planning.blocks import Blocks, all_blocks, spanning_blocks
 from grasp_core.planning.certify import Certified
-from grasp_core.planning.family_search import Search, search_construction
+from grasp_core.planning.family_search import MethodSearch, search_construction
 from grasp_core.planning.free_search import FreeRequest, search_free, search_undecided
+from grasp_core.planning.planned_cones import PlannedCones
 from grasp_core.planning.reach import Reach, reach
-from grasp_core.planning.request import COMPLETE_CELLS, FAMILIES, METHODS, PlanRequest
+from grasp_core.planning.request import COMPLETE_PARTS, FAMILIES, METHODS, PlanRequest
 from grasp_core.planning.result import Outcomes
 from grasp_core.values import FINGERS, FaceQuadruple, Family, Method, four
 
@@ -27,23 +27,6 @@ KEPT_BLOCKS = 8
 """Number of blocks made once for all families and kept: they take some hundred megabytes."""
 Progress: TypeAlias = Callable[[int, int, int], None]
 """Called with (quadruples finished, all quadruples, grasps so far) after each quadruple tried."""
-
-
-class _Kept:
-    """Blocks of quadruples; the first ones are kept once they are made."""
-
-    def __init__(self, blocks: Blocks) -> None:
-        self.blocks = blocks
-        self.made: dict[int, Prospects] = {}
-
-    def make(self, place: int) -> Prospects:
-        """Make a block, or return it if it was kept."""
-        if place in self.made:
-            return self.made[place]
-        block = self.blocks.make(place)
-        if place < KEPT_BLOCKS:
-            self.made[place] = block
-        return block
 
 
 class Searches:
@@ -61,22 +44,22 @@ class Searches:
         self.shapes = face_shapes(self.body)
         self.shared = shared_quadruples(self.owners)
         self.quadruples = math.comb(len(body.faces), FINGERS) + len(self.shared)
-        self.by_method: dict[Method, Search] = {
-            method: Search(request.searched, self._reach)
+        self.by_method: dict[Method, MethodSearch] = {
+            method: MethodSearch(method, request.searched, self._reach)
             for method in METHODS
             if method in request.families
         }
         self.whole = len(body.faces)
         of_object = self.body, self.shapes, request.theta
         around = PlannedCones(*of_object, tilted=False)
-        self.spanning_blocks = _Kept(spanning_blocks(around, self.whole))
+        self.spanning_blocks = spanning_blocks(around, self.whole).keeping(KEPT_BLOCKS)
         self.tilted_blocks = self.spanning_blocks
         if request.cones == "tilted":
             tilted = PlannedCones(*of_object, tilted=True)
-            self.tilted_blocks = _Kept(all_blocks(tilted, self.whole, self.shared))
+            self.tilted_blocks = all_blocks(tilted, self.whole, self.shared).keeping(KEPT_BLOCKS)
 
     @property
-    def constructions(self) -> dict[Family, Search]:
+    def constructions(self) -> dict[Family, MethodSearch]:
         """The searches of the paper's three families, as far as they are asked for."""
         return {family: self.by_method[family] for family in FAMILIES if family in self.by_method}
 
@@ -108,7 +91,7 @@ class Searches:
             yield from enumerate(_timed(steps, search), start=dealt_with + 1)
             # each quadruple counts once per order of the fingers
             every = self.quadruples * len(construction.orders)
-            search.tally["pruned"] = every - search.tally["tried"]
+            search.tally.prune(every)
         if "free" in self.by_method:
             search = self.by_method["free"]
             search.limit = self._left()
@@ -116,9 +99,9 @@ class Searches:
             request = self._free_request()
             steps = search_free(self.shapes, self._every(), request, search, self.held)
             yield from enumerate(_timed(steps, search), start=dealt_with + 1)
-            search.tally["pruned"] = self.quadruples - search.tally["tried"]
+            search.tally.prune(self.quadruples)
             if self.request.complete:
-                request = self._free_request(COMPLETE_CELLS)
+                request = self._free_request(COMPLETE_PARTS)
                 steps = search_undecided(self.shapes, request, search)
                 for found in _timed(steps, search):
                     yield dealt_with + self.quadruples, found
@@ -154,17 +137,16 @@ class Searches:
 
         A construction without bounds on discs uses only cones around the normals.
         """
-        kept = self.spanning_blocks if construction.limits is None else self.tilted_blocks
-        return Blocks(kept.blocks.rooms, kept.make)
+        return self.spanning_blocks if construction.limits is None else self.tilted_blocks
 
-    def _free_request(self, cells: int | None = None) -> FreeRequest:
+    def _free_request(self, max_parts: int | None = None) -> FreeRequest:
         request = self.request
         structured = [CONSTRUCTIONS[method] for method in self.constructions]
         upgrades = [each for each in structured if each.limits and request.cones == "tilted"]
         upgrades += [MIXED for each in upgrades if each.family == MIXED.family]
         return FreeRequest(
-            request.friction, request.theta, request.seed, cells or request.cells, upgrades,
-            self.owners,
+            request.friction, request.theta, request.seed,
+            max_parts or request.max_parts, upgrades, self.owners,
         )  # fmt: skip
 
     def _reach(self, found: Certified) -> Reach:
@@ -194,7 +176,7 @@ class Searches:
         ]
         return as_given(found, places, mirrored=self.standard.mirrored)
 
-    def absences(self, search: Search) -> dict[FaceQuadruple, tuple[Absence, ...]]:
+    def absences(self, search: MethodSearch) -> dict[FaceQuadruple, tuple[Absence, ...]]:
         """Proofs of absence found by a search, translated to the object as it was given."""
         return {
             self.whole_faces(faces): tuple(
@@ -235,7 +217,7 @@ class Searches:
         return math.comb(self.whole, FINGERS) - math.comb(roomy, FINGERS) + shared
 
 
-def _timed(steps: Iterator[list[Certified]], search: Search) -> Iterator[list[Certified]]:
+def _timed(steps: Iterator[list[Certified]], search: MethodSearch) -> Iterator[list[Certified]]:
     """Yield the same steps, adding their processor time to the search."""
     while True:
         start = time.process_time()

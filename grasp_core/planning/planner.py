@@ -9,25 +9,42 @@ and finds grasps on them or proves that there are none.
 
 import math
 import time
-from collections.abc import Iterator, Sequence
-from functools import partial
-from typing import cast
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial, wraps
+from typing import ParamSpec, TypeVar, cast
 
 from grasp_core.checked import function, several, text
 from grasp_core.cones.spanning import count_spanning
+from grasp_core.errors import InputError
 from grasp_core.families.constructions import LEAST_RADIUS
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.planning.candidates import LEAST_SPAN_ANGLE
 from grasp_core.planning.certify import to_grasp
 from grasp_core.planning.methods import Progress, Searches
+from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.request import METHODS, ConeKind, PlanRequest, RankBy, check_request
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.planning.selection import chosen
 from grasp_core.values import Grasp, Method
 
+Given = ParamSpec("Given")
+Result = TypeVar("Result")
 
+
+def _knows_old_name(planner: Callable[Given, Result]) -> Callable[Given, Result]:
+    """Refuse the old name of a keyword with an error that says the new one."""
+
+    @wraps(planner)
+    def checked(*args: Given.args, **options: Given.kwargs) -> Result:
+        if "cells" in options:
+            raise InputError("the keyword cells is called max_parts now; write max_parts instead")
+        return planner(*args, **options)
+
+    return checked
+
+
+@_knows_old_name
 def plan(  # noqa: PLR0913 - the contract's keywords
     body: Polyhedron,
     friction: float = 0.5,
@@ -38,7 +55,7 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     limit: int | None = None,
     rank_by: RankBy = "radius",
     seed: int = 0,
-    cells: int = 1,
+    max_parts: int = 1,
     complete: bool = False,
     finger: Finger | None = None,
     clearance: float = 0.0,
@@ -63,7 +80,7 @@ def plan(  # noqa: PLR0913 - the contract's keywords
             friction), `ferrari-canny` (the largest quality) and `diverse` (each next one is the
             farthest from those before it) all grasps that are found compete.
         seed: Seed of the free method's restarts.
-        cells: Most parts into which the free method may cut the faces of one quadruple.
+        max_parts: Most parts into which the free method may cut the faces of one quadruple.
         complete: Decide the quadruples that would stay undecided, with up to 20,000 parts each.
         finger: Keep only grasps that such fingers reach on straight free lines.
         clearance: Distance of contacts and their regions from all edges of their faces [m]. Faces
@@ -81,8 +98,8 @@ def plan(  # noqa: PLR0913 - the contract's keywords
         SolverError: A program was neither solved nor proved infeasible.
     """
     request = PlanRequest(
-        friction, _listed(families), theta_deg, cones, limit, rank_by, seed, cells, complete,
-        finger, clearance, share_faces,
+        friction, _listed(families), theta_deg, cones, limit, rank_by, seed, max_parts,
+        complete, finger, clearance, share_faces,
     )  # fmt: skip
     check_request(body, request)
     if progress is not None:
@@ -93,6 +110,7 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     return _planned(body, request, searches)
 
 
+@_knows_old_name
 def iter_grasps(  # noqa: PLR0913 - as `plan`
     body: Polyhedron,
     friction: float = 0.5,
@@ -101,7 +119,7 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
     theta_deg: float | None = None,
     cones: ConeKind = "tilted",
     seed: int = 0,
-    cells: int = 1,
+    max_parts: int = 1,
     finger: Finger | None = None,
     clearance: float = 0.0,
     share_faces: float | None = None,
@@ -113,8 +131,8 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
         SolverError: A program was neither solved nor proved infeasible.
     """
     request = PlanRequest(
-        friction, _listed(families), theta_deg, cones, seed=seed, cells=cells, finger=finger,
-        clearance=clearance, share_faces=share_faces,
+        friction, _listed(families), theta_deg, cones, seed=seed, max_parts=max_parts,
+        finger=finger, clearance=clearance, share_faces=share_faces,
     )  # fmt: skip
     check_request(body, request)
     searches = Searches(body, request)
@@ -131,11 +149,10 @@ def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
 def _planned(body: Polyhedron, request: PlanRequest, searches: Searches) -> Plan:
     """Put together a plan from what the searches found, with the best grasps."""
     grasps: list[Grasp] = []
-    owner = {id(found): search for search in searches.by_method.values() for found in search.best}
     for found in chosen([search.best for search in searches.by_method.values()], request):
         start = time.process_time()
         grasps.append(to_grasp(body, request.friction, searches.as_found(found)))
-        owner[id(found)].seconds += time.process_time() - start
+        searches.by_method[found.method].seconds += time.process_time() - start
     counts = PlanCounts(
         len(body.faces),
         searches.quadruples,

@@ -33,7 +33,7 @@ RankBy: TypeAlias = Literal["radius", "friction-margin", "ferrari-canny", "diver
 ITS_RADIUS = ", the object's radius in m"
 FARTHEST_APPROACH = 1e3
 """Longest free line of a finger, in object radii."""
-COMPLETE_CELLS = 20_000
+COMPLETE_PARTS = 20_000
 """Parts into which `complete` may cut the faces of one quadruple."""
 MOST_FACES = 1000
 """Most faces to plan with: tables of all pairs of faces and of all triples whose normals span then
@@ -51,7 +51,7 @@ class PlanRequest:
     limit: int | None = None
     rank_by: RankBy = "radius"
     seed: int = 0
-    cells: int = 1
+    max_parts: int = 1
     complete: bool = False
     finger: Finger | None = None
     clearance: float = 0.0
@@ -92,7 +92,7 @@ def check_request(body: Polyhedron, request: PlanRequest) -> None:
 def _check_counts(request: PlanRequest) -> None:
     if request.limit is not None:
         whole(request.limit, "limit", least=1)
-    whole(request.cells, "cells", least=1)
+    whole(request.max_parts, "max_parts", least=1)
     seed_of(request.seed)
     switch(request.complete, "complete")
 

@@ -110,7 +110,7 @@ class Planning:
     """Which grasps are best: those with the largest discs, of each family in turn; with the least
     critical friction; with the largest quality; or each next one the farthest from those before
     it."""
-    cells: Count = 1
+    max_parts: Count = 1
     """Number of parts into which the free method may cut the four faces where it is undecided."""
     complete: bool = False
     """Cut the faces that stay undecided until each is decided."""

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from grasp_core.cones.spanning import count_spanning
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.planning.candidates import LEAST_SPAN_ANGLE
+from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
 from grasp_core.short_text import vector
 from scenes.example_objects import example_names
 from sim_validate.cli import command_flags

@@ -45,7 +45,7 @@ def plan_object(
             limit=planning.limit,
             rank_by=planning.rank_by,
             seed=planning.seed,
-            cells=planning.cells,
+            max_parts=planning.max_parts,
             complete=planning.complete,
             finger=asked_finger(planning),
             clearance=planning.edge_clearance_m,

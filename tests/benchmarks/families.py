@@ -34,8 +34,7 @@ from grasp_core.families.regulus import (
 )
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning.blocks import spanning_blocks
-from grasp_core.planning.candidates import NORMAL, PlannedCones
-from grasp_core.planning.ranking import outlook
+from grasp_core.planning.planned_cones import NORMAL, PlannedCones
 from grasp_core.solvers.lp import LinearProgram, Optimum, _by_highs
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object
@@ -121,7 +120,7 @@ def _attempts(body, shapes, construction):
     blocks = spanning_blocks(PlannedCones(body, shapes, THETA, tilted=False), len(body.faces))
     found = []
     for place in range(len(blocks)):
-        part = blocks.make(place).candidates(slice(None))
+        part = blocks.make(place).coned(slice(None))
         for order in map(list, construction.orders):
             normals, half_angles = part.normals[:, order], part.half_angles[:, NORMAL]
             some = construction.admits(normals, half_angles)
@@ -219,17 +218,17 @@ def decided(body, shapes, bounded, least):
     cones = PlannedCones(body, shapes, THETA, tilted=False)
     blocks, counts = spanning_blocks(cones, len(body.faces)), Counter()
     for place in range(len(blocks)):
-        prospects = blocks.make(place)
-        prospects = prospects.some(np.flatnonzero(prospects.widest >= least))
+        wide = blocks.make(place)
+        wide = wide.some(np.flatnonzero(wide.widest >= least))
         for family, construction in CONSTRUCTIONS.items():
-            listed = outlook(prospects, construction, construction.least)
-            ranking = listed.ranking(slice(None))
-            row, kind, column = np.nonzero(ranking.bounds > construction.least)
-            at, order = ranking.places[row], np.array(construction.orders)[column]
+            ranked, _ = wide.ranked(construction, construction.least)
+            coned, cheap = ranked.coned(slice(None)).ranked(construction)
+            row, kind, column = np.nonzero(cheap > construction.least)
+            order = np.array(construction.orders)[column]
             some = Attempts(
-                np.take_along_axis(ranking.candidates.faces[at], order, axis=1),
-                np.take_along_axis(ranking.candidates.axes[at, kind], order[:, :, None], axis=1),
-                ranking.candidates.half_angles[at, kind],
+                np.take_along_axis(coned.faces[row], order, axis=1),
+                np.take_along_axis(coned.axes[row, kind], order[:, :, None], axis=1),
+                coned.half_angles[row, kind],
             )
             bounds = bounded.of(construction, some, construction.least)
             counts[family] += int((bounds > construction.least).sum())

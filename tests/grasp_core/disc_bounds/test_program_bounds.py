@@ -12,7 +12,7 @@ from grasp_core.families.kernel_tables import Attempts
 from grasp_core.families.placements import Placement
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning.blocks import all_blocks
-from grasp_core.planning.candidates import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
+from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
 from grasp_core.solvers.lp import RESIDUAL
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object
@@ -29,8 +29,8 @@ NONE = np.empty((0, 4), dtype=np.int64)
 def attempts(body, kind, order, count=60):
     """Faces in finger order, axes and half-angles of some quadruples of a body."""
     cones = PlannedCones(body, face_shapes(body), math.atan(0.5), tilted=True)
-    prospects = all_blocks(cones, len(body.faces), NONE).make(0)
-    found = prospects.candidates(slice(None))
+    wide = all_blocks(cones, len(body.faces), NONE).make(0)
+    found = wide.coned(slice(None))
     usable = np.flatnonzero(found.half_angles[:, kind] > LEAST_SPAN_ANGLE)
     some = np.random.default_rng(0).permutation(usable)[:count]
     order = list(order)

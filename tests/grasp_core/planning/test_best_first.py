@@ -1,7 +1,5 @@
 """Best-first search: what a limit keeps is the best of everything, whatever kind of object."""
 
-from collections import Counter
-
 import numpy as np
 import pytest
 
@@ -11,10 +9,12 @@ from grasp_core.errors import SolverError
 from grasp_core.families import discs as largest_discs
 from grasp_core.families.constructions import CONSTRUCTIONS
 from grasp_core.planning import best_first as promising_module
-from grasp_core.planning.best_first import Block, promising
+from grasp_core.planning.best_first import BestFirst
+from grasp_core.planning.blocks import Blocks
 from grasp_core.planning.family_search import SAME_MERIT
 from grasp_core.planning.methods import Searches
 from grasp_core.planning.request import PlanRequest
+from grasp_core.planning.result import Tally
 from scenes.example_objects import example_object
 from tests.grasp_core.curved import curved_body
 from tests.marks import more
@@ -61,21 +61,26 @@ def test_cones_that_are_tilted_late_are_not_missed(monkeypatch):
 
 
 def opened(body, family, least):
-    """Quadruples as they are handed out, with the tally, and blocks that were made."""
+    """Quadruples as they are handed out, and blocks that were made."""
     request = PlanRequest(0.4, (family,), None, "tilted")
     searches = Searches(body, request)
-    blocks = searches.tilted_blocks.blocks
-    construction, tally, made = CONSTRUCTIONS[family], Counter(), []
+    blocks, made = searches.tilted_blocks, []
 
     def make(place):
         made.append(place)
         return blocks.make(place)
 
-    listed = [
-        Block(room, lambda place=place: make(place)) for place, room in enumerate(blocks.rooms)
-    ]
-    discs = AttemptBounds(searches.shapes)
-    return promising(construction, listed, discs, lambda _: least[0], tally), made
+    search = BestFirst(CONSTRUCTIONS[family], AttemptBounds(searches.shapes), Tally())
+    return search.over(Blocks(blocks.rooms, make), lambda _: least[0]), made
+
+
+def bound(attempts):
+    return max(attempt.bounds[0] for attempt in attempts)
+
+
+def faces(attempts):
+    (found,) = {tuple(sorted(attempt.faces)) for attempt in attempts}
+    return found
 
 
 @pytest.mark.parametrize("family", ["concurrent", *more("pencil")])
@@ -83,11 +88,11 @@ def test_quadruples_come_in_the_order_of_their_bounds_and_only_as_asked_for(fami
     body, least = example_object("random-40-1"), [1e-3]
     quadruples, made = opened(body, family, least)
     first = [next(quadruples) for _ in range(12)]
-    bounds = [each.bound for each in first]
+    bounds = [bound(each) for each in first]
     assert (np.diff(bounds) <= 1e-7).all()
-    assert len({each.faces for each in first}) == len(first)
+    assert len({faces(each) for each in first}) == len(first)
     every, all_made = opened(body, family, least)
-    rest = {each.faces: each.bound for each in every}
+    rest = {faces(each): bound(each) for each in every}
     assert len(made) < len(all_made)
     assert sorted(rest.values(), reverse=True)[:12] == pytest.approx(bounds, abs=1e-7)
     least[0] = bounds[-1]  # nothing more is worth having

@@ -12,7 +12,7 @@ from grasp_core.disc_bounds.corner_bounds import corners_of, widths_apart
 from grasp_core.families.constructions import LEAST_RADIUS
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning.blocks import LARGEST_BLOCK, all_blocks, spanning_blocks
-from grasp_core.planning.candidates import LEAST_SPAN_ANGLE, TILTED, PlannedCones
+from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, TILTED, PlannedCones
 from scenes.example_objects import example_object
 from tests.benchmarks.planning import sphere_hull
 from tests.grasp_core.cones.reference_tilting import lowest_heights
@@ -99,14 +99,14 @@ def test_the_widest_half_angle_is_that_of_the_definition():
 def test_limits_before_cones_are_chosen_bound_those_after(name):
     body = example_object(name)
     cones, tested = planned(body), 0
-    prospects = all_blocks(cones, len(body.faces), NONE).make(0)
-    limits = cones.limits(prospects.faces, prospects.widest)
-    candidates = prospects.candidates(slice(None))
-    usable = candidates.half_angles > LEAST_SPAN_ANGLE
-    assert (candidates.half_angles[usable] <= prospects.widest[np.nonzero(usable)[0]]).all()
+    wide = all_blocks(cones, len(body.faces), NONE).make(0)
+    limits = cones.limits(wide.faces, wide.widest)
+    coned = wide.coned(slice(None))
+    usable = coned.half_angles > LEAST_SPAN_ANGLE
+    assert (coned.half_angles[usable] <= wide.widest[np.nonzero(usable)[0]]).all()
     for kind in range(2):
         held = usable[:, kind]
-        assert (candidates.limits[held, kind] <= limits[held] * (1.0 + 1e-9)).all()
+        assert (coned.limits[held, kind] <= limits[held] * (1.0 + 1e-9)).all()
         tested += held.sum()
     assert tested >= 30
 
@@ -136,10 +136,10 @@ def test_no_pair_of_tilted_cones_has_larger_discs_than_its_widest_cones_allow():
 def test_widths_from_distances_bound_those_from_corners_however_axes_lean():
     body = example_object("random-14-1")
     cones = planned(body)
-    candidates = all_blocks(cones, 14, NONE).make(0).candidates(slice(None))
-    held = candidates.half_angles[:, TILTED] > LEAST_SPAN_ANGLE
-    faces, axes = candidates.faces[held], candidates.axes[held, TILTED]
-    leaning = np.arccos(np.clip((axes * candidates.normals[held]).sum(axis=-1), -1.0, 1.0))
+    coned = all_blocks(cones, 14, NONE).make(0).coned(slice(None))
+    held = coned.half_angles[:, TILTED] > LEAST_SPAN_ANGLE
+    faces, axes = coned.faces[held], coned.axes[held, TILTED]
+    leaning = np.arccos(np.clip((axes * coned.normals[held]).sum(axis=-1), -1.0, 1.0))
     bounds = widths_apart(faces, cones._distances, cones._halves, leaning.max(axis=1))
     bounded = widths(corners_of(body).points[faces], axes)
     pairs = np.triu_indices(4, 1)

@@ -9,8 +9,7 @@ from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.objects.standard_order import standard
 from grasp_core.planning.blocks import all_blocks
-from grasp_core.planning.candidates import PlannedCones
-from grasp_core.planning.ranking import outlook
+from grasp_core.planning.planned_cones import PlannedCones
 from grasp_core.planning.request import METHODS
 from scenes.example_objects import example_object
 from tests.benchmarks.planning import sphere_hull
@@ -331,6 +330,12 @@ def test_grasps_are_streamed_as_they_are_found():
     assert everything == {grasp.id for grasp in gc.plan(body, 0.4).grasps}
 
 
+def test_the_old_name_of_max_parts_is_refused_with_the_new_one():
+    for planner in (gc.plan, gc.iter_grasps):
+        with pytest.raises(gc.InputError, match="max_parts"):
+            planner(example_object("tetrahedron"), cells=2)
+
+
 def test_radii_stay_below_the_bounds_that_prune():
     given, theta = example_object("random-12-1"), math.radians(8.0)
     planned = standard(given)
@@ -339,16 +344,15 @@ def test_radii_stay_below_the_bounds_that_prune():
     blocks, tested = all_blocks(cones, len(body.faces), np.empty((0, 4), dtype=int)), 0
     (room,) = blocks.rooms
     for family in DISCS:
-        listed = outlook(blocks.make(0), CONSTRUCTIONS[family], LEAST_RADIUS)
-        ranking = listed.ranking(slice(None))
-        coarse = dict(zip(map(tuple, listed.prospects.faces.tolist()), listed.bounds, strict=True))
-        faces = ranking.candidates.faces[ranking.places].tolist()
-        limits = [coarse[tuple(each)] for each in faces]
-        assert (ranking.bounds.max(axis=(1, 2)) <= limits).all()
-        ordered = (ranking.quadruple(row, ranking.bounds[row]) for row in range(len(ranking)))
+        wide, loose = blocks.make(0).ranked(CONSTRUCTIONS[family], LEAST_RADIUS)
+        coned, tight = wide.coned(slice(None)).ranked(CONSTRUCTIONS[family])
+        coarse = dict(zip(map(tuple, wide.faces.tolist()), loose, strict=True))
+        limits = [coarse[tuple(each)] for each in coned.faces.tolist()]
+        best = tight.max(axis=(1, 2))
+        assert (best <= limits).all()
         bounds = {
-            tuple(sorted(planned.faces[face] for face in each.faces)): each.bound
-            for each in ordered
+            tuple(sorted(planned.faces[face] for face in faces)): bound
+            for faces, bound in zip(coned.faces.tolist(), best, strict=True)
         }
         assert max(bounds.values()) <= room
         for grasp in gc.plan(given, 1.0, theta_deg=8.0, families=family, cones="tilted").grasps:

@@ -1,4 +1,4 @@
-"""Force cones for face quadruples, and upper bounds on their discs.
+"""Force cones for the face quadruples of one object, and upper bounds on their discs.
 
 Cones around the normals, as in the paper, are planned at theta_plan = min(theta, just below the
 span angle theta*): these smaller cones lie inside the real ones, so what holds for them holds at
@@ -6,7 +6,7 @@ the friction asked for. Tilted cones are an alternative, and for most quadruples
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -25,7 +25,6 @@ from grasp_core.families.constructions import LEAST_RADIUS
 from grasp_core.families.kernel_tables import Corners
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.values import ForceCone, four
 
 LEAST_SPAN_ANGLE = math.atan(LEAST_RADIUS)
 """Least half-angle to plan with [rad]: narrower cones hold no disc that counts at a depth of one
@@ -36,36 +35,6 @@ INSIDE_FRICTION = 1.0 - 1e-6
 """Share of the friction angle to plan with, so that equilibrium is not marginal."""
 NORMAL, TILTED = 0, 1
 """Indices of the two choices of force cones."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Candidates:
-    """Face quadruples with two choices of force cones each, and upper bounds on their grasps."""
-
-    faces: Indices
-    """Faces of each quadruple, (q, 4)."""
-    normals: Array
-    """Inward unit normals of the faces, (q, 4, 3)."""
-    axes: Array
-    """Unit cone axes of both choices, around the normals and tilted, (q, 2, 4, 3)."""
-    half_angles: Array
-    """Half-angle of each choice, (q, 2) [rad]; not positive where the choice does not exist."""
-    limits: Array
-    """Upper bounds on the discs of each choice (see `disc_limits`), (q, 2, 4) [object radii]."""
-    rooms: Array
-    """Radius of the largest disc that fits in each of the four faces, (q,) [object radii]."""
-
-    def __len__(self) -> int:
-        return len(self.faces)
-
-    def some(self, places: Indices) -> "Candidates":
-        """The quadruples at the given places, in that order."""
-        return Candidates(*(getattr(self, each.name)[places] for each in fields(self)))
-
-    def cones(self, place: int, kind: int) -> tuple[ForceCone, ForceCone, ForceCone, ForceCone]:
-        """The force cones of one choice for one quadruple, in the order of its faces."""
-        half_angle = float(self.half_angles[place, kind])
-        return four(ForceCone(axis, half_angle) for axis in self.axes[place, kind])
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +61,7 @@ class PlannedCones:
         Args:
             quads: Faces of each quadruple, (q, 4).
         """
-        normals, thetas = self._normals[quads], self._thetas[quads]
+        normals, thetas = self.normals[quads], self._thetas[quads]
         sines = span_sines(normals)
         around = _around(sines, thetas)
         if not self.tilted:
@@ -121,30 +90,45 @@ class PlannedCones:
         widths = widths_apart(quads, self._distances, self._halves, leaning)
         return angle_limits(extent, widths, widest)
 
-    def candidates(self, quads: Indices) -> Candidates:
-        """Choose force cones for the face quadruples `quads`, (q, 4)."""
-        normals, thetas = self._normals[quads], self._thetas[quads]
+    def chosen(self, quads: Indices) -> tuple[Array, Array]:
+        """Choose force cones for face quadruples, around the normals and tilted.
+
+        Args:
+            quads: Faces of each quadruple, (q, 4).
+
+        Returns:
+            Unit axes of both choices, (q, 2, 4, 3), and their half-angles, (q, 2) [rad], which are
+            not positive where the choice does not exist.
+        """
+        normals, thetas = self.normals[quads], self._thetas[quads]
         axes = [normals, normals]
         half_angles = [_around(span_sines(normals), thetas), np.zeros(len(quads))]
         if self.tilted:
             leaning = tilted_cones(normals, thetas)
             axes[TILTED] = leaning.axes
             half_angles[TILTED] = BELOW_SPAN_ANGLE * leaning.half_angles
+        return np.stack(axes, axis=1), np.stack(half_angles, axis=1)
+
+    def limits_of(self, quads: Indices, axes: Array, half_angles: Array) -> Array:
+        """Upper bounds on the discs of chosen cones (see `disc_limits`), (q, 2, 4).
+
+        Args:
+            quads: Faces of each quadruple, (q, 4).
+            axes: Unit axes of both choices, (q, 2, 4, 3).
+            half_angles: Half-angles of both choices, (q, 2) [rad].
+
+        Returns:
+            Bounds in object radii.
+        """
         limits = [
-            disc_limits(self._corners, self._normals, quads, *choice)
-            for choice in list(zip(axes, half_angles, strict=True))[: 1 + self.tilted]
+            disc_limits(self._corners, self.normals, quads, axes[:, kind], half_angles[:, kind])
+            for kind in range(1 + self.tilted)
         ]
-        return Candidates(
-            faces=quads,
-            normals=normals,
-            axes=np.stack(axes, axis=1),
-            half_angles=np.stack(half_angles, axis=1),
-            limits=np.stack([limits[NORMAL], limits[-1]], axis=1),
-            rooms=self.rooms[quads].min(axis=1, initial=np.inf),
-        )
+        return np.stack([limits[NORMAL], limits[-1]], axis=1)
 
     @cached_property
-    def _normals(self) -> Array:
+    def normals(self) -> Array:
+        """Inward unit normals of all faces, (f, 3)."""
         return self.body.normals
 
     @cached_property
@@ -154,7 +138,7 @@ class PlannedCones:
     @cached_property
     def _halves(self) -> Array:
         """Half the angle between every two normals, (f, f) [rad]."""
-        apart = np.linalg.norm(self._normals[:, None] - self._normals, axis=-1)
+        apart = np.linalg.norm(self.normals[:, None] - self.normals, axis=-1)
         return np.arcsin(np.minimum(0.5 * apart, 1.0))
 
     @cached_property

@@ -1,0 +1,173 @@
+"""Tables of face quadruples, and the attempts that are worth a program on them.
+
+A table of wide quadruples knows how wide cones can be at most, a table of coned quadruples which
+cones were chosen. Both can be ranked for a construction: the rows are ordered by an upper bound on
+their discs, and rows that are not worth a program are dropped.
+"""
+
+from dataclasses import dataclass, fields
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.families.constructions import LEAST_RADIUS, Construction
+from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
+from grasp_core.solvers.ties import graded
+from grasp_core.values import FaceQuadruple, ForceCone, four
+
+Cones: TypeAlias = tuple[ForceCone, ForceCone, ForceCone, ForceCone]
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """One order of the fingers on four faces, with force cones to try."""
+
+    faces: FaceQuadruple
+    """The face that each finger touches."""
+    cones: tuple[Cones, ...]
+    """Choices of force cones in finger order, the choice with the largest bound first."""
+    bounds: tuple[float, ...]
+    """Upper bound on the discs of each choice [object radii]; infinite for constructions without
+    discs."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConedQuadruples:
+    """Face quadruples with two choices of force cones each, and upper bounds on their grasps."""
+
+    faces: Indices
+    """Faces of each quadruple, (q, 4)."""
+    normals: Array
+    """Inward unit normals of the faces, (q, 4, 3)."""
+    axes: Array
+    """Unit cone axes of both choices, around the normals and tilted, (q, 2, 4, 3)."""
+    half_angles: Array
+    """Half-angle of each choice, (q, 2) [rad]; not positive where the choice does not exist."""
+    limits: Array
+    """Upper bounds on the discs of each choice (see `disc_limits`), (q, 2, 4) [object radii]."""
+    rooms: Array
+    """Radius of the largest disc that fits in each of the four faces, (q,) [object radii]."""
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+    def some(self, rows: Indices) -> "ConedQuadruples":
+        """The quadruples in the given rows, in that order."""
+        return ConedQuadruples(*(getattr(self, each.name)[rows] for each in fields(self)))
+
+    def ranked(self, construction: Construction) -> tuple["ConedQuadruples", Array]:
+        """Order quadruples by their bounds; for reguli, by the width of the cones.
+
+        Returns:
+            The quadruples worth a program, and a bound for each choice of cones and finger order,
+            (q, 2, orders) [object radii]: minus infinity where an attempt is not worth a program.
+        """
+        bounds = self._bounds(construction)
+        best = bounds.max(axis=(1, 2), initial=-np.inf)
+        promise = self.half_angles[:, NORMAL] if construction.limits is None else best
+        order = np.argsort(-graded(promise), kind="stable")
+        order = order[best[order] > -np.inf]
+        return self.some(order), bounds[order]
+
+    def _bounds(self, construction: Construction) -> Array:
+        usable: NDArray[np.bool_] = self.half_angles > LEAST_SPAN_ANGLE
+        usable &= self.rooms[:, None] > 0.0
+        spans = usable[:, NORMAL].copy()
+        if construction.limits is None:
+            usable[:, TILTED] = False  # no region to gain: the free method finds such grasps
+            bounds = np.full((*usable.shape, len(construction.orders)), np.inf)
+        else:
+            limits = self.limits[:, :, construction.limits]
+            # an undefined limit bounds nothing
+            bounds = np.where(np.isnan(limits), np.inf, limits)
+            bounds = np.minimum(bounds, self.rooms[:, None, None])
+        for column, order in enumerate(construction.orders):
+            admitted = construction.admits(
+                self.normals[spans][:, order], self.half_angles[spans, NORMAL]
+            )
+            kept = np.where(admitted[:, None], bounds[spans, :, column], -np.inf)
+            bounds[spans, :, column] = kept
+        return np.where(usable[:, :, None] & (bounds >= LEAST_RADIUS), bounds, -np.inf)
+
+    def attempts(self, row: int, construction: Construction, bounds: Array) -> tuple[Attempt, ...]:
+        """The attempts on the quadruple in a row.
+
+        Args:
+            row: Row of the table.
+            construction: Gives the orders of the fingers.
+            bounds: Bound of each choice of cones and finger order, (2, orders); attempts with a
+                bound of minus infinity are left out.
+        """
+        found: list[Attempt] = []
+        for column, order in enumerate(construction.orders):
+            kinds = np.argsort(-graded(bounds[:, column]), kind="stable").tolist()
+            kinds = [kind for kind in kinds if bounds[kind, column] > -np.inf]
+            if kinds:
+                faces = four(int(self.faces[row, finger]) for finger in order)
+                cones = tuple(self._cones(row, kind, order) for kind in kinds)
+                attempt = Attempt(faces, cones, tuple(float(bounds[k, column]) for k in kinds))
+                found.append(attempt)
+        return tuple(found)
+
+    def _cones(self, row: int, kind: int, order: tuple[int, ...]) -> Cones:
+        half_angle = float(self.half_angles[row, kind])
+        return four(ForceCone(self.axes[row, kind, finger], half_angle) for finger in order)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WideQuadruples:
+    """Face quadruples with upper bounds on their cones, before cones are chosen."""
+
+    cones: PlannedCones
+    faces: Indices
+    """Faces of each quadruple, (q, 4)."""
+    widest: Array
+    """Upper bound on the half-angle of any choice of force cones, (q,) [rad]."""
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+    @property
+    def rooms(self) -> Array:
+        """Radius of the largest disc that fits in each of the four faces, (q,)."""
+        return self.cones.rooms[self.faces].min(axis=1, initial=np.inf)
+
+    def some(self, rows: Indices) -> "WideQuadruples":
+        """The quadruples in the given rows, in that order."""
+        return WideQuadruples(self.cones, self.faces[rows], self.widest[rows])
+
+    def coned(self, rows: slice) -> ConedQuadruples:
+        """Choose force cones for the quadruples in the given rows."""
+        faces = self.faces[rows]
+        axes, half_angles = self.cones.chosen(faces)
+        return ConedQuadruples(
+            faces=faces,
+            normals=self.cones.normals[faces],
+            axes=axes,
+            half_angles=half_angles,
+            limits=self.cones.limits_of(faces, axes, half_angles),
+            rooms=self.rooms[rows],
+        )
+
+    def ranked(self, construction: Construction, worth: float) -> tuple["WideQuadruples", Array]:
+        """Order quadruples by what their widest cones allow, dropping those not above `worth`.
+
+        Args:
+            construction: The construction to be tried on them.
+            worth: The merit that placements must exceed.
+
+        Returns:
+            The quadruples, and upper bounds on their discs, (q,) [object radii]; infinite for
+            reguli, which have none.
+        """
+        rooms, bounds = self.rooms, np.full(len(self), np.inf)
+        promise = self.widest
+        if construction.limits is not None:
+            limits = self.cones.limits(self.faces, self.widest)[:, construction.limits]
+            promise = bounds = np.minimum(limits.max(axis=1), rooms)
+        usable = (self.widest > LEAST_SPAN_ANGLE) & (rooms > 0.0) & (bounds > worth)
+        order = np.argsort(-graded(promise), kind="stable")
+        order = order[usable[order]]
+        return self.some(order), bounds[order]
