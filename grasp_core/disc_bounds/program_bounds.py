@@ -15,8 +15,7 @@ from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
 from grasp_core.families.constructions import LEAST_RADIUS, Construction
-from grasp_core.families.face_tables import face_table
-from grasp_core.families.kernel_tables import Attempts, FaceTable
+from grasp_core.families.kernel_tables import Attempts, FaceTable, face_table
 from grasp_core.families.regulus import regulus_bounds
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.solvers.lp import RESIDUAL

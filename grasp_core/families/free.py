@@ -11,22 +11,11 @@ a convex face is a convex combination of the same force at its corners, so
 A separating twist of the patch is therefore a proof of absence; by convexity of the supports it
 separates every grasp on these faces.
 
-If the patch is closed, take the smallest forces that show it and add them face by face:
-
-    F_i = sum of the forces at the corners of face i.                                    (2)
-
-The F_i lie inside the cones and balance as forces. With them fixed, equilibrium is linear in the
-positions x_i = o_i + T_i y_i:
-
-    maximise t  subject to  sum_i (o_i + T_i y_i) x F_i = 0,                             (3)
-                            e.y_i + t <= b                   for all i, edges.           (4)
-
-Any solution inside the faces, unless all on one line, is in force closure. Among solutions nearly
-as far from the edges as these forces allow, the one nearest to the middles of the faces is taken.
-If there is none, the centres of pressure of the patch are tried as contacts (5), then patches of
-smaller random pieces of the faces, which give other forces (6). What is still open can be split
-(7): each face quadruple is cut through its longest face, parts are dropped with their proof of
-absence, until a grasp is found, nothing is left, or the budget is spent.
+If the patch is closed, its forces, added up face by face, say where four contacts balance
+(`free_contacts`). If no contacts are found in this way, patches of smaller random pieces of the
+faces are tried, which give other forces (2). What is still open can be split (3): each face
+quadruple is cut through its longest face, parts are dropped with their proof of absence, until a
+grasp is found, nothing is left, or the budget is spent.
 
 Nothing here depends on P3. The lines of force are of the most general type, as a rule a
 regulus, with u, slopes and pitch free; so this also answers the freedom that the paper leaves
@@ -42,10 +31,7 @@ from heapq import heappop, heappush
 
 import numpy as np
 
-from grasp_core.arrays import Array
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
-from grasp_core.closure.lines import classify_lines
-from grasp_core.closure.wrenches import cross_matrix, grasp_map, normal_and_tangential
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.face_parts import (
     Corners,
@@ -56,31 +42,15 @@ from grasp_core.families.face_parts import (
     part_at,
     random_parts,
 )
-from grasp_core.families.free_forces import smallest_forces
+from grasp_core.families.free_contacts import grasp_from_patch, of_general_type
 from grasp_core.families.placements import Placement
 from grasp_core.fields import are_frictions, is_a, is_tuple_of
 from grasp_core.objects.face_pieces import FacePiece
-from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
-from grasp_core.solvers.nearest_point import least_distance
 from grasp_core.solvers.ties import graded
 from grasp_core.values import FINGERS
 
 RESTARTS = 12
 """Default number of smaller random patches that are tried."""
-LEAST_INSET = 1e-4
-"""Least distance of a contact from the edges of its face, in object radii."""
-DEPTH_KEPT = 0.5
-"""Share of the patch's margin that its forces keep inside their cones."""
-ROUNDED = 1e-12
-"""Least weight of a corner in a centre of pressure: keeps the weights' sum above zero."""
-INSET_KEPT = 0.9
-"""Share of the largest distance from the edges that contacts keep when they move to the middles."""
-SAME_PLANE = 1e-6
-"""Moments smaller than this, relative to the largest, are rounding: the forces lie in a plane."""
-LEAST_SPREAD = 1e-3
-"""Least extent of the contacts across the line they are closest to, in object radii."""
-
-
 SAME_CORNERS = 1e-12
 """How far contacts of a proof may be from the corners of its part: thousands of roundings."""
 
@@ -171,15 +141,15 @@ def place_free(
         if patch is not None and not patch.closed:
             leaves.append((path, patch))
             continue
-        found = _grasp(pieces, part, patch, friction) if patch is not None else None
-        # (6), once for the whole pieces
+        found = grasp_from_patch(pieces, part, patch, friction) if patch is not None else None
+        # (2), once for the whole pieces
         if found is None and not path:
             found = _restarted(pieces, friction, rng, restarts)
         if found is not None:
             general = of_general_type(pieces, found, friction, rng)
             return general or Undecided(len(waiting) + 1, _share([*waiting, (0.0, path)]))
         margin = patch.margin if patch is not None else 0.0
-        # (7): parts with the largest margin are examined first
+        # (3): parts with the largest margin are examined first
         for half in (0, 1):
             heappush(waiting, (-graded(margin), (*path, half)))
     if waiting:
@@ -201,149 +171,11 @@ def close_patch(
         return None
 
 
-def place_by_forces(pieces: Sequence[FacePiece], forces: Array) -> Placement | None:
-    """Place contacts at which given forces balance, as far from the edges as possible.
-
-    Args:
-        pieces: Four convex pieces.
-        forces: One force per piece, summing to zero, (4, 3).
-
-    Returns:
-        The placement; None if the contacts would be too near an edge or on one line.
-    """
-    A_eq = np.zeros((3, 2 * FINGERS + 1))
-    b_eq = np.zeros(3)
-    rows: list[Array] = []
-    limits: list[Array] = []
-    for i, (piece, force) in enumerate(zip(pieces, forces, strict=True)):
-        # (3): x_i x F_i = -F_i x (o_i + T_i y_i)
-        turn = -cross_matrix(force)
-        A_eq[:, 2 * i : 2 * i + 2] = turn @ piece.frame
-        b_eq -= turn @ piece.origin
-        # (4): contacts keep a distance t from the edges
-        inside = np.zeros((len(piece.E), 2 * FINGERS + 1))
-        inside[:, 2 * i : 2 * i + 2], inside[:, -1] = piece.E, 1.0
-        rows.append(inside)
-        limits.append(piece.b)
-    objective = np.eye(2 * FINGERS + 1)[-1]
-    scale = float(np.abs(forces).max())
-    found = maximize(
-        # scaling (3) by the largest force leaves the solver numbers of size one
-        LinearProgram(objective, np.vstack(rows), np.hstack(limits), A_eq / scale, b_eq / scale)
-    )
-    if not isinstance(found, Optimum) or INSET_KEPT * found.value < LEAST_INSET:
-        return None
-    edges, ends = np.vstack(rows)[:, :-1], np.hstack(limits)
-    inside = ends - INSET_KEPT * found.value
-    y = _nearest_to_middles(pieces, found.x[:-1], A_eq[:, :-1], edges, inside)
-    positions = np.array(
-        [piece.point(at) for piece, at in zip(pieces, y.reshape(FINGERS, 2), strict=True)]
-    )
-    if _on_one_line(positions):
-        return None
-    inset = float((ends - edges @ y).min())
-    return Placement(positions, forces, np.empty((0, 3)), np.zeros(FINGERS), inset)
-
-
-def _nearest_to_middles(
-    pieces: Sequence[FacePiece], start: Array, A_eq: Array, rows: Array, limits: Array
-) -> Array:
-    """Balanced contacts with rows @ y <= limits that are nearest to the pieces' middles, (8,).
-
-    They are unique, unlike the contacts farthest from the edges, so they turn with the object.
-    """
-    _, sizes, right = np.linalg.svd(A_eq)
-    # the null space of (3): moves along it keep the balance
-    free = right[int((sizes > SAME_PLANE * sizes[0]).sum()) :].T
-    middles = np.concatenate([piece.corners.mean(axis=0) for piece in pieces])
-    y = start + free @ (free.T @ (middles - start))
-    (step,) = least_distance(rows @ free, (limits - rows @ y)[None])
-    return start if np.isnan(step).any() else y + free @ step
-
-
-def _grasp(
-    pieces: Sequence[FacePiece], part: Corners, patch: ClosureCertificate, friction: float
-) -> Placement | None:
-    """Make a placement from the forces of a closed patch; None if no attempt holds."""
-    if patch.forces is None:
-        return None
-    owner = np.repeat(np.arange(FINGERS), [len(corners) for corners in part])
-    at_corners = smallest_forces(
-        [pieces[int(i)] for i in owner], patch.positions, patch.normals, friction,
-        DEPTH_KEPT * patch.margin,
-    )  # fmt: skip
-    at_corners = patch.forces if at_corners is None else at_corners
-    # (2); the mean takes away what rounding leaves of the sum
-    forces = np.array([at_corners[owner == i].sum(axis=0) for i in range(FINGERS)])
-    if found := place_by_forces(pieces, forces - forces.mean(axis=0)):
-        return found
-    # (5): pressed harder, a corner draws the contact nearer
-    pushes, _ = normal_and_tangential(at_corners, patch.normals)
-    weights = np.maximum(pushes, ROUNDED)
-    centers = np.array(
-        [
-            np.average(patch.positions[owner == i], axis=0, weights=weights[owner == i])
-            for i in range(FINGERS)
-        ]
-    )
-    return _held_at(pieces, centers, friction)
-
-
-def of_general_type(
-    pieces: Sequence[FacePiece], found: Placement, friction: float, rng: np.random.Generator
-) -> Placement | None:
-    """Give a placement forces whose lines form a regulus, at the same contacts.
-
-    On symmetric faces the patch's forces may all meet, or lie in one plane. Adding internal
-    forces, half as large as the cones have room for, makes the lines skew. The result is None
-    where that room is too small to tell.
-    """
-    if classify_lines(found.positions, found.forces) == "regulus":
-        return found
-    normals = np.array([piece.normal for piece in pieces])
-    G = grasp_map(found.positions)
-    drawn = np.concatenate(
-        [np.column_stack([piece.normal, piece.frame]) @ rng.normal(size=3) for piece in pieces]
-    )
-    # internal forces make no wrench: take away the part of the drawn ones that does
-    internal = (drawn - np.linalg.pinv(G) @ (G @ drawn)).reshape(FINGERS, 3)
-    along, across = normal_and_tangential(found.forces, normals)
-    inward, sideways = normal_and_tangential(internal, normals)
-    room = (friction * along - across) / (sideways + friction * np.abs(inward))
-    forces = found.forces + 0.5 * float(room.min()) * internal
-    pushes = float(np.einsum("ki,ki->", forces, normals))
-    if classify_lines(found.positions, forces) != "regulus":
-        return None
-    return replace(found, forces=forces / pushes, planned=found.forces)
-
-
-def _held_at(pieces: Sequence[FacePiece], positions: Array, friction: float) -> Placement | None:
-    """Make a placement at given contacts if they are in force closure; None otherwise."""
-    inset = min(
-        float((piece.b - piece.E @ (piece.frame.T @ (at - piece.origin))).min())
-        for piece, at in zip(pieces, positions, strict=True)
-    )
-    normals = np.array([piece.normal for piece in pieces])
-    try:
-        certificate = force_closure(positions, normals, friction)
-    except UndecidedError:
-        return None
-    if certificate.forces is None or inset < LEAST_INSET or _on_one_line(positions):
-        return None
-    return Placement(positions, certificate.forces, np.empty((0, 3)), np.zeros(FINGERS), inset)
-
-
-def _on_one_line(positions: Array) -> bool:
-    """Whether contacts are so near one line that they hardly resist turning about it."""
-    spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
-    return bool(spread[1] < LEAST_SPREAD)
-
-
 def _restarted(
     pieces: Sequence[FacePiece], friction: float, rng: np.random.Generator, restarts: int
 ) -> Placement | None:
     for part in random_parts(pieces, rng, restarts):
         patch = close_patch(pieces, part, friction)
-        if patch is not None and (found := _grasp(pieces, part, patch, friction)):
+        if patch is not None and (found := grasp_from_patch(pieces, part, patch, friction)):
             return found
     return None

@@ -1,4 +1,4 @@
-"""Frames, slopes and force rows of the two pairs of a regulus, in the letters of `regulus`."""
+"""Frames, slopes and force rows of a regulus' two pairs, in the letters of `regulus_program`."""
 
 from typing import NamedTuple
 
@@ -51,7 +51,7 @@ def pair_frames(faces: FaceTable, attempts: Attempts, a: int, terms: RegulusTerm
         for j in range(3):
             frames.N[pair, j] = scale * normal[j]
             frames.v[pair, j] *= scale
-        # the interval (3) of `regulus`
+        # the interval (3) of `regulus_program`
         least, largest = -np.pi, np.pi / 2.0
         for axis in (first, second):
             phi = angle_between(axis, resultant * u)

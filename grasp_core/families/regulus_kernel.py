@@ -3,8 +3,8 @@
 A program, over (x0, k, p, x_1, x_2, z_1, z_2, t), is first solved without its gap: if p stays
 beyond the gap anyway, that side was the better one. As the cones span (P3), x_i is on the side of
 its pair's resultant; there the rows that keep the forces of a pair in their pyramids are bounds on
-z_i / x_i, of which the tightest imply the others. `regulus` builds the same programs whole and
-solves the best one again. Numbers in comments are those of its derivation.
+z_i / x_i, of which the tightest imply the others. `regulus_program` builds the same programs whole,
+and `regulus` solves the best one again. Numbers in comments are those of `regulus_program`.
 """
 
 from typing import NamedTuple

@@ -23,7 +23,7 @@ from grasp_core.checked import SMALLEST, coefficient, number, seed_of
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.constructions import point_region, regions_of
-from grasp_core.families.free import of_general_type
+from grasp_core.families.free_contacts import of_general_type
 from grasp_core.families.placements import Placement
 from grasp_core.geometry.polygons import SAME_CORNER
 from grasp_core.objects.face_pieces import FacePiece, inset_piece, unit_pieces

@@ -1,4 +1,4 @@
-"""How large a wrench contacts resist: the largest multiple of one, and the weakest of several.
+"""How large a wrench contacts resist: the largest multiple of a given one, proved on both sides.
 
 With each normal force at most f_max, the wrenches that the contacts can apply form a convex
 body W around the origin. An external wrench w is resisted up to
@@ -9,18 +9,11 @@ a conic program. Its dual is a facet of W: a twist y with
 
     y.w = -1  and  lambda = h(y) = f_max sum_i max(0, s_i(y)),                          (2)
 
-the support of W (s_i as in `force_closure`). The wrench -y / |y| meets that facet squarely, so
-
-    limit of -y / |y|  <=  h(y) / |y|:                                                  (3)
-
-stepping from a wrench to the one its limiting facet points at never raises the limit, and stops
-at a wrench that is locally the weakest. No wrench of unit size has a limit below f_max times the
-`linf` quality of the contacts (see `ferrari_canny`), which is the bound over all directions.
-
-Torques are compared with forces through a stated length.
+the support of W (s_i as in `force_closure`). `weakest_wrench` steps along such facets to the wrench
+of unit size that is hardest to resist. No such wrench has a limit below f_max times the `linf`
+quality of the contacts (see `ferrari_canny`), which is the bound over all directions.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,11 +27,8 @@ from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_fr
 from grasp_core.errors import InputError
 from grasp_core.fields import is_array, is_number
 from grasp_core.solvers.conic import ConicProgram, minimize
-from grasp_core.solvers.ties import first_best, smallest_first
 from grasp_core.values import Grasp
 
-SETTLED = 1e-3
-"""The search for the weakest wrench ends when a step lowers the limit by less than this share."""
 HELD = 1e-7
 """How far forces at a limit may leave cones and balance, relative to the largest wrench of a unit
 normal force: the accuracy of conic programs."""
@@ -47,9 +37,6 @@ ROUNDING = 1e-9
 its factors."""
 LAST_DIGITS = 1e-12
 """Slack of an upper bound near zero, relative to the largest that the facet's length allows."""
-MAX_STEPS = 30
-STARTS = 3
-"""How many of the weakest axis wrenches the search starts from."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -277,33 +264,6 @@ class WrenchBody:
         slides = np.asarray(np.cross(facet[3:], self.middle), dtype=np.float64)
         return np.concatenate([facet[:3] - slides, facet[3:]])
 
-    def weakest_from(self, limits: Iterable[WrenchLimit], torque_scale: float) -> WrenchLimit:
-        """Search for a wrench of unit size that is locally the hardest to resist.
-
-        Args:
-            limits: Limits of wrenches of unit size; the weakest of these are followed.
-            torque_scale: Length that makes a torque comparable with a force [m].
-
-        Returns:
-            The weakest limit found: its wrench has |(force, torque / torque_scale)| = 1.
-        """
-        scale = np.array([1.0] * 3 + [torque_scale] * 3)
-        every = list(limits)
-        weak = [every[place] for place in smallest_first([found.limit for found in every])]
-        ends = [self._descend(start, scale) for start in weak[:STARTS]]
-        return ends[first_best([-found.limit for found in ends])]
-
-    def _descend(self, start: WrenchLimit, scale: Array) -> WrenchLimit:
-        best = start
-        for _ in range(MAX_STEPS):
-            # (3): the wrench that the limiting facet points at, by the scaled product of wrenches
-            facing = -best.facet * scale**2
-            found = self.limit(_unit(facing, scale))
-            if found.limit > best.limit * (1.0 - SETTLED):
-                break
-            best = found
-        return best
-
 
 def axis_wrenches(torque_scale: float) -> Array:
     """Return the twelve wrenches along and against each axis, (12, 6) [N, N m].
@@ -313,7 +273,3 @@ def axis_wrenches(torque_scale: float) -> Array:
     """
     scale = np.array([1.0] * 3 + [torque_scale] * 3)
     return np.vstack([np.eye(6), -np.eye(6)]) * scale
-
-
-def _unit(wrench: Array, scale: Array) -> Array:
-    return wrench / float(np.linalg.norm(wrench / scale))

@@ -9,6 +9,7 @@ from grasp_core.arrays import Array, to_digits
 from grasp_core.closure.contact_arrays import contact_frictions, stacked
 from grasp_core.closure.wrenches import normal_and_tangential
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.weakest_wrench import weakest_from
 from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit, axis_wrenches
 from grasp_core.values import Contact
 from sim_validate.simulation.schedules import Load
@@ -104,7 +105,7 @@ def _relative(
 ) -> list[tuple[str, WrenchLimit]]:
     """Name the wrenches that are applied at a share of their limit, and compute that limit."""
     axes = [resisted.limit(wrench) for wrench in axis_wrenches(torque_scale)]
-    weakest = resisted.weakest_from(axes, torque_scale)
+    weakest = weakest_from(resisted, axes, torque_scale)
     rng = np.random.default_rng(agenda.seed)
     scale = np.array([1.0] * 3 + [torque_scale] * 3)
     drawn = rng.normal(size=(agenda.random_wrenches, 6))

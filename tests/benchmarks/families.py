@@ -22,15 +22,12 @@ from grasp_core.families.kernel_tables import Attempts
 from grasp_core.families.pencil import CELL_A, CELL_B, _discs, _near_rows
 from grasp_core.families.pencil import _rows as pencil_rows
 from grasp_core.families.placements import focus_direction
-from grasp_core.families.regulus import (
-    CHOICES,
-    SIDES,
-    SLOPES,
-    _line,
-    _pairs,
-    _program,
-    _slope,
-    regulus_bounds,
+from grasp_core.families.regulus import CHOICES, SIDES, SLOPES, regulus_bounds
+from grasp_core.families.regulus_program import (
+    frames_of_pairs,
+    line_of,
+    regulus_program,
+    slope_at,
 )
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning.blocks import spanning_blocks
@@ -107,12 +104,12 @@ def by_highs(program):
 
 
 def regulus_programs(pieces, cones):
-    pairs = _pairs(cones)
+    pairs = frames_of_pairs(cones)
     facets = [inscribed_facets(c, p.frame[:, 0]) for c, p in zip(cones, pieces, strict=True)]
     for *which, side in CHOICES:
-        slopes = [_slope(pair, SLOPES[each]) for pair, each in zip(pairs, which, strict=True)]
-        lines = [_line(pairs, slopes, finger) for finger in range(4)]
-        yield _program(pieces, facets, lines, slopes, SIDES[side])
+        slopes = [slope_at(pair, SLOPES[each]) for pair, each in zip(pairs, which, strict=True)]
+        lines = [line_of(pairs, slopes, finger) for finger in range(4)]
+        yield regulus_program(pieces, facets, lines, slopes, SIDES[side])
 
 
 def _attempts(body, shapes, construction):

@@ -3,6 +3,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.wrenches import grasp_map, normal_and_tangential
+from grasp_core.quality.weakest_wrench import weakest_from
 from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, max_resisted_wrench
 from scenes.example_objects import example_object
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
@@ -62,7 +63,7 @@ def test_the_weakest_wrench_is_weaker_than_axes_and_random_wrenches():
                 grasp.positions - body.center_of_mass, grasp.normals, np.full(4, 0.5), 10.0
             )
             axes = axis_wrenches(body.radius)
-            weakest = resisted.weakest_from(map(resisted.limit, axes), body.radius)
+            weakest = weakest_from(resisted, map(resisted.limit, axes), body.radius)
             assert np.linalg.norm(weakest.wrench / scale) == pytest.approx(1.0)
             others = rng.normal(size=(30, 6))
             others = others / np.linalg.norm(others, axis=1, keepdims=True) * scale
