@@ -195,7 +195,8 @@ class Grip:
                 "turns about their line; use other contacts, or less squeeze"
             )
         units = np.diag(np.repeat([1.0, 1.0 / self.size], 3))
-        return units @ np.linalg.inv(self._scaled) @ units
+        inverse = np.asarray(np.linalg.inv(self._scaled), dtype=np.float64)
+        return units @ inverse @ units
 
     @cached_property
     def _maps(self) -> Array:
