@@ -101,7 +101,11 @@ class Reactions:
         return np.where(L > 0.0, found, np.where(room >= 0.0, np.inf, -np.inf))
 
     def worst_angles(self) -> tuple[Array, Array]:
-        """Find the angle of the least scale (3) of each contact, and that scale, (k,) each."""
+        """Find the least scale (3) of each contact and an angle of it, (k,) each, angles first.
+
+        Of equal minima one is taken by a rule with a margin (see `ties`). Where a contact slips
+        under the offset alone, its negative scale need not be the least one.
+        """
         k, step = len(self.friction), 2.0 * np.pi / ANGLES
         grid = np.tile(np.linspace(0.0, 2.0 * np.pi, ANGLES, endpoint=False), (k, 1))
         values = self.scales(grid)
@@ -114,7 +118,7 @@ class Reactions:
         angles = np.hstack([across, self._polished(starts, step), starts])
         found = self.scales(angles)
         chosen = [first_best(-row) for row in found]
-        return angles[np.arange(k), chosen], found[np.arange(k), chosen]
+        return angles[np.arange(k), chosen], found.min(axis=1)
 
     def worst_of(self, contact: int, angle: float) -> Array:
         """Find the z at which a contact slips first in a direction, of unit length, (m,)."""
@@ -180,6 +184,6 @@ class Reactions:
             high, low = np.where(slope > 0.0, angles, high), np.where(slope > 0.0, low, angles)
             with np.errstate(divide="ignore", invalid="ignore"):
                 newton = angles - slope / bend
-            inside = (newton > low) & (newton < high)  # nor if it is not a number
+            inside = (newton >= low) & (newton <= high)  # nor if it is not a number
             angles = np.where(inside, newton, 0.5 * (low + high))
         return angles
