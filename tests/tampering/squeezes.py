@@ -57,7 +57,7 @@ def responding(g, loads):
     return frames, rest, change @ loads.offset, change @ loads.axes
 
 
-def squeeze(c, rng):
+def squeeze(c):
     """The squeeze survives, its worst load is one, and no squeeze survives more than the bound."""
     g = c.grip
     if not sensible(g) or not 0.0 <= c.scale <= c.upper or c.max_push_n < 0.0:
@@ -92,64 +92,72 @@ def lean(change, mu):
     return np.linalg.norm(tilted, axis=2)
 
 
+class Rows:
+    """Rows of a linear program in squeeze and scale."""
+
+    def __init__(self, states, mu):
+        self.states, self.mu, self.A, self.b = states, mu, [], []
+        for start, swing in states:
+            for i in range(len(mu)):
+                for sign in (1.0, -1.0):
+                    row = np.zeros(3 * len(mu) + 1)
+                    row[3 * i], row[-1] = sign, np.linalg.norm(swing[i, 0])
+                    self.A.append(row)
+                    self.b.append((sign > 0.0) - sign * start[i, 0])
+        for j in range(0, 720, 30):
+            self.take([np.full(len(mu), j)] * len(states))
+
+    def take(self, places):
+        """One more direction for each contact in each state."""
+        for (start, swing), turns in zip(self.states, places, strict=True):
+            leaning = lean(swing, self.mu)
+            for i, j in enumerate(turns):
+                row = np.zeros(3 * len(self.mu) + 1)
+                row[3 * i], row[3 * i + 1 : 3 * i + 3] = -self.mu[i], CIRCLE[j]
+                row[-1] = leaning[i, j]
+                self.A.append(row)
+                self.b.append(self.mu[i] * start[i, 0] - CIRCLE[j] @ start[i, 1:])
+
+    def worst(self, f, s):
+        """Directions in which a squeeze breaks the cones most."""
+        return [
+            ((f + start)[:, 1:] @ CIRCLE.T + s * lean(swing, self.mu)).argmax(axis=1)
+            for start, swing in self.states
+        ]
+
+
 def largest_scale(g, frames, offset, change, c):
     """By a linear program with rows of 720 directions, taken up where they are broken most."""
-    k, mu, most = len(g.friction), g.friction, c.max_push_n or 1e-12
+    k, most = len(g.friction), c.max_push_n or 1e-12
     unit = most / np.linalg.norm(change, axis=(1, 2)).max()
     states = [(offset / most, change * unit / most)]
     states += [(0.0 * offset, 0.0 * change)] * bool(c.loads.offset.any())
     size = np.linalg.norm(g.arms, axis=1).max()
     columns = [
         np.append(v, np.cross(arm, v) / size)
-        for arm, frame in zip(g.arms, frames, strict=True) for v in frame.T
-    ]  # fmt: skip
-    balance = np.column_stack([*columns, np.zeros(6)])
-    A, b = [], []
-
-    def take(state, i, j):
-        start, swing = state
-        row = np.zeros(3 * k + 1)
-        row[3 * i], row[3 * i + 1 : 3 * i + 3] = -mu[i], CIRCLE[j]
-        row[-1] = lean(swing, mu)[i, j]
-        A.append(row)
-        b.append(mu[i] * start[i, 0] - CIRCLE[j] @ start[i, 1:])
-
-    for state in states:
-        start, swing = state
-        for i in range(k):
-            for sign in (1.0, -1.0):
-                row = np.zeros(3 * k + 1)
-                row[3 * i], row[-1] = sign, np.linalg.norm(swing[i, 0])
-                A.append(row)
-                b.append((sign > 0.0) - sign * start[i, 0])
-            for j in range(0, 720, 30):
-                take(state, i, j)
+        for arm, frame in zip(g.arms, frames, strict=True)
+        for v in frame.T
+    ]
+    rows, scale = Rows(states, g.friction), 0.0
     for _ in range(12):
         answer = linprog(
-            np.append(np.zeros(3 * k), -1.0), A_ub=np.array(A), b_ub=np.array(b),
-            A_eq=balance, b_eq=np.zeros(6), bounds=[(None, None)] * (3 * k) + [(0.0, None)],
+            np.append(np.zeros(3 * k), -1.0), A_ub=np.array(rows.A), b_ub=np.array(rows.b),
+            A_eq=np.column_stack([*columns, np.zeros(6)]), b_eq=np.zeros(6),
+            bounds=[(None, None)] * (3 * k) + [(0.0, None)],
         )  # fmt: skip
         if answer.status != 0:
             return 0.0
-        f, s = answer.x[:-1].reshape(k, 3), answer.x[-1]
-        for state in states:
-            force = f + state[0]
-            broken = force[:, 1:] @ CIRCLE.T + s * lean(state[1], mu) - (mu * force[:, 0])[:, None]
-            for i, j in enumerate(broken.argmax(axis=1)):
-                take(state, i, j)
-    return s * unit
+        scale = answer.x[-1]
+        rows.take(rows.worst(answer.x[:-1].reshape(k, 3), scale))
+    return scale * unit
 
 
-def payload(c, rng):
+def payload(c):
     """The squeeze is as claimed, the rays too, and a hull of other rays agrees with the bounds."""
     g, free, most = c.fixed.grip, c.free, c.fixed.max_push_n
     E = c.fixed.loads.axes
     ball = np.diag([GRAVITY**2] * 3 + [0.0] * 3)
-    if (
-        c.fixed.loads.offset.any()
-        or np.abs(E @ E.T - ball).max() > 1e-6
-        or not squeeze(c.fixed, rng)
-    ):
+    if c.fixed.loads.offset.any() or np.abs(E @ E.T - ball).max() > 1e-6 or not squeeze(c.fixed):
         return False
     if not 0.0 <= free.lower <= free.upper:
         return False

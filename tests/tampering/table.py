@@ -219,8 +219,8 @@ TABLE = {
             c.found, c.positions, c.normals, c.friction, c.max_normal_force, c.center
         ),
     ),
-    "BestSqueeze": Row(best_squeeze, squeezes.squeeze, 0.8),
-    "Payload": Row(payload, squeezes.payload, 0.4),
+    "BestSqueeze": Row(best_squeeze, lambda c, _: squeezes.squeeze(c), 0.8),
+    "Payload": Row(payload, lambda c, _: squeezes.payload(c), 0.4),
     "proof file of regions": Row(
         proof_file, lambda c, rng: on_planes.regions(regions_of(vars(c)), rng), 0.4
     ),

@@ -21,7 +21,7 @@ def opposed(pairs=2):
     center = box().center_of_mass
     beside = (-ASIDE, ASIDE) if pairs == 2 else (0.0,)
     return tuple(
-        gc.Contact(center + [side * HALF, y, 0.0], [-side, 0.0, 0.0])
+        gc.Contact(center + np.array([side * HALF, y, 0.0]), [-side, 0.0, 0.0])
         for y in beside
         for side in (-1.0, 1.0)
     )

@@ -1,4 +1,5 @@
 import dataclasses
+from functools import partial
 
 import numpy as np
 import pytest
@@ -95,6 +96,11 @@ def test_the_worst_load_is_a_first_slip():
     assert tested == 24
 
 
+def less(grip, N, x):
+    local = (N @ x).reshape(4, 3)
+    return -survived(grip.squeezed(np.einsum("kij,kj->ki", grip.frames, local)), ANY, 10.0)
+
+
 def test_no_random_or_searched_squeeze_survives_more():
     """Balanced squeezes, 300 at random and the best by a direct search from five of them, each with
     its own response: at stiff fingertips, where that is nearly the same, none is better by 1 %, and
@@ -107,11 +113,7 @@ def test_no_random_or_searched_squeeze_survives_more():
             found = gc.best_squeeze(body, grasp, 0.5, ANY, max_push_n=10.0, stiffness=20_000.0)
             grip = found.grip
             N = null_space(in_frames(grasp_map(grip.arms), grip.frames))
-            away = lambda x, g=grip, n=N: (
-                -survived(  # noqa: E731
-                    g.squeezed(np.einsum("kij,kj->ki", g.frames, (n @ x).reshape(4, 3))), ANY, 10.0
-                )
-            )
+            away = partial(less, grip, N)
             known = N.T @ grip.local_squeeze.ravel()
             starts = known + 2.0 * rng.normal(size=(300, N.shape[1]))
             values = [away(x) for x in starts]

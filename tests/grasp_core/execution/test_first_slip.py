@@ -71,8 +71,8 @@ def test_the_linear_model_is_the_limit_of_stiff_fingertips():
 
 @pytest.mark.parametrize("most", [np.inf, 12.0])
 def test_no_first_slip_is_above_the_closure_limit(most):
-    """Finite: forces at first slip are in cones and limits and balance the load in the pose reached,
-    so that the contacts in that pose resist it.
+    """Finite: forces at first slip are in cones and limits and balance the load in the pose
+    reached, so that the contacts in that pose resist it.
     """
     tested = 0
     for stiffness in (500.0, 3000.0):
@@ -95,7 +95,7 @@ def test_no_first_slip_is_above_the_closure_limit(most):
 
 
 def test_linear_forces_balance_at_rest_where_tips_do_not_roll():
-    """The comparison with the closure limit of the contacts at rest is exact for tips of no size."""
+    """The comparison with the closure limit of the contacts at rest is exact for point tips."""
     tested = 0
     for i, grip in enumerate(planned_grips(stiffness=1000.0, tip_radius_m=0.0)):
         for load in loads_of(grip, 4, np.random.default_rng(i)):
