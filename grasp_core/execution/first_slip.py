@@ -113,8 +113,8 @@ def _check_rest(grip: Grip, max_push_n: float) -> None:
     if slack[worst] < -AT_REST * float(np.abs(n).max()):
         raise InputError(
             f"squeeze: contact {worst} of the grip is not held at rest: it pushes with "
-            f"{n[worst]:.6g} N, of at most {max_push_n:.6g} N, and has {t[worst]:.6g} N across, at "
-            f"friction {grip.friction[worst]:.6g}; take the squeeze from best_squeeze"
+            f"{n[worst]:.6g} N (max_push_n is {max_push_n:.6g}) and has {t[worst]:.6g} N across, "
+            f"at friction {grip.friction[worst]:.6g}; take the squeeze from best_squeeze"
         )
 
 
