@@ -54,6 +54,7 @@ class FirstSlip:
     multiple: float
     """Multiple of the load at which it ends; infinite where nothing happens."""
     event: Event
+    """What happens there: `slip`, `push limit`, `unstable` or `none`."""
     contact: int
     """Index of the contact where it happens; -1 for events of the whole grip."""
     forces: Array

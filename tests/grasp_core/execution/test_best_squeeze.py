@@ -152,6 +152,25 @@ def test_the_scale_does_not_depend_on_the_frame_or_the_order_of_fingers():
     assert (again.grip.squeeze == first.grip.squeeze).all()
 
 
+def test_last_digits_of_contacts_move_a_squeeze_by_last_digits():
+    """The nearest of equal optima is taken, so that rounding by 1e-13 does not choose another."""
+    tested = 0
+    rng = np.random.default_rng(0)
+    for name in ("box", "dodecahedron", "wedge"):
+        body, grasps = planned(name, 3)
+        for grasp in grasps:
+            first = gc.best_squeeze(body, grasp, 0.5, ANY, max_push_n=10.0)
+            shaken = [
+                gc.Contact(c.position + 1e-13 * rng.normal(size=3), c.normal)
+                for c in grasp.contacts
+            ]
+            second = gc.best_squeeze(body, shaken, 0.5, ANY, max_push_n=10.0)
+            assert second.grip.squeeze == pytest.approx(first.grip.squeeze, abs=1e-5)
+            assert second.scale == pytest.approx(first.scale, rel=1e-6)
+            tested += 1
+    assert tested == 9
+
+
 def test_without_friction_nothing_is_survived():
     found = gc.best_squeeze(box(), opposed(), 0.0, ANY, max_push_n=10.0)
     assert found.scale == 0.0
