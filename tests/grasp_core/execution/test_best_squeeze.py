@@ -101,30 +101,39 @@ def less(grip, N, x):
     return -survived(grip.squeezed(np.einsum("kij,kj->ki", grip.frames, local)), ANY, 10.0)
 
 
-def test_no_random_or_searched_squeeze_survives_more():
-    """Balanced squeezes, 300 at random and the best by a direct search from five of them, each with
-    its own response: at stiff fingertips, where that is nearly the same, none is better by 1 %, and
-    the search comes within 1 %.
+def against_brute_force(name, limit, count):
+    """Balanced squeezes at random, and the best by a direct search from some, each with its own
+    response: at stiff fingertips, where that is nearly the same, none is better by 1 %, and the
+    search comes within 1 %. Returns how many squeezes were tried.
     """
     rng, tested = np.random.default_rng(1), 0
-    for name in ("box", "wedge"):
-        body, grasps = planned(name, 2)
-        for grasp in grasps:
-            found = gc.best_squeeze(body, grasp, 0.5, ANY, max_push_n=10.0, stiffness=20_000.0)
-            grip = found.grip
-            N = null_space(in_frames(grasp_map(grip.arms), grip.frames))
-            away = partial(less, grip, N)
-            known = N.T @ grip.local_squeeze.ravel()
-            starts = known + 2.0 * rng.normal(size=(300, N.shape[1]))
-            values = [away(x) for x in starts]
-            assert min(values) >= -found.upper * 1.01
-            near = [known, *starts[np.argsort(values)[:4]]]
-            best = min(
-                minimize(away, x, method="Nelder-Mead", options={"maxiter": 300}).fun for x in near
-            )
-            assert -1.01 * found.scale <= best <= -0.99 * found.scale
-            tested += len(starts)
-    assert tested == 1200
+    body, grasps = planned(name, limit)
+    for grasp in grasps:
+        found = gc.best_squeeze(body, grasp, 0.5, ANY, max_push_n=10.0, stiffness=20_000.0)
+        grip = found.grip
+        N = null_space(in_frames(grasp_map(grip.arms), grip.frames))
+        away = partial(less, grip, N)
+        known = N.T @ grip.local_squeeze.ravel()
+        starts = known + 2.0 * rng.normal(size=(count, N.shape[1]))
+        values = [away(x) for x in starts]
+        assert min(values) >= -found.upper * 1.01
+        near = [known, *starts[np.argsort(values)[: count // 70]]]
+        best = min(
+            minimize(away, x, method="Nelder-Mead", options={"maxiter": count}).fun for x in near
+        )
+        assert -1.01 * found.scale <= best <= -0.99 * found.scale
+        tested += len(starts)
+    return tested
+
+
+def test_no_random_or_searched_squeeze_survives_more():
+    assert against_brute_force("wedge", 1, 140) == 140
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["box", "dodecahedron", "wedge"])
+def test_no_squeeze_of_many_survives_more(name):
+    assert against_brute_force(name, 3, 300) == 900
 
 
 def test_least_push_and_most_scale_are_inverse():
