@@ -17,6 +17,17 @@ from grasp_core.errors import NoForcesError as NoForcesError
 from grasp_core.errors import SolverError as SolverError
 from grasp_core.errors import UndecidedError as UndecidedError
 from grasp_core.errors import UnfaithfulError as UnfaithfulError
+from grasp_core.execution.best_squeeze import best_squeeze as best_squeeze
+from grasp_core.execution.first_slip import FirstSlip as FirstSlip
+from grasp_core.execution.first_slip import first_slip as first_slip
+from grasp_core.execution.grips import Grip as Grip
+from grasp_core.execution.grips import grip as grip
+from grasp_core.execution.loads import LoadSet as LoadSet
+from grasp_core.execution.loads import any_direction as any_direction
+from grasp_core.execution.payload import FreeMass as FreeMass
+from grasp_core.execution.payload import Payload as Payload
+from grasp_core.execution.payload import payload as payload
+from grasp_core.execution.squeeze_certificate import BestSqueeze as BestSqueeze
 from grasp_core.forces.contact_forces import contact_forces as contact_forces
 from grasp_core.mesh_files.limits import MeshLimits as MeshLimits
 from grasp_core.objects.conversion import from_trimesh as from_trimesh

@@ -5,6 +5,7 @@ import importlib
 import inspect
 import textwrap
 from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -119,7 +120,7 @@ def short_default(text: str) -> str:
 def called(kind: type, part: ast.FunctionDef) -> str:
     """How a property or a method is written."""
     held = inspect.getattr_static(kind, part.name)
-    if isinstance(held, property):
+    if isinstance(held, property | cached_property):
         return f".{part.name}"
     return f".{part.name}{signature(getattr(kind, part.name))}"
 

@@ -85,9 +85,10 @@ class WrenchLimit:
             points - about, units, contact_frictions(friction, len(points)), max_normal_force
         )
         with np.errstate(all="ignore"):
-            return self._has_numbers(len(points)) and body.attains(self) and body.bounds(self)
+            return self.has_numbers(len(points)) and body.attains(self) and body.bounds(self)
 
-    def _has_numbers(self, count: int) -> bool:
+    def has_numbers(self, count: int) -> bool:
+        """Return whether the fields are numbers of the right shapes, for `count` contacts."""
         return (
             is_array(self.wrench, WRENCH)
             and bool(self.wrench.any())

@@ -9,12 +9,25 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from tests.public_values import calls_of_analysis, calls_of_simulation, calls_of_values
+from tests.public_values import (
+    calls_of_analysis,
+    calls_of_execution,
+    calls_of_simulation,
+    calls_of_values,
+)
 
 PACKAGES = {"gc": gc, "scenes": scenes, "sv": sv}
-CALLS = [*calls_of_analysis.CALLS, *calls_of_values.CALLS, *calls_of_simulation.CALLS]
+CALLS = [
+    *calls_of_analysis.CALLS, *calls_of_execution.CALLS, *calls_of_values.CALLS,
+    *calls_of_simulation.CALLS,
+]  # fmt: skip
 BY_NAME = {call.name: call for call in CALLS}
 MADE_BY_FUNCTIONS = {
+    "gc.BestSqueeze": "best_squeeze",
+    "gc.FirstSlip": "first_slip",
+    "gc.FreeMass": "payload",
+    "gc.Grip": "grip",
+    "gc.Payload": "payload",
     "gc.CertifiedRegions": "certify_regions and read_regions",
     "gc.ClosureCertificate": "force_closure",
     "gc.FerrariCanny": "ferrari_canny",

@@ -17,7 +17,7 @@ from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.regions.certify_regions import certify_regions
 from sim_validate.records.regions import SHAPES, proof_arrays, regions_of
 from tests.judges import random_contacts
-from tests.tampering import exact_closure, on_planes, wrench_bounds
+from tests.tampering import exact_closure, on_planes, squeezes, wrench_bounds
 
 SIZES = (1e-3, 0.1, 1.0, 100.0)
 FRICTIONS = (0.0, 0.05, 0.3, 0.5, 1.0, 3.0)
@@ -157,6 +157,36 @@ def wrench_limit(seed):
     return Limited(found, x, n, mu, largest, center)
 
 
+@cache
+def held(seed):
+    """Keyword arguments of a grip."""
+    rng = np.random.default_rng(seed)
+    body, friction, grasps = planned(seed)
+    return (body, grasps[seed // len(PLANNED) % len(grasps)], friction), {
+        "stiffness": float(rng.choice([1000.0, 5000.0])),
+        "tip_radius_m": float(rng.choice([0.0, 0.01])),
+    }
+
+
+def best_squeeze(seed):
+    """With and without a limit on pushes, and an offset."""
+    rng = np.random.default_rng(seed)
+    contacts, springs = held(seed)
+    size = contacts[0].radius
+    axes = np.diag(np.repeat([0.5, 0.5 * size], 3))[:, : rng.choice([3, 6])]
+    loads = gc.LoadSet([0.0, 0.0, -1.0 * (seed % 2), 0.0, 0.0, 0.0], axes)
+    most = None if seed % 3 == 1 else 10.0
+    try:
+        return gc.best_squeeze(*contacts, loads, max_push_n=most, **springs)
+    except gc.NoForcesError:
+        return None
+
+
+def payload(seed):
+    contacts, springs = held(seed)
+    return gc.payload(*contacts, max_push_n=10.0, **springs)
+
+
 ProofFile = dataclasses.make_dataclass(
     "ProofFile", SHAPES, frozen=True, eq=False,
     namespace={"verify": lambda self: regions_of(vars(self)).verify()},
@@ -189,6 +219,8 @@ TABLE = {
             c.found, c.positions, c.normals, c.friction, c.max_normal_force, c.center
         ),
     ),
+    "BestSqueeze": Row(best_squeeze, lambda c, _: squeezes.squeeze(c), 0.8),
+    "Payload": Row(payload, lambda c, _: squeezes.payload(c), 0.4),
     "proof file of regions": Row(
         proof_file, lambda c, rng: on_planes.regions(regions_of(vars(c)), rng), 0.4
     ),

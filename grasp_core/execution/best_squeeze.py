@@ -1,0 +1,241 @@
+"""The squeeze that survives most: least push for stated loads, or most load for a stated push.
+
+Fingers squeeze with forces that balance, and whose commands stay as they are when loads come.
+Given the response of the grip, what a squeeze survives are rows that are linear in the squeeze, the
+scale s of the loads and the limit N on pushes (see `squeeze_rows`). So the largest scale for a
+limit, and the least limit for the scale one, are linear programs with a row for every contact and
+tangent direction. The response depends on the squeeze, but only through the geometric stiffness:
+each round takes the response anew at the squeeze found so far, solves the program, and adds the
+rows that the squeeze found breaks most. Of equal optima the one nearest to zero is taken
+(see `ties`), so that squeezes move continuously with the response.
+
+Multipliers of the rows at the last squeeze, with its own response, bound what any squeeze with
+this response survives (see `squeeze_certificate`).
+
+Source of the program as a cone program in the forces: Boyd & Wegbreit, "Fast computation of optimal
+contact forces", IEEE T-RO (2007), for forces that are computed anew for each load.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array
+from grasp_core.checked import instance, positive
+from grasp_core.closure.wrenches import WRENCH
+from grasp_core.errors import NoForcesError, SolverError
+from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Grip, unsqueezed
+from grasp_core.execution.loads import LoadSet
+from grasp_core.execution.squeeze_certificate import ROUNDING, BestSqueeze, no_scale
+from grasp_core.execution.squeeze_rows import Cuts, Survival
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
+from grasp_core.solvers.ties import first_best, nearest_optimum
+from grasp_core.values import Contact, Grasp
+
+ROUNDS = 60
+"""Most programs that are solved; ten are usual."""
+GAP = 1e-4
+"""Gap between scale and upper bound, relative to it, at which no more rounds follow: the nearest of
+all optima gives up a fifth of it."""
+ABOVE = 1e-4
+"""By how much more than scale one the least push is asked to survive: rows are met to less."""
+AT_REST = 1e-5
+"""Share of the friction that the search leaves unused at rest, where rows are met to less."""
+SAFE = (1e-9, 1e-8, 1e-7, 1e-6)
+"""Shares of the scale that are given away, tried in turn, so that rounding spoils no proof."""
+
+
+def best_squeeze(  # noqa: PLR0913 - each is a quantity of its own
+    body: Polyhedron,
+    contacts: Grasp | Iterable[Contact],
+    friction: ArrayLike,
+    loads: LoadSet,
+    *,
+    max_push_n: float | None = None,
+    stiffness: ArrayLike = STIFFNESS_N_PER_M,
+    tip_radius_m: ArrayLike = TIP_RADIUS_M,
+) -> BestSqueeze:
+    """Find the squeeze that survives most without replanning, in the linear model.
+
+    With a limit on pushes the scale of the loads' ellipsoid is as large as possible. Without one
+    the largest push is as small as possible, and the scale is one.
+
+    Args:
+        body: The object, whose centre of mass the torques of loads are about.
+        contacts: A grasp, or contacts, at least two.
+        friction: Coulomb coefficient, one for all contacts or one each.
+        loads: Loads that must be survived (see `any_direction`).
+        max_push_n: Largest normal force of a finger, at rest and under all loads [N]; None for the
+            least that survives the loads at scale one.
+        stiffness: Stiffness of the fingertips' springs [N/m]: one number, one each, or a symmetric
+            matrix each, (k, 3, 3).
+        tip_radius_m: Radius of the fingertips [m], one for all or one each.
+
+    Raises:
+        InputError: Shapes or ranges are wrong, or the contacts have no stiffness in some motion.
+        NoForcesError: No squeeze survives the loads, or the grip is unstable under the best one.
+        SolverError: A program's answer failed its check.
+    """
+    start = unsqueezed(body, contacts, friction, stiffness=stiffness, tip_radius_m=tip_radius_m)
+    instance(loads, LoadSet, "loads", "gc.any_direction makes one")
+    most = None if max_push_n is None else positive(max_push_n, "max_push_n")
+    return searched(start, loads, most)
+
+
+def searched(start: Grip, loads: LoadSet, most: float | None) -> BestSqueeze:
+    """Find the best squeeze of contacts, (see `best_squeeze`), starting from any squeeze.
+
+    Raises:
+        InputError: The contacts have no stiffness against some motion.
+        NoForcesError: No squeeze survives the loads, or the grip is unstable under the best one.
+        SolverError: A program's answer failed its check.
+    """
+    survival = Survival.of(start, loads)
+    cuts = Cuts.first(len(survival.friction))
+    best: _Round | None = None
+    for _ in range(ROUNDS):
+        found = _solved(start, loads, survival, cuts, most)
+        if best is None or found.gap < best.gap:
+            best = found
+        if found.gap <= (GAP if most else GAP + ABOVE) * found.upper + found.nothing:
+            break
+        start, survival, cuts = found.grip, found.survival, found.more_cuts()
+    if best is None or np.isinf(best.gap):
+        raise SolverError("no squeeze was found to survive the loads, though its program has one")
+    if not best.grip.stable:
+        raise NoForcesError(
+            "the grip is unstable under the best squeeze, whatever its force closure: its least "
+            f"stiffness is {best.grip.least_stiffness:.3g} N/m; use stiffer or larger fingertips, "
+            "or a smaller max_push_n"
+        )
+    return _certified(best, loads)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Round:
+    """A squeeze with its own response, and what it survives."""
+
+    grip: Grip
+    survival: Survival
+    cuts: Cuts
+    multipliers: Array
+    balance: Array
+    max_push_n: float
+    angles: Array
+    """Worst angle of each case, (cases,) [rad]."""
+    scales: Array
+    """Scale at which each case slips, then at which each exceeds its limit, (2 cases,)."""
+    upper: float
+    least: float
+    """Scale below which the squeeze is no answer: one where the least push is sought, else zero."""
+
+    @property
+    def reached(self) -> float:
+        """Scale that the squeeze survives."""
+        return float(self.scales.min())
+
+    @property
+    def gap(self) -> float:
+        """What the upper bound leaves open."""
+        return self.upper - self.reached if self.reached >= self.least else np.inf
+
+    @property
+    def nothing(self) -> float:
+        """Scale that is none."""
+        return no_scale(self.survival, self.max_push_n)
+
+    def more_cuts(self) -> Cuts:
+        """Return the rows so far and those that the squeeze breaks most."""
+        broken = np.flatnonzero(self.scales[: len(self.angles)] < self.upper * (1.0 - ROUNDING))
+        return self.cuts.with_rows(self.angles[broken], broken)
+
+
+def _solved(
+    start: Grip, loads: LoadSet, survival: Survival, cuts: Cuts, most: float | None
+) -> _Round:
+    """Solve the program with some rows, and judge its squeeze with the response that it has."""
+    local, multipliers = _program(survival, cuts, most)
+    grip = start.squeezed(np.einsum("kij,kj->ki", start.frames, local))
+    own = Survival.of(grip, loads)
+    reactions = own.reactions(grip.local_squeeze)
+    angles, slips = reactions.worst_angles()
+    pushes, swing = reactions.start[:, 0], reactions.swing
+    limit = most or float((pushes + swing).max()) * (1.0 + 2.0 * SAFE[-1])
+    limits = np.where(swing > 0.0, (limit - pushes) / np.where(swing > 0.0, swing, 1.0), np.inf)
+    limits = np.where(pushes <= limit * (1.0 + ROUNDING), limits, -np.inf)
+    y, z = multipliers[:-WRENCH], multipliers[-WRENCH:]
+    upper = own.bound(cuts, y, z, limit)
+    scales = np.concatenate([slips, limits])
+    upper, least = max(upper, float(scales.min())), 0.0 if most else 1.0 + SAFE[-1]
+    return _Round(grip, own, cuts, y, z, limit, angles, scales, upper, least)
+
+
+def _program(survival: Survival, cuts: Cuts, most: float | None) -> tuple[Array, Array]:
+    """Find the nearest optimal squeeze, (k, 3) local [N], and the multipliers of rows and balance.
+
+    Unknowns are the squeeze and the scale, or the squeeze and the push limit, all of order one.
+    """
+    k, change = survival.contacts, np.linalg.norm(survival.change, axis=(1, 2))
+    used = np.repeat([1.0, 1.0 - AT_REST], k)[: len(change)]  # under the loads, and at rest
+    rows = replace(survival, friction=used * survival.friction).rows(cuts)
+    largest = float(change.max())
+    goal = np.append(np.zeros(3 * k), 1.0)
+    if most is None:
+        unit = max(largest, float(np.abs(survival.offset).max()))
+        last, b = (
+            rows.d,
+            (rows.b - (1.0 + ABOVE) * rows.c) / unit,
+        )  # the last unknown is minus the limit
+    else:
+        unit = most
+        last, b = rows.c / largest, rows.b / unit + rows.d
+    # the last row: the scale, or minus the limit, is not negative, or not positive
+    sign = -1.0 if most else 1.0
+    A = np.vstack([np.column_stack([rows.R, last]), sign * goal])
+    balance = np.column_stack([survival.G, np.zeros(WRENCH)])
+    program = LinearProgram(goal, A, np.append(b, 0.0), balance, np.zeros(WRENCH))
+    answer = maximize(program)
+    if not isinstance(answer, Optimum):
+        raise NoForcesError(_refusal(most))
+    x = nearest_optimum(program, answer)
+    y = np.maximum(answer.multipliers[: len(rows.b)], 0.0)
+    return unit * x[:-1].reshape(k, 3), np.append(y, answer.multipliers[-WRENCH:])
+
+
+def _refusal(most: float | None) -> str:
+    if most is None:
+        return (
+            "no balanced squeeze survives the loads, however hard the fingers push; more friction, "
+            "or contacts in force closure, may allow one"
+        )
+    return (
+        f"no balanced squeeze with pushes up to {most:.6g} N survives the offset of the loads; "
+        "allow larger pushes, or use more friction"
+    )
+
+
+def _certified(found: _Round, loads: LoadSet) -> BestSqueeze:
+    """Prove what a squeeze survives, with the share of `SAFE` that suffices."""
+    reactions = found.survival.reactions(found.grip.local_squeeze)
+    k = found.survival.contacts
+    for share in SAFE:
+        scale = found.reached * (1.0 - share)
+        proofs = reactions.multipliers(scale)
+        if reactions.survives(scale, proofs):
+            break
+    else:
+        raise SolverError("the proof that the squeeze survives its loads fails our check")
+    loaded = np.concatenate([found.scales[:k], found.scales[len(found.angles) :][:k]])
+    place = first_best(-loaded)
+    contact = place % k
+    direction = (
+        reactions.worst_of(contact, float(found.angles[contact])) if place < k
+        else reactions.change[contact, 0] / reactions.swing[contact]
+    )  # fmt: skip
+    return BestSqueeze(
+        found.grip, loads, found.max_push_n, scale, found.upper, contact, direction, proofs,
+        found.cuts, found.multipliers, found.balance,
+    )  # fmt: skip

@@ -1,0 +1,239 @@
+"""The smallest multiple of a load at which a contact of a grip begins to slip.
+
+The commands of the fingers stay as they are while the load grows. Contact i slips where its
+tangential force reaches the cone, |t| = mu n, which happens at n = 0 at the latest. In the linear
+model the force along the contact's axes is f + s A w (see `grips`), so with its parts (n, t) and
+those (a, b) of A w the first slip is at the least positive root s of
+
+    |t + s b|^2 = mu^2 (n + s a)^2    with    n + s a >= 0.                               (1)
+
+The finite model follows the equilibrium (see `equilibrium`): at each pose (1) says how far the
+load can grow if the response stays as it is; the load is raised by that, or by as much as moves the
+object by a small step, and the response is taken anew. The steps to the root become Newton's, and
+the root is met to `MET`. A finger with a limit on its push is also checked against it: beyond the
+limit no closed grasp is sure to resist (see `wrench_limits`), so that a first slip with limits is
+never above the closure limit.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, frozen
+from grasp_core.checked import LARGEST, SMALLEST, number, one_of
+from grasp_core.errors import InputError, SolverError
+from grasp_core.execution.equilibrium import Held, at_rest, rotation, under
+from grasp_core.execution.grips import Grip, check_grip
+
+Event: TypeAlias = Literal["slip", "push limit", "unstable", "none"]
+"""What ends the growth of a load: a contact slips, a finger reaches its limit, the equilibrium is
+not stable any more, or nothing up to `FARTHEST`."""
+Model: TypeAlias = Literal["finite", "linear"]
+"""Whether the object's motion is followed, or taken to be small."""
+
+FARTHEST = 1e6
+"""Largest load that is tried, in units of the largest push at rest."""
+STEP = 0.02
+"""Largest motion of the object in one step, in arms' lengths or radians."""
+MET = 1e-9
+"""How near the load of first slip is met, relative to it."""
+MOST_STEPS = 1000
+SMALLEST_STEP = 1e-6
+"""Part of a step at which the equilibrium ends, rather than that Newton's method fails."""
+AT_REST = 1e-9
+"""How far a squeeze may leave a cone or limit at rest, in largest pushes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FirstSlip:
+    """Where the growth of a load ends."""
+
+    multiple: float
+    """Multiple of the load at which it ends; infinite where nothing happens."""
+    event: Event
+    """What happens there: `slip`, `push limit`, `unstable` or `none`."""
+    contact: int
+    """Index of the contact where it happens; -1 for events of the whole grip."""
+    forces: Array
+    """Contact forces then, on the object, world axes, (k, 3) [N]."""
+    arms: Array
+    """Contact points then, from the centre of mass, world axes, (k, 3) [m]; in the linear model
+    those at rest."""
+    normals: Array
+    """Unit normals then, into the object, world axes, (k, 3)."""
+    displacement_m: float
+    """Distance that the centre of mass has moved [m]."""
+    turn_rad: float
+    """Angle that the object has turned [rad]."""
+
+
+def first_slip(
+    grip: Grip, wrench: ArrayLike, *, model: Model = "finite", max_push_n: float = math.inf
+) -> FirstSlip:
+    """Find the smallest multiple of a load at which a contact slips, without replanning.
+
+    Args:
+        grip: The squeezed contacts (see `grip`).
+        wrench: External (force, torque), (6,) [N, N m], torque about the centre of mass, with axes
+            that stay those of the world when the object turns.
+        model: `finite` follows the object's motion; `linear` is the closed form of small motions.
+        max_push_n: Largest normal force of a finger [N].
+
+    Returns:
+        The multiple of the wrench, and what happens there. A grip that is unstable before any load
+        has the multiple zero.
+
+    Raises:
+        InputError: The wrench is zero, or a contact is not inside its friction cone at rest.
+        SolverError: The equilibrium could not be followed.
+    """
+    check_grip(grip)
+    load = frozen(wrench, (6,), "wrench")
+    one_of(model, get_args(Model), "model")
+    number(max_push_n, "max_push_n", least=SMALLEST, most=math.inf)
+    if not SMALLEST <= float(np.abs(load).max()) <= LARGEST:
+        raise InputError(
+            f"wrench must not be zero: the largest part is from {SMALLEST:g} to {LARGEST:g}, got "
+            f"{float(np.abs(load).max()):.6g}"
+        )
+    _check_rest(grip, max_push_n)
+    if not grip.stable:
+        return _ended(at_rest(grip), 0.0, "unstable", -1)
+    if model == "linear":
+        return _linear(grip, load, max_push_n)
+    return _finite(grip, load, max_push_n)
+
+
+def _check_rest(grip: Grip, max_push_n: float) -> None:
+    n, t = grip.local_squeeze[:, 0], np.linalg.norm(grip.local_squeeze[:, 1:], axis=1)
+    slack = np.minimum(grip.friction * n - t, np.minimum(n, max_push_n - n))
+    worst = int(np.argmin(slack))
+    if slack[worst] < -AT_REST * float(np.abs(n).max()):
+        raise InputError(
+            f"squeeze: contact {worst} of the grip is not held at rest: it pushes with "
+            f"{n[worst]:.6g} N (max_push_n is {max_push_n:.6g}) and has {t[worst]:.6g} N across, "
+            f"at friction {grip.friction[worst]:.6g}; take the squeeze from best_squeeze"
+        )
+
+
+def slip_steps(local: Array, change: Array, friction: Array) -> Array:
+    """Solve (1) for each contact: the least s >= 0 at which it slips, (k,); infinite if never.
+
+    Args:
+        local: Contact forces (normal, tangent, tangent), inside their cones, (k, 3).
+        change: Their change per unit of load, (k, 3).
+        friction: Coulomb coefficients, (k,).
+    """
+    n, t, a, b = local[:, 0], local[:, 1:], change[:, 0], change[:, 1:]
+    # q2 s^2 + 2 q1 s + q0 is the squared cone less the squared tangential force, q0 >= 0
+    mu2 = friction**2
+    q2 = mu2 * a**2 - np.einsum("ki,ki->k", b, b)
+    q1 = mu2 * n * a - np.einsum("ki,ki->k", t, b)
+    q0 = np.maximum(mu2 * n**2 - np.einsum("ki,ki->k", t, t), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(np.maximum(q1**2 - q2 * q0, 0.0))
+        # the least positive root, in the form without cancellation
+        falls = np.where(q1 <= 0.0, q0 / (root - q1), np.where(q2 < 0.0, (-q1 - root) / q2, np.inf))
+        real = (q1**2 >= q2 * q0) & ~((q1 >= 0.0) & (q2 >= 0.0))
+        slips = np.where(real, falls, np.inf)
+        # where the cone is left through its tip, no later
+        lifts = np.where(a < 0.0, n / -a, np.inf)
+    return np.minimum(np.where(np.isnan(slips), 0.0, slips), lifts)
+
+
+def _push_steps(local: Array, change: Array, most: float) -> Array:
+    """Find the further multiple at which each push reaches the limit, (k,)."""
+    left, a = np.maximum(most - local[:, 0], 0.0), change[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(a > 0.0, left / a, np.inf)
+
+
+def _next_event(grip: Grip, load: Array, most: float) -> tuple[float, Event, int]:
+    """Find the next multiple of a load at which something happens, as the response stays."""
+    local, change = grip.local_squeeze, grip.response @ load
+    slips = slip_steps(local, change, grip.friction)
+    limits = _push_steps(local, change, most)
+    if limits.min() < slips.min():
+        return float(limits.min()), "push limit", int(np.argmin(limits))
+    if math.isinf(slips.min()):
+        return math.inf, "none", -1
+    return float(slips.min()), "slip", int(np.argmin(slips))
+
+
+def _linear(grip: Grip, load: Array, most: float) -> FirstSlip:
+    multiple, event, contact = _next_event(grip, load, most)
+    rest = at_rest(grip)
+    if event == "none":
+        return _ended(rest, multiple, event, contact)
+    motion = multiple * grip.compliance @ load
+    local = grip.local_squeeze + multiple * (grip.response @ load)
+    forces = np.einsum("kij,kj->ki", grip.frames, local)
+    moved = Held(grip.squeezed(forces), motion[:3], rotation(motion[3:]), rest.tips, rest.load)
+    return _ended(moved, multiple, event, contact)
+
+
+def _finite(start: Grip, load: Array, most: float) -> FirstSlip:
+    held, reached, part = at_rest(start), 0.0, 1.0
+    farthest = FARTHEST * float(start.local_squeeze[:, 0].max()) / float(np.abs(load).max())
+    for _ in range(MOST_STEPS):
+        if not held.grip.stable or part < SMALLEST_STEP:
+            return _ended(held, reached, "unstable", -1)
+        further, event, contact = _next_event(held.grip, load, most)
+        if further <= MET * reached:
+            return _ended(held, reached, event, contact)
+        step = min(further, part * STEP / _pace(held.grip, load))
+        if reached + step > farthest:
+            return _ended(held, math.inf, "none", -1)
+        try:
+            moved, multiple = _followed(held, start, load, reached + step, most)
+        except SolverError:  # where the equilibrium ends no step is short enough
+            part *= 0.5
+            continue
+        held, reached, part = moved, multiple, min(1.0, 2.0 * part)
+    raise SolverError("the load of first slip was not met; the grip may be nearly unstable")
+
+
+def _pace(grip: Grip, load: Array) -> float:
+    """Motion of the object per multiple of a load, in arms' lengths or radians."""
+    motion = grip.compliance @ load
+    return max(float(np.linalg.norm(motion[:3])) / grip.size, float(np.linalg.norm(motion[3:])))
+
+
+def _followed(
+    held: Held, start: Grip, load: Array, multiple: float, most: float
+) -> tuple[Held, float]:
+    """Follow the equilibrium to a multiple of the load, or back to where a contact slips."""
+    held = under(held, start, multiple * load)
+    over = _overshoot(held.grip, load, most)
+    if over > 0.0:  # the response grew on the way
+        multiple -= over
+        held = under(held, start, multiple * load)
+    return held, multiple
+
+
+def _overshoot(grip: Grip, load: Array, most: float) -> float:
+    """How much less load would bring contacts that have just left their cones back into them."""
+    local, change = grip.local_squeeze, grip.response @ load
+    n, t = local[:, 0], local[:, 1:]
+    across = np.linalg.norm(t, axis=1)
+    out = across - grip.friction * n
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rate = np.einsum("ki,ki->k", t, change[:, 1:]) / across - grip.friction * change[:, 0]
+        back = np.where((out > 0.0) & (rate > 0.0), out / rate, 0.0)
+        if math.isfinite(most):
+            beyond = np.where(change[:, 0] > 0.0, (n - most) / change[:, 0], 0.0)
+            back = np.maximum(back, beyond)
+    return float(np.nanmax(back, initial=0.0))
+
+
+def _ended(held: Held, multiple: float, event: Event, contact: int) -> FirstSlip:
+    cosine = 0.5 * (float(np.trace(held.rotation)) - 1.0)
+    axis = held.rotation - held.rotation.T
+    sine = 0.5 * math.hypot(axis[2, 1], axis[0, 2], axis[1, 0])
+    return FirstSlip(
+        multiple, event, contact, held.forces, held.grip.arms, held.grip.normals,
+        float(np.linalg.norm(held.moved)), math.atan2(sine, cosine),
+    )  # fmt: skip

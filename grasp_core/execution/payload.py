@@ -1,0 +1,243 @@
+"""The largest mass that contacts hold in every orientation, with forces fixed or chosen anew.
+
+*Fixed.* The largest mass under the best squeeze, which is chosen beforehand and never replanned, is
+the scale of a `BestSqueeze` for the weight of one kilogram in any direction.
+
+*Free.* Forces that are chosen anew for each orientation hold the mass m if all weights m g d, |d| =
+1, are in the set S of forces through the centre of mass that contacts with limited pushes resist.
+S is convex, so the largest such mass is the distance from the origin to the border of S, in units
+of weight. The ray in a direction d meets the border at a mass lambda with a facet y of the body of
+wrenches (see `wrench_limits`), both proved:
+
+    lambda d is in S,   and   m d' in S  implies  m <= h(y) / (-g y_F.d') for all d',     (1)
+
+where y_F is the force part of y. So the free mass is at most h(y) / (g |y_F|) for every ray, and
+at least the distance of the origin from the hull of the points lambda d. The next ray goes through
+the hull's nearest facet.
+
+That a hull contains a ball about the origin is shown by its triangles: if they have the origin on
+their inner side, and every edge belongs to two of them in opposite directions, then the cones over
+them cover all directions, and the ball of the least distance of their planes is inside.    (2)
+
+With the same limit on pushes the fixed mass is at most the free one where fingertips do not roll,
+as the forces at rest plus their change balance the load at the contacts. Rolling moves the contacts
+by tip radius times turn.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.checked import positive
+from grasp_core.closure.wrenches import WRENCH
+from grasp_core.execution.best_squeeze import searched
+from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Grip, unsqueezed
+from grasp_core.execution.loads import GRAVITY_M_PER_S2, any_direction
+from grasp_core.execution.squeeze_certificate import BestSqueeze
+from grasp_core.fields import is_a, is_indices, is_number, is_tuple_of
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.growing_hull import GrowingHull
+from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit
+from grasp_core.solvers.ties import first_best
+from grasp_core.values import Contact, Grasp
+
+GAP = 1e-3
+"""Gap between the bounds of the free mass, relative to it, at which no more rays follow."""
+RAYS = 200
+"""Most rays; twenty to eighty are usual."""
+NOTHING = 1e-6
+"""Free mass that is none, in pushes over gravity: the accuracy of conic programs is a tenth."""
+ROUNDING = 1e-9
+"""Slack of bounds, relative to them."""
+FIRST = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
+"""Directions of the first rays, whose hull contains the origin."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeMass:
+    """Bounds of the mass that forces chosen anew for each orientation hold."""
+
+    lower: float
+    """Mass that is held in every orientation [kg]."""
+    upper: float
+    """Mass above which some orientation is not held [kg]."""
+    rays: tuple[WrenchLimit, ...]
+    """Largest masses in some directions: weights of one kilogram, and multiples of them."""
+    triangles: Indices
+    """Triangles (2) of the hull of the rays' ends, by their indices, (t, 3); none where the lower
+    bound is zero."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Payload:
+    """The largest mass held in every orientation, with forces chosen beforehand and chosen anew."""
+
+    fixed: BestSqueeze
+    """The squeeze that holds the largest mass, `fixed.scale` [kg], without replanning."""
+    free: FreeMass
+    """The largest mass that any forces with such pushes hold."""
+
+    @property
+    def mass_kg(self) -> float:
+        """The largest mass that is held without replanning [kg]."""
+        return self.fixed.scale
+
+    def verify(self) -> bool:
+        """Re-check every field in plain arithmetic; False if they are no certificate.
+
+        The free mass is about the contacts and the largest push of `fixed`. Whether the contacts
+        are those of an object can only be checked with it.
+        """
+        with np.errstate(all="ignore"):
+            return (
+                is_a(self.fixed, BestSqueeze)
+                and is_a(self.free, FreeMass)
+                and self.fixed.verify()
+                and _is_weight(self.fixed)
+                and is_tuple_of(self.free.rays, WrenchLimit)
+                and is_number(self.free.lower, least=0.0)
+                and is_number(self.free.upper, least=self.free.lower)
+                and self._are_rays()
+                and _outer(self.free.rays) <= self.free.upper * (1.0 + ROUNDING)
+                and self._contains_ball()
+            )
+
+    def _are_rays(self) -> bool:
+        body = _body(self.fixed.grip, self.fixed.max_push_n)
+        return all(
+            ray.has_numbers(body.count)
+            and not ray.wrench[3:].any()
+            and abs(np.linalg.norm(ray.wrench) / GRAVITY_M_PER_S2 - 1.0) <= ROUNDING
+            and body.attains(ray)
+            and body.bounds(ray)
+            for ray in self.free.rays
+        )
+
+    def _contains_ball(self) -> bool:
+        if not is_indices(self.free.triangles, None, 3):
+            return False
+        if self.free.lower == 0.0:
+            return True
+        ends, triangles = _ends(self.free.rays), self.free.triangles
+        if not (len(triangles) and triangles.min() >= 0 and triangles.max() < len(ends)):
+            return False
+        if not _is_closed(triangles):
+            return False
+        return self.free.lower <= _least_distance(ends[triangles]) * (1.0 + ROUNDING)
+
+
+def payload(
+    body: Polyhedron,
+    contacts: Grasp | Iterable[Contact],
+    friction: ArrayLike,
+    *,
+    max_push_n: float,
+    stiffness: ArrayLike = STIFFNESS_N_PER_M,
+    tip_radius_m: ArrayLike = TIP_RADIUS_M,
+) -> Payload:
+    """Find the largest mass that contacts hold in every orientation.
+
+    Args:
+        body: The object, of which only the centre of mass counts.
+        contacts: A grasp, or contacts, at least two.
+        friction: Coulomb coefficient, one for all contacts or one each.
+        max_push_n: Largest normal force of a finger, at rest and under the weight [N].
+        stiffness: Stiffness of the fingertips' springs [N/m]: one number, one each, or a symmetric
+            matrix each, (k, 3, 3).
+        tip_radius_m: Radius of the fingertips [m], one for all or one each.
+
+    Raises:
+        InputError: Shapes or ranges are wrong, or the contacts have no stiffness in some motion.
+        NoForcesError: The grip is unstable under the best squeeze.
+        SolverError: A program's answer failed its check.
+    """
+    start = unsqueezed(body, contacts, friction, stiffness=stiffness, tip_radius_m=tip_radius_m)
+    most = positive(max_push_n, "max_push_n")
+    fixed = searched(start, any_direction(1.0), most)
+    return Payload(fixed, _free_mass(_body(start, most)))
+
+
+def _body(grip: Grip, max_push_n: float) -> WrenchBody:
+    return WrenchBody(grip.arms, grip.normals, grip.friction, max_push_n)
+
+
+def _free_mass(body: WrenchBody) -> FreeMass:
+    """Bound the mass that forces chosen anew hold, by rays until the bounds meet."""
+    rays = [_ray(body, direction) for direction in FIRST]
+    none = NOTHING * body.max_normal_force / GRAVITY_M_PER_S2
+    # where a direction is hardly resisted, so is one of these or the one that its facet faces
+    weakest = rays[first_best([-ray.limit for ray in rays])]
+    if weakest.limit <= none or _outer(rays) <= none:
+        return _nothing_held(rays)
+    hull = GrowingHull(_ends(rays))
+    for _ in range(RAYS):
+        normal, distance = hull.lowest()
+        if _outer(rays) <= none:
+            return _nothing_held(rays)
+        if _outer(rays) <= distance * (1.0 + GAP):
+            break
+        rays.append(_ray(body, normal))
+        if not hull.add(_ends(rays[-1:])[0]):
+            break
+    triangles = _outward(_ends(rays), hull.simplices()[1])
+    lower = _least_distance(_ends(rays)[triangles])
+    return FreeMass(lower, max(_outer(rays), lower), tuple(rays), triangles)
+
+
+def _nothing_held(rays: list[WrenchLimit]) -> FreeMass:
+    return FreeMass(0.0, _outer(rays), tuple(rays), np.zeros((0, 3), dtype=np.int64))
+
+
+def _ray(body: WrenchBody, direction: Array) -> WrenchLimit:
+    weight = np.zeros(WRENCH)
+    weight[:3] = GRAVITY_M_PER_S2 * direction / np.linalg.norm(direction)
+    return body.limit(weight)
+
+
+def _ends(rays: Iterable[WrenchLimit]) -> Array:
+    """Return the ends lambda d of rays, (n, 3) [kg]."""
+    return np.array([ray.limit * ray.wrench[:3] / GRAVITY_M_PER_S2 for ray in rays])
+
+
+def _outer(rays: Iterable[WrenchLimit]) -> float:
+    """Return the least bound (1) of rays on the free mass [kg]; infinite if there is none."""
+    forces = [(ray.upper, GRAVITY_M_PER_S2 * float(np.linalg.norm(ray.facet[:3]))) for ray in rays]
+    return min((upper / force for upper, force in forces if force > 0.0), default=np.inf)
+
+
+def _outward(ends: Array, triangles: Indices) -> Indices:
+    """Turn triangles, (t, 3), so that the origin is on their inner side."""
+    turned = np.linalg.det(ends[triangles]) < 0.0
+    return np.where(turned[:, None], triangles[:, ::-1], triangles)
+
+
+def _least_distance(corners: Array) -> float:
+    """Return the least distance of the origin from planes of triangles, (t, 3, 3).
+
+    The distance is negative where a triangle has the origin on its outer side.
+    """
+    a, b, c = np.moveaxis(corners, 1, 0)
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    if not (lengths > 0.0).all():
+        return -np.inf
+    return float((np.einsum("ti,ti->t", normals, a) / lengths).min())
+
+
+def _is_closed(triangles: Indices) -> bool:
+    """Return whether every edge belongs to two triangles, in opposite directions."""
+    edges = [tuple(edge) for t in triangles.tolist() for edge in zip(t, t[1:] + t[:1], strict=True)]
+    known = set(edges)
+    return len(known) == len(edges) and all((b, a) in known for a, b in edges)
+
+
+def _is_weight(fixed: BestSqueeze) -> bool:
+    """Return whether the loads of a squeeze are the weight of one kilogram in any direction."""
+    E = fixed.loads.axes
+    ball = np.zeros((WRENCH, WRENCH))
+    ball[:3, :3] = GRAVITY_M_PER_S2**2 * np.eye(3)
+    near = bool((np.abs(E @ E.T - ball) <= ROUNDING * GRAVITY_M_PER_S2**2).all())
+    return near and not fixed.loads.offset.any()

@@ -1,0 +1,137 @@
+"""A squeeze with both sides of a proof: what it survives, and what no other squeeze survives.
+
+A multiplier for each contact shows by the S-lemma that the squeeze survives all loads of a set, (4)
+of `worst_loads`. Multipliers of rows that are linear in the squeeze bound what any squeeze with
+this response survives, (3) of `squeeze_rows`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import LARGEST
+from grasp_core.closure.wrenches import WRENCH
+from grasp_core.execution.grips import Grip
+from grasp_core.execution.loads import LoadSet
+from grasp_core.execution.squeeze_rows import Cuts, Survival
+from grasp_core.fields import is_a, is_array, is_indices, is_number
+
+ROUNDING = 1e-9
+"""Slack of pushes and of the upper bound, relative to them."""
+NEAR = 1e-5
+"""Share by which a load larger than the worst makes a contact slip."""
+NONE = 1e-9
+"""Scale that is none, in pushes over the change of contact forces at scale one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BestSqueeze:
+    """A squeeze, the loads that it survives without replanning, and a bound on what others survive.
+
+    All of this is about the linear model of small motions. The upper bound is for squeezes under
+    which the contact forces respond to loads as under this one: the response depends on the squeeze
+    through the geometric stiffness, which is small against that of the fingertips unless they are
+    soft.
+    """
+
+    grip: Grip
+    """The contacts with the squeeze, `grip.squeeze` (k, 3) [N]."""
+    loads: LoadSet
+    """The loads that were asked about."""
+    max_push_n: float
+    """Largest push of any finger, at rest and under all loads up to the scale [N]."""
+    scale: float
+    """Scale of the set's ellipsoid up to which no contact slips and no push exceeds the limit."""
+    upper: float
+    """Scale that no squeeze with the same response and largest push exceeds."""
+    contact: int
+    """Index of the contact that slips, or reaches the limit, first."""
+    direction: Array
+    """Place z in the ellipsoid, of unit length, of the load that makes it do so, (m,)."""
+    proofs: Array
+    """S-lemma multiplier of each case, (cases,) [N^2]: contacts under the loads, then, where the
+    loads have an offset, contacts at rest."""
+    cuts: Cuts
+    """Tangent directions whose rows bound the scale from above."""
+    multipliers: Array
+    """Multipliers of these rows, and of the limits on pushes from above and from below in each
+    case, (r + 2 cases,)."""
+    balance: Array
+    """Multipliers of the balance, (6,)."""
+
+    @property
+    def load(self) -> Array:
+        """The worst load at the scale, (6,) [N, N m], torque about the centre of mass."""
+        return self.loads.offset + self.scale * self.loads.axes @ self.direction
+
+    def verify(self) -> bool:
+        """Re-check every field in plain arithmetic; False if they are no certificate.
+
+        The check is that the squeeze balances and is stable, that its S-lemma multipliers and
+        pushes prove the scale, that the worst load is one, and that the multipliers of rows prove
+        the upper bound. Whether the contacts are those of an object can only be checked with it.
+        """
+        with np.errstate(all="ignore"):
+            if not (self._has_numbers() and self.grip.sound() and self.grip.stable):
+                return False
+            survival = Survival.of(self.grip, self.loads)
+            return (
+                self._fits(survival)
+                and self._survives(survival)
+                and self._slips(survival)
+                and self._is_bounded(survival)
+            )
+
+    def _has_numbers(self) -> bool:
+        return (
+            is_a(self.grip, Grip)
+            and is_a(self.loads, LoadSet)
+            and self.loads.sound()
+            and is_number(self.max_push_n, least=0.0, most=LARGEST)
+            and is_number(self.scale, least=0.0)
+            and is_number(self.upper, least=self.scale)
+        )
+
+    def _fits(self, survival: Survival) -> bool:
+        cases = len(survival.friction)
+        angles = self.cuts.angles if is_a(self.cuts, Cuts) else None
+        r = len(angles) if is_array(angles, None) else 0
+        return (
+            r > 0
+            and is_indices(self.cuts.cases, r)
+            and bool(((self.cuts.cases >= 0) & (self.cuts.cases < cases)).all())
+            and is_array(self.multipliers, r + 2 * cases)
+            and bool((self.multipliers >= 0.0).all())
+            and is_array(self.balance, WRENCH)
+            and is_array(self.proofs, cases)
+            and is_a(self.contact, int)
+            and not is_a(self.contact, bool)
+            and 0 <= self.contact < survival.contacts
+            and is_array(self.direction, self.loads.axes.shape[1])
+            and abs(float(np.linalg.norm(self.direction)) - 1.0) <= ROUNDING
+        )
+
+    def _survives(self, survival: Survival) -> bool:
+        reactions = survival.reactions(self.grip.local_squeeze)
+        pushes = reactions.start[:, 0] + self.scale * reactions.swing
+        limited = bool((pushes <= self.max_push_n * (1.0 + ROUNDING)).all())
+        return limited and reactions.survives(self.scale, self.proofs)
+
+    def _slips(self, survival: Survival) -> bool:
+        reactions = survival.reactions(self.grip.local_squeeze)
+        start, change = reactions.start[self.contact], reactions.change[self.contact]
+        further = self.scale * (1.0 + NEAR) + no_scale(survival, self.max_push_n)
+        normal, *across = (start + further * change @ self.direction).tolist()
+        slipping = float(np.hypot(*across)) >= reactions.friction[self.contact] * normal
+        return bool(slipping or normal >= self.max_push_n)
+
+    def _is_bounded(self, survival: Survival) -> bool:
+        bound = survival.bound(self.cuts, self.multipliers, self.balance, self.max_push_n)
+        return bound <= self.upper * (1.0 + ROUNDING) + no_scale(survival, self.max_push_n)
+
+
+def no_scale(survival: Survival, max_push_n: float) -> float:
+    """Return the scale that is none, `NONE` of what changes a contact force by the largest push."""
+    largest = float(np.linalg.norm(survival.change, axis=(1, 2)).max())
+    return NONE * max_push_n / largest if largest > 0.0 else 0.0

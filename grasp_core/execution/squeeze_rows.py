@@ -1,0 +1,146 @@
+"""Which squeezes survive loads, as rows that are linear in squeeze, scale and push limit.
+
+With the response of `grips` given, contact i keeps its cone under all loads w0 + s E z if, by (2)
+of `worst_loads`, for all angles of a tangent direction u
+
+    u.t_i - mu n_i + s |B_i'u - mu a_i| <= mu n0_i - u.t0_i,                              (1)
+
+where (n_i, t_i) is the squeeze and (n0_i, t0_i) what the offset w0 adds to it. Its push stays
+between 0 and N if
+
+    n_i + s |a_i| <= N - n0_i,    -n_i + s |a_i| <= n0_i.                                 (2)
+
+Where w0 is not zero, the same is asked of the squeeze alone: at rest nothing slips either. These
+are further *cases*, with a = B = 0 and no offset. Squeezes balance, G f = 0.
+
+Multipliers y >= 0 of some rows (1) and of (2), and z of the balance, combine the rows R f + s c <=
+b + N d. If R'y + G'z = r, then for every squeeze that survives the scale s
+
+    s c.y <= b.y + N d.y - r.f,    |f_i| <= N sqrt(1 + mu_i^2),                           (3)
+
+which bounds s where c.y > 0. The residual r is zero but for rounding.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.closure.wrenches import grasp_map, in_frames
+from grasp_core.execution.grips import Grip
+from grasp_core.execution.loads import LoadSet
+from grasp_core.execution.worst_loads import Reactions
+
+STARTS = 8
+"""Tangent directions of each case in the first program."""
+BOUNDING = 1e-6
+"""Least c.y of (3), relative to |c| |y|, that bounds the scale."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cuts:
+    """Angles and cases of some rows (1)."""
+
+    angles: Array
+    """Angles of the tangent directions in their contacts' frames, (r,) [rad]."""
+    cases: Indices
+    """Index of each row's case, (r,)."""
+
+    @classmethod
+    def first(cls, count: int) -> "Cuts":
+        """Return evenly spread rows of each of `count` cases."""
+        angles = np.tile(np.linspace(0.0, 2.0 * np.pi, STARTS, endpoint=False), count)
+        return cls(angles, np.repeat(np.arange(count), STARTS))
+
+    def with_rows(self, angles: Array, cases: Indices) -> "Cuts":
+        """Return these rows and more, (n,) each."""
+        return Cuts(np.append(self.angles, angles), np.append(self.cases, cases))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """Rows R f + s c <= b + N d in local squeezes f (3k,), scale s and push limit N."""
+
+    R: Array
+    """(rows, 3k): rows (1), then both of (2) for all cases."""
+    c: Array
+    """What loads of scale one take, (rows,) [N]."""
+    b: Array
+    """What the offset leaves, (rows,) [N]."""
+    d: Array
+    """One where the row is a limit on a push, else zero, (rows,)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Survival:
+    """What contacts with a given response ask of a squeeze under a set of loads."""
+
+    G: Array
+    """Matrix from local squeezes to wrenches, torques over the grip's size, (6, 3k)."""
+    offset: Array
+    """Forces (n0, t0) that the offset adds in each case, (cases, 3) [N]."""
+    change: Array
+    """The rows (a, B) of each case, (cases, 3, m) [N]."""
+    friction: Array
+    """Coulomb coefficient of each case, (cases,)."""
+
+    @classmethod
+    def of(cls, grip: Grip, loads: LoadSet) -> "Survival":
+        """Take the response of a grip at its squeeze."""
+        A, mu = grip.response, grip.friction
+        offset, change = A @ loads.offset, A @ loads.axes
+        if loads.offset.any():
+            offset = np.concatenate([offset, np.zeros_like(offset)])
+            change = np.concatenate([change, np.zeros_like(change)])
+            mu = np.concatenate([mu, mu])
+        return cls(in_frames(grasp_map(grip.arms / grip.size), grip.frames), offset, change, mu)
+
+    @property
+    def contacts(self) -> int:
+        """Number of contacts."""
+        return self.G.shape[1] // 3
+
+    def reactions(self, local: Array) -> Reactions:
+        """Compute the forces of all cases with a squeeze in the contacts' frames, (k, 3) [N]."""
+        cases = len(self.friction) // self.contacts
+        return Reactions(np.tile(local, (cases, 1)) + self.offset, self.change, self.friction)
+
+    def rows(self, cuts: Cuts) -> Rows:
+        """Build the rows (1) at some angles, and all of (2)."""
+        i, k, count = cuts.cases, self.contacts, len(self.friction)
+        r, mu = len(i), self.friction[cuts.cases]
+        u = np.stack([np.cos(cuts.angles), np.sin(cuts.angles)], axis=1)
+        R = np.zeros((r + 2 * count, 3 * k))
+        R[np.arange(r), 3 * (i % k)] = -mu
+        R[np.arange(r), 3 * (i % k) + 1], R[np.arange(r), 3 * (i % k) + 2] = u.T
+        normal = 3 * (np.arange(count) % k)
+        R[r + np.arange(count), normal] = 1.0
+        R[r + count + np.arange(count), normal] = -1.0
+        nothing = Reactions(self.offset, self.change, self.friction)
+        lean = np.linalg.norm(nothing.leaning(i, cuts.angles), axis=1)
+        n0, t0 = self.offset[:, 0], self.offset[:, 1:]
+        left = mu * n0[i] - np.einsum("rj,rj->r", u, t0[i])
+        limits = np.zeros(len(R))
+        limits[r : r + count] = 1.0
+        return Rows(
+            R, np.concatenate([lean, nothing.swing, nothing.swing]),
+            np.concatenate([left, -n0, n0]), limits,
+        )  # fmt: skip
+
+    def bound(self, cuts: Cuts, multipliers: Array, balance: Array, max_push_n: float) -> float:
+        """Bound by (3) the scale that any squeeze with this response survives; infinite if none.
+
+        Args:
+            cuts: Which rows (1) are combined.
+            multipliers: y of these and of (2), (r + 2 cases,), not negative.
+            balance: z, (6,).
+            max_push_n: The limit N on pushes.
+        """
+        rows = self.rows(cuts)
+        taken = float(rows.c @ multipliers)
+        if not taken > BOUNDING * float(np.linalg.norm(rows.c) * np.linalg.norm(multipliers)):
+            return np.inf
+        left = (rows.R.T @ multipliers + self.G.T @ balance).reshape(-1, 3)
+        longest = max_push_n * np.sqrt(1.0 + self.friction[: self.contacts] ** 2)
+        slack = float(np.linalg.norm(left, axis=1) @ longest)
+        return (float(rows.b @ multipliers + max_push_n * rows.d @ multipliers) + slack) / taken

@@ -1,0 +1,125 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.closure.wrenches import grasp_map, normal_and_tangential
+from tests.grasp_core.execution.held import directions, opposed_grip, planned_grips
+
+ACROSS = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+ALONG = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("stiffness", [100.0, 2000.0, 1e6])
+@pytest.mark.parametrize("model", ["finite", "linear"])
+def test_a_pair_carries_twice_friction_times_push(stiffness, model):
+    """Across the pushes, where the object sinks by load over stiffness without any turn."""
+    grip = opposed_grip(push=5.0, friction=0.4, stiffness=stiffness, tip_radius_m=0.05)
+    found = gc.first_slip(grip, ACROSS, model=model)
+    assert found.multiple == pytest.approx(2 * 2 * 0.4 * 5.0, rel=1e-8)
+    assert found.event == "slip"
+    assert found.displacement_m == pytest.approx(found.multiple / (4 * stiffness), rel=1e-6)
+    assert found.turn_rad == pytest.approx(0.0, abs=1e-9)
+
+
+def test_along_the_pushes_a_finger_leaves_or_reaches_its_limit():
+    grip = opposed_grip(push=5.0)
+    free = gc.first_slip(grip, ALONG)
+    assert (free.event, free.multiple) == ("slip", pytest.approx(20.0))
+    limited = gc.first_slip(grip, ALONG, max_push_n=6.0)
+    assert (limited.event, limited.multiple) == ("push limit", pytest.approx(4.0))
+
+
+def test_without_friction_everything_slips_at_once():
+    grip = opposed_grip(friction=0.0)
+    for model in ("finite", "linear"):
+        assert gc.first_slip(grip, ACROSS, model=model).multiple == 0.0
+
+
+def test_unstable_grips_are_reported():
+    grip = opposed_grip(push=500.0, stiffness=1000.0, tip_radius_m=0.0)
+    for model in ("finite", "linear"):
+        found = gc.first_slip(grip, ACROSS, model=model)
+        assert (found.event, found.multiple, found.contact) == ("unstable", 0.0, -1)
+
+
+def loads_of(grip, count, rng):
+    return directions(count, rng, 6) * np.repeat([1.0, grip.size], 3)
+
+
+def test_the_linear_model_is_the_limit_of_stiff_fingertips():
+    """Its error falls like one over the stiffness: by 10 to 40 where that grows by 20."""
+    ratios = []
+    soft, stiff = (list(planned_grips(stiffness=k)) for k in (1e4, 2e5))
+    for i, (one, other) in enumerate(zip(soft, stiff, strict=True)):
+        for load in loads_of(one, 3, np.random.default_rng(i)):
+            errors = [
+                abs(
+                    gc.first_slip(grip, load).multiple
+                    / gc.first_slip(grip, load, model="linear").multiple
+                    - 1.0
+                )
+                for grip in (one, other)
+            ]
+            assert errors[1] < 5e-3
+            if errors[0] > 1e-4:
+                ratios.append(errors[0] / errors[1])
+    assert len(ratios) >= 10
+    assert 15.0 < np.median(ratios) < 25.0
+
+
+@pytest.mark.parametrize("most", [np.inf, 12.0])
+def test_no_first_slip_is_above_the_closure_limit(most):
+    """Finite: forces at first slip are in cones and limits and balance the load in the pose
+    reached, so that the contacts in that pose resist it.
+    """
+    tested = 0
+    for stiffness in (500.0, 3000.0):
+        for i, grip in enumerate(planned_grips(stiffness=stiffness)):
+            for load in loads_of(grip, 3, np.random.default_rng(i)):
+                found = gc.first_slip(grip, load, max_push_n=most)
+                if found.event not in ("slip", "push limit"):
+                    continue
+                along, across = normal_and_tangential(found.forces, found.normals)
+                assert (across <= 0.5 * along + 1e-7).all()
+                assert along.max() <= most + 1e-7
+                left = grasp_map(found.arms) @ found.forces.ravel() + found.multiple * load
+                assert np.abs(left).max() < 1e-8 * np.abs(found.forces).sum()
+                limit = gc.max_resisted_wrench(
+                    found.arms, found.normals, 0.5, load, max_normal_force=min(most, along.max())
+                )
+                assert found.multiple <= limit * (1.0 + 1e-6)
+                tested += 1
+    assert tested >= 30
+
+
+def test_linear_forces_balance_at_rest_where_tips_do_not_roll():
+    """The comparison with the closure limit of the contacts at rest is exact for point tips."""
+    tested = 0
+    for i, grip in enumerate(planned_grips(stiffness=1000.0, tip_radius_m=0.0)):
+        for load in loads_of(grip, 4, np.random.default_rng(i)):
+            found = gc.first_slip(grip, load, model="linear", max_push_n=20.0)
+            left = grasp_map(grip.arms) @ found.forces.ravel() + found.multiple * load
+            assert np.abs(left).max() < 1e-9 * np.abs(found.forces).sum()
+            limit = gc.max_resisted_wrench(
+                grip.arms, grip.normals, 0.5, load, max_normal_force=20.0
+            )
+            assert found.multiple <= limit * (1.0 + 1e-6)
+            tested += 1
+    assert tested == 24
+
+
+def test_what_is_wrong_is_refused():
+    grip = opposed_grip(push=5.0)
+    for change, message in (
+        ({"wrench": np.zeros(6)}, "wrench must not be zero"),
+        ({"wrench": np.ones(5)}, "wrench must have shape"),
+        ({"model": "exact"}, "model must be one of finite, linear"),
+        ({"max_push_n": 0.0}, "max_push_n must be a number from"),
+        ({"max_push_n": 2.0}, "squeeze: contact 0 of the grip is not held at rest"),
+        ({"grip": None}, "grip must be a Grip"),
+        ({"grip": dataclasses.replace(grip, normals=2.0 * grip.normals)}, "as gc.grip makes it"),
+    ):
+        with pytest.raises(gc.InputError, match=message):
+            gc.first_slip(**({"grip": grip, "wrench": ACROSS} | change))

@@ -1,0 +1,107 @@
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.closure.wrenches import grasp_map
+from grasp_core.execution.equilibrium import at_rest, stepped
+from tests.grasp_core.execution.held import box, opposed, opposed_grip, planned_grips, pressed
+
+
+def differences(grip, step=1e-6):
+    """Wrench of all contacts against each small motion, by central differences, (6, 6)."""
+    rest, columns = at_rest(grip), []
+    for motion in np.eye(6) * step:
+        ends = [stepped(rest, grip, sign * motion) for sign in (1.0, -1.0)]
+        there, back = (grasp_map(end.grip.arms) @ end.forces.ravel() for end in ends)
+        columns.append((back - there) / (2.0 * step))
+    return np.array(columns).T
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.01, 0.05])
+def test_the_stiffness_is_that_of_finite_differences(radius):
+    """Translations, turns, and tips that roll; central differences are good to the step squared."""
+    tested = 0
+    for stiffness in (300.0, 5000.0, np.diag([500.0, 1500.0, 900.0]) * np.ones((4, 1, 1))):
+        for grip in planned_grips(stiffness=stiffness, tip_radius_m=radius):
+            K = grip.grasp_stiffness
+            assert np.abs(differences(grip) - K).max() < 1e-8 * np.abs(K).max()
+            assert np.abs(grip.geometric_stiffness).max() > 0.0
+            tested += 1
+    assert tested == 18
+
+
+def test_the_response_is_that_of_finite_differences():
+    """Changes of forces along axes that turn with the object."""
+    tested = 0
+    for grip in planned_grips(stiffness=800.0):
+        for motion in np.eye(6) * 1e-6:
+            ends = [stepped(at_rest(grip), grip, sign * motion).grip for sign in (1.0, -1.0)]
+            turns = [motion[3:], -motion[3:]]
+            local = [
+                np.einsum("kij,ki->kj", grip.frames, end.squeeze - np.cross(turn, end.squeeze))
+                for end, turn in zip(ends, turns, strict=True)
+            ]
+            found = grip.response @ (grip.grasp_stiffness @ motion)
+            expected = 0.5 * (local[0] - local[1])
+            assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
+            tested += 1
+    assert tested == 36
+
+
+def test_four_fingers_share_a_force_and_yield_by_load_over_stiffness():
+    grip = opposed_grip(stiffness=1000.0)
+    load = np.array([1.0, 2.0, -3.0, 0.0, 0.0, 0.0])
+    assert grip.compliance @ load == pytest.approx(load / 4000.0, abs=1e-15)
+    changes = np.einsum("kij,kjm,m->ki", grip.frames, grip.response, load)
+    assert changes == pytest.approx(np.tile(-load[:3] / 4.0, (4, 1)), abs=1e-12)
+
+
+def test_a_squeeze_makes_turns_less_stiff_and_large_tips_help():
+    """About z: 4 K times the squared arm, less the pushes times the arms along them."""
+    stiff = {}
+    for radius in (0.0, 0.02, 0.04):
+        grip = opposed_grip(push=5.0, stiffness=1000.0, tip_radius_m=radius)
+        arm = 0.03**2 + 0.02**2
+        assert grip.grasp_stiffness[5, 5] == pytest.approx(
+            4000.0 * arm - 4.0 * 5.0 * (0.03 - radius)
+        )
+        stiff[radius] = grip.least_stiffness
+    assert stiff[0.0] <= stiff[0.02] <= stiff[0.04]
+
+
+def test_hard_pushes_make_soft_grips_unstable():
+    assert opposed_grip(push=5.0, stiffness=1000.0, tip_radius_m=0.0).stable
+    grip = opposed_grip(push=500.0, stiffness=1000.0, tip_radius_m=0.0)
+    assert grip.least_stiffness < 0.0
+    assert not grip.stable
+
+
+def test_two_fingers_have_no_stiffness_about_their_line():
+    grip = gc.grip(box(), opposed(1), 0.5, pressed(5.0, 1))
+    assert not grip.stable
+    with pytest.raises(gc.InputError, match="no stiffness against some motion"):
+        _ = grip.response
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"squeeze": np.ones((4, 3))}, "squeeze must balance: a wrench of"),
+        ({"squeeze": np.zeros((3, 3))}, r"squeeze must have shape \(4, 3\)"),
+        ({"stiffness": 0.0}, "stiffness must be positive"),
+        ({"stiffness": np.diag([1.0, 1.0, -1.0]) * np.ones((4, 1, 1))}, "stiffness must be pos"),
+        ({"stiffness": np.triu(np.ones((4, 3, 3)))}, "symmetric"),
+        ({"stiffness": [1.0, 2.0]}, r"stiffness must have shape \(4,\)"),
+        ({"tip_radius_m": -0.1}, "tip_radius_m must be from 0"),
+        ({"friction": -0.1}, "friction must not be negative"),
+        ({"contacts": opposed()[:1]}, "at least two are needed, got 1"),
+        ({"contacts": [1, 2]}, "contacts must be a Contact, got 1"),
+        ({"contacts": 5}, "contacts must be several Contact values"),
+        ({"body": None}, "body must be a Polyhedron"),
+    ],
+)
+def test_what_is_wrong_is_refused(change, message):
+    good = {"body": box(), "contacts": opposed(), "friction": 0.5, "squeeze": pressed(5.0)}
+    assert gc.grip(**good).sound()
+    with pytest.raises(gc.InputError, match=message):
+        gc.grip(**(good | change))

@@ -1,0 +1,129 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+from grasp_core.execution.payload import GAP
+from tests.grasp_core.execution.held import box, directions, opposed, planned
+
+G = 9.80665
+
+
+def orientations():
+    """Forty-two evenly spread directions: corners and middles of the edges of an icosahedron."""
+    corners = scenes.example_object("icosahedron").vertices
+    corners = corners - corners.mean(axis=0)
+    corners /= np.linalg.norm(corners, axis=1, keepdims=True)
+    middles = [a + b for i, a in enumerate(corners) for b in corners[:i] if a @ b > 0.0]
+    middles = np.array(middles) / np.linalg.norm(middles, axis=1, keepdims=True)
+    found = np.vstack([corners, middles])
+    assert len(found) == 42
+    return found
+
+
+def payloads(names=("box", "dodecahedron", "wedge"), limit=2):
+    for name in names:
+        body, grasps = planned(name, limit)
+        for grasp in grasps:
+            for stiffness in (500.0, 3000.0):
+                given = {"max_push_n": 10.0, "stiffness": stiffness}
+                yield body, grasp, gc.payload(body, grasp, 0.5, **given)
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.4, 0.9])
+def test_four_opposed_fingers_hold_what_the_closed_forms_say(mu):
+    """A force F along the pushes leaves one side N - F / 2 in a finger, and both sides must take
+    equal shares across: 4 mu (N - F / 2) in all, a line at 4 mu N / sqrt(1 + 4 mu^2) from zero.
+    """
+    found = gc.payload(box(), opposed(), mu, max_push_n=10.0, tip_radius_m=0.0)
+    across = 2 * 2 * mu * 10.0 / G
+    free = across / np.sqrt(1.0 + 4.0 * mu**2)
+    assert found.free.lower <= free * (1.0 + 1e-6)
+    assert found.free.upper >= free * (1.0 - 1e-6)
+    assert found.free.upper == pytest.approx(free, rel=2e-3)
+    assert found.mass_kg == pytest.approx(across / (np.sqrt(1.0 + mu**2) + mu), rel=1e-4)
+    assert found.verify()
+
+
+def test_the_free_mass_is_that_of_many_orientations():
+    """No orientation holds less than the lower bound, and a hundred more do not either."""
+    rng, tested = np.random.default_rng(0), 0
+    for body, grasp, found in payloads():
+        weights = np.zeros((142, 6))
+        weights[:, :3] = G * np.vstack([orientations(), directions(100, rng)])
+        limits = gc.wrench_limits(
+            grasp, None, 0.5, weights, max_normal_force=10.0, center=body.center_of_mass
+        )
+        least = min(limit.limit for limit in limits)
+        assert found.free.lower <= least * (1.0 + 1e-6)
+        assert least <= 1.2 * found.free.upper
+        assert found.free.upper <= found.free.lower * (1.0 + GAP) * (1.0 + 1e-6)
+        tested += len(weights)
+    assert tested == 1704
+
+
+def test_the_fixed_mass_is_held_in_every_orientation_and_is_no_larger_than_the_free_one():
+    tested = 0
+    for _, _, found in payloads():
+        assert found.verify()
+        assert found.fixed.scale <= found.free.upper
+        slips = [
+            gc.first_slip(
+                found.fixed.grip, np.append(G * d, np.zeros(3)), model="linear", max_push_n=10.001
+            ).multiple
+            for d in orientations()
+        ]
+        assert found.mass_kg <= min(slips)
+        assert min(slips) <= 1.3 * found.mass_kg
+        tested += len(slips)
+    assert tested == 504
+
+
+@pytest.mark.slow
+def test_the_fixed_mass_is_below_the_free_one_for_many_grasps():
+    """Tips that do not roll, for which this is a theorem, and tips that do."""
+    tested = 0
+    for name in ("box", "tetrahedron", "octahedron", "icosahedron", "random-20-7", "wedge"):
+        body, grasps = planned(name, 6)
+        for grasp in grasps:
+            for friction in (0.4, 0.7):
+                for radius in (0.0, 0.015):
+                    found = gc.payload(body, grasp, friction, max_push_n=6.0, tip_radius_m=radius)
+                    assert found.verify()
+                    assert found.fixed.scale <= found.free.upper
+                    tested += 1
+    assert tested >= 120
+
+
+def test_contacts_that_hold_nothing_have_no_payload():
+    found = gc.payload(box(), opposed(), 0.0, max_push_n=10.0)
+    assert found.mass_kg == found.free.lower == 0.0
+    assert found.free.upper < 1e-6
+    assert found.verify()
+
+
+def test_false_claims_are_no_certificate():
+    found = gc.payload(box(), opposed(), 0.4, max_push_n=10.0)
+    free = found.free
+    false = [
+        {"lower": free.lower * 1.001}, {"upper": free.lower * 0.999},
+        {"upper": free.upper * (1.0 - 1e-6)}, {"triangles": free.triangles[1:]},
+        {"triangles": free.triangles[:, ::-1]}, {"rays": free.rays[1:]}, {"rays": ()},
+        {"triangles": None}, {"rays": None}, {"lower": np.nan}, {"upper": "a"},
+        {"rays": (None,) * len(free.rays)},
+    ]  # fmt: skip
+    for change in false:
+        changed = dataclasses.replace(found, free=dataclasses.replace(free, **change))
+        assert changed.verify() is False, change
+    assert dataclasses.replace(found, free=None).verify() is False
+    assert dataclasses.replace(found, fixed=None).verify() is False
+    heavier = gc.best_squeeze(box(), opposed(), 0.4, gc.any_direction(2.0), max_push_n=10.0)
+    assert dataclasses.replace(found, fixed=heavier).verify() is False
+
+
+@pytest.mark.parametrize("most", [0.0, -1.0, np.nan, None, "a"])
+def test_wrong_pushes_are_refused(most):
+    with pytest.raises(gc.InputError, match="max_push_n must be a number"):
+        gc.payload(box(), opposed(), 0.4, max_push_n=most)

@@ -1,0 +1,195 @@
+"""What is claimed of squeezes and payloads: by the springs' own equations, grids and programs."""
+
+import numpy as np
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
+
+from tests.tampering.exact_closure import UNIT, conic, contacts_make_sense, locals_of, tangents
+from tests.tampering.wrench_bounds import wrench_limit
+
+GRAVITY = 9.80665
+TURNS = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
+CIRCLE = np.column_stack([np.cos(TURNS), np.sin(TURNS)])
+
+
+def sensible(g):
+    """Whether a grip is one, with a squeeze that balances and returns after every small push."""
+    if not contacts_make_sense(g.arms, g.normals, g.friction):
+        return False
+    symmetric = (
+        np.abs(g.stiffness - g.stiffness.transpose(0, 2, 1)).max() <= 1e-8 * g.stiffness.max()
+    )
+    positive = np.linalg.eigvalsh(g.stiffness).min() > 0.0 and g.tip_radius_m.min() >= 0.0
+    size = np.linalg.norm(g.arms, axis=1).max()
+    torque = np.cross(g.arms, g.squeeze).sum(axis=0) / size
+    left = np.abs(np.append(g.squeeze.sum(axis=0), torque)).max()
+    balanced = left <= 2e-6 * np.linalg.norm(g.squeeze, axis=1).sum()
+    S = stiffness(g)
+    scale = np.repeat([1.0, 1.0 / size], 3)
+    stable = np.linalg.eigvalsh(scale[:, None] * (S + S.T) * scale).min() > 0.0
+    return bool(symmetric and positive and balanced and stable)
+
+
+def moved(g):
+    """Change of each contact force, and of its arm, under the six unit motions, (6, k, 3) each."""
+    forces, arms = [], []
+    for d, t in zip(*np.split(np.eye(6), 2, axis=1), strict=True):
+        tip = d + np.cross(t, g.arms)
+        forces.append(-np.einsum("kij,kj->ki", g.stiffness, tip))
+        arms.append(np.cross(t, g.arms) + g.tip_radius_m[:, None] * np.cross(t, g.normals))
+    return np.array(forces), np.array(arms)
+
+
+def stiffness(g):
+    """Minus the change of the contacts' wrench under each unit motion, in columns."""
+    forces, arms = moved(g)
+    torque = np.cross(g.arms, forces) + np.cross(arms, g.squeeze)
+    return -np.hstack([forces.sum(axis=1), torque.sum(axis=1)]).T
+
+
+def responding(g, loads):
+    """Forces (normal, tangents) of the squeeze, what the offset adds, and what unit loads add."""
+    frames = np.array([np.column_stack([n, tangents(n)]) for n in g.normals])
+    forces, _ = moved(g)
+    turned = np.array([np.cross(t, g.squeeze) for t in np.eye(6)[:, 3:]])
+    change = np.einsum("jki,kia->kaj", forces - turned, frames) @ np.linalg.inv(stiffness(g))
+    rest = np.einsum("kia,ki->ka", frames, g.squeeze)
+    return frames, rest, change @ loads.offset, change @ loads.axes
+
+
+def squeeze(c):
+    """The squeeze survives, its worst load is one, and no squeeze survives more than the bound."""
+    g = c.grip
+    if not sensible(g) or not 0.0 <= c.scale <= c.upper or c.max_push_n < 0.0:
+        return False
+    frames, rest, offset, change = responding(g, c.loads)
+    most, mu = c.max_push_n, g.friction
+    slack = 2e-6 * (most + c.scale * np.linalg.norm(change, axis=(1, 2)).max())
+    states = [(rest + offset, c.scale * change)] + [(rest, 0.0 * change)] * bool(
+        c.loads.offset.any()
+    )
+    for start, swing in states:
+        across, leaning = start[:, 1:] @ CIRCLE.T, lean(swing, mu)
+        reach = np.linalg.norm(swing[:, 0], axis=1)
+        if (across + leaning - (mu * start[:, 0])[:, None]).max() > slack:
+            return False
+        if (start[:, 0] + reach).max() > most + slack or (start[:, 0] - reach).min() < -slack:
+            return False
+    i, z = c.contact, c.direction
+    if abs(np.linalg.norm(z) - 1.0) > UNIT:
+        return False
+    n, *t = rest[i] + offset[i] + c.scale * change[i] @ z
+    if np.hypot(*t) < mu[i] * n - 20.0 * slack and n < most - 20.0 * slack:
+        return False
+    best = largest_scale(g, frames, offset, change, c)
+    unit = most / np.linalg.norm(change, axis=(1, 2)).max()
+    return bool(c.upper >= best * (1.0 - 1e-4) - 1e-6 * unit)
+
+
+def lean(change, mu):
+    """Length of B'u - mu a over the circle of directions u, (k, 720)."""
+    tilted = np.einsum("gj,kjm->kgm", CIRCLE, change[:, 1:]) - (mu[:, None] * change[:, 0])[:, None]
+    return np.linalg.norm(tilted, axis=2)
+
+
+class Rows:
+    """Rows of a linear program in squeeze and scale."""
+
+    def __init__(self, states, mu):
+        self.states, self.mu, self.A, self.b = states, mu, [], []
+        for start, swing in states:
+            for i in range(len(mu)):
+                for sign in (1.0, -1.0):
+                    row = np.zeros(3 * len(mu) + 1)
+                    row[3 * i], row[-1] = sign, np.linalg.norm(swing[i, 0])
+                    self.A.append(row)
+                    self.b.append((sign > 0.0) - sign * start[i, 0])
+        for j in range(0, 720, 30):
+            self.take([np.full(len(mu), j)] * len(states))
+
+    def take(self, places):
+        """One more direction for each contact in each state."""
+        for (start, swing), turns in zip(self.states, places, strict=True):
+            leaning = lean(swing, self.mu)
+            for i, j in enumerate(turns):
+                row = np.zeros(3 * len(self.mu) + 1)
+                row[3 * i], row[3 * i + 1 : 3 * i + 3] = -self.mu[i], CIRCLE[j]
+                row[-1] = leaning[i, j]
+                self.A.append(row)
+                self.b.append(self.mu[i] * start[i, 0] - CIRCLE[j] @ start[i, 1:])
+
+    def worst(self, f, s):
+        """Directions in which a squeeze breaks the cones most."""
+        return [
+            ((f + start)[:, 1:] @ CIRCLE.T + s * lean(swing, self.mu)).argmax(axis=1)
+            for start, swing in self.states
+        ]
+
+
+def largest_scale(g, frames, offset, change, c):
+    """By a linear program with rows of 720 directions, taken up where they are broken most."""
+    k, most = len(g.friction), c.max_push_n or 1e-12
+    unit = most / np.linalg.norm(change, axis=(1, 2)).max()
+    states = [(offset / most, change * unit / most)]
+    states += [(0.0 * offset, 0.0 * change)] * bool(c.loads.offset.any())
+    size = np.linalg.norm(g.arms, axis=1).max()
+    columns = [
+        np.append(v, np.cross(arm, v) / size)
+        for arm, frame in zip(g.arms, frames, strict=True)
+        for v in frame.T
+    ]
+    rows, scale = Rows(states, g.friction), 0.0
+    for _ in range(12):
+        answer = linprog(
+            np.append(np.zeros(3 * k), -1.0), A_ub=np.array(rows.A), b_ub=np.array(rows.b),
+            A_eq=np.column_stack([*columns, np.zeros(6)]), b_eq=np.zeros(6),
+            bounds=[(None, None)] * (3 * k) + [(0.0, None)],
+        )  # fmt: skip
+        if answer.status != 0:
+            return 0.0
+        scale = answer.x[-1]
+        rows.take(rows.worst(answer.x[:-1].reshape(k, 3), scale))
+    return scale * unit
+
+
+def payload(c):
+    """The squeeze is as claimed, the rays too, and a hull of other rays agrees with the bounds."""
+    g, free, most = c.fixed.grip, c.free, c.fixed.max_push_n
+    E = c.fixed.loads.axes
+    ball = np.diag([GRAVITY**2] * 3 + [0.0] * 3)
+    if c.fixed.loads.offset.any() or np.abs(E @ E.T - ball).max() > 1e-6 or not squeeze(c.fixed):
+        return False
+    if not 0.0 <= free.lower <= free.upper:
+        return False
+    for ray in free.rays:
+        if abs(np.linalg.norm(ray.wrench) - GRAVITY) > 1e-7 or ray.wrench[3:].any():
+            return False
+        if not wrench_limit(ray, g.arms, g.normals, g.friction, most, np.zeros(3)):
+            return False
+    inner, outer = bounds(g, most, np.array([ray.wrench[:3] for ray in free.rays]))
+    slack = 1e-6 * most
+    return bool(free.lower <= outer + slack and free.upper >= inner - slack)
+
+
+def bounds(g, most, directions):
+    """Mass held in every orientation, and the least held in some, by a hull of ends of rays."""
+    rng = np.random.default_rng(0)
+    d = np.vstack([directions, rng.normal(size=(30, 3))])
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    held = np.array([ray(g, most, each) for each in d])
+    if held.min() < 1e-7 * most:
+        return 0.0, held.min()
+    hull = ConvexHull(held[:, None] * d)
+    return max(-hull.equations[:, -1].max(), 0.0), held.min()
+
+
+def ray(g, most, d):
+    """Largest mass that contacts hold whose weight points along d."""
+    k, size = len(g.arms), np.linalg.norm(g.arms, axis=1).max()
+    A = np.zeros((6 + 4 * k, 3 * k + 1))
+    A[:6, :-1] = locals_of(g.arms / size, g.normals, g.friction)
+    A[:3, -1] = d
+    A[6 + np.arange(k), 3 * np.arange(k)] = 1.0
+    A[6 + k :, :-1] = -np.eye(3 * k)
+    b = np.r_[np.zeros(6), np.ones(k), np.zeros(3 * k)]
+    return most * conic(np.append(np.zeros(3 * k), -1.0), A, b, 6, k, k).x[-1] / GRAVITY
