@@ -108,14 +108,15 @@ def test_placements_balance_strictly_inside_their_faces_and_cones():
     assert len(found) >= 250
 
 
-def test_a_linear_program_with_inner_pyramids_accepts_the_placements():
-    found = of_kind(Placement)
+@pytest.mark.parametrize("every", [5, *more(1)])
+def test_a_linear_program_with_inner_pyramids_accepts_the_placements(every):
+    found = of_kind(Placement)[::every]
     for pieces, friction, placed in found:
         normals = normals_of(pieces)
         assert pyramid_margin(placed.positions, normals, friction, 128, outer=False) > 0.0
         spread = np.linalg.svd(placed.positions - placed.positions.mean(axis=0), compute_uv=False)
         assert spread[1] > patch.LEAST_INSET
-    assert len(found) >= 250
+    assert len(found) >= 250 // every
 
 
 def test_symmetric_faces_too_are_held_by_a_regulus():
@@ -142,17 +143,18 @@ def test_nearly_every_quadruple_with_a_closed_patch_gets_a_grasp():
     assert len(found) >= 0.98 * len(closed)
 
 
-def test_no_contacts_in_closure_are_found_where_absence_is_proved():
+@pytest.mark.parametrize("every", [4, *more(1)])
+def test_no_contacts_in_closure_are_found_where_absence_is_proved(every):
     rng = np.random.default_rng(3)
-    absent = of_kind(Absence)
+    absent = of_kind(Absence)[::every]
     for pieces, friction, absence in absent:
         assert absence.verify()
         best = climb(rng, pieces, friction, samples=40, steps=20)
         assert pyramid_margin(best, normals_of(pieces), friction, 16, outer=False) <= 0.0
-    assert len(absent) >= 60
+    assert len(absent) >= 60 // every
 
 
-@pytest.mark.parametrize("each", [2, *more(6)])
+@pytest.mark.parametrize("each", [1, *more(6)])
 def test_absence_holds_up_to_the_friction_at_which_the_patch_closes(each):
     """Just above it a grasp is found at once, or nearly always."""
     rng = np.random.default_rng(4)
