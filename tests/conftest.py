@@ -1,7 +1,7 @@
 """What holds for all tests: no clock decides, files stay together, and kernels compile once."""
 
 import fcntl
-from pathlib import Path
+import os
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -33,15 +33,15 @@ def one_compiles(listener):
 
     class OneCompiles(listener):
         def __init__(self):
-            self.file, self.depth = Path(__file__).open(), 0
+            self.lock, self.depth = os.open(__file__, os.O_RDONLY), 0
 
-        def on_start(self, event):
+        def on_start(self, _):
             self.depth += 1
-            fcntl.flock(self.file, fcntl.LOCK_EX)
+            fcntl.flock(self.lock, fcntl.LOCK_EX)
 
-        def on_end(self, event):
+        def on_end(self, _):
             self.depth -= 1
             if self.depth == 0:
-                fcntl.flock(self.file, fcntl.LOCK_UN)
+                fcntl.flock(self.lock, fcntl.LOCK_UN)
 
     return OneCompiles()
