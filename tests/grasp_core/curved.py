@@ -1,5 +1,7 @@
 """Curved bodies as fine meshes, and what a line along a patch's normal meets."""
 
+from functools import cache
+
 import numpy as np
 import trimesh
 
@@ -15,6 +17,7 @@ def bumpy_ellipsoid(seed=0, noise=0.0, subdivisions=4, radii=(0.05, 0.042, 0.036
     return ball.vertices * away[:, None] * np.array(radii), np.array(ball.faces)
 
 
+@cache
 def curved_body(**shape):
     few = gc.PatchLimits(most=12)
     return gc.Polyhedron.from_mesh(*bumpy_ellipsoid(**shape), name="bumpy", patches=few)

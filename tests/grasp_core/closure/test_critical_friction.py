@@ -1,4 +1,5 @@
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -39,7 +40,9 @@ def test_a_margin_that_grows_with_the_square_shows_no_friction():
 
 
 def test_pushes_that_balance_without_friction_need_no_search(monkeypatch):
-    grasp = gc.plan(example_object("wedge"), 0.5, families="pencil", cones="normal").grasps[0]
+    grasp = gc.plan(
+        example_object("wedge"), 0.5, families="pencil", cones="normal", limit=1
+    ).grasps[0]
     monkeypatch.setattr(critical, "search_interval", None)
     assert gc.critical_friction(grasp) == 0.0
     with pytest.raises(TypeError):
@@ -54,7 +57,7 @@ def test_few_programs_are_needed(monkeypatch):
         counts[-1] += 1
         return decide(*contacts)
 
-    grasps = gc.plan(example_object("random-12-1"), 0.5, families="concurrent").grasps
+    grasps = gc.plan(example_object("random-12-1"), 0.5, families="concurrent", limit=40).grasps
     decide = friction_search.decide
     monkeypatch.setattr(friction_search, "decide", counted)
     for grasp in grasps:
@@ -67,6 +70,12 @@ def test_few_programs_are_needed(monkeypatch):
 
 def contact_sets(count=4):
     """Contacts of planned grasps, if four, on bodies and about a point, (g, k, 3) each."""
+    positions, normals = made_sets(count)
+    return positions.copy(), normals.copy()
+
+
+@cache
+def made_sets(count):
     rng, both = np.random.default_rng(count), []
     if count == 4:
         for name in ("random-12-1", "octahedron", "hex-nut"):
@@ -169,7 +178,9 @@ def test_what_the_search_gets_wrong_is_made_program_by_program(monkeypatch, spoi
 
 
 def test_hopeless_and_frictionless_sets_are_left_to_the_reference():
-    grasp = gc.plan(example_object("wedge"), 0.5, families="pencil", cones="normal").grasps[0]
+    grasp = gc.plan(
+        example_object("wedge"), 0.5, families="pencil", cones="normal", limit=1
+    ).grasps[0]
     parallel = np.tile([0.0, 0, 1], (4, 1))
     positions = np.array([grasp.positions, TETRA_CENTERS, TETRA_CENTERS])
     normals = np.array([grasp.normals, parallel, TETRA_NORMALS])

@@ -196,14 +196,14 @@ def test_verdicts_carry_certificates_that_verify_and_pyramids_agree():
     """Random contacts: closed ones pass an outer, others fail an inner 64-sided pyramid."""
     rng = np.random.default_rng(11)
     seen = {True: 0, False: 0}
-    for _ in range(400):
+    for _ in range(160):
         positions, normals = random_contacts(rng)
         certificate = gc.force_closure(positions, normals, 0.5)
         assert certificate.verify()
         margin = pyramid_margin(positions, normals, 0.5, 64, outer=certificate.closed)
         assert (margin > -1e-9) if certificate.closed else (margin < 1e-9)
         seen[certificate.closed] += 1
-    assert min(seen.values()) >= 100
+    assert min(seen.values()) >= 40
 
 
 def test_closure_holds_exactly_above_the_critical_friction():

@@ -30,6 +30,7 @@ from sim_validate.validation.paper_as_printed import (
     unit,
 )
 from tests.grasp_core.quadruples import paired_quadruples
+from tests.marks import MORE
 
 TOLERANCE = 1e-7
 """Ten times the residual at which a program's answer is accepted, in object radii."""
@@ -200,14 +201,15 @@ def test_swapping_the_foci_of_the_counterexample_closes_every_corner_choice():
     assert worst == pytest.approx(0.01097, abs=1e-5)
 
 
-def test_an_adversary_breaks_printed_pencils_but_no_corrected_one():
+@pytest.mark.parametrize("count", [12, pytest.param(30, marks=MORE)])
+def test_an_adversary_breaks_printed_pencils_but_no_corrected_one(count):
     """At the centres of all discs the forces along the normals balance, and nearly all random
     contacts are closed too: only a search over the borders shows what the printed program does.
     """
     theta = math.radians(5.0)
     friction = math.tan(theta) + BORDER
     printed, broken, corrected = 0, 0, 0
-    for quad, cones in paired_quadruples("random-16-1", theta, 30):
+    for quad, cones in paired_quadruples("random-16-1", theta, count):
         discs = printed_pencil(quad, theta)
         if discs is not None and not in_a_safe_cell(quad, discs):
             printed += 1
@@ -218,9 +220,10 @@ def test_an_adversary_breaks_printed_pencils_but_no_corrected_one():
             assert in_a_safe_cell(quad, discs)
             assert adversarial_margin(quad, discs, friction) > 0.0
             corrected += 1
-    assert printed >= 40
-    assert broken >= 2
-    assert corrected >= 60
+
+    assert printed >= 40 * count // 30
+    assert broken >= 1 + count // 30
+    assert corrected >= 2 * count
 
 
 def fourth_singular_value(points, directions):

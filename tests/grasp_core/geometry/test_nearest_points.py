@@ -85,7 +85,7 @@ def test_distances_are_those_of_rational_arithmetic(size, height):
 @pytest.mark.parametrize("diameter", [1e-3, 2.0, *more(0.1)])
 def test_points_inside_of_every_triangle_are_on_the_surface(diameter):
     """Whatever the size: triangles of an object of 1 mm have some 1e-9 square metres."""
-    body = gc.Polyhedron.from_mesh(*bumpy_ellipsoid(subdivisions=3), patches=gc.PatchLimits(most=4))
+    body = gc.Polyhedron.from_mesh(*bumpy_ellipsoid(subdivisions=2), patches=gc.PatchLimits(most=4))
     vertices = body.vertices * (diameter / (2.0 * body.radius))
     surface = Surface(vertices, body.triangles)
     rng, slack = np.random.default_rng(3), 1e-9 * diameter
@@ -96,4 +96,4 @@ def test_points_inside_of_every_triangle_are_on_the_surface(diameter):
         point = rng.dirichlet([1.0, 1.0, 1.0]) @ triangle
         assert surface.holds(point, normal, slack)
         assert not surface.holds(point - 0.01 * diameter * normal, normal, slack)
-    assert len(corners) >= 1000
+    assert len(corners) >= 300

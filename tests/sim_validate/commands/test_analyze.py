@@ -1,4 +1,3 @@
-import copy
 import json
 import re
 from pathlib import Path
@@ -11,46 +10,12 @@ from sim_validate import contact_analysis as analysis
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
-
-ROOT = Path(__file__).parents[3]
-CROSS = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
-"""Four contacts that push towards the origin along x and y."""
-
-
-def contacts(positions, normals):
-    pairs = zip(np.asarray(positions).tolist(), np.asarray(normals).tolist(), strict=True)
-    return [{"position_m": position, "normal": normal} for position, normal in pairs]
-
-
-TETRAHEDRON = {
-    "contacts": contacts(TETRA_CENTERS, TETRA_NORMALS), "friction": 0.5,
-    "center_m": [0.0, 0.0, 0.0], "torque_scale_m": 1.0,
-}  # fmt: skip
-
-
-@pytest.fixture
-def analyze(tmp_path, monkeypatch, capsys):
-    """The exit code and the one document of `analyze --json` on a file with this content."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(content, *flags):
-        Path("contacts.json").write_text(json.dumps(content))
-        code = main(["analyze", "contacts.json", "--json", *flags])
-        return code, json.loads(capsys.readouterr().out)
-
-    return run
-
-
-def refused(content, capsys, *flags):
-    """What is said about a file that is refused."""
-    text = content if isinstance(content, str) else json.dumps(content)
-    Path("contacts.json").write_text(text)
-    assert main(["analyze", "contacts.json", *flags]) == Exit.INPUT
-    shown = capsys.readouterr()
-    assert shown.out == ""
-    assert shown.err.count("\n") == 1
-    assert shown.err.startswith("graspproof: contacts.json: ")
-    return shown.err
+from tests.sim_validate.commands.contacts_files import (
+    CROSS,
+    TETRAHEDRON,
+    arms_and_normals,
+    contacts,
+)
 
 
 def test_the_centers_of_a_tetrahedron(analyze):
@@ -109,12 +74,6 @@ def test_forces_and_separating_wrench_prove_themselves_from_the_document(analyze
     across = np.linalg.norm(velocities - along[:, None] * normals, axis=1)
     assert np.linalg.norm(facing) > 0.0
     assert (along + 0.5 * across <= 1e-9).all()
-
-
-def arms_and_normals(grasp):
-    positions = np.array([contact["position_m"] for contact in grasp["contacts"]])
-    normals = np.array([contact["normal"] for contact in grasp["contacts"]])
-    return positions - grasp["center_m"], normals
 
 
 def test_two_contacts_are_never_closed(analyze):
@@ -186,20 +145,6 @@ def test_a_load_along_the_axis_of_a_cross(analyze):
     assert heavy["least_norm_forces_n"] is None
 
 
-def test_friction_is_that_of_the_contact_then_the_flag_then_the_file(analyze):
-    file = {"contacts": contacts(CROSS, -CROSS), "friction": 0.5}
-    file["contacts"][0]["friction"] = 0.9
-
-    def used(*flags):
-        listed = analyze(file, *flags)[1]["grasps"][0]["contacts"]
-        return [contact["friction"] for contact in listed]
-
-    assert used() == [0.9, 0.5, 0.5, 0.5]
-    assert used("--friction", "0.3") == [0.9, 0.3, 0.3, 0.3]
-    del file["friction"]
-    assert used("--friction", "0.2") == [0.9, 0.2, 0.2, 0.2]
-
-
 def test_a_cross_needs_friction_at_both_pairs(analyze):
     """The pair along y turns nothing about y; without friction the other pair does not either."""
     file = {"contacts": contacts(CROSS, -CROSS), "friction": 0.5}
@@ -210,20 +155,6 @@ def test_a_cross_needs_friction_at_both_pairs(analyze):
     assert code == Exit.NEGATIVE
     facing = np.array(document["grasps"][0]["separating_wrench"])
     assert np.flatnonzero(np.abs(facing) > 1e-9 * np.abs(facing).max()).tolist() == [4]
-
-
-def test_outward_normals_are_turned(analyze):
-    outward = TETRAHEDRON | {"contacts": contacts(TETRA_CENTERS, -TETRA_NORMALS)}
-    assert analyze(outward, "--outward") == analyze(TETRAHEDRON)
-    assert analyze(outward) != analyze(TETRAHEDRON)
-
-
-def test_normals_with_three_digits_are_made_unit_vectors(analyze):
-    file = TETRAHEDRON | {"contacts": contacts(TETRA_CENTERS, np.round(TETRA_NORMALS, 3))}
-    code, document = analyze(file)
-    assert code == Exit.GOOD
-    _, normals = arms_and_normals(document["grasps"][0])
-    assert normals == pytest.approx(TETRA_NORMALS, abs=1e-12)
 
 
 def test_center_and_scale_are_the_contacts_own_unless_given(analyze):
@@ -269,90 +200,6 @@ def test_grasps_of_a_plan_are_measured_by_their_object(tmp_path, monkeypatch, ca
     Path("none.json").write_text(json.dumps(planned | {"grasps": []}))
     assert main(["analyze", "none.json"]) == Exit.INPUT
     assert "none.json: grasps: the list is empty" in capsys.readouterr().err
-
-
-def changed(place, value):
-    """The file of the tetrahedron with one entry set, or removed where the value is `...`."""
-    file = copy.deepcopy(TETRAHEDRON)
-    owner = file
-    for key in place[:-1]:
-        owner = owner[key]
-    if value is ...:
-        del owner[place[-1]]
-    else:
-        owner[place[-1]] = value
-    return file
-
-
-ONE = TETRAHEDRON["contacts"][0]
-
-
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        ("", "not JSON"),
-        ("[1]", "expected an object, as a contacts file is, got a list"),
-        ('{"contacts": ' * 100_000, "deep inside each other"),
-        (changed(["friction"], None), "friction: null; give a value, or leave the key out"),
-        ("{}", '"contacts" (one grasp) and "grasps" (several)'),
-        (TETRAHEDRON | {"grasps": [{"contacts": [ONE, ONE]}]}, '"contacts" (one grasp)'),
-        ({"grasps": [], "friction": 1}, "grasps: expected at least 1"),
-        (changed(["friction"], ...), 'contacts[0].friction: missing; give it there, as a key "fri'),
-        (changed(["friction"], -0.1), "friction: expected at least 0.0, got -0.1"),
-        (changed(["friction"], 1e4), "friction: expected at most 1000"),
-        (changed(["friction"], "0.5"), 'friction: expected a number, got "0.5"'),
-        (changed(["mu"], 0.5), "mu: unknown key; expected are contacts, grasps, friction"),
-        (changed(["schema"], 1), "schema: unknown key"),
-        (changed(["torque_scale_m"], 0), "torque_scale_m: expected more than 0.0, got 0"),
-        (changed(["center_m"], [0, 0]), "center_m[2]: missing"),
-        (changed(["contacts"], [ONE]), "contacts: expected at least 2 items, got 1"),
-        (changed(["contacts"], [ONE] * 101), "contacts: expected at most 100 items, got 101"),
-        (changed(["contacts"], [ONE] * 3), "contacts: all lie within"),
-        (changed(["contacts", 1, "normal"], ...), "contacts[1].normal: missing"),
-        (changed(["contacts", 2, "normal"], [0, 0, 1.01]), "contacts[2].normal: its length must"),
-        (changed(["contacts", 2, "normal"], [0, 0, 1.01]), "got 1.01; divide it"),
-        (changed(["contacts", 3, "normal", 0], float("nan")), "contacts[3].normal[0]: expected a"),
-        (changed(["contacts", 3, "position_m", 2], 1e7), "contacts[3].position_m[2]: expected at"),
-        (changed(["contacts", 3, "pos"], 1), "contacts[3].pos: unknown key; expected are position"),
-        ({"grasps": [{"contacts": [ONE, ONE | {"normal": 1}]}]}, "grasps[0].contacts[1].normal: "),
-        ({"grasps": [{"contacts": [ONE, ONE], "name": "a"}]}, "expected are id, contacts"),
-        ({"grasps": [TETRAHEDRON | {"friction": 1}]}, "grasps[0].friction: unknown key"),
-        ({"grasps": [{"id": "1", "contacts": [ONE, ONE]}, {"contacts": [ONE, ONE]}]},
-         "grasps[1].id: '1' is also that of grasps[0]"),
-    ],
-)  # fmt: skip
-def test_a_file_is_refused_by_name_and_field(tmp_path, monkeypatch, capsys, content, words):
-    monkeypatch.chdir(tmp_path)
-    assert words in refused(content, capsys)
-
-
-def test_a_file_that_is_missing_or_asks_too_much_is_refused(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["analyze", "none.json"]) == Exit.INPUT
-    assert "none.json: cannot be read" in capsys.readouterr().err
-    Path("contacts.json").write_text(json.dumps(TETRAHEDRON))
-    assert main(["analyze", "contacts.json", "--edges", "2501"]) == Exit.INPUT
-    assert "--edges 2500 or less" in capsys.readouterr().err
-    assert main(["analyze", "contacts.json", "--friction", "1001"]) == Exit.USAGE
-    assert "--friction must be at least 1e-09, at most 1000" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("flags", "words"),
-    [
-        ("--wrench 0 0 0 0 0 0", "must not be zero"),
-        ("--wrench 0 0 1 0 0", "6 values"),
-        ("--wrench 0 0 1 0 0 inf", "finite"),
-        ("--edges 2", "edges"),
-        ("--friction 0", "friction"),
-        ("--max-normal-force -1", "--max-normal-force must be"),
-        ("--torque-scale-m 0", "--torque-scale-m must be"),
-    ],
-)
-def test_flags_without_sense_are_usage_errors(capsys, flags, words):
-    assert main(["analyze", "contacts.json", *flags.split()]) == Exit.USAGE
-    shown = capsys.readouterr()
-    assert words in shown.err + shown.out
 
 
 def test_what_cannot_be_decided_is_named_and_the_rest_is_answered(analyze, monkeypatch, capsys):
@@ -402,26 +249,9 @@ def test_one_and_two_processes_say_the_same(analyze):
             assert here[name] == pytest.approx(there[name], rel=1e-4, abs=1e-9)
 
 
-def test_a_config_file_gives_wrenches(analyze):
-    Path("c.toml").write_text("wrench = [[0, 0, -1, 0, 0, 0], [1, 0, 0, 0, 0, 0.1]]\nedges = 6\n")
-    _, document = analyze(TETRAHEDRON, "--config", "c.toml")
-    asked = [found["wrench"] for found in document["grasps"][0]["wrenches"]]
-    assert asked == [[0, 0, -1, 0, 0, 0], [1, 0, 0, 0, 0, 0.1]]
-    assert document["edges"] == 6
-
-
 @pytest.mark.usefixtures("analyze")
 def test_control_characters_in_an_id_do_not_reach_the_terminal(capsys):
     grasp = {"id": "a\x1b[31m", "contacts": TETRAHEDRON["contacts"]}
     Path("contacts.json").write_text(json.dumps({"grasps": [grasp], "friction": 1}))
     assert main(["analyze", "contacts.json"]) == Exit.GOOD
     assert "\x1b[31m" not in capsys.readouterr().out
-
-
-def test_the_page_of_files_shows_one_that_is_read(analyze):
-    page = (ROOT / "docs" / "files.md").read_text()
-    shown = json.loads(re.search(r"```json\n(.*?)```", page, re.DOTALL)[1])
-    code, document = analyze(shown)
-    assert code == Exit.GOOD
-    assert len(document["grasps"][0]["contacts"]) == 4
-    assert document["grasps"][0]["verified"]["closure"] is True

@@ -1,0 +1,182 @@
+"""Contacts whose closure, critical friction or limit is known in closed form."""
+
+import math
+from collections import Counter
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from scenes.example_objects import example_object
+from tests.grasp_core.regular_solids import SOLIDS, TOLERANCE, all_signs, quadruples, units
+from tests.judges import random_contacts, random_rotation
+
+
+def cotangent_of_cap(normals):
+    """Cotangent of the angular radius of the least cap that holds unit vectors, at least zero.
+
+    The cap is determined by two or three of them, or there is none below a half space.
+    """
+    middles = [a + b for a, b in combinations(normals, 2)]
+    middles += [np.cross(b - a, c - a) for a, b, c in combinations(normals, 3)]
+    middles = units([m for m in middles if np.linalg.norm(m) > 1e-9])
+    cosine = min(max((np.vstack([middles, -middles]) @ normals.T).min(axis=1).max(), 0.0), 1.0)
+    return cosine / math.sqrt(1.0 - cosine**2)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("tetrahedron", {0.0: 1}),
+        ("cube", {0.0: 15}),
+        ("octahedron", {0.0: 56, 0.353553: 8, 0.707107: 6}),
+        ("dodecahedron", {0.0: 285, 0.190983: 60, 0.5: 120, 0.618034: 30}),
+    ],
+)
+def test_critical_frictions_at_the_face_centres_of_a_regular_solid(name, expected):
+    """All equal the cotangent of the least cap around the normals.
+
+    Where that is zero the margin may grow with the square of the friction only, as 0.007 mu^2: at
+    1e-5 it is seventy times the slack of the proofs. What is reported is then zero to four digits.
+    """
+    seen = Counter()
+    for normals in quadruples(SOLIDS[name]):
+        critical, cap = gc.critical_friction(-normals, normals), cotangent_of_cap(normals)
+        if cap < 1e-9:
+            assert gc.force_closure(-normals, normals, 1e-5).closed
+            assert critical < 5e-5
+        else:
+            assert critical == pytest.approx(cap, rel=TOLERANCE)
+        seen[round(cap, 6)] += 1
+    assert seen == expected
+
+
+def test_a_critical_friction_of_zero_is_bracketed_to_a_few_millionths():
+    """Closure is proved at 2e-6 for each of these contacts."""
+    zeros = [n for n in quadruples(SOLIDS["dodecahedron"]) if cotangent_of_cap(n) < 1e-9]
+    assert all(gc.force_closure(-normals, normals, 2e-6).closed for normals in zeros)
+    assert max(gc.critical_friction(-normals, normals) for normals in zeros) < 4e-6
+
+
+def test_the_faces_that_an_octahedron_needs_friction_on():
+    """A face with its three neighbours, and the four faces around a vertex."""
+    normals = all_signs(3)
+    for chosen in quadruples(normals):
+        critical = gc.critical_friction(-units(chosen), units(chosen))
+        if any((chosen @ face == 1.0).sum() == 3 for face in chosen):
+            assert critical == pytest.approx(1.0 / math.sqrt(8.0), rel=TOLERANCE)
+        elif (np.abs(chosen.sum(axis=0)) == 4.0).any():
+            assert critical == pytest.approx(1.0 / math.sqrt(2.0), rel=TOLERANCE)
+        else:
+            assert critical < 1e-5
+
+
+def wedge_contacts(length, l, m, s):  # noqa: E741 - the oracle's letters
+    """Two contacts on either end of a double-wedge bar."""
+    x = length + 1.0 - s
+    positions = np.array([[-x, s, l], [-x, -s, -l], [x, m, s], [x, -m, -s]])
+    return positions, units([[1, -1, 0], [1, 1, 0], [-1, 0, -1], [-1, 0, 1]])
+
+
+@pytest.mark.parametrize("s", [0.3, 0.5])
+@pytest.mark.parametrize("l", [0.0, 0.1, 0.3])
+def test_the_length_of_a_double_wedge_bar_does_not_matter(l, s):  # noqa: E741 - as above
+    """For m = -l the critical friction is |D| / sqrt(2 + D^2), D = (l - m) / 2 s; for other m it
+    is no more than that.
+    """
+    for m in (-l, 0.2 - l, l):
+        D = (l - m) / (2.0 * s)
+        bound = abs(D) / math.sqrt(2.0 + D * D)
+        found = [gc.critical_friction(*wedge_contacts(x, l, m, s)) for x in (0.5, 1.0, 3.0, 8.0)]
+        assert found == pytest.approx(found[:1] * 4, rel=TOLERANCE, abs=4e-6)
+        assert max(found) <= bound + 4e-6
+        if m == -l:
+            assert found[0] == pytest.approx(bound, rel=TOLERANCE, abs=4e-6)
+
+
+@pytest.mark.parametrize(("c", "h"), [(0.25, 0.5), (0.3, 0.7), (0.2, 0.7), (0.3, 0.3), (0.2, 0.3)])
+def test_a_square_with_friction_below_only_needs_c_over_h(c, h):
+    """Contacts of a planar problem, below, on the right and above, each drawn twice along z.
+
+    Forces in the plane may be shared by the two copies, and the forces of any equilibrium,
+    projected into the plane, are one there; so both problems are closed together.
+    """
+    flat, up = np.array([[0.0, -0.5, 0.0], [0.5, h - 0.5, 0.0], [c, 0.5, 0.0]]), np.eye(3)[2]
+    positions = np.vstack([flat - up, flat + up])
+    normals = np.tile([[0.0, 1, 0], [-1, 0, 0], [0, -1, 0]], (2, 1))
+    for step in (-1e-3, 1e-3):
+        certificate = gc.force_closure(positions, normals, [c / h + step, 0.0, 0.0] * 2)
+        assert certificate.closed == (step > 0.0)
+        assert certificate.verify()
+
+
+def test_seven_frictionless_contacts_hold_a_cube_when_one_is_moved():
+    below, above = [1.0, -1, -1], [-1.0, 1, 1]
+    positions = np.array([below] * 3 + [above] * 3 + [[1, 1, 1]])
+    normals = np.array(
+        [[0.0, 0, 1], [-1, 0, 0], [0, 1, 0], [0, 0, -1], [1, 0, 0], [0, -1, 0], [0, 0, -1]]
+    )
+    for first, closed in ((below, False), ([1.0, 0, -1], True)):
+        positions[0] = first
+        certificate = gc.force_closure(positions, normals, 0.0)
+        assert certificate.closed is closed
+        assert certificate.verify()
+
+
+def test_margins_of_the_upper_faces_of_an_octahedron():
+    """The corners of the faces, then their centres."""
+    signs = np.column_stack([all_signs(2), np.ones(4)])
+    corners = np.array([np.diag(row) for row in signs])
+    at_corners = corners.reshape(-1, 3), np.repeat(-units(signs), 3, axis=0)
+    at_centers = corners.mean(axis=1), -units(signs)
+    for friction, by_corners, by_centers in ((0.70, -0.00059, -0.00178), (0.72, 0.00107, 0.00322)):
+        patch = gc.force_closure(*at_corners, friction)
+        assert patch.margin == pytest.approx(by_corners, abs=5e-6)
+        assert gc.force_closure(*at_centers, friction).margin == pytest.approx(by_centers, abs=5e-6)
+
+
+@pytest.mark.parametrize(("count", "largest"), [(5, 0.49108896), (6, 0.38630774)])
+def test_the_largest_normal_force_under_a_weight_on_a_paraboloid(count, largest):
+    """Contacts on z = x^2 + y^2 around (0.3, 0); a known problem of convex optimisation."""
+    turns = 2.0 * np.pi * np.arange(1, count + 1) / count
+    x, y = 0.3 + np.cos(turns), np.sin(turns)
+    positions = np.column_stack([x, y, x * x + y * y])
+    normals = units(np.column_stack([-2.0 * x, -2.0 * y, np.ones(count)]))
+    weight = [0.0, 0.0, -1.0, 0.0, 0.0, 0.0]
+    resisted = gc.max_resisted_wrench(positions, normals, 0.3, weight, max_normal_force=1.0)
+    assert 1.0 / resisted == pytest.approx(largest, abs=5e-9)
+
+
+def test_motions_sizes_orders_and_mirrors_leave_thresholds_alone():
+    rng, tested = np.random.default_rng(1), 0
+    for _ in range(40):
+        positions, normals = random_contacts(rng)
+        turn, size, order = random_rotation(rng), 10.0 ** rng.uniform(-3, 3), rng.permutation(4)
+        turn = turn * rng.choice([1.0, -1.0])
+        points = (size * positions @ turn.T + size * rng.normal(size=3))[order]
+        directions = units(normals @ turn.T)[order]
+        assert gc.span_angle(directions) == pytest.approx(gc.span_angle(normals), abs=1e-12)
+        here, there = (
+            gc.critical_friction(positions, normals),
+            gc.critical_friction(points, directions),
+        )
+        if 1e-3 < here < 10.0:
+            assert there == pytest.approx(here, rel=TOLERANCE)
+            for friction in (0.999 * here, 1.001 * here):
+                closed = gc.force_closure(points, directions, friction).closed
+                assert closed == (friction > here)
+            tested += 1
+    assert tested >= 25
+
+
+def test_what_is_planned_with_narrow_cones_is_closed_with_wide_ones():
+    tested = 0
+    for name in ("dodecahedron", "random-12-1", "double-wedge-bar"):
+        for grasp in gc.plan(example_object(name), 0.5, theta_deg=5.0, limit=9).grasps:
+            narrow = math.tan(max(cone.half_angle for cone in grasp.force_cones))
+            assert narrow <= math.tan(math.radians(5.0))
+            for friction in (narrow + 1e-6, 0.1, 0.3535, 0.3536, 0.5, 2.0):
+                assert gc.force_closure(grasp, friction=friction).closed
+            tested += 1
+    assert tested >= 25

@@ -1,0 +1,159 @@
+"""Faces whose grasps are known in closed form, or to all digits."""
+
+import math
+from collections import Counter
+from functools import partial
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.closure.lines import plucker_vectors
+from grasp_core.cones.pyramids import inscribed_facets
+from grasp_core.families import concurrent as concurrent_grasps
+from grasp_core.families.concurrent import place_concurrent
+from grasp_core.families.pencil import CELL_A, place_pencil
+from grasp_core.families.placements import NoPlacement, Placement
+from grasp_core.geometry.polygons import edge_rows, plane_frame
+from grasp_core.objects.booleans import hull
+from grasp_core.objects.face_pieces import FacePiece, unit_pieces
+from grasp_core.values import ForceCone
+from scenes.example_objects import example_object
+from tests.grasp_core.quadruples import tilted_side_cones
+from tests.grasp_core.regular_solids import TOLERANCE, all_signs, quadruples
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS
+
+V4 = [np.diag(signs) for signs in ([1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1])]
+"""The rotations of a tetrahedron that move every face."""
+
+
+def small_piece(center, normal):
+    """A triangle of a ten-thousandth around a contact."""
+    turns = 2.0 * np.pi * np.arange(3) / 3.0
+    corners = 1e-4 * np.column_stack([np.cos(turns), np.sin(turns)])
+    E, b = edge_rows(corners)
+    return FacePiece(0, normal, center, plane_frame(normal), corners, E, b, b.min())
+
+
+T1, T2 = np.array([1.0, -1, 0]) / math.sqrt(2.0), np.array([1.0, 1, -2]) / math.sqrt(6.0)
+
+
+@pytest.mark.parametrize(
+    ("shift", "family"),
+    [
+        (0.1 * T1, "regulus"),
+        (0.08 * T1 - 0.12 * T2, "regulus"),
+        (0.05 * T1 + 0.15 * T2, "regulus"),
+        (0.15 * T2, "pencil"),
+        (-0.18 * T2, "pencil"),
+    ],
+)
+def test_equal_displacements_leave_no_focus_unless_there_is_enough_friction(shift, family):
+    """The lines along the normals are dependent, and skew unless the shift is towards an edge: then
+    two of them are in either of two planes.
+
+    By symmetry the best focus is the centre of the tetrahedron, which each contact sees at |shift|
+    over the inradius. Pyramids of sixteen sides may ask for 1.9 % more, the triangles for 0.1 %
+    less.
+    """
+    positions = np.array([R @ (TETRA_CENTERS[0] + shift) for R in V4])
+    normals = np.array([R @ TETRA_NORMALS[0] for R in V4])
+    assert np.linalg.svd(plucker_vectors(positions, normals), compute_uv=False)[3] < 1e-12
+    assert gc.classify_lines(positions, normals) == family
+    assert gc.force_closure(positions, normals, 1e-3).closed
+    pieces = [small_piece(*contact) for contact in zip(positions, normals, strict=True)]
+    needed = math.sqrt(3.0) * np.linalg.norm(shift)
+    for share, kind in ((0.5, NoPlacement), (0.99, NoPlacement), (1.025, Placement)):
+        cones = [ForceCone(normal, math.atan(share * needed)) for normal in normals]
+        assert isinstance(place_concurrent(pieces, cones, least=0.0), kind)
+
+
+@pytest.mark.parametrize(
+    ("theta_deg", "radius"), [(5.0, 0.0466666), (10.0, 0.0940532), (15.0, 0.1429247)]
+)
+def test_concurrent_discs_of_a_tetrahedron_with_pyramids_of_eight_sides(
+    monkeypatch, theta_deg, radius
+):
+    """r = rho0 tan(theta) cos(pi / 8), with rho0 = 1 / sqrt(3) for vertices at sqrt(3)."""
+    monkeypatch.setattr(concurrent_grasps, "inscribed_facets", partial(inscribed_facets, sides=8))
+    pieces = unit_pieces(example_object("tetrahedron"))
+    cones = [ForceCone(piece.normal, math.radians(theta_deg)) for piece in pieces]
+    placed = place_concurrent(pieces, cones, least=1e-4)
+    assert isinstance(placed, Placement)
+    assert math.sqrt(3.0) * placed.radii == pytest.approx(radius, abs=2e-7)
+    assert placed.foci == pytest.approx(0.0, abs=TOLERANCE)
+
+
+def bar(length):
+    """A double-wedge bar with ends at +-(length + 1), and the four pieces of its ends."""
+    tips = [[-length - 1.0, 0, s] for s in (-1, 1)] + [[length + 1.0, s, 0] for s in (-1, 1)]
+    solid = hull(np.vstack([tips, all_signs(3) * (length, 1.0, 1.0)]))
+    body = gc.Polyhedron.from_mesh(solid.vertices, solid.triangles)
+    ends = [p for s in (-1, 1) for p in unit_pieces(body) if s * p.normal[0] < -0.5]
+    return body, ends
+
+
+def half_angle_cones(pieces, theta_deg):
+    return [ForceCone(piece.normal, math.radians(theta_deg)) for piece in pieces]
+
+
+def test_a_double_wedge_bar_has_rectangles_and_pentagons_that_span_in_nine_ways():
+    body, ends = bar(3.0)
+    corners = Counter(len(face.pieces[0]) for face in body.faces)
+    assert corners == {4: 4, 5: 4}
+    angles = np.degrees([gc.span_angle(normals) for normals in quadruples(body.normals)])
+    wide = sorted(angles[angles > 10.0])
+    assert wide == pytest.approx([12.4589] * 8 + [18.434949], abs=5e-5)
+    assert (angles > 15.0).sum() == 1
+    assert math.degrees(gc.span_angle([p.normal for p in ends])) == pytest.approx(wide[-1])
+
+
+@pytest.mark.parametrize("theta_deg", [5.0, 10.0, 15.0])
+@pytest.mark.parametrize("length", [1.0, 3.0, 7.0])
+def test_pencils_on_the_ends_of_a_bar_do_not_depend_on_its_length(theta_deg, length):
+    """r = sqrt(2) t / (1 + t), t = tan(theta / 2), from length (1 - t) / (1 + t) on."""
+    body, ends = bar(length)
+    t = math.tan(math.radians(theta_deg) / 2.0)
+    assert length > (1.0 - t) / (1.0 + t)
+    cones = half_angle_cones(ends, theta_deg)
+    placed = place_pencil(ends, cones, least=1e-3, least_gap=1e-3, cells=(CELL_A,))
+    assert isinstance(placed, Placement)
+    expected = math.sqrt(2.0) * t / (1.0 + t)
+    assert body.radius * placed.merit == pytest.approx(expected, abs=body.radius * TOLERANCE)
+
+
+def test_a_focus_serves_both_ends_of_a_bar_only_up_to_a_known_length():
+    """2 / (1 - q) - 1, where q is tan(10 deg) for cones; pyramids of sixteen sides stand between
+    cones and cos(pi / 16) of them: 1.4182 to 1.4281.
+    """
+    q = math.tan(math.radians(10.0))
+    longest = [2.0 / (1.0 - share * q) - 1.0 for share in (math.cos(math.pi / 16.0), 1.0)]
+    assert longest == pytest.approx([1.4182, 1.4281], abs=5e-5)
+    for length, kind in ((longest[0] - 1e-3, Placement), (longest[1] + 1e-3, NoPlacement)):
+        _, ends = bar(length)
+        assert isinstance(place_concurrent(ends, half_angle_cones(ends, 10.0), least=0.0), kind)
+
+
+@pytest.mark.parametrize(
+    ("friction", "tilt_deg", "half_angle_deg", "radius"),
+    [
+        (0.5, 14.036, 12.529, 0.2284),
+        (0.3, 8.531, 8.168, 0.1445),
+        (0.8, 21.801, 16.858, 0.3273),
+        (1.0, 26.565, 18.435, 0.3765),
+    ],
+)
+def test_tilted_cones_hold_a_cube_by_its_four_sides(friction, tilt_deg, half_angle_deg, radius):
+    """The best tilt leaves the half-angle theta - tilt at which the axes just span. The radii are
+    of pyramids of 32 sides, which reach 0.5 % less than cones and 1.5 % farther than those of 16.
+    """
+    solid = hull(all_signs(3))
+    body = gc.Polyhedron.from_mesh(solid.vertices, solid.triangles)
+    sides = [piece for piece in unit_pieces(body) if abs(piece.normal[2]) < 0.5]
+    cones = tilted_side_cones(sides, math.radians(tilt_deg), math.radians(half_angle_deg))
+    spans = math.degrees(gc.span_angle([cone.axis for cone in cones]))
+    assert spans == pytest.approx(half_angle_deg, abs=1e-3)
+    assert math.degrees(math.atan(friction)) - tilt_deg == pytest.approx(spans, abs=1e-3)
+    placed = place_concurrent(sides, cones, least=1e-4)
+    assert isinstance(placed, Placement)
+    assert 0.983 * radius < body.radius * placed.merit < 1.005 * radius

@@ -1,0 +1,205 @@
+"""Least-norm forces, beside the conditions of optimality and other solvers."""
+
+import math
+
+import clarabel
+import numpy as np
+from scipy import sparse
+from scipy.optimize import nnls
+
+from grasp_core.closure.wrenches import contact_frames, grasp_map, normal_and_tangential
+from grasp_core.cones.pyramids import PYRAMID_SIDES
+from grasp_core.forces import contact_forces as forces_module
+from grasp_core.forces.balance import Balance
+from grasp_core.forces.cone_forces import least_norm_in_cones
+from grasp_core.forces.contact_forces import (
+    NoForcesError,
+    contact_forces,
+    least_friction_forces,
+)
+from grasp_core.solvers import nearest_point as least_distance_module
+from tests.grasp_core.forces.loads import (
+    ALL_LIMITS,
+    INSCRIBED,
+    LIMITS,
+    SLACK,
+    balanced_wrenches,
+    batches,
+    cases,
+    closed_just_so,
+    imbalance,
+)
+from tests.judges import random_contacts
+
+
+def pyramid_program(positions, normals, friction, limits):
+    """Map A and rows with A f = -w, rows @ f <= bounds, as `contact_forces` states them.
+
+    Forces are in the frame of the positions, (3k,).
+    """
+    turns = 2.0 * np.pi * (np.arange(PYRAMID_SIDES) + 0.5) / PYRAMID_SIDES
+    sides = [
+        np.outer(np.cos(turns), frame[:, 1])
+        + np.outer(np.sin(turns), frame[:, 2])
+        - mu * INSCRIBED * frame[:, 0]
+        for frame, mu in zip(contact_frames(normals), friction, strict=True)
+    ]
+    pushes = sparse.block_diag([normal[None] for normal in normals]).toarray()
+    rows, bounds = [sparse.block_diag(sides).toarray(), -pushes], [0.0, -limits[0]]
+    if math.isfinite(limits[1]):
+        rows, bounds = [*rows, pushes], [*bounds, limits[1]]
+    bounds = np.concatenate([np.full(len(r), b) for r, b in zip(rows, bounds, strict=True)])
+    return grasp_map(positions), np.vstack(rows), bounds
+
+
+def kkt_residual(program, wrench, forces):
+    """How far forces are from feasible and from least norm, over the size of the forces.
+
+    The gradient f must be -A'y - rows'u with u >= 0 on the rows that hold with equality.
+    """
+    A, rows, bounds = program
+    f = forces.ravel()
+    size = np.abs(f).max()
+    if size == 0.0:
+        return max(np.abs(wrench).max(), -bounds.min())
+    slack = bounds - rows @ f
+    active = rows[slack <= 1e-9 * size]
+    _, off = nnls(np.hstack([A.T, -A.T, active.T]), -f)
+    return max(off, np.abs(A @ f + wrench).max(), -slack.min()) / size
+
+
+def clarabel_least_norm(program, wrench):
+    """The same program by an interior-point method."""
+    A, rows, bounds = program
+    n = A.shape[1]
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-12
+    return np.array(
+        clarabel.DefaultSolver(
+            sparse.identity(n, format="csc"), np.zeros(n),
+            sparse.csc_matrix(np.vstack([A, rows])), np.concatenate([-wrench, bounds]),
+            [clarabel.ZeroConeT(6), clarabel.NonnegativeConeT(len(rows))], settings,
+        ).solve().x
+    ).reshape(-1, 3)  # fmt: skip
+
+
+def count_calls(monkeypatch, module, name):
+    """Counts calls of a module's function; the list grows by one each."""
+    calls, function = [], getattr(module, name)
+
+    def counted(*args, **kwargs):
+        calls.append(name)
+        return function(*args, **kwargs)
+
+    monkeypatch.setattr(module, name, counted)
+    return calls
+
+
+def nothing_proved(C, D, _):
+    return np.zeros((len(D), C.shape[1])), np.zeros(len(D), dtype=bool)
+
+
+def test_every_least_norm_answer_is_optimal_and_few_on_a_path_need_a_program(monkeypatch):
+    """By the conditions of optimality, with multipliers found here; without the kernel."""
+    monkeypatch.setattr(least_distance_module, "_by_kernel", nothing_proved)
+    programs = count_calls(monkeypatch, least_distance_module, "_weights")
+    proxqp = count_calls(monkeypatch, forces_module, "_solve")
+    tested = 0
+    for positions, normals, friction, limits, loads in batches(25, 20):
+        program = pyramid_program(positions, normals, friction, limits)
+        forces = contact_forces(positions, normals, friction, loads, normal_force=limits)
+        for load, answer in zip(loads, forces, strict=True):
+            assert kkt_residual(program, load, answer) < 1e-9
+            tested += 1
+    print(f"{tested} answers by {len(programs)} programs")
+    assert tested == 25 * 42
+    assert len(programs) < 0.9 * tested
+    assert not proxqp
+
+    positions, normals, friction, limits, loads = next(batches(1, 2))
+    programs.clear()
+    path = np.linspace(loads[0], loads[1], 500)
+    contact_forces(positions, normals, friction, path, normal_force=limits)
+    assert len(programs) < 50
+
+
+def test_least_norm_agrees_with_an_interior_point_method():
+    tested = 0
+    for positions, normals, friction, limits, loads in batches(25, 4):
+        program = pyramid_program(positions, normals, friction, limits)
+        forces = contact_forces(positions, normals, friction, loads, normal_force=limits)
+        for load, answer in zip(loads, forces, strict=True):
+            expected = clarabel_least_norm(program, load)
+            np.testing.assert_allclose(answer, expected, atol=1e-6 * np.abs(expected).max())
+            tested += 1
+    assert tested == 250
+
+
+def test_balanced_wrenches_of_any_size_get_forces_at_any_friction():
+    """Of least norm, though some of these programs are nearly without interior."""
+    rng = np.random.default_rng(4)
+    tested = 0
+    for friction in (0.0, 1e-6, 1e-3, 0.1, 1.0, 10.0):
+        for limits in ALL_LIMITS:
+            for size in (1.0, 1e-9) if limits[0] == 0.0 else (1.0,):
+                positions, normals = random_contacts(rng, 2 + tested % 7)
+                mu = np.full(len(positions), friction)
+                loads = size * balanced_wrenches(rng, positions, normals, mu, limits, 6)
+                forces = contact_forces(positions, normals, mu, loads, normal_force=limits)
+                program = pyramid_program(positions, normals, mu, limits)
+                for load, answer in zip(loads, forces, strict=True):
+                    assert kkt_residual(program, load, answer) < 1e-7
+                    tested += 1
+    assert tested == 6 * 7 * 6
+
+
+def test_without_the_nearest_points_proxqp_finds_the_same_forces(monkeypatch):
+    cases = list(batches(10, 3))
+    nearest = [contact_forces(*case[:3], case[4], normal_force=case[3]) for case in cases]
+    monkeypatch.setattr(
+        forces_module, "least_distance", lambda C, D: np.full((len(D), C.shape[1]), np.nan)
+    )
+    solved = count_calls(monkeypatch, forces_module, "_solve")
+    for case, expected in zip(cases, nearest, strict=True):
+        forces = contact_forces(*case[:3], case[4], normal_force=case[3])
+        np.testing.assert_allclose(forces, expected, atol=1e-5 * np.abs(expected).max())
+    assert len(solved) == 10 * 8
+
+
+def test_least_norm_forces_are_no_larger_than_others():
+    tested = 0
+    for body, grasp, wrench in cases(per_object=1):
+        center = body.center_of_mass
+        limits = {"normal_force": LIMITS, "center": center}
+        small = contact_forces(grasp, None, 0.5, wrench, **limits)
+        steady, _ = least_friction_forces(grasp.positions, grasp.normals, 0.5, wrench, **limits)
+        assert np.linalg.norm(small) <= np.linalg.norm(steady) * (1 + 1e-3)
+        assert np.abs(imbalance(grasp, small, wrench, center)).max() < SLACK
+        along, across = normal_and_tangential(small, grasp.normals)
+        assert (across <= 0.5 * along + SLACK).all()
+        tested += 1
+    assert tested >= 40
+
+
+def test_forces_in_exact_cones_are_no_larger_than_those_in_pyramids():
+    """And no smaller by more than pyramids with as much more friction save."""
+    rng, tested = np.random.default_rng(42), 0
+    for trial in range(30):
+        positions, normals, friction, wrench = closed_just_so(rng)
+        each = np.full(len(normals), 1.5 * friction)
+        each[0] *= trial % 3 > 0
+        limits = (0.0, math.inf) if trial % 2 else (0.0, 50.0 * np.abs(wrench).max())
+        try:
+            outer = contact_forces(
+                positions, normals, each / INSCRIBED, wrench, normal_force=limits
+            )
+            inner = contact_forces(positions, normals, each, wrench, normal_force=limits)
+        except NoForcesError:  # a frictionless contact, or limits
+            continue
+        balance = Balance.of(positions, normals, wrench[None], limits, by_load=True)
+        exact = balance.in_space(least_norm_in_cones(balance, each)[None])[0]
+        sizes = [np.linalg.norm(forces) for forces in (outer, exact, inner)]
+        assert sizes[0] * (1.0 - 1e-6) <= sizes[1] <= sizes[2] * (1.0 + 1e-6)
+        tested += 1
+    assert tested >= 15
