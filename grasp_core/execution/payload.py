@@ -24,8 +24,10 @@ as the forces at rest plus their change balance the load at the contacts. Rollin
 by tip radius times turn.
 """
 
+import importlib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,9 +41,8 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.fields import is_a, is_indices, is_number, is_tuple_of
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.quality.growing_hull import GrowingHull
 from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit
-from grasp_core.solvers.ties import first_best
+from grasp_core.solvers.ties import first_best, on_grid
 from grasp_core.values import Contact, Grasp
 
 GAP = 1e-3
@@ -172,17 +173,14 @@ def _free_mass(body: WrenchBody) -> FreeMass:
     weakest = rays[first_best([-ray.limit for ray in rays])]
     if weakest.limit <= none or _outer(rays) <= none:
         return _nothing_held(rays)
-    hull = GrowingHull(_ends(rays))
-    for _ in range(RAYS):
-        normal, distance = hull.lowest()
+    while True:
+        normal, distance, triangles = _nearest_facet(_ends(rays))
         if _outer(rays) <= none:
             return _nothing_held(rays)
-        if _outer(rays) <= distance * (1.0 + GAP):
+        if _outer(rays) <= distance * (1.0 + GAP) or len(rays) == RAYS:
             break
         rays.append(_ray(body, normal))
-        if not hull.add(_ends(rays[-1:])[0]):
-            break
-    triangles = _outward(_ends(rays), hull.simplices()[1])
+    triangles = _outward(_ends(rays), triangles)
     lower = _least_distance(_ends(rays)[triangles])
     return FreeMass(lower, max(_outer(rays), lower), tuple(rays), triangles)
 
@@ -200,6 +198,22 @@ def _ray(body: WrenchBody, direction: Array) -> WrenchLimit:
 def _ends(rays: Iterable[WrenchLimit]) -> Array:
     """Return the ends lambda d of rays, (n, 3) [kg]."""
     return np.array([ray.limit * ray.wrench[:3] / GRAVITY_M_PER_S2 for ray in rays])
+
+
+def _nearest_facet(ends: Array) -> tuple[Array, float, Indices]:
+    """Find the facet of the hull of points (n, 3) that is nearest to the origin, inside the hull.
+
+    Returns:
+        The facet's outward unit normal, (3,), its distance from the origin, and all triangles of
+        the hull, (t, 3).
+    """
+    spatial: Any = importlib.import_module("scipy.spatial")
+    hull = spatial.ConvexHull(ends)
+    equations: Array = hull.equations
+    # equally near facets are taken in the order of their normals, the same on every machine
+    equations = equations[np.lexsort(on_grid(equations[:, :3]).T)]
+    nearest = equations[first_best(equations[:, 3])]
+    return nearest[:3], -float(nearest[3]), np.asarray(hull.simplices, dtype=np.int64)
 
 
 def _outer(rays: Iterable[WrenchLimit]) -> float:

@@ -9,7 +9,7 @@ from scipy.optimize import nnls
 
 from grasp_core.closure.wrenches import contact_frames, grasp_map, normal_and_tangential
 from grasp_core.cones.pyramids import PYRAMID_SIDES
-from grasp_core.forces import contact_forces as forces_module
+from grasp_core.forces import force_programs
 from grasp_core.forces.balance import Balance
 from grasp_core.forces.cone_forces import least_norm_in_cones
 from grasp_core.forces.contact_forces import (
@@ -104,7 +104,7 @@ def test_every_least_norm_answer_is_optimal_and_few_on_a_path_need_a_program(mon
     """By the conditions of optimality, with multipliers found here; without the kernel."""
     monkeypatch.setattr(least_distance_module, "_by_kernel", nothing_proved)
     programs = count_calls(monkeypatch, least_distance_module, "_weights")
-    proxqp = count_calls(monkeypatch, forces_module, "_solve")
+    proxqp = count_calls(monkeypatch, force_programs, "_solve")
     tested = 0
     for positions, normals, friction, limits, loads in batches(25, 20):
         program = pyramid_program(positions, normals, friction, limits)
@@ -158,9 +158,9 @@ def test_without_the_nearest_points_proxqp_finds_the_same_forces(monkeypatch):
     cases = list(batches(10, 3))
     nearest = [contact_forces(*case[:3], case[4], normal_force=case[3]) for case in cases]
     monkeypatch.setattr(
-        forces_module, "least_distance", lambda C, D: np.full((len(D), C.shape[1]), np.nan)
+        force_programs, "least_distance", lambda C, D: np.full((len(D), C.shape[1]), np.nan)
     )
-    solved = count_calls(monkeypatch, forces_module, "_solve")
+    solved = count_calls(monkeypatch, force_programs, "_solve")
     for case, expected in zip(cases, nearest, strict=True):
         forces = contact_forces(*case[:3], case[4], normal_force=case[3])
         np.testing.assert_allclose(forces, expected, atol=1e-5 * np.abs(expected).max())
