@@ -68,7 +68,7 @@ def test_wrenches_of_a_task_are_read_as_they_are(tmp_path):
         ('{"wrenches": [{"name": "a", "force_n": [0, 0]}]}', "wrenches\\[0\\].force_n"),
         (
             '{"wrenches": [{"name": "a", "force_n": [0, 0, 0]}]}',
-            "wrench .a.: the largest part must be from 1e-09",
+            "wrench .a.: its largest component must be from 1e-09",
         ),
         (
             '{"wrenches": [{"name": "a", "force_n": [1, 0, 0], "mass": 1}]}',
