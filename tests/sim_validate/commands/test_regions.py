@@ -228,7 +228,7 @@ def clearance_of(body, grasp, regions):
 def test_fingers_on_one_face_and_certified_regions_do_not_go_together(capsys):
     asked = ["plan", "wedge", "--regions", "--share-faces-m", "0.01"]
     assert main(asked) == Exit.INPUT
-    assert "leave one of them out" in capsys.readouterr().err
+    assert "leave one of the two flags out" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("flags", [["--balance", "area"], ["--recenter"]])
