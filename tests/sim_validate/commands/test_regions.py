@@ -106,7 +106,7 @@ def test_where_nothing_can_be_proved_it_is_said(folder, capsys):
 def test_what_is_wrong_is_refused(folder, capsys):
     grasps = str(folder / "grasps.json")
     assert main(["regions", grasps, "--grasp", "none"]) == Exit.INPUT
-    assert "no grasp none" in capsys.readouterr().err
+    assert "expected a grasp none to certify" in capsys.readouterr().err
     assert main(["regions", grasps, "--max-cones", "1"]) == Exit.USAGE
 
 

@@ -175,7 +175,7 @@ def test_other_files_are_refused(tmp_path, capsys, name, text, message):
         ((), "give --grasp ID; there is "),
         (("--grasp", "no"), "no grasp no; there is "),
         (("--grasp", "FIRST", "--control", "no"), "has no negative control 'no'; choose from "),
-        (("--grasp", "FIRST", "--wrench", "no"), "no wrench 'no'; there are "),
+        (("--grasp", "FIRST", "--wrench", "no"), "no wrench is named 'no'; choose from "),
         (
             ("--grasp", "FIRST", "--trial", "0"),
             "no repeat with noise numbered 0; it was recorded without",
