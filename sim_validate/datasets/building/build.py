@@ -66,7 +66,7 @@ def build(
     Raises:
         InputError: An object does not exist, the folder holds something else, or another command is
             at work in it.
-        UnfaithfulError: The simulator fails the gate.
+        UnfaithfulError: The simulator fails its checks on cases with known answers.
         WorkerError: A worker cannot compute units for this driver.
     """
     pyarrow()  # before any work, so that a missing library is named at once

@@ -67,17 +67,17 @@ def with_entry(**changed):
         (with_entry(outcome="holds"), "grasps\\[0\\].outcome: expected 'held'"),
         (
             with_entry(outcome="slipped"),
-            "grasps\\[0\\]: .*outcome is slipped, but wrenches not",
+            "grasps\\[0\\]: .*`outcome` slipped contradicts `not_held`",
         ),
         (
             with_entry(not_held=["lift"]),
-            "grasps\\[0\\]: .*outcome is held, but wrenches not",
+            "grasps\\[0\\]: .*`outcome` held contradicts `not_held`",
         ),
         (
             with_entry(controls_let_go=9),
-            "grasps\\[0\\]: .*more wrenches or controls ended in some way than were tried",
+            "grasps\\[0\\]: .*`not_held` or `controls_let_go` counts more than",
         ),
-        (with_entry(noisy_not_held=[100]), "grasps\\[0\\]: .*not below the number of repeats"),
+        (with_entry(noisy_not_held=[100]), "grasps\\[0\\]: .*must hold numbers below `noisy_trials`"),
         (spoiled(lambda r: r["grasps"].append(r["grasps"][0])), "the same id"),
     ],
 )

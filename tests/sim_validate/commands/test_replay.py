@@ -180,7 +180,7 @@ def test_other_files_are_refused(tmp_path, capsys, name, text, message):
             ("--grasp", "FIRST", "--trial", "0"),
             "no repeat with noise numbered 0; it was recorded without",
         ),
-        (("--grasp", "FIRST", "--trial", "0", "--control", "x"), "give one"),
+        (("--grasp", "FIRST", "--trial", "0", "--control", "x"), "give only one of them"),
     ],
 )
 def test_what_is_not_there_is_named(folder, capsys, flags, message):

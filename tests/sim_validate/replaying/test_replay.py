@@ -111,5 +111,5 @@ def test_the_clip_begins_when_the_fingers_have_closed(tried):
 
 def test_closed_contacts_are_no_control(tried):
     known, _ = tried
-    with pytest.raises(gc.InputError, match="in force closure"):
+    with pytest.raises(gc.InputError, match="are force-closed"):
         replayed(dataclasses.replace(known, control="made_up"))

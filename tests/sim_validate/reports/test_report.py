@@ -327,7 +327,7 @@ def test_a_control_that_says_nothing_is_bad_news(small_run):
          r"verdicts\[0\]\.wrenches\[0\]\.wrench"),
         ("verdicts.json", lambda each: each["object"].update(content_sha256="0"), "another object"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(contacts_sha256="0"), "contacts"),
-        ("verdicts.json", lambda each: each["verdicts"][0].update(id="c-9-9-9-9"), "is not there"),
+        ("verdicts.json", lambda each: each["verdicts"][0].update(id="c-9-9-9-9"), "is not in that file"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(held=False),
          r"verdicts\[0\]: held is False and outcome held"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(outcome="splendid"),
@@ -352,7 +352,7 @@ def test_a_folder_without_a_run_is_refused(tmp_path, capsys):
     assert main(["report", str(tmp_path)]) == Exit.INPUT
     assert "has no grasps.json" in capsys.readouterr().err
     assert main(["report", str(tmp_path / "none")]) == Exit.INPUT
-    assert "not a folder" in capsys.readouterr().err
+    assert "expected the folder of a run" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
