@@ -74,8 +74,10 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
     known = ("friction",) if args else SETTINGS
     for name in settings:
         if name not in known:
-            beside = "beside a file takes" if args else "takes"
-            raise InputError(f"@pytest.mark.grasp {beside} {', '.join(known)}; got {name!r}")
+            beside = " beside a file of grasps" if args else ""
+            raise InputError(
+                f"@pytest.mark.grasp has no setting {name!r}{beside}; it takes {', '.join(known)}"
+            )
     friction = _number(settings.get("friction", FRICTION))
     source = Source()
     if args:

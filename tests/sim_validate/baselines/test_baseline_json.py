@@ -48,7 +48,7 @@ def with_entry(**changed):
     [
         ("", "not JSON"),
         ("[]", "expected an object, as a baseline is, got a list"),
-        ("{}", "is not a baseline"),
+        ("{}", "expected a baseline, as"),
         (spoiled(lambda r: r.update(schema=2)), "schema: .* by a newer graspproof"),
         (spoiled(lambda r: r.pop("friction")), "friction: missing"),
         (spoiled(lambda r: r.update(friction="x")), "friction: expected a number, got"),
@@ -115,7 +115,7 @@ def test_settings_that_are_none_are_refused(change, message):
 def test_only_baselines_are_overwritten(tmp_path):
     path = tmp_path / "grasps.json"
     path.write_text('{"grasps": []}')
-    with pytest.raises(gc.InputError, match="is not a baseline, and will not be overwritten"):
+    with pytest.raises(gc.InputError, match="is not a baseline and will not be overwritten"):
         write_baseline(path, BEFORE)
     assert path.read_text() == '{"grasps": []}'
     write_baseline(tmp_path / "b.json", BEFORE)

@@ -69,7 +69,7 @@ def test_marked_tests_run_with_each_grasp(blessed, tmp_path):
     [
         ("", "needs the path of a grasps.json, or object="),
         ("object='wedge', taste=1", "got 'taste'"),
-        ("'grasps.json', limit=1", "beside a file takes friction; got 'limit'"),
+        ("'grasps.json', limit=1", "no setting 'limit' beside a file of grasps; it takes friction"),
         ("'a.json', 'b.json'", "takes the path of one file of grasps"),
         ("3", "takes the path of one file of grasps"),
         ("'nowhere.json'", "nowhere.json"),
@@ -118,7 +118,7 @@ def test_assert_stable_in_code(tmp_path):
         ("assert_stable(grasp_case, trials=2, min_pass_rate=80)", "from 0 to 1, got 80"),
         ("assert_stable(grasp_case, min_margin=float('nan'))", "min_margin must be from 0"),
         ("assert_stable(grasp_case, min_margin='0.2')", "min_margin must be from 0"),
-        ("assert_stable(grasp_case, trial=2)", "assert_stable takes wrenches, trials"),
+        ("assert_stable(grasp_case, trial=2)", "has no argument 'trial'; it takes wrenches, trials"),
         ("assert_stable(grasp_case, wrenches=[[1, 2]])", "must be NamedWrench values"),
         ("assert_stable(grasp_case.grasp)", "expected a grasp_case"),
         ("assert_stable(grasp_case, friction=0.01)", "needs friction above"),
