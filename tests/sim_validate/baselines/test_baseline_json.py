@@ -77,7 +77,7 @@ def with_entry(**changed):
             with_entry(controls_let_go=9),
             "grasps\\[0\\]: .*`not_held` or `controls_let_go` counts more than",
         ),
-        (with_entry(noisy_not_held=[100]), "grasps\\[0\\]: .*must hold numbers below `noisy_trials`"),
+        (with_entry(noisy_not_held=[100]), "grasps\\[0\\]: .*numbers below `noisy_trials`"),
         (spoiled(lambda r: r["grasps"].append(r["grasps"][0])), "the same id"),
     ],
 )
