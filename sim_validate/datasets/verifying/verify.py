@@ -1,4 +1,4 @@
-"""Is a dataset what its manifest says, and are its rows consistent with the theory?"""
+"""Checks whether a dataset is as its manifest says, and whether its rows agree with the theory."""
 
 from collections.abc import Iterator, Mapping, Sequence, Set
 from pathlib import Path
@@ -26,13 +26,14 @@ from sim_validate.datasets.verifying.rows_by_object import ObjectRows, by_object
 from sim_validate.files.paths import path_inside
 
 SAME_MARGIN = 1e-6
-"""Largest difference of a closure margin from that of the contacts, relative to the friction."""
+"""Largest difference between a closure margin in a row and that of the contacts, relative to the
+friction."""
 ON_SURFACE, NEAR_SURFACE = 1e-5, 0.05
-"""Largest distance of contacts from the object's mesh, for grasps and for controls, relative to the
-object's radius. Planar faces are as flat as six digits show. Controls are moved in the planes of
+"""Largest distance of contacts from the mesh, for grasps and negative controls, relative to the
+object's radius. Planar faces are as flat as six digits show. Controls are moved in planes of
 patches, and a curved surface leaves these."""
 UNIT = 1e-9
-"""Largest difference of a normal's length from one."""
+"""Largest difference between a normal's length and one."""
 
 
 def verify(folder: Path, sample: Sample | None = None) -> list[str]:
@@ -67,7 +68,7 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
 
 
 def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
-    """Yield what is wrong with rows and meshes, one object at a time.
+    """Yield sentences on what is wrong with rows and meshes, one object at a time.
 
     Raises:
         InputError: A file is damaged, or its number of rows differs from the manifest's.
@@ -103,20 +104,23 @@ def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
             yield str(error)
             continue
         if found.bytes != each.bytes:
-            yield f"{each.path}: {found.bytes} bytes, listed are {each.bytes}"
+            yield (
+                f"{each.path}: the file has {found.bytes} bytes, but the manifest lists "
+                f"{each.bytes}"
+            )
         elif found.sha256 != each.sha256:
             yield f"{each.path}: its contents are not what was written (sha256 differs)"
 
 
 def _split_faults(split: str, rows: ObjectRows) -> Iterator[str]:
-    """Check that rows are in files of their split."""
+    """Check that rows are in the files of their split."""
     for name in ("objects", "grasps"):
         if any(row["split"] != split for row in rows[name]):
             yield f"{name}: files of {split} have rows of another split"
 
 
 def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
-    """Check that the manifest agrees with the files it lists."""
+    """Check that the manifest agrees with the files that it lists."""
     config = config_from_toml(folder / CONFIG)
     if config.sha256 != manifest.config_sha256:
         yield f"{CONFIG}: is not the configuration that the manifest names"
@@ -150,7 +154,7 @@ def _row_faults(rows: ObjectRows, frictions: Sequence[float]) -> Iterator[str]:
 
 
 def _outcome_faults(row: Mapping[str, Any], trials: Sequence[str]) -> Iterator[str]:
-    """Check that a row agrees with its trials, and that one that was not tried claims nothing."""
+    """Check that a row agrees with its trials, and claims nothing if it was not tried."""
     if row["outcome"] == NOT_TRIED:
         claims = [row[name] for name in ("held", "force_closed", "closure_margin")]
         if row["label"] != GIVEN or any(claim is not None for claim in claims) or trials:
@@ -164,7 +168,7 @@ def _outcome_faults(row: Mapping[str, Any], trials: Sequence[str]) -> Iterator[s
 
 
 def _mesh_faults(folder: Path, rows: ObjectRows) -> Iterator[str]:
-    """Check that meshes are those of their objects, and that contacts lie on them."""
+    """Check that meshes belong to their objects, and that contacts lie on the meshes."""
     claimed: dict[str, list[tuple[Array, Array | None, float]]] = {
         row["object_id"]: [] for row in rows["objects"]
     }
@@ -199,7 +203,7 @@ def _mesh_faults(folder: Path, rows: ObjectRows) -> Iterator[str]:
 def _reference_faults(
     row: Mapping[str, Any], splits: Mapping[str, str], names: Set[str]
 ) -> Iterator[str]:
-    """Yield references of a row to missing rows."""
+    """Yield sentences on references of a row to rows that are missing."""
     if splits.get(row["object_id"]) != row["split"]:
         yield "its object is not there, or in another split"
     if row["control_of"] is not None and row["control_of"] not in names:
@@ -207,7 +211,7 @@ def _reference_faults(
 
 
 def _contact_faults(row: Mapping[str, Any]) -> Iterator[str]:
-    """Check the normals of a contact set, and its closure from the contacts alone."""
+    """Check the normals of a contact set, and compute its closure from the contacts alone."""
     count = row["contacts"]
     closed = row["force_closed"]
     if not 1 <= count <= FINGERS or closed is None or (closed and row["closure_margin"] is None):

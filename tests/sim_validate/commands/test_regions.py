@@ -152,7 +152,7 @@ def test_files_give_back_the_regions_and_their_proof(folder):
 def test_files_that_are_no_proofs_are_refused(tmp_path, text):
     path = tmp_path / "proof.npz"
     path.write_bytes(text)
-    with pytest.raises(gc.InputError, match="not the proof"):
+    with pytest.raises(gc.InputError, match="expected a proof file"):
         sv.read_regions(path)
 
 

@@ -239,7 +239,7 @@ def rewritten(folder, change):
         (lambda r: r["files"][0].update(path="/etc/passwd"), r"files\[0\].path: expected a path"),
         (lambda r: r["files"][0].update(rows=-1), r"files\[0\].rows: expected at least 0, got -1"),
         (lambda r: r.update(schema=2), "schema: expected 1, got 2: written by a newer graspproof"),
-        (lambda r: r["files"].append(r["files"][0]), "a path is listed twice"),
+        (lambda r: r["files"].append(r["files"][0]), "expected each path once"),
         (lambda r: r.update(units="4"), 'units: expected a whole number, got "4"'),
         (lambda r: r.update(taste=1), "taste: unknown key; expected are config_sha256"),
         (lambda r: r.pop("files"), "files: missing"),
@@ -270,10 +270,10 @@ def test_nothing_is_loaded_where_any_byte_is_another(copy):
                 for at in range(4, len(whole), len(whole) // 9)]  # fmt: skip
     for data in spoiled:
         path.write_bytes(data)
-        with pytest.raises(gc.InputError, match=rf"{path.name}: damaged"):
+        with pytest.raises(gc.InputError, match=rf"{path.name}: .* differs from what"):
             load_dataset(copy)
     path.unlink()
-    with pytest.raises(gc.InputError, match=rf"{path.name}: missing"):
+    with pytest.raises(gc.InputError, match=rf"{path.name}: .* is missing"):
         load_dataset(copy)
 
 
