@@ -180,7 +180,9 @@ class _Asking:
 
 def _checked(certificate: Checked) -> Checked:
     if not certificate.verify():
-        raise UndecidedError("the certificate failed its check")
+        raise UndecidedError(
+            "the answer's own certificate failed its check, so the answer cannot be trusted"
+        )
     return certificate
 
 

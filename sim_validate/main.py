@@ -59,7 +59,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if "" in arguments:
             said = "an argument is empty, perhaps from a variable that is not set"
-            raise FlagsError(f"{said}; leave it out, or give a value")
+            raise FlagsError(f"{said}; leave the argument out, or give it a value")
         flags = with_config(arguments, COMMANDS)
     except InputError as error:
         return _complain(str(error), exit_code(error))

@@ -51,7 +51,7 @@ def source_of(
     if body.source_sha256 == body.content_sha256:
         if named is not None:
             raise InputError(
-                f"{grasps}: was not planned from a mesh file, so it cannot be that of {named}; "
+                f"{grasps}: these grasps were not planned from a mesh file, so not from {named}; "
                 "leave `object` out, or plan from the file"
             )
         return Source()

@@ -161,7 +161,7 @@ def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
         raise InputError(f"{place(unknown[:1])}: no such setting; choose from {', '.join(known)}")
     if "objects" not in given:
         raise InputError(
-            "objects: expected a list of mesh files or built-in objects, got no such setting"
+            "objects: expected a list of mesh files or built-in objects, but the setting is missing"
         )
     return DatasetConfig(**{name: _typed(name, value) for name, value in given.items()})
 

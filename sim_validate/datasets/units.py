@@ -89,7 +89,7 @@ def shared_settings(config: DatasetConfig) -> dict[str, object]:
 
 
 def units_of(config: DatasetConfig) -> list[WorkUnit]:
-    """Split a configuration into units of work, sorted by their names.
+    """Split a configuration into units of work, each one object at one friction, sorted by name.
 
     Raises:
         InputError: An object is neither a readable file nor built in, or the contacts are refused.

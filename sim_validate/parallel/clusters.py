@@ -119,14 +119,15 @@ def dask_workers(workers: int, address: str | None) -> Generator[DaskCluster]:
             workers must have one thread each, because limits of time end a whole process.
 
     Raises:
-        InputError: Dask is not installed, there is no scheduler, or a worker has several threads.
+        InputError: Dask is not installed, no scheduler answers, or a worker has several threads.
     """
     distributed = _imported("distributed", "dask")
     with _dask_client(distributed, workers, address) as client:
         threads: dict[str, int] = client.nthreads()
         if any(count > 1 for count in threads.values()):
             raise InputError(
-                "a Dask worker has several threads, but a unit that takes too long ends its "
+                "a Dask worker has several threads, but work that takes too long must end its "
+                "whole "
                 "process: start workers with --nthreads 1"
             )
         yield DaskCluster(client, max(1, len(threads)))

@@ -194,7 +194,9 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
     numbers = {name: frozen(finite[name], shape, name) for name, shape in SHAPES.items()}
     scale = numbers["scale_m"].item()
     if not SMALLEST_SCALE <= scale <= LARGEST:
-        raise InputError(f"scale_m: expected {SMALLEST_SCALE:g} to {LARGEST:g}, got {scale:g}")
+        raise InputError(
+            f"scale_m: expected a length from {SMALLEST_SCALE:g} to {LARGEST:g} m, got {scale:g}"
+        )
     normals = frozen_units(numbers["normals"], (FINGERS, 3), "normals")
     choice, wrench = numbers["open_choice_m"], numbers["open_wrench"]
     return CertifiedRegions(
@@ -221,13 +223,16 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
 def _region(name: str, polygon: Array, normal: Array, scale: float) -> ContactRegion:
     if not FEWEST_CORNERS <= len(polygon) <= MOST_CORNERS or np.abs(polygon).max() > LARGEST:
         raise InputError(
-            f"{name}: expected {FEWEST_CORNERS} to {MOST_CORNERS} corners within {LARGEST:g} m"
+            f"{name}: expected a polygon of {FEWEST_CORNERS} to {MOST_CORNERS} corners within "
+            f"{LARGEST:g} m"
         )
     try:
         with np.errstate(invalid="ignore", divide="ignore"):  # edges without length divide by zero
             return ContactRegion("certified", polygon, _inscribed(polygon, normal, scale))
     except SolverError as error:
-        raise InputError(f"{name}: its corners do not form a convex polygon") from error
+        raise InputError(
+            f"{name}: expected the corners of a convex polygon in order, got other points"
+        ) from error
 
 
 def _inscribed(polygon: Array, normal: Array, scale: float) -> float:

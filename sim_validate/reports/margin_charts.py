@@ -58,7 +58,7 @@ def margin_figure(
     positive(max_normal_force_n, "max_normal_force_n")
     if not force_closure(grasp, friction=friction).closed:
         raise InputError(
-            f"{grasp.id} is not in force closure at friction {friction:g}, so nothing is resisted "
+            f"{grasp.id} is not in force closure at friction {friction:g}, so it resists nothing "
             f"in some direction; draw it at a friction above {grasp.critical_friction:.4g}"
         )
     figure = new_figure(9.0, 2.5)

@@ -123,7 +123,7 @@ def forces_just_above(positions: Array, normals: Array, critical: float) -> Arra
             break
     if forces is None:
         raise UndecidedError(
-            f"no balanced forces in which every finger pushes were found just above the critical "
-            f"friction {critical:.6g}"
+            "no balanced forces were found in which every finger pushes, at frictions just above "
+            f"the critical friction {critical:.6g}"
         )
     return forces

@@ -180,7 +180,9 @@ class Agenda:
         taken = {*AXIS_NAMES, WEAKEST, *drawn}
         for each in self.wrenches:
             if each.name in taken:
-                raise InputError(f"two wrenches are named {each.name!r}: give yours another name")
+                raise InputError(
+                    f"two wrenches are named {each.name!r}: give one of them another name"
+                )
             taken.add(each.name)
 
 

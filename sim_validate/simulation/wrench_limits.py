@@ -38,8 +38,8 @@ class SimulatedLimit:
     lower: float
     upper: float
     share: float
-    """The best estimate of the share at which the object lets go: where a ramp passed its
-    threshold, or the middle of a bisection."""
+    """Best estimate of the share of the predicted limit at which the object lets go: where a ramp
+    passed its threshold, or the middle of a bisection."""
 
 
 def ramped_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | None, ...]:

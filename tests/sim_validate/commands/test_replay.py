@@ -172,8 +172,8 @@ def test_other_files_are_refused(tmp_path, capsys, name, text, message):
 @pytest.mark.parametrize(
     ("flags", "message"),
     [
-        ((), "give --grasp ID; there is "),
-        (("--grasp", "no"), "no grasp no; there is "),
+        ((), "choose a grasp with --grasp ID; the file has "),
+        (("--grasp", "no"), "no grasp is named no; the file has "),
         (("--grasp", "FIRST", "--control", "no"), "has no negative control 'no'; choose from "),
         (("--grasp", "FIRST", "--wrench", "no"), "no wrench is named 'no'; choose from "),
         (

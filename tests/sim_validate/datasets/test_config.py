@@ -31,7 +31,7 @@ def test_names_with_quotes_and_control_characters_survive(tmp_path):
     ("changed", "message"),
     [
         ({"objects": []}, "objects: expected a list of one or more"),
-        ({"objects": ["wedge", "wedge"]}, "each once"),
+        ({"objects": ["wedge", "wedge"]}, "one or more different items"),
         ({"objects": "wedge"}, "objects: expected a list of text"),
         ({"frictions": [0.0]}, "frictions: expected numbers above 0"),
         ({"frictions": [True]}, "frictions: expected a list of numbers"),
