@@ -21,7 +21,7 @@ SHOWN = 12
 """Number of rows of the motion that are shown; the trace file has all of them."""
 MICRO = 1e6
 SLOWER = 1.0 / (RATE * 0.01)
-"""Slow-down of clips, which show a sample of ten milliseconds in each frame."""
+"""Factor by which clips are slower than reality; a clip shows ten milliseconds in each frame."""
 
 
 def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:

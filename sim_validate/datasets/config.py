@@ -68,7 +68,7 @@ class DatasetConfig:
     random_wrenches: int = 0
     """Number of random wrenches to hold besides the usual ones."""
     seed: int = 0
-    """Seed of everything random."""
+    """Seed of all random choices."""
     contacts: str = ""
     """Path of a file of contacts on the one object, which are judged instead of planned ones; empty
     to plan."""

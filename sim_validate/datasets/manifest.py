@@ -127,5 +127,5 @@ def manifest_from_json(text: str) -> Manifest:
     for i, each in enumerate(found.files):
         require_inside(each.path, place(["files", i, "path"]))
     if len({each.path for each in found.files}) < len(found.files):
-        raise InputError("files: expected each path once, got a path twice")
+        raise InputError("files: expected every path only once, got one path twice")
     return found

@@ -66,7 +66,7 @@ def arrays_of(data: bytes, names: Collection[str]) -> dict[str, NDArray[Any]]:
         raise
     except Exception as error:  # a damaged file can make zipfile and numpy raise anything
         raise InputError(
-            f"cannot be read as npz ({shown(str(error))}); save it again with numpy.savez"
+            f"the file cannot be read as npz ({shown(str(error))}); save it again with numpy.savez"
         ) from error
 
 

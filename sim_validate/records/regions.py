@@ -126,7 +126,7 @@ def _record(
 
 
 def area_of(region: ContactRegion) -> float:
-    """Area of a convex region [m^2]."""
+    """Compute the area of a convex region [m^2]."""
     sides = region.polygon[1:] - region.polygon[0]
     crossed = np.cross(sides[:-1], sides[1:])
     return 0.5 * float(np.linalg.norm(crossed.sum(axis=0)))
@@ -135,7 +135,7 @@ def area_of(region: ContactRegion) -> float:
 def proof_arrays(
     proved: CertifiedRegions, grasp: Grasp, body: Polyhedron
 ) -> dict[str, NDArray[Any]]:
-    """The regions of a grasp and their proof, as arrays by name."""
+    """Return the regions of a grasp and their proof, as arrays by name."""
     cover, choice, wrench = proved.cover, proved.open_choice, proved.open_wrench
     polygons = [region.polygon for region in proved.regions]
     return {
@@ -163,7 +163,7 @@ def read_regions(path: str | Path) -> CertifiedRegions:
     """Read regions and their proof, as `graspproof regions` writes them; nothing is verified yet.
 
     Raises:
-        InputError: The file is not the proof of a grasp's regions.
+        InputError: The file does not hold the proof of a grasp's regions.
     """
     path = path_of(path, "path")
     try:

@@ -156,7 +156,7 @@ class Agenda:
     rules: tuple[str, ...] = ()
     """Names of other validators' acceptance rules that also judge the same trials."""
     trials: int = 0
-    """How many times all holds are repeated with noise."""
+    """How many times all trials that hold a wrench are repeated with noise."""
     noise: Noise = field(default_factory=Noise)
     keep_traces: bool = False
     seed: int = 0

@@ -411,7 +411,7 @@ def test_a_damaged_dataset_is_refused_and_leaves_nothing(copy, tmp_path):
         with pytest.raises(gc.InputError):
             export(copy, to, tmp_path / "out", None, silent)
     (copy / "manifest.json").unlink()
-    with pytest.raises(gc.InputError, match="not finished"):
+    with pytest.raises(gc.InputError, match="expected a finished dataset"):
         export(copy, "csv", tmp_path / "out", None, silent)
     assert [path.name for path in tmp_path.iterdir()] == ["copy"]
 

@@ -86,7 +86,7 @@ def test_long_settings_are_refused_before_they_are_read(tmp_path):
     with pytest.raises(gc.InputError, match="larger than"):
         read_tables(path)
     for key in ("a.", '"a b" . ', "'=,'."):  # tomllib would take hours
-        with pytest.raises(gc.InputError, match="a key has more than 64 parts"):
+        with pytest.raises(gc.InputError, match="has more than 64 parts"):
             tables_of_toml("x = 1\n" + key * (MOST_LETTERS // 8) + "a = 1")
     with pytest.raises(gc.InputError, match="more than 64 deep"):
         tables_of_toml("[a.a]\na = " + "[" * 65 + "]" * 65)

@@ -29,7 +29,7 @@ def test_a_file_changes_what_it_names_and_nothing_else(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[physics]\ntimestp = 0.001\n", r"\[physics\] has .*timestep.* got .timestp."),
+        ("[physics]\ntimestp = 0.001\n", r"\[physics\]: no setting is named .timestp.*timestep"),
         ("[physic]\ntimestep = 0.001\n", "expected tables physics.* got .physic."),
         ("timestep = 0.001\n", "expected tables physics.* got .timestep."),
         ('[physics]\ntimestep = "slow"\n', r"\[physics\] timestep: .*number"),

@@ -272,7 +272,7 @@ def test_pages_are_not_put_among_other_things(copy, tmp_path, capsys):
         (tmp_path / "site" / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "site" / name).write_text("mine")
     assert main(["report", str(copy), "--out", str(tmp_path / "site")]) == Exit.INPUT
-    assert "holds no report" in capsys.readouterr().err
+    assert "holds other files than a report" in capsys.readouterr().err
     assert all((tmp_path / "site" / name).read_text() == "mine" for name in names)
     shutil.copytree(tmp_path / "site", copy / "report")
     assert main(["run", "wedge", "--limit", "1", "--out", str(copy), "-q"]) == Exit.INPUT

@@ -69,7 +69,7 @@ def test_a_killed_build_goes_on_where_it_was(dataset, tmp_path, killed_at):
     engine = Here(die)
     with pytest.raises(KilledError):
         build(CONFIG, folder, engine, silent)
-    with pytest.raises(gc.InputError, match="not finished"):
+    with pytest.raises(gc.InputError, match="expected a finished dataset"):
         verify(folder)
     again = Here()
     built = build(CONFIG, folder, again, silent)
