@@ -44,7 +44,7 @@ class _Settings(BaseModel):
 
 
 def settings_of(setup: Setup, agenda: Agenda) -> dict[str, Any]:
-    """Write a setup and an agenda in the form that a baseline keeps."""
+    """Write simulation settings and a choice of trials in the form that a baseline keeps."""
     settings = {
         "setup": tables_of(setup),
         "surface": setup.surface,
@@ -59,7 +59,7 @@ def settings_of(setup: Setup, agenda: Agenda) -> dict[str, Any]:
 
 
 def of_settings(settings: Mapping[str, Any], path: str) -> tuple[Setup, Agenda]:
-    """Read the setup and agenda that a baseline keeps.
+    """Read the simulation settings and the choice of trials that a baseline keeps.
 
     Args:
         settings: Settings as `settings_of` writes them.

@@ -64,7 +64,8 @@ def source_of(
             f"{found[0]}: this is not the mesh that {grasps} was planned on: the mesh has changed "
             "since, or "
             f"is another object's. Plan on it again (graspproof plan {found[0]} --out ...) and "
-            "bless the baseline, put the former file back, or say which file it is with `object` "
+            "write the baseline with pytest --grasp-bless, put the former file back, or name the "
+            "right file with `object` "
             "in a *.grasps.toml"
         )
     return Source(

@@ -154,7 +154,7 @@ class Suite:
             return self.kept if self.baseline.is_file() else None
         except InputError as error:
             raise InputError(
-                f"{error}; remove the file, then bless again to write a new baseline"
+                f"{error}; remove the file, then write a new baseline with pytest --grasp-bless"
             ) from error
 
     def _settings(self, before: Baseline | None) -> tuple[Setup, Agenda]:

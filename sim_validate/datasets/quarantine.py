@@ -56,4 +56,4 @@ def _read(line: str, number: int) -> LeftOut:
     try:
         return record_of(LeftOut, line, "line of quarantine.jsonl")
     except InputError as error:
-        raise InputError(f"line {number} of quarantine.jsonl: {error}") from error
+        raise InputError(f"line {number}: {error}") from error

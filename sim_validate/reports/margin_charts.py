@@ -77,7 +77,7 @@ def margin_figure(
 def _limits(
     body: Polyhedron, grasp: Grasp, friction: float, largest: float, wrenches: Array
 ) -> Array:
-    """Compute the largest multiples of a map's wrenches, (LATITUDES, LONGITUDES), each once."""
+    """Compute how far each wrench of a map is resisted, (LATITUDES, LONGITUDES)."""
     different, same = np.unique(np.round(wrenches, SAME), axis=0, return_inverse=True)
     found = wrench_limits(
         grasp, None, friction, different, max_normal_force=largest, center=body.center_of_mass

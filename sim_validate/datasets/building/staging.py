@@ -70,7 +70,7 @@ class Staging:
         self.folder.mkdir(parents=True, exist_ok=True)
         for path in self.folder.iterdir():
             if path.name.startswith(UNFINISHED):
-                # a worker of a killed driver may still write here
+                # a worker process of a killed build may still write here
                 shutil.rmtree(path, ignore_errors=True)
 
     def remove(self) -> None:

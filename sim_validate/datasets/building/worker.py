@@ -30,7 +30,8 @@ class Limits:
 
     timeout_s: float
     memory_bytes: int | None = None
-    """Address space beyond that of a process that has just started; None for no limit."""
+    """Address space that a unit may use beyond that of a process that has just started; None for no
+    limit."""
 
 
 Work: TypeAlias = Callable[[WorkUnit, Staging], None]

@@ -99,7 +99,7 @@ class _Redoing:
             where = f"{row['source_name']} at friction {friction}"
             if self._all_left_out(row, friction):
                 if stored["grasps"]:
-                    yield f"{where}: is quarantined, but has rows"
+                    yield f"{where}: {QUARANTINE} lists this object as left out, but it has rows"
             elif (row["object_id"], friction) in chosen:
                 found = islice(self._unit_faults(row, friction, stored), MOST_NAMED)
                 yield from (f"{where}: {fault}" for fault in found)
@@ -118,7 +118,7 @@ class _Redoing:
             body = stored_body(self._folder, row["object_id"], name, self._config.faces)
             made = made_of(WorkUnit(name, None, source, friction, self._config, given), body)
         except GraspError as error:
-            yield f"cannot be done again ({error})"
+            yield f"the grasps cannot be computed again ({error})"
             return
         now: ObjectRows = {table: as_read(table, made.rows[table]) for table in TABLES}
         if not self._exact:
@@ -128,11 +128,11 @@ class _Redoing:
             yield from _differences(table, stored[table], now[table])
         for path, text in made.files.items():
             if read_text(self._folder / path) != text:
-                yield f"{path}: is not what comes out again"
+                yield f"{path}: the file differs from what is computed again"
 
 
 def _left_out(folder: Path) -> dict[tuple[str, float], set[str]]:
-    """Read which objects at frictions have no rows, with the given grasps that are missing."""
+    """Read which objects have no rows at a friction, with the given grasps that are missing."""
     found: dict[tuple[str, float], set[str]] = {}
     for each in read_left_out(folder / QUARANTINE):
         if not each.reason.startswith(TWIN):
@@ -162,15 +162,19 @@ def _differences(name: Name, stored: Sequence[Row], made: Sequence[Row]) -> Iter
     """Yield sentences on cells that differ, and on rows that only one side has."""
     before = {tuple(row[key] for key in KEYS[name]): row for row in stored}
     after = {tuple(row[key] for key in KEYS[name]): row for row in made}
-    yield from (f"{name}: {key[-1]} is not found again" for key in before.keys() - after.keys())
     yield from (
-        f"{name}: {key[-1]} is found, but not there" for key in after.keys() - before.keys()
+        f"{name}: {key[-1]} has a row, but is not computed again"
+        for key in before.keys() - after.keys()
+    )
+    yield from (
+        f"{name}: {key[-1]} is computed again, but has no row"
+        for key in after.keys() - before.keys()
     )
     for key in before.keys() & after.keys():
         for column in TABLES[name]:
             one, other = before[key][column.name], after[key][column.name]
             if one != other:
-                yield f"{name}: {key}: {column.name} is {one}, done again {other}"
+                yield f"{name}: {key}: {column.name} is {one}, but {other} when computed again"
 
 
 def _loose_differences(stored: ObjectRows, made: ObjectRows) -> Iterator[str]:
@@ -179,14 +183,20 @@ def _loose_differences(stored: ObjectRows, made: ObjectRows) -> Iterator[str]:
     after = {row["grasp_id"]: row for row in made["grasps"] if row["control_of"] is None}
     counts = [Counter(row["family"] for row in rows.values()) for rows in (before, after)]
     if counts[0] != counts[1]:
-        yield f"grasps: {dict(counts[0])} by family, done again {dict(counts[1])}"
+        yield f"grasps: {dict(counts[0])} by family, but {dict(counts[1])} when computed again"
     for name in sorted(before.keys() & after.keys()):
         one, other = before[name], after[name]
         points = [np.array(row["contact_points_m"], dtype=np.float64) for row in (one, other)]
         if not np.allclose(*points, rtol=ROUNDING, atol=0.0):
             continue  # the best contacts are not unique
         if one["held"] != other["held"] or one["force_closed"] != other["force_closed"]:
-            yield f"grasps: {name}: is {one['outcome']}, done again {other['outcome']}"
+            yield (
+                f"grasps: {name}: outcome is {one['outcome']}, but {other['outcome']} when "
+                "computed again"
+            )
         frictions = [float(row["critical_friction"] or 0.0) for row in (one, other)]
         if not np.isclose(*frictions, rtol=ROUNDING, atol=0.0):
-            yield f"grasps: {name}: critical friction {frictions[0]}, done again {frictions[1]}"
+            yield (
+                f"grasps: {name}: critical friction is {frictions[0]}, but {frictions[1]} when "
+                "computed again"
+            )
