@@ -1,6 +1,6 @@
-"""Contacts to numbers: closure, critical friction, quality and wrench limits.
+"""Analyses given contacts: force closure, critical friction, quality and wrench limits.
 
-A question that cannot be decided leaves its reason; all others are still answered.
+A question that cannot be decided leaves a reason; all other questions are still answered.
 """
 
 from collections.abc import Callable, Iterable
@@ -33,7 +33,7 @@ Wrench = tuple[float, float, float, float, float, float]
 
 
 class Outcome(StrEnum):
-    """What was decided about closure."""
+    """What was decided about force closure."""
 
     CLOSED = "closed"
     OPEN = "open"
@@ -42,7 +42,7 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """The questions about contacts, with their settings."""
+    """Which questions to answer about contacts, with their settings."""
 
     max_normal_force: float
     """Largest normal force of each contact [N]."""
@@ -63,7 +63,7 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Resisted:
-    """How far a wrench is resisted, and forces that balance the wrench itself."""
+    """The largest multiple of a wrench that is resisted, and forces that balance the wrench."""
 
     limit: WrenchLimit
     forces: Array | None
@@ -73,11 +73,11 @@ class Resisted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Analysis:
-    """What is known about one grasp; None stands for what could not be decided."""
+    """Results about one grasp; None stands for a result that could not be decided."""
 
     contacts: ContactSet
     certificate: ClosureCertificate | None
-    """The certificate of closure, checked again in plain arithmetic."""
+    """The certificate of force closure, checked again in plain arithmetic."""
     friction_interval: FrictionInterval | None
     """Interval of the least common friction for closure, checked again in rational arithmetic."""
     l1: Bounds | None
@@ -86,17 +86,17 @@ class Analysis:
     hull_volume: float | None
     smallest_singular_value: float
     weakest_axis: WrenchLimit | None
-    """The weakest of the twelve axis wrenches."""
+    """The wrench along an axis that is resisted least, and its limit."""
     everywhere: float | None
-    """Multiple up to which every wrench of unit size is resisted."""
+    """Multiple up to which the grasp resists every wrench of unit size."""
     wrenches: tuple[Resisted | None, ...]
-    """The wrenches in the order asked."""
+    """Results about the wrenches, in the order in which they were asked about."""
     undecided: dict[str, str]
-    """Why a question could not be decided, by its name."""
+    """Reasons why questions could not be decided, by the name of the question."""
 
     @property
     def outcome(self) -> Outcome:
-        """The answer about closure."""
+        """The answer about force closure."""
         if self.certificate is None:
             return Outcome.UNDECIDED
         return Outcome.CLOSED if self.certificate.closed else Outcome.OPEN
@@ -121,7 +121,7 @@ def check_edges(sets: Iterable[ContactSet], edges: int) -> None:
     """Refuse pyramids with so many edges that their hull would take minutes.
 
     Raises:
-        InputError: The message names the grasp and the limit.
+        InputError: A grasp exceeds the limit; the message names both.
     """
     for contacts in sets:
         count = len(contacts.positions)
@@ -166,7 +166,7 @@ def analyze(contacts: ContactSet, question: Question) -> Analysis:
 
 @dataclass(slots=True)
 class _Asking:
-    """Answers questions, and keeps the reasons why some have no answer."""
+    """Answers questions about one grasp, and keeps the reasons why some have no answer."""
 
     reasons: dict[str, str] = field(default_factory=dict[str, str])
 
@@ -180,7 +180,9 @@ class _Asking:
 
 def _checked(certificate: Checked) -> Checked:
     if not certificate.verify():
-        raise UndecidedError("the certificate failed its check")
+        raise UndecidedError(
+            "the answer's own certificate failed its check, so the answer cannot be trusted"
+        )
     return certificate
 
 

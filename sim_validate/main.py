@@ -1,6 +1,6 @@
-"""The `graspproof` command: arguments become flags, flags a command, errors an exit code.
+"""Runs the `graspproof` command: turns arguments into flags, runs a command, returns an exit code.
 
-Nothing heavy is imported here, so that help and usage errors answer at once.
+This module imports nothing that is slow to load, so that help and usage errors answer at once.
 """
 
 import sys
@@ -42,12 +42,12 @@ ACTIONS: dict[type[Any], str] = {
     command_flags.Objects: "objects:list_objects",
     command_flags.Doctor: "doctor:check_installation",
 }
-"""Module and function of each command. They are names, because planning must not wait for a
-simulator to be imported."""
+"""Module and function of each command. They are named as text, because planning must not wait until
+a simulator is imported."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command.
+    """Run the `graspproof` command with some arguments.
 
     Args:
         argv: Arguments without the program's name; None for those of the process.
@@ -59,7 +59,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if "" in arguments:
             said = "an argument is empty, perhaps from a variable that is not set"
-            raise FlagsError(f"{said}; leave it out, or give a value")
+            raise FlagsError(f"{said}; leave the argument out, or give it a value")
         if any(word.partition("=")[0] == "--cells" for word in arguments):
             raise FlagsError("--cells is called --max-parts now; write --max-parts instead")
         flags = with_config(arguments, COMMANDS)
@@ -124,7 +124,7 @@ def _complain(message: str, code: Exit) -> int:
 
 
 def run_and_exit() -> None:
-    """Entry point of the `graspproof` command."""
+    """Run the `graspproof` command as a program, and exit with its exit code."""
     from sim_validate.cli import streams
 
     streams.steady()

@@ -28,7 +28,7 @@ TRAVELS = "_graspproof"
 
 
 class UnstableError(AssertionError):
-    """A grasp is not as stable as it must be."""
+    """Error for a grasp that is not as stable as it must be."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -47,7 +47,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Register the marker and collect the lines of all tests."""
+    """Register the `grasp` marker, and prepare to collect report lines from all tests."""
     config.addinivalue_line("markers", MARKER)
     config.stash[LINES] = []
     config.pluginmanager.register(_Collecting(config))
@@ -83,7 +83,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 def pytest_runtest_makereport(
     item: pytest.Item,
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Attach the lines about grasps to the report, which is sent between processes."""
+    """Attach the lines about grasps to pytest's report on a test."""
     report = yield
     if lines := item.stash.get(LINES, None):
         setattr(report, TRAVELS, lines)
@@ -122,7 +122,7 @@ class _Collecting:
 
 
 class GraspsFile(pytest.File):
-    """A file of grasps that must stay as they were."""
+    """A `*.grasps.toml` file: which grasps must stay as stable as they were."""
 
     def collect(self) -> Iterator[pytest.Item]:
         """Yield a test for each grasp, or a single one if a baseline is to be written."""
@@ -187,7 +187,7 @@ class GraspItem(_SuiteItem):
         self.user_properties += [("status", finding.status.value), *(after or {}).items()]
         _note(self, finding.id, finding.status.value, why, (before, after), suite.source)
         if fails:
-            raise UnstableError(f"{why}\n  to accept it: pytest --grasp-bless {self.path}")
+            raise UnstableError(f"{why}\n  to accept the change: pytest --grasp-bless {self.path}")
 
 
 class BlessItem(_SuiteItem):
@@ -205,7 +205,7 @@ class BlessItem(_SuiteItem):
 
 @pytest.fixture
 def grasp_case(request: pytest.FixtureRequest) -> Any:
-    """The grasp that a test marked with `grasp` is run with."""
+    """The grasp, object and friction that a test marked with `grasp` is run with."""
     pytest.fail(f"{request.node.name}: grasp_case needs @pytest.mark.grasp(...)", pytrace=False)
 
 
@@ -226,8 +226,8 @@ def assert_stable(
                 `random_wrenches`, `seed`, `setup`.
 
         Raises:
-            UnstableError: A wrench was not held, a control was, the analysis is contradicted, or
-                less is reached than `asked` demands.
+            UnstableError: A wrench was not held, a negative control was held, simulation
+                contradicts the analysis, or a demand in `asked` is not met.
             InputError: The grasp or `asked` is refused.
         """
         from sim_validate.baselines.demands import checked, demands_of

@@ -1,5 +1,5 @@
 """Is a grasp as stable as it was?
 
-This room compares fresh verdicts with a recorded baseline. It explains each difference, and says
-whether it breaks what was demanded.
+Modules here compare new verdicts on grasps with a recorded baseline, explain each difference, and
+say whether the grasp is still as stable as it must be.
 """

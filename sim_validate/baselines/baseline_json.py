@@ -1,4 +1,4 @@
-"""Baselines <-> JSON that people read in reviews: a header, then one line per grasp, sorted."""
+"""Reads and writes baselines as JSON that people can review: a header, then one line per grasp."""
 
 import json
 from dataclasses import asdict, fields
@@ -14,11 +14,11 @@ from sim_validate.files.reading import read_text, write_text
 
 SCHEMA = 1
 MARK = '"grasps_file"'
-"""Text that every baseline has, and no other file."""
+"""Text that stands in every baseline, and in no other file."""
 
 
 def baseline_to_json(baseline: Baseline) -> str:
-    """The text of a baseline; equal verdicts give equal texts."""
+    """Write the text of a baseline; equal verdicts give equal texts."""
     header = {
         "schema": SCHEMA,
         **{each.name: getattr(baseline, each.name) for each in fields(Baseline)},
@@ -37,7 +37,7 @@ def baseline_from_json(text: str, path: str) -> Baseline:
         path: Path of the file, for messages.
 
     Raises:
-        InputError: The text is no baseline of this version; the message names the field.
+        InputError: The text is not a baseline of this version; the message names the field.
     """
     try:
         return _from_text(text)
@@ -48,7 +48,7 @@ def baseline_from_json(text: str, path: str) -> Baseline:
 def _from_text(text: str) -> Baseline:
     record = object_of(text, "baseline")
     if "grasps_file" not in record:
-        raise InputError("is not a baseline; `graspproof baseline record` writes one")
+        raise InputError("expected a baseline, as `graspproof baseline record` writes it")
     check_schema(record, SCHEMA)
     del record["schema"]
     # an empty list is refused, because it would check nothing
@@ -61,7 +61,7 @@ def _from_text(text: str) -> Baseline:
                          if said.startswith("entries") else said) from error  # fmt: skip
     if PurePath(found.grasps_file).is_absolute() or not found.grasps_file.isprintable():
         raise InputError(
-            "grasps_file: expected a path from this file's folder, got "
+            "grasps_file: expected a path relative to this baseline's folder, got "
             f"{shown(found.grasps_file)}; name the file with --grasps"
         )
     return found
@@ -80,17 +80,19 @@ def write_baseline(path: Path, baseline: Baseline) -> None:
     """Write a baseline to a new file, or over another baseline.
 
     Raises:
-        InputError: The path holds something else than a baseline.
+        InputError: The path holds another kind of file.
     """
     check_writable(path)
     write_text(path, baseline_to_json(baseline))
 
 
 def check_writable(path: Path) -> None:
-    """Refuse a path that holds something else than a baseline of any version.
+    """Refuse a path where a file stands that is not a baseline of any version.
 
     Raises:
-        InputError: The path holds something else.
+        InputError: The path holds another kind of file.
     """
     if path.exists() and MARK not in read_text(path):
-        raise InputError(f"{path}: is not a baseline, and will not be overwritten")
+        raise InputError(
+            f"{path}: this file is not a baseline and will not be overwritten; choose another path"
+        )

@@ -1,4 +1,4 @@
-"""A baseline and the present grasps -> how each grasp has changed."""
+"""Simulates the grasps of a baseline again, and compares each with its recorded result."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -13,12 +13,12 @@ from sim_validate.validation.grasp_verdict import Verdict
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Checked:
-    """How the grasps of a baseline have changed."""
+    """The result of a check: how the grasps of a baseline have changed."""
 
     findings: tuple[Finding, ...]
     measured: Measured
     how: str
-    """How results were compared, in words."""
+    """How strictly results were compared, in words."""
 
     @property
     def verdicts(self) -> Mapping[str, Verdict]:
@@ -41,8 +41,8 @@ def check(
         report: Called with (done, total) after each grasp.
 
     Raises:
-        InputError: The file holds no grasp.
-        UnfaithfulError: The simulator fails the gate.
+        InputError: The file of grasps is empty.
+        UnfaithfulError: The simulator fails its checks on cases with known answers.
     """
     setup, agenda = with_planned_fingers(how[0], before, saved), how[1]
     found = measured(saved, (where, before.limit), setup, agenda, processors, report)

@@ -1,10 +1,10 @@
-"""Two baselines -> how each grasp has changed: the same, better, worse, or not comparable.
+"""Compares two baselines: each grasp is the same, better, worse, or not comparable.
 
 With the same versions, on processors that round alike, results are the same, and every difference
 counts. With the same versions and other rounding, results differ by rounding, which the searches of
 the simulation enlarge to their step size. With other versions verdicts must be the same, except for
 grasps so close to their critical friction that tiny changes decide, and numbers may differ within
-wider bands.
+wider tolerances, called bands.
 """
 
 from collections.abc import Iterator, Mapping
@@ -18,23 +18,24 @@ from sim_validate.baselines.entries import Baseline, Entry
 from sim_validate.simulation.hold_verdict import LET_GO, Outcome
 
 DECISIVE = ("graspproof", "mujoco", "machine")
-"""Components whose version may change any result."""
+"""Packages and other components whose version may change any result."""
 ASIDE = ("python", "trimesh")
-"""Components whose version changes no result; older baselines name trimesh, which read meshes."""
+"""Components whose version changes no result; older baselines name trimesh, which read meshes then.
+"""
 
 
 class Status(StrEnum):
-    """How a grasp has changed."""
+    """How a grasp has changed since the baseline."""
 
     SAME = "same"
     WITHIN = "within bands"
-    """Numbers differ as other versions or processors make them differ."""
+    """Numbers differ only as much as other versions or processors make them differ."""
     GREY = "grey zone"
     """The verdict differs, on a grasp that is too close to its critical friction to tell."""
     IMPROVED = "improved"
     REGRESSED = "regressed"
     NOT_COMPARABLE = "not comparable"
-    """The object, the contacts or the settings are others, so there is nothing to compare."""
+    """The object, the contacts or the settings differ, so the results cannot be compared."""
     MISSING = "missing"
     """The grasp is in the baseline, but not among the present grasps."""
     NEW = "new"
@@ -45,7 +46,7 @@ FAILED = (Status.REGRESSED, Status.MISSING, Status.NEW)
 
 
 def failing(*, strict: bool) -> tuple[Status, ...]:
-    """Statuses that fail a check, beside "not comparable"; strict checks add "improved"."""
+    """List the statuses that fail a check besides "not comparable"; strict adds "improved"."""
     return (*FAILED, Status.IMPROVED) if strict else FAILED
 
 
@@ -53,15 +54,15 @@ EXACT = Bands(
     predicted=1e-9, simulated=1e-9, least=0.0, displacement_m=1e-12, rotation_rad=1e-12,
     grey=0.0, exact=True,
 )  # fmt: skip
-"""Bands for the same versions and rounding: only the rounding of written numbers."""
+"""Tolerances for the same versions and rounding: only the rounding of written numbers."""
 ROUNDING = Bands(
     predicted=1e-6, simulated=5e-3, least=1e-7, displacement_m=1e-6, rotation_rad=1e-5,
     grey=1e-4, exact=True,
 )  # fmt: skip
-"""Bands for the same versions with other rounding. With linear algebra for another processor, or
-without compiled loops, no verdict of sixty grasps changed. Predicted limits agreed to nine digits,
-critical frictions to 5e-9, motions of some 1e-8 m to .6 %, and results of bisection to two steps of
-.13 %."""
+"""Tolerances for the same versions with other rounding. With linear algebra for another processor,
+or without compiled loops, no verdict of sixty grasps changed. Predicted limits agreed to nine
+digits, critical frictions to 5e-9, motions of some 1e-8 m to .6 %, and results of bisection to two
+steps of .13 %."""
 OTHER_VERSIONS = Bands(
     predicted=0.05, simulated=0.05, least=1e-7, displacement_m=2e-4, rotation_rad=radians(0.2),
     grey=0.02, exact=False,
@@ -70,20 +71,20 @@ OTHER_VERSIONS = Bands(
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """How one grasp has changed."""
+    """How one grasp has changed since the baseline."""
 
     id: str
     status: Status
     reasons: tuple[str, ...] = ()
-    """Reasons for the status, in words."""
+    """Reasons for the status, one sentence each."""
     differences: tuple[str, ...] = ()
-    """Every difference, in words."""
+    """Every difference from the baseline, one sentence each."""
     before: Entry | None = None
     after: Entry | None = None
 
 
 def bands_between(before: Baseline, after: Baseline) -> tuple[Bands, str]:
-    """The bands within which results may differ, and why these bands, in words."""
+    """Choose the tolerances within which results may differ, and say in words why."""
     names = sorted({*before.versions, *after.versions} - {*ASIDE})
     others = [
         f"{name} {before.versions.get(name)} -> {after.versions.get(name)}"
@@ -187,7 +188,7 @@ def _status(counting: list[Difference], *, grey: bool, same: bool) -> Status:
 
 
 def _is_grey(one: Entry, other: Entry, friction: float, bands: Bands) -> bool:
-    """Whether a grasp close to its critical friction was held and is not now, or the reverse."""
+    """Tell whether a verdict changed on a grasp that is close to its critical friction."""
     brink = abs(friction - one.critical_friction) <= bands.grey * friction
     decided = all(entry.outcome in (Outcome.HELD, *LET_GO) for entry in (one, other))
     return brink and decided and one.held != other.held

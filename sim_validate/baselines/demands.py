@@ -1,4 +1,4 @@
-"""Whether a grasp is as stable as a test asks for."""
+"""Checks whether a grasp is as stable as a test demands."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -16,21 +16,21 @@ from sim_validate.validation.validation import validate
 
 @dataclass(frozen=True, slots=True)
 class Demands:
-    """Trials of a grasp beside the usual wrenches and controls, and what it must reach.
+    """What a test demands of a grasp, beside holding the usual wrenches.
 
     Raises:
-        InputError: A number is missing or out of range, or a share of no repeats is asked for.
+        InputError: A number is missing or out of range, or a pass rate is given without repeats.
     """
 
     wrenches: Sequence[NamedWrench] = ()
-    """Wrenches to hold as they are."""
+    """Wrenches that the grasp must hold in full."""
     trials: int = 0
     """Number of repeats with noise."""
     noise: Noise = field(default_factory=Noise)
     min_pass_rate: float = 0.0
-    """Least share of repeats that must hold."""
+    """Least share of the repeats with noise in which the grasp must hold."""
     min_margin: float = 0.0
-    """Least distance of the friction from the critical one, by analysis and in simulation."""
+    """Least difference between the friction and the critical one, both predicted and simulated."""
     random_wrenches: int = 0
     seed: int = 0
     setup: Setup = field(default_factory=Setup)
@@ -42,38 +42,40 @@ class Demands:
             if not (isinstance(value, int | float) and 0.0 <= value <= most):
                 raise InputError(f"{name} must be from 0 to {most:g}, got {value!r}")
         if self.min_pass_rate > 0.0 and not self.trials:
-            raise InputError("min_pass_rate is a share of repeats with noise: give trials, too")
+            raise InputError(
+                "min_pass_rate is a share of repeats with noise: give their number as `trials`, too"
+            )
         for each in self.wrenches:
             if not isinstance(each, NamedWrench):  # pyright: ignore[reportUnnecessaryIsInstance]
                 raise InputError(f"wrenches must be NamedWrench values, got {each!r}")
 
 
 def demands_of(asked: Mapping[str, Any]) -> Demands:
-    """Build the demands that a test names.
+    """Build the demands from the arguments of a test.
 
     Raises:
-        InputError: A demand is unknown, or its value is refused.
+        InputError: An argument is unknown, or its value is refused.
     """
     known = [each.name for each in fields(Demands)]
     for name in asked:
         if name not in known:
-            raise InputError(f"assert_stable takes {', '.join(known)}; got {name!r}")
+            raise InputError(f"assert_stable has no argument {name!r}; it takes {', '.join(known)}")
     return Demands(**asked)
 
 
 def checked(case: GraspCase, demands: Demands) -> tuple[Verdict, str]:
-    """Simulate a grasp and say what is wrong with it.
+    """Simulate a grasp, and say in what it falls short of the demands.
 
     Args:
         case: The grasp on its object, and the friction.
         demands: What the grasp must reach.
 
     Returns:
-        The verdict, and what is wrong in words, empty if nothing is.
+        The verdict, and sentences on what the grasp lacks, empty if it meets all demands.
 
     Raises:
         InputError: The grasp or a setting is refused.
-        UnfaithfulError: The simulator fails the gate.
+        UnfaithfulError: The simulator fails its checks on cases with known answers.
     """
     agenda = Agenda(
         random_wrenches=demands.random_wrenches,

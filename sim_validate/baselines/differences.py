@@ -1,4 +1,4 @@
-"""Differences between two verdicts on a grasp: which count, and which are worse."""
+"""Lists the differences between two verdicts on a grasp: which ones count, and which are worse."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,28 +8,28 @@ from sim_validate.baselines.entries import Entry
 
 @dataclass(frozen=True, slots=True)
 class Bands:
-    """How far results may differ."""
+    """Tolerances: how far results may differ from a baseline without counting as changed."""
 
     predicted: float
-    """Band of critical frictions and limits by analysis, relative to the baseline's."""
+    """Tolerance of predicted critical frictions and wrench limits, relative to the baseline's."""
     simulated: float
-    """Band of critical frictions and limits in simulation, relative to the baseline's."""
+    """Tolerance of simulated critical frictions and wrench limits, relative to the baseline's."""
     least: float
-    """Differences of critical frictions and limits that never count; critical frictions are proved
-    to 1e-7."""
+    """Differences of critical frictions and wrench limits that never count; critical frictions are
+    proved to 1e-7."""
     displacement_m: float
     rotation_rad: float
     grey: float
-    """Relative distance of the friction from the critical one within which a grasp may change its
+    """Relative distance between friction and critical friction within which a grasp may change its
     verdict."""
     exact: bool
-    """Whether the same repeats with noise must hold; otherwise repeats with a load close to the
-    limit may change."""
+    """Whether exactly the same repeats with noise must hold; otherwise repeats with a load close to
+    the limit may change."""
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One difference between two verdicts."""
+    """One difference between two verdicts on a grasp."""
 
     text: str
     worse: bool
@@ -39,11 +39,11 @@ class Difference:
 
 
 def differences(one: Entry, other: Entry, bands: Bands) -> tuple[Difference, ...]:
-    """Every difference between two verdicts.
+    """List every difference between two verdicts on a grasp.
 
     Args:
-        one: The baseline's entry.
-        other: The entry of now.
+        one: What the baseline recorded.
+        other: What was measured now.
         bands: How far numbers may differ without counting.
     """
     return (
@@ -85,7 +85,7 @@ def _of_controls(one: Entry, other: Entry) -> Iterator[Difference]:
 
 
 def _of_numbers(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]:
-    """Compare the numbers; a larger number is worse, except for limits."""
+    """Compare the measured numbers; a larger number is worse, except for wrench limits."""
     rows = (
         ("critical_friction", bands.predicted, bands.least, 1.0),
         ("simulated_critical_friction", bands.simulated, bands.least, 1.0),
@@ -113,7 +113,7 @@ def _per_cent(change: float, before: float) -> str:
 
 
 def _of_repeats(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]:
-    """Compare each repeat with itself, as the draws of noise are the same."""
+    """Compare each repeat with the same repeat of the baseline, as both draw the same noise."""
     if one.noisy_trials != other.noisy_trials:
         text = f"repeats with noise: {one.noisy_trials} -> {other.noisy_trials}"
         yield Difference(text, worse=other.noisy_trials < one.noisy_trials)

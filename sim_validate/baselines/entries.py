@@ -1,4 +1,4 @@
-"""What a baseline keeps of verdicts, to compare later ones: a header, and one entry per grasp."""
+"""The contents of a baseline: a header, and one entry that summarises the verdict on each grasp."""
 
 import json
 import math
@@ -18,12 +18,12 @@ from sim_validate.validation.grasp_verdict import Verdict
 from sim_validate.validation.wrench_verdict import WrenchVerdict
 
 DIGITS = 12
-"""Number of digits that are kept of a number."""
+"""Number of decimal digits to which a baseline keeps numbers."""
 NUMBERS = (
     "critical_friction", "simulated_critical_friction", "limit_n", "simulated_limit_n",
     "displacement_m", "rotation_rad",
 )  # fmt: skip
-"""Names of the fields that are measured."""
+"""Names of the fields that hold measured numbers."""
 STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 Count = Annotated[int, Field(ge=0)]
 Size = Annotated[float, Field(ge=0.0)]
@@ -31,19 +31,19 @@ Size = Annotated[float, Field(ge=0.0)]
 
 @dataclass(frozen=True, slots=True, config=STRICT)
 class Entry:
-    """What a baseline keeps of the verdict on one grasp; None for what was not measurable."""
+    """Summary of the verdict on one grasp; None stands for what could not be measured."""
 
     id: str
     contacts_sha256: str
-    """Hash of positions and normals, in finger order."""
+    """Hash of the contact positions and normals, in finger order."""
     outcome: Outcome
-    """`held`, or how the first wrench that was not held ended."""
+    """`held`, or the outcome of the first wrench that was not held."""
     wrenches: Count
-    """Number of wrenches."""
+    """Number of wrenches that were tested."""
     not_held: tuple[str, ...]
     """Names of the wrenches that were not held, in order."""
     controls: Count
-    """Number of negative controls."""
+    """Number of negative controls: contacts that must fail."""
     controls_let_go: Count
     """Number of negative controls that were let go, as they must be."""
     mismatches: Count
@@ -51,50 +51,55 @@ class Entry:
     critical_friction: Size
     simulated_critical_friction: Size | None
     limit_n: Size
-    """Size of the largest resisted wrench along the weakest one, by analysis [N]; torques are
-    divided by the object's radius."""
+    """Size of the largest wrench that is resisted in the weakest direction, by analysis [N];
+    torques are divided by the object's radius."""
     simulated_limit_n: Size | None
-    """Size of the largest resisted wrench along the weakest one, in simulation [N]."""
+    """Size of the largest wrench that is resisted in the weakest direction, in simulation [N]."""
     displacement_m: Size | None
     """Largest motion of the object in any trial [m]."""
     rotation_rad: Size | None
     noisy_trials: Count
     """Number of repeats with noise."""
     noisy_not_held: tuple[Count, ...]
-    """Numbers of the repeats that were not held."""
+    """Numbers of the repeats with noise that were not held."""
     noisy_close: tuple[Count, ...]
-    """Numbers of the repeats with a load very close to the largest that can be resisted."""
+    """Numbers of the repeats with noise whose load is very close to the largest that can be
+    resisted."""
 
     def __post_init__(self) -> None:
-        """Refuse an entry that contradicts itself."""
+        """Refuse an entry whose numbers contradict each other."""
         if self.held == bool(self.not_held):
             raise ValueError(
-                f"outcome is {self.outcome.value}, but wrenches not held are {self.not_held}"
+                f"`outcome` {self.outcome.value} contradicts `not_held`, which is {self.not_held}"
             )
         if self.controls_let_go > self.controls or len(self.not_held) > self.wrenches:
-            raise ValueError("more wrenches or controls ended in some way than were tried")
+            raise ValueError(
+                "`not_held` or `controls_let_go` counts more than `wrenches` or `controls`"
+            )
         if any(number >= self.noisy_trials for number in (*self.noisy_not_held, *self.noisy_close)):
-            raise ValueError("a number is not below the number of repeats with noise")
+            raise ValueError(
+                "`noisy_not_held` and `noisy_close` must hold numbers below `noisy_trials`"
+            )
 
     @property
     def held(self) -> bool:
-        """Whether every wrench held."""
+        """Whether the grasp held every wrench."""
         return self.outcome is Outcome.HELD
 
     @property
     def noisy_held(self) -> int:
-        """Number of repeats with noise that held."""
+        """Number of repeats with noise in which the grasp held."""
         return self.noisy_trials - len(self.noisy_not_held)
 
 
 @dataclass(frozen=True, slots=True, config=STRICT)
 class Baseline:
-    """Verdicts on the grasps of one object, and all that they depend on."""
+    """Verdicts on the grasps of one object, and all settings and versions that they depend on."""
 
     grasps_file: str
-    """Path of the grasps from the baseline's folder."""
+    """Path of the file of grasps, relative to the baseline's folder."""
     limit: Annotated[int, Field(ge=1)] | None
-    """Number of grasps, the first ones of the file; None for all."""
+    """Number of grasps that are kept, the first ones of the file; None for all."""
     object: str
     content_sha256: str
     """Hash of the object's mesh."""
@@ -102,26 +107,26 @@ class Baseline:
     planned_radius_m: Size | None
     """Radius of the fingertips that the grasps were planned for, if any [m]."""
     settings: Mapping[str, Any]
-    """How trials were simulated, and which ones."""
+    """Settings of the simulation, and which trials were run."""
     versions: Mapping[str, str]
     arithmetic: str
-    """Hash of how the processor rounds that measured them."""
+    """Hash that tells how the processor rounds."""
     entries: tuple[Entry, ...]
-    """Entries sorted by id."""
+    """Entries of the grasps, sorted by id."""
 
     def __post_init__(self) -> None:
-        """Refuse two entries of one grasp."""
+        """Refuse a baseline with two entries for one grasp."""
         if len({entry.id for entry in self.entries}) < len(self.entries):
-            raise ValueError("two grasps have the same id")
+            raise ValueError("two grasps of the baseline have the same id")
 
 
 def plain(entry: Entry | None) -> dict[str, Any] | None:
-    """An entry as plain values, which can be sent between processes and written into any file."""
+    """Turn an entry into plain values, which processes can send and any file can hold."""
     return None if entry is None else json.loads(json.dumps(asdict(entry), allow_nan=False))
 
 
 def entry_of(grasp: Grasp, verdict: Verdict, radius_m: float) -> Entry:
-    """Make the entry of a verdict.
+    """Summarise a verdict as an entry of a baseline.
 
     Args:
         grasp: The grasp.
@@ -158,14 +163,14 @@ def entry_of(grasp: Grasp, verdict: Verdict, radius_m: float) -> Entry:
 
 
 def _rounded(value: float | None) -> float | None:
-    """Round a number to the digits that are kept; None for what no file can hold."""
+    """Round a number to the digits that are kept; None for a number that no file can hold."""
     if value is None or not math.isfinite(value):
         return None
     return float(f"{value:.{DIGITS}g}")
 
 
 def _limits(trial: WrenchVerdict, radius_m: float) -> tuple[float, float | None]:
-    """Size of the largest wrench along a trial's, by analysis and in simulation [N]."""
+    """Compute the size of a trial's wrench at its limits, predicted and simulated [N]."""
     scaled = trial.wrench / np.array([1.0] * 3 + [radius_m] * 3)
     predicted = trial.predicted_limit * float(np.linalg.norm(scaled))
     found = trial.simulated_limit

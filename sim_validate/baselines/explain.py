@@ -1,4 +1,4 @@
-"""Explaining in words why a grasp is not as stable as it must be, and how to see it."""
+"""Explains in words why a grasp is not as stable as it must be, and how to look at it."""
 
 import shlex
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ def explained(finding: Finding, verdict: Verdict | None, files: tuple[Path, Path
 
     Args:
         finding: How the grasp has changed.
-        verdict: The verdict of now, if the grasp could be simulated.
+        verdict: The verdict measured now, or None if the grasp could not be simulated.
         files: Paths of the baseline and the grasps.
         how: How results were compared, in words.
     """
@@ -37,7 +37,7 @@ def explained(finding: Finding, verdict: Verdict | None, files: tuple[Path, Path
 
 
 def unstable(verdict: Verdict) -> str:
-    """What did not hold, or held and must not; empty if everything is as it must be."""
+    """Describe what the grasp did not hold, or a negative control held; empty if all is right."""
     lines = [f"{verdict.id} at friction {verdict.friction}: {verdict.outcome.value}"]
     lines += [f"  {in_words(failed)}" for failed in verdict.failures[:1]]
     lines += [f"  control {each.control.name} was not let go"
@@ -47,7 +47,7 @@ def unstable(verdict: Verdict) -> str:
 
 
 def in_words(trial: WrenchVerdict) -> str:
-    """How a wrench ended, when, and what was predicted."""
+    """Describe how the trial of a wrench ended, when, and what was predicted."""
     hold = trial.hold
     when = "" if hold.failed_after_s is None else f" after {hold.failed_after_s:.3g} s"
     return (
@@ -68,5 +68,5 @@ def _numbers(title: str, entry: Entry) -> Iterator[str]:
 
 
 def number(value: float | None) -> str:
-    """A measured number to six digits."""
+    """Write a measured number to six digits."""
     return "not measured" if value is None else f"{value:.6g}"

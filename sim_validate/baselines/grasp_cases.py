@@ -1,4 +1,4 @@
-"""The grasps that a marked test is run with: read from a file, or planned on the spot."""
+"""Reads or plans the grasps that a marked pytest test is run with."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,13 +14,13 @@ from sim_validate.baselines.source_file import Source, source_of
 from sim_validate.records.grasps import read_grasps
 
 FRICTION = 0.5
-"""Friction of cases that give none."""
+"""Friction of grasps for which the test gives none."""
 SETTINGS = ("object", "friction", "limit", "families", "cones", "seed", "unit")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GraspCase:
-    """A grasp on its object, and the friction to try it at."""
+    """A grasp on its object, and the friction at which to test it."""
 
     body: Polyhedron
     grasp: Grasp
@@ -30,14 +30,14 @@ class GraspCase:
 
 
 def case_of(given: Sequence[Any], friction: float | None) -> GraspCase:
-    """Make a case from a test's arguments: a case, or an object, a grasp, and perhaps the friction.
+    """Build a case from a test's arguments: a case, or object and grasp, perhaps with a friction.
 
     Args:
-        given: A case, or these things in that order.
+        given: A case, or an object, a grasp and perhaps a friction, in that order.
         friction: Friction in place of the case's own.
 
     Raises:
-        InputError: The arguments are something else.
+        InputError: The arguments are of other types.
     """
     kinds: list[type[Any]] = [type(each) for each in given]
     if kinds == [GraspCase]:
@@ -49,11 +49,13 @@ def case_of(given: Sequence[Any], friction: float | None) -> GraspCase:
         if len(frictions) <= 1:
             return GraspCase(given[0], given[1], _number(*frictions) if frictions else FRICTION)
     got = ", ".join(kind.__name__ for kind in kinds)
-    raise InputError(f"expected a grasp_case, or an object, a grasp and the friction; got {got}")
+    raise InputError(
+        f"assert_stable: expected a grasp_case, or an object, a grasp and a friction; got {got}"
+    )
 
 
 def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) -> list[GraspCase]:
-    """Read or plan the grasps of a marker.
+    """Read or plan the grasps that a pytest marker asks for.
 
     Args:
         folder: Folder in which relative paths start.
@@ -62,16 +64,20 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
             with a file, `friction` alone.
 
     Raises:
-        InputError: A setting is unknown, missing or refused, there is no grasp, or the mesh file
-            of a file of grasps has changed.
+        InputError: A setting is unknown, missing or refused, no grasp was found, or the mesh that
+            the grasps were planned on has changed.
     """
     if len(args) > 1 or not all(isinstance(each, str) for each in args):
-        raise InputError(f"@pytest.mark.grasp takes one file of grasps, got {list(args)}")
+        raise InputError(
+            f"@pytest.mark.grasp takes the path of one file of grasps, got {list(args)}"
+        )
     known = ("friction",) if args else SETTINGS
     for name in settings:
         if name not in known:
-            beside = "beside a file takes" if args else "takes"
-            raise InputError(f"@pytest.mark.grasp {beside} {', '.join(known)}; got {name!r}")
+            beside = " beside a file of grasps" if args else ""
+            raise InputError(
+                f"@pytest.mark.grasp has no setting {name!r}{beside}; it takes {', '.join(known)}"
+            )
     friction = _number(settings.get("friction", FRICTION))
     source = Source()
     if args:
@@ -85,7 +91,10 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
         body = _body(folder, wanted)
         grasps = _planned(body, wanted)
     if not grasps:
-        raise InputError(f"@pytest.mark.grasp: there is no grasp of {body.name}")
+        raise InputError(
+            f"@pytest.mark.grasp: no grasp of {body.name} was found at friction {friction:g}; try "
+            "a higher friction"
+        )
     return [GraspCase(body, grasp, friction, source) for grasp in grasps]
 
 
@@ -103,10 +112,10 @@ def _planned(body: Polyhedron, wanted: Mapping[str, Any]) -> Sequence[Grasp]:
 
 
 def _body(folder: Path, wanted: dict[str, Any]) -> Polyhedron:
-    """Load the object, and remove its settings from what is wanted."""
+    """Load the object, and remove its settings from the wanted ones."""
     name, unit = wanted.pop("object", None), wanted.pop("unit", "m")
     if not isinstance(name, str):
-        raise InputError("@pytest.mark.grasp needs a grasps.json, or object=...")
+        raise InputError("@pytest.mark.grasp needs the path of a grasps.json, or object=...")
     if Path(name).suffix:
         return load_polyhedron(folder / name, unit=unit)
     return example_object(name)

@@ -1,4 +1,4 @@
-"""Findings -> a JUnit file, which build servers show as test results."""
+"""Writes the findings of a check as a JUnit file, which build servers show as test results."""
 
 from collections.abc import Iterable
 from dataclasses import asdict
@@ -38,5 +38,5 @@ def junit_text(name: str, findings: Iterable[Finding], *, strict: bool) -> str:
 
 
 def _printable(text: str) -> str:
-    """Replace letters that XML cannot hold."""
+    """Replace characters that XML cannot hold."""
     return "".join(letter if letter.isprintable() else " " for letter in text)

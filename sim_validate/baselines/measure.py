@@ -1,4 +1,4 @@
-"""Grasps on the bench -> a baseline: verdicts now, with all that they depend on."""
+"""Simulates grasps and makes a baseline of the verdicts, with all that they depend on."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -22,7 +22,7 @@ Report = Callable[[int, int], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
-    """Verdicts on the grasps of a file, and what a baseline keeps of them."""
+    """Verdicts on the grasps of a file, and the baseline made of them."""
 
     baseline: Baseline
     """Baseline without the grasps that could not be simulated."""
@@ -36,23 +36,23 @@ def measured(
     saved: SavedGrasps, about: tuple[str, int | None], setup: Setup, agenda: Agenda,
     processors: int, report: Report,
 ) -> Measured:  # fmt: skip
-    """Simulate grasps and keep what their verdicts say.
+    """Simulate grasps and make a baseline of their verdicts.
 
     Args:
         saved: The grasps.
-        about: Path of the grasps from the baseline's folder, and how many of them are chosen.
+        about: Path of the grasps, relative to the baseline's folder, and how many to simulate.
         setup: How trials are simulated.
         agenda: Which trials to run.
         processors: Number of processors to use; no result depends on it.
         report: Called with (done, total) after each grasp.
 
     Raises:
-        InputError: The file holds no grasp.
-        UnfaithfulError: The simulator fails the gate.
+        InputError: The file of grasps is empty.
+        UnfaithfulError: The simulator fails its checks on cases with known answers.
     """
     chosen = saved.grasps[: about[1]]
     if not chosen:
-        raise InputError(f"{about[0]}: holds no grasp")
+        raise InputError(f"{about[0]}: expected at least one grasp to simulate, found none")
     require_faithful(setup, saved.friction, saved.body.radius)
     jobs = [Job(saved.body, grasp, saved.friction, agenda, setup) for grasp in chosen]
     verdicts, refused = dict[str, Verdict](), dict[str, str]()
@@ -98,7 +98,7 @@ def _try(job: Job) -> Verdict | str:
 
 
 def complete(found: Measured) -> Baseline:
-    """The baseline of a measurement, if it is complete.
+    """Return the baseline of a measurement in which every grasp could be simulated.
 
     Raises:
         InputError: A grasp could not be simulated.
@@ -109,7 +109,7 @@ def complete(found: Measured) -> Baseline:
 
 
 def with_planned_fingers(setup: Setup, before: Baseline, saved: SavedGrasps) -> Setup:
-    """Put the fingertips that the grasps are planned for now into a baseline's setup.
+    """Replace a setup's fingertips by those that the grasps are planned for now.
 
     A radius that was not the planned one when the baseline was recorded stays.
     """
@@ -119,7 +119,7 @@ def with_planned_fingers(setup: Setup, before: Baseline, saved: SavedGrasps) -> 
 
 
 def seen_from(baseline: Path, grasps: Path) -> str:
-    """The path of grasps from a baseline's folder."""
+    """Return the path of a file of grasps, relative to a baseline's folder."""
     return Path(os.path.relpath(grasps.resolve(), baseline.resolve().parent)).as_posix()
 
 

@@ -1,4 +1,4 @@
-"""How trials are simulated and which ones, as a baseline's file keeps them."""
+"""Reads and writes the simulation settings and the choice of trials in a baseline's file."""
 
 import json
 from collections.abc import Mapping
@@ -29,7 +29,7 @@ Count = Annotated[int, Field(ge=0)]
 
 
 class _Settings(BaseModel):
-    """The settings in a baseline's file."""
+    """The simulation settings in a baseline's file."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -44,7 +44,7 @@ class _Settings(BaseModel):
 
 
 def settings_of(setup: Setup, agenda: Agenda) -> dict[str, Any]:
-    """Write a setup and an agenda as a baseline's file keeps them."""
+    """Write simulation settings and a choice of trials in the form that a baseline keeps."""
     settings = {
         "setup": tables_of(setup),
         "surface": setup.surface,
@@ -59,11 +59,11 @@ def settings_of(setup: Setup, agenda: Agenda) -> dict[str, Any]:
 
 
 def of_settings(settings: Mapping[str, Any], path: str) -> tuple[Setup, Agenda]:
-    """Read the setup and agenda that a baseline keeps.
+    """Read the simulation settings and the choice of trials that a baseline keeps.
 
     Args:
         settings: Settings as `settings_of` writes them.
-        path: Path that they come from, for messages.
+        path: Path of the file with the settings, for messages.
 
     Raises:
         InputError: A setting is missing, unknown or refused.
@@ -88,7 +88,7 @@ def of_settings(settings: Mapping[str, Any], path: str) -> tuple[Setup, Agenda]:
 
 
 def noise_from_table(given: Mapping[str, Any]) -> Noise:
-    """Build noise from some of its fields.
+    """Build noise settings from some of their fields.
 
     Raises:
         InputError: A field is unknown, or its value is refused.
@@ -96,14 +96,16 @@ def noise_from_table(given: Mapping[str, Any]) -> Noise:
     known = [each.name for each in fields(Noise)]
     for name, value in given.items():
         if name not in known:
-            raise InputError(f"noise has {', '.join(known)}; got {shown(name)}")
+            raise InputError(
+                f"noise: no field is named {shown(name)}; choose from {', '.join(known)}"
+            )
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise InputError(f"noise.{name}: expected a number, got {shown(value)}")
     return Noise(**given)
 
 
 def setup_for(saved: SavedGrasps, path: Path | None) -> Setup:
-    """Build the setup of grasps: with their planned fingertips, then with the settings of a file.
+    """Build the setup of grasps: with their planned fingertips, then with a settings file.
 
     Raises:
         InputError: The file is missing or refused.

@@ -1,4 +1,4 @@
-"""Is the mesh in a `grasps.json` still that of the file it was planned from?
+"""Checks whether the mesh file that grasps were planned from has changed since.
 
 Grasps are tested on the mesh that their file holds, so a part that has been changed since would
 pass unnoticed. Therefore its mesh file is searched, and a changed one is refused. The file counts
@@ -19,18 +19,17 @@ from sim_validate.files.reading import read_bytes
 
 
 class ChangedPartError(InputError):
-    """The mesh file is not the one that the grasps were planned from."""
+    """Error for a mesh file that is not the one that the grasps were planned from."""
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """The mesh file that grasps were planned from."""
+    """The mesh file that grasps were planned from, if it was found."""
 
     file: Path | None = None
-    """Path of the file, whose mesh is the tested one; None if there is none, or it was not
-    found."""
+    """Path of the mesh file; None if it was not found, or the grasps come from no file."""
     note: str = ""
-    """Note about the test if the file was not found; empty if there is nothing to say."""
+    """A sentence that says the mesh file was not found; empty otherwise."""
 
 
 def source_of(
@@ -45,14 +44,14 @@ def source_of(
         named: The mesh file if the user names it; then nothing else is searched.
 
     Raises:
-        ChangedPartError: Mesh files were found, but none holds the mesh that the grasps are on.
+        ChangedPartError: Mesh files were found, but none holds the mesh of the grasps.
         InputError: The named file is missing, or the grasps were not planned from a file.
     """
     body = saved.body
     if body.source_sha256 == body.content_sha256:
         if named is not None:
             raise InputError(
-                f"{grasps}: was not planned from a mesh file, so it cannot be that of {named}; "
+                f"{grasps}: these grasps were not planned from a mesh file, so not from {named}; "
                 "leave `object` out, or plan from the file"
             )
         return Source()
@@ -62,9 +61,11 @@ def source_of(
             return Source(file=path)
     if found:
         raise ChangedPartError(
-            f"{found[0]}: is not the mesh that {grasps} was planned on: it has changed since, or "
+            f"{found[0]}: this is not the mesh that {grasps} was planned on: the mesh has changed "
+            "since, or "
             f"is another object's. Plan on it again (graspproof plan {found[0]} --out ...) and "
-            "bless the baseline, put the former file back, or say which file it is with `object` "
+            "write the baseline with pytest --grasp-bless, put the former file back, or name the "
+            "right file with `object` "
             "in a *.grasps.toml"
         )
     return Source(
@@ -74,7 +75,7 @@ def source_of(
 
 
 def _beside(name: str, folders: Iterable[Path]) -> list[Path]:
-    """Mesh files with a given name, sorted within their folders."""
+    """List mesh files with a given name, sorted within their folders."""
     unique = {folder.resolve(): folder for folder in folders}
     return [
         path
@@ -85,7 +86,7 @@ def _beside(name: str, folders: Iterable[Path]) -> list[Path]:
 
 
 def _entries(folder: Path) -> list[Path]:
-    """Sorted contents of a folder; none if it does not exist or cannot be read."""
+    """List the contents of a folder, sorted; none if it does not exist or cannot be read."""
     try:
         return sorted(folder.iterdir())
     except OSError:
@@ -93,14 +94,14 @@ def _entries(folder: Path) -> list[Path]:
 
 
 def _is_source(path: Path, body: Polyhedron) -> bool:
-    """Whether a file is the one that a body was read from, or holds the same solid in some unit."""
+    """Tell whether a body was read from a file, or the file holds the same solid in some unit."""
     if hashlib.sha256(read_bytes(path)).hexdigest() == body.source_sha256:
         return True
     return any(_content(path, unit, body) == body.content_sha256 for unit in UNITS_M)
 
 
 def _content(path: Path, unit: str, body: Polyhedron) -> str:
-    """Hash of a file's solid; empty if the file is no solid in this unit."""
+    """Hash the solid in a file; empty if the file holds no solid in this unit."""
     faces = "planar" if body.patches is None else "patches"
     try:
         read = load_polyhedron(path, unit=unit, faces=faces, patches=body.patches, limits=RECORDED)

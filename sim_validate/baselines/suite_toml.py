@@ -1,4 +1,7 @@
-"""A TOML file that says which grasps must stay as they were: grasps, baseline, settings."""
+"""Reads a `*.grasps.toml` file: which grasps must stay as stable as their baseline says.
+
+The file names the grasps, the baseline and settings.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -31,33 +34,33 @@ KINDS: Mapping[str, type] = {
     "grasps": str, "object": str, "baseline": str, "strict": bool, "setup": str, "wrenches": str,
     "limits": str, "random_wrenches": int, "trials": int, "noise": dict, "seed": int,
 }  # fmt: skip
-"""Settings of the file, with their types."""
+"""Types of the file's settings, by name."""
 WORDS = {str: "text", bool: "true or false", int: "a whole number", dict: "a table"}
 PATHS = ("grasps", "object", "baseline", "setup", "wrenches")
 DIRECT = ("limits", "random_wrenches", "trials", "seed")
-"""Fields of an agenda that the file sets directly."""
+"""Settings of trials that the file gives by the same name as an agenda has."""
 
 
 @dataclass(frozen=True)
 class Suite:
-    """Grasps that must stay as they were; a setting that is None is the baseline's."""
+    """Grasps that must stay as stable as they were; a setting of None is the baseline's."""
 
     path: Path
-    """Path of the suite's own file."""
+    """Path of the `*.grasps.toml` file itself."""
     grasps: Path
-    """Path of a grasps.json."""
+    """Path of the grasps.json."""
     baseline: Path
     object: Path | None = None
-    """The mesh file that the grasps were planned from; if None, one of the object's name beside
-    them."""
+    """The mesh file that the grasps were planned from; None to search beside them for the object's
+    name."""
     strict: bool = False
     """Whether improved grasps fail, too."""
     setup: Path | None = None
     """TOML file of simulation settings."""
     wrenches: Path | None = None
-    """JSON file of wrenches to hold beside the usual ones."""
+    """JSON file of wrenches that each grasp must hold in full."""
     limits: str | None = None
-    """How limits are found in simulation."""
+    """How the largest multiple of each wrench is found in simulation."""
     random_wrenches: int | None = None
     trials: int | None = None
     """Number of repeats with noise."""
@@ -66,7 +69,7 @@ class Suite:
 
     @cached_property
     def saved(self) -> SavedGrasps:
-        """Read the grasps.
+        """Read the grasps that the suite is about.
 
         Raises:
             InputError: The file of grasps is missing or refused.
@@ -75,27 +78,30 @@ class Suite:
 
     @cached_property
     def source(self) -> Source:
-        """Find the mesh file that the grasps were planned from, if it is there.
+        """Find the mesh file that the grasps were planned from; a changed one is refused.
 
         Raises:
-            InputError: The mesh has changed since, or a file is refused.
+            InputError: The mesh has changed since the grasps were planned, or a file is refused.
         """
         return source_of(self.saved, self.grasps, [self.path.parent], self.object)
 
     @cached_property
     def kept(self) -> Baseline:
-        """Read the baseline.
+        """Read the baseline of the suite.
 
         Raises:
             InputError: The baseline is missing or refused.
         """
         if not self.baseline.is_file():
-            raise InputError(f"{self.baseline}: there is no baseline yet: pytest --grasp-bless")
+            raise InputError(
+                f"{self.baseline}: this baseline does not exist yet; write it with pytest "
+                "--grasp-bless"
+            )
         return read_baseline(self.baseline)
 
     @property
     def ids(self) -> list[str]:
-        """Ids of all grasps, in the file or in the baseline.
+        """List the ids of all grasps that are in the file or in the baseline.
 
         Raises:
             InputError: A file is missing or refused.
@@ -106,26 +112,26 @@ class Suite:
 
     @property
     def where(self) -> str:
-        """The path of the grasps from the baseline's folder."""
+        """Path of the file of grasps, relative to the baseline's folder."""
         return seen_from(self.baseline, self.grasps)
 
     def tested(self, name: str) -> Checked:
-        """Simulate one grasp with the baseline's settings and those of the file, and compare it.
+        """Simulate one grasp again, and compare the result with the baseline.
 
         Raises:
             InputError: A file is refused, or the part has changed.
-            UnfaithfulError: The simulator fails the gate.
+            UnfaithfulError: The simulator fails its checks on cases with known answers.
         """
         _ = self.source
         before = self.kept
         return check_one(before, self.saved, self.where, self._settings(before), name)
 
     def bless(self) -> Baseline:
-        """Simulate all grasps and write the baseline, with the settings that it has.
+        """Simulate all grasps and write the results as the new baseline.
 
         Raises:
             InputError: A file or a grasp is refused, or the part has changed.
-            UnfaithfulError: The simulator fails the gate.
+            UnfaithfulError: The simulator fails its checks on cases with known answers.
         """
         _ = self.source
         check_writable(self.baseline)
@@ -139,7 +145,7 @@ class Suite:
         return found
 
     def _kept_if_any(self) -> Baseline | None:
-        """The baseline that will be overwritten, if there is one.
+        """Read the baseline that will be overwritten, if it exists.
 
         Raises:
             InputError: The baseline is refused.
@@ -147,10 +153,12 @@ class Suite:
         try:
             return self.kept if self.baseline.is_file() else None
         except InputError as error:
-            raise InputError(f"{error}; remove the file to begin a new baseline") from error
+            raise InputError(
+                f"{error}; remove the file, then write a new baseline with pytest --grasp-bless"
+            ) from error
 
     def _settings(self, before: Baseline | None) -> tuple[Setup, Agenda]:
-        """The baseline's settings or the default ones, replaced by those that the file gives."""
+        """Take the baseline's settings, or the default ones, replaced by those of the file."""
         if before is None:
             setup, agenda = setup_for(self.saved, None), Agenda(seed=self.saved.seed)
         else:
@@ -168,7 +176,7 @@ class Suite:
 
 
 def suite_from_toml(path: Path) -> Suite:
-    """Read which grasps must stay as they were; paths in the file start at its folder.
+    """Read a `*.grasps.toml` file; paths in it are relative to its folder.
 
     Raises:
         InputError: The file is invalid; the message names the setting.
@@ -177,7 +185,7 @@ def suite_from_toml(path: Path) -> Suite:
 
 
 def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
-    """Build a suite from the settings of a file.
+    """Build a suite from the settings of a `*.grasps.toml` file.
 
     Raises:
         InputError: A setting is unknown, missing or refused.

@@ -1,5 +1,5 @@
-"""Which flags does the command line take, and what does it answer?
+"""Which flags does the command line take, and what does it print?
 
-This room turns arguments and config files into checked flags, and results into console output and
+Modules here turn arguments and config files into checked flags, and results into console output and
 exit codes.
 """

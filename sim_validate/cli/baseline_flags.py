@@ -1,4 +1,4 @@
-"""The flags of the commands about baselines; nothing heavy is imported here."""
+"""The flags of the commands about baselines; this module imports nothing that is slow to load."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,25 +14,25 @@ from sim_validate.parallel.processes import available_cores
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """Simulate grasps and keep the results as a file for the repository."""
+    """Simulate grasps and write a baseline: a file that records how stable each grasp is."""
 
     grasps: Positional[Path]
-    """The grasps.json to simulate."""
+    """The grasps.json with the grasps to simulate."""
     out: Annotated[Path, arg(aliases=("-o",))]
-    """The baseline to write."""
+    """Path of the baseline to write."""
     limit: Count | None = None
-    """How many grasps to keep; all of them if not given."""
+    """Number of grasps to simulate, from the first; all of them if not given."""
     setup: Path | None = None
     """TOML file of simulation settings (see docs/files.md)."""
     wrenches: Path | None = None
-    """JSON file of wrenches to hold beside the usual ones (see docs/files.md)."""
+    """JSON file of wrenches that each grasp must hold in full (see docs/files.md)."""
     random_wrenches: Annotated[int, at_least(0, up_to=MOST_RANDOM_WRENCHES)] = 0
-    """Number of random wrenches to hold as well."""
+    """Number of random wrenches that each grasp must hold as well."""
     limits: Literal["none", "ramp", "bisection"] = "none"
     """Also find the largest multiple of each wrench in simulation."""
     repeats: OmitArgPrefixes[Repeats] = field(default_factory=Repeats)
     seed: Seed | None = None
-    """Seed of everything random; the one planned with if not given."""
+    """Seed of all random choices; if not given, the seed that the grasps were planned with."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
@@ -40,20 +40,20 @@ class Record:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Simulate the grasps of a baseline again and report what changed for each."""
+    """Simulate the grasps of a baseline again, and report how each result has changed."""
 
     baseline: Positional[Path]
-    """The baseline file to check."""
+    """Path of the baseline to check."""
     grasps: Path | None = None
-    """A grasps.json to use in place of the one the baseline names."""
+    """Use this grasps.json instead of the one that the baseline names."""
     setup: Path | None = None
-    """TOML file of simulation settings to use in place of those the baseline keeps."""
+    """TOML file of simulation settings to use instead of those in the baseline."""
     strict: bool = False
-    """Also fail where something is better."""
+    """Fail also if a grasp has become better."""
     bless: bool = False
-    """Write the new results over the baseline, whatever they are."""
+    """Write the new results over the baseline, even if grasps have become worse."""
     junit: Path | None = None
-    """Also write a JUnit file, with a case for each grasp."""
+    """Also write a JUnit file, which build servers show, with a case for each grasp."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
@@ -61,7 +61,7 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
-    """Keep verdicts in a repository, and notice when stability changes."""
+    """Record simulation results of grasps, and notice later when their stability changes."""
 
     action: OmitArgPrefixes[
         Annotated[Record, subcommand("record", prefix_name=False)]

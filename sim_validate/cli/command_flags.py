@@ -29,12 +29,12 @@ from sim_validate.cli.showing_flags import Report, View
 from sim_validate.parallel.processes import available_cores
 
 RUN_LIMIT = 100
-"""Number of grasps that `run` tests by default, which takes some ten seconds."""
+"""Number of grasps that `run` simulates by default, which takes some ten seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Plan grasps, test each with its negative controls in MuJoCo, and write everything."""
+    """Plan grasps, simulate them and negative controls (contacts that must fail); write all."""
 
     object: Positional[str]
     """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
@@ -42,14 +42,14 @@ class Run:
     testing: OmitArgPrefixes[Testing] = field(default_factory=Testing)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
-    """Folder for the results; graspproof-out/OBJECT if not given."""
+    """Folder for the results; if not given, graspproof-out/OBJECT."""
     no_report: bool = False
-    """Write no pages; `graspproof report` can write them later."""
+    """Write no pages about the results; `graspproof report` can write them later."""
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Find force-closure grasps, each with its certificate checked."""
+    """Find force-closure grasps of an object, each with a checked certificate of force closure."""
 
     object: Positional[str]
     """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
@@ -58,93 +58,97 @@ class Plan:
     """Largest number of processes for --optimize and --regions; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
-    """Folder for grasps.json; nothing is written if not given."""
+    """Folder for grasps.json; if not given, no file is written."""
 
 
 @dataclass(frozen=True, slots=True)
 class Validate:
-    """Test the grasps of a file, with negative controls, in MuJoCo."""
+    """Simulate the grasps of a file in MuJoCo, with negative controls: contacts that must fail."""
 
     grasps: Positional[Path]
-    """The grasps.json to test."""
+    """The grasps.json with the grasps to simulate."""
     friction: Friction | None = None
-    """Coulomb coefficient to test at; the one planned for if not given."""
+    """Coulomb coefficient to simulate with; if not given, the one planned for."""
     limit: Count | None = None
-    """Test only this many grasps, from the first."""
+    """Simulate only this many grasps, from the first."""
     seed: Seed | None = None
-    """Seed of random wrenches and moved contacts; the plan's if not given."""
+    """Seed of random wrenches and of moved contacts; if not given, the seed of the plan."""
     testing: OmitArgPrefixes[Testing] = field(default_factory=Testing)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
-    """Folder for verdicts.json; nothing is written if not given."""
+    """Folder for verdicts.json; if not given, no file is written."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Write grasps as MuJoCo scenes that open in MuJoCo's own viewer."""
+    """Write grasps as MuJoCo scenes, which MuJoCo's own viewer can open."""
 
     grasps: Positional[Path]
-    """The grasps.json to write scenes of."""
+    """The grasps.json with the grasps to write as scenes."""
     grasp: str | None = None
-    """Id of one grasp; all of them if not given."""
+    """Id of the grasp to write; if not given, all grasps are written."""
     friction: Friction | None = None
-    """Coulomb coefficient; the one planned for if not given."""
+    """Coulomb coefficient in the scene; if not given, the one planned for."""
     fingers: OmitArgPrefixes[Fingers] = field(default_factory=Fingers)
     surface: Literal["pads", "mesh"] = "pads"
-    """What fingertips touch: one pad each, exact on any object, or a convex object's own mesh."""
+    """What fingertips touch: flat pads at the contacts, which are exact on any object, or the mesh
+    of a convex object."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
-    """Folder for the scenes; a single scene is printed if not given."""
+    """Folder for the scenes; if not given, a single scene is printed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Regions:
-    """Certify where fingers may stand, each anywhere in its own region, with a proof."""
+    """Prove regions in which each finger may stand anywhere, whatever the others do."""
 
     grasps: Positional[Path]
     """The grasps.json whose contacts get regions."""
     grasp: str | None = None
-    """Id of one grasp; all of them if not given."""
+    """Id of the grasp that gets regions; if not given, all grasps do."""
     limit: Count | None = None
-    """Certify only this many grasps, from the first."""
+    """Compute regions for only this many grasps, from the first."""
     friction: Friction | None = None
-    """Coulomb coefficient; the one planned for if not given."""
+    """Coulomb coefficient of the proof; if not given, the one planned for."""
     reserve: Annotated[float, at_least(0.0, up_to=0.99)] = 0.0
     """Share of the friction that the proof does not count on."""
     balance: Literal["radius", "area"] = "radius"
-    """Prefer large discs for all fingers, or much area in total, which may have smaller discs and
-    is several times slower."""
+    """Prefer large discs for all fingers (radius), or large regions in total (area), whose discs
+    may be smaller and which take several times longer."""
     recenter: bool = False
     """Move the regions to where discs inside the faces can be largest; contacts may then lie
     outside their regions."""
     edge_clearance_m: NotNegative = 0.0
     """How far regions stay from the edges of their faces [m]."""
     max_cones: Annotated[int, at_least(64, up_to=1_000_000)] = 10_000
-    """Effort: the number of cones that one attempt at a proof may use. More cones enlarge radii by
-    some hundredths, or not at all where they are as large as possible."""
+    """Number of cones that one attempt at a proof may use. More cones take longer and enlarge radii
+    by some hundredths, or not at all where they are as large as possible."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
-    """Folder for regions.json and the proofs; nothing is written if not given."""
+    """Folder for regions.json and the proofs; if not given, no file is written."""
 
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """Simulate one trial of a file again and write what moved, sample by sample, and a clip."""
+    """Simulate one recorded trial again, and write its motion, sample by sample, and a clip."""
 
     source: Positional[Path]
-    """A baseline, verdicts.json or grasps.json, the folder of a run, or a dataset."""
+    """Where the trial is recorded: a baseline, verdicts.json or grasps.json, the folder of a run,
+    or a dataset."""
     grasp: str | None = None
-    """Id of the grasp; may be left out where there is only one."""
+    """Id of the grasp; may be left out if there is only one."""
     wrench: str | None = None
-    """Name of the wrench; if not given, the first that was not held, or else the weakest."""
+    """Name of the wrench; if not given, the first one that was not held, or else the one that is
+    hardest to hold."""
     control: str | None = None
-    """Replay a negative control made from the grasp, by name."""
+    """Name of a negative control (contacts made from the grasp that must fail) to replay instead of
+    the grasp."""
     trial: Annotated[int, at_least(0, up_to=MOST_COUNT)] | None = None
-    """Replay the repeat with noise that has this number."""
+    """Number of a repeat with noise to replay instead of the trial without noise."""
     grasps: Path | None = None
-    """The grasps.json of the verdicts or the baseline, if it is not where they say."""
+    """The grasps.json that the verdicts or the baseline are about, if it is not where they say."""
     out: Path | None = None
     """Folder for scene.xml, trace.csv and, where graphics are available, clip.gif."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
@@ -152,23 +156,26 @@ class Replay:
 
 @dataclass(frozen=True, slots=True)
 class Analyze:
-    """Judge contacts of any origin: closure with its certificate, quality, wrench limits."""
+    """Judge contacts of any origin: force closure with a certificate, quality, wrench limits."""
 
     contacts: Positional[Path]
     """A contacts file (see docs/files.md), or a grasps.json."""
     friction: Friction | None = None
-    """Coulomb coefficient of contacts that have none of their own; the file's if not given."""
+    """Coulomb coefficient of contacts that have none of their own; if not given, the one in the
+    file."""
     torque_scale_m: Usual | None = None
-    """Length that makes a torque comparable with a force [m]; the file's if not given."""
+    """Length by which torques are divided to compare them with forces [m]; if not given, the one in
+    the file."""
     max_normal_force: Usual = 10.0
     """Largest normal force of each contact [N]."""
     wrench: Annotated[UseAppendAction[tuple[Wrench, ...]], arg(metavar="FX FY FZ TX TY TZ")] = ()
-    """An external wrench [N, N m], torque about the center; may be repeated."""
+    """An external wrench whose largest resisted multiple is wanted [N, N m], torque about the
+    center; may be repeated."""
     outward: bool = False
-    """Say that the file's normals point out of the object."""
+    """Tell that the file's normals point out of the object, not into it."""
     edges: Edges = 8
-    """Number of edges of the pyramids that stand for friction cones in min-weight and hull
-    volume."""
+    """Number of edges of the pyramids that replace friction cones in two quality measures,
+    min-weight and hull volume."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
@@ -176,7 +183,7 @@ class Analyze:
 
 @dataclass(frozen=True, slots=True)
 class Inspect:
-    """Show a mesh as a polyhedron: faces, mass properties, spanning quadruples."""
+    """Show a mesh as a polyhedron: faces, mass properties, face quadruples to grasp by."""
 
     object: Positional[str]
     """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
@@ -186,14 +193,14 @@ class Inspect:
 
 @dataclass(frozen=True, slots=True)
 class Objects:
-    """List the built-in objects."""
+    """List the names of the built-in objects."""
 
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
 class Doctor:
-    """Check this installation: versions, solvers, simulator."""
+    """Check this installation: versions, solvers and simulator."""
 
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 

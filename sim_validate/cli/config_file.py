@@ -1,4 +1,4 @@
-"""Settings of a TOML file, turned into flags on the command line."""
+"""Turns the settings of a TOML file into flags on the command line."""
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
@@ -10,7 +10,7 @@ from grasp_core.files.strict_json import place
 from sim_validate.cli.flag_bounds import FlagsError
 
 COMMAND_WORDS = {"dataset": 2, "baseline": 2}
-"""Number of words in the name of a command, where it is not one."""
+"""Number of words in those command names that have more than one."""
 
 
 def with_config(arguments: list[str], commands: Mapping[str, type]) -> list[str]:
@@ -21,7 +21,7 @@ def with_config(arguments: list[str], commands: Mapping[str, type]) -> list[str]
         commands: Classes of flags, by the names of commands.
 
     Raises:
-        FlagsError: The flag has no file after it, or the file names an unknown flag.
+        FlagsError: No file follows --config, or the file names an unknown flag.
         InputError: The file is missing, or it is not TOML.
     """
     words = [part for word in arguments for part in _split_config(word)]
@@ -29,7 +29,7 @@ def with_config(arguments: list[str], commands: Mapping[str, type]) -> list[str]
         return arguments
     at = words.index("--config")
     if at + 1 >= len(words):
-        raise FlagsError("--config needs the name of a TOML file")
+        raise FlagsError("--config needs the path of a TOML file after it")
     rest = words[:at] + words[at + 2 :]
     flags = _read(Path(words[at + 1]), flag_names(commands.get(rest[0])) if rest else set())
     command = COMMAND_WORDS.get(rest[0], 1) if rest else 0
@@ -49,7 +49,7 @@ def flags_from(settings: dict[str, Any]) -> list[str]:
 
 
 def flag_names(kind: Any) -> set[str]:
-    """Names of a command's flags in files: all fields of its class and of the classes inside."""
+    """Return the names of a command's flags in config files, with those of its groups of flags."""
     if not is_dataclass(kind):
         return set[str]().union(*(flag_names(part) for part in get_args(kind)))
     names = {field.name for field in fields(kind)}

@@ -1,4 +1,4 @@
-"""Console output: results on standard output, everything else on standard error."""
+"""Writes console output: results on standard output, everything else on standard error."""
 
 import json
 import sys
@@ -23,9 +23,9 @@ from rich.text import Text
 from sim_validate.parallel import interrupts
 
 PLAIN_EVERY_S = 5.0
-"""Time between two lines of progress where there is no terminal [s]."""
+"""Time between two lines of progress if the output is no terminal [s]."""
 EARLIEST = 0.02
-"""Share of the work from which on an estimate of the remaining time is shown."""
+"""Share of the work that must be done before the remaining time is estimated."""
 
 
 def printable(text: str) -> str:
@@ -39,7 +39,7 @@ TABLE_ROWS = 20
 
 @dataclass(slots=True)
 class Reporter:
-    """Writes a command's output; `json_only` keeps standard output for one JSON document."""
+    """Writes a command's output; with `json_only`, standard output gets only one JSON document."""
 
     quiet: bool = False
     verbose: bool = False
@@ -48,7 +48,7 @@ class Reporter:
     err: Console = field(default_factory=lambda: Console(stderr=True, highlight=False))
 
     def say(self, text: str) -> None:
-        """Print a line of results: on standard output, or with JSON on standard error."""
+        """Print a line of results: on standard output or, with --json, on standard error."""
         if not self.quiet:
             console = self.err if self.json_only else self.out
             console.print(Text(printable(text)), soft_wrap=True)
@@ -68,7 +68,7 @@ class Reporter:
             sys.stdout.write(json.dumps(value, allow_nan=False, indent=1) + "\n")
 
     def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """Print a table beside the lines of results."""
+        """Print a table on the same stream as lines of results."""
         if self.quiet:
             return
         table = Table(
@@ -92,7 +92,7 @@ class Reporter:
 
 
 class Steps:
-    """Counts the steps that are done; it is used as a context manager."""
+    """Shows the progress of long work in a `with` block."""
 
     def __init__(self, title: str, console: Console, *, shown: bool) -> None:
         self.title, self.console, self.shown = title, console, shown
@@ -120,7 +120,7 @@ class Steps:
             self.bar.stop()
 
     def update(self, done: int, total: int, note: str = "") -> None:
-        """Show the progress; an interrupt that was swallowed is raised here."""
+        """Show how many steps are done; an interrupt that was swallowed is raised here."""
         interrupts.check()
         if self.bar is not None:
             title = f"{self.title} {note}" if note else self.title

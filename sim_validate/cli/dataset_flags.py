@@ -1,4 +1,4 @@
-"""The flags of the commands about datasets; nothing heavy is imported here."""
+"""The flags of the commands about datasets; this module imports nothing that is slow to load."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,70 +15,72 @@ from sim_validate.parallel.processes import available_cores
 
 @dataclass(frozen=True, slots=True)
 class Planning:
-    """Which grasps a dataset holds."""
+    """Which grasps of each object a dataset holds."""
 
     family: UseAppendAction[tuple[Literal["concurrent", "pencil", "regulus", "free"], ...]] = ()
-    """Construction to try, may be repeated; all if not given."""
+    """Family of grasps to construct; may be repeated; all families if not given."""
     limit: Count = 20
     """Largest number of grasps of each object, friction and family."""
     cones: Literal["normal", "tilted"] = "tilted"
-    """Force cones to construct with: only those around the normals, or tilted ones too."""
+    """Axes of the force cones that grasps are constructed with: only the face normals, or tilted
+    ones too."""
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """Where a dataset is made, and what one object may cost; no row depends on these."""
+    """Where a dataset is computed, and how much time and memory; no row depends on these."""
 
     engine: Literal["local", "ray", "dask"] = "local"
     """Where to compute: in processes of this machine, or on a Ray or Dask cluster."""
     address: str | None = None
-    """Address of the cluster; one is started on this machine if not given."""
+    """Address of the Ray or Dask cluster; if not given, one is started on this machine."""
     timeout_s: Positive = 3600.0
-    """Time after which an attempt at one object and friction is stopped; there are two attempts
+    """Time after which an attempt at one object and friction is stopped; each gets two attempts
     [s]."""
     memory_mb: Count | None = None
-    """Memory that a process may use beyond what it needs to start [MiB]."""
+    """Memory that a process may use beyond that of a process that has just started [MiB]."""
     jobs: Count = field(default_factory=available_cores)
     """Number of processes; results do not depend on it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What a dataset is made of, however its grasps are found."""
+    """What a dataset is made of, whether its grasps are planned or given."""
 
     friction: UseAppendAction[tuple[Friction, ...]] = ()
-    """Coulomb coefficient to prove and try at, may be repeated; 0.5 if not given."""
+    """Coulomb coefficient to plan and simulate with; may be repeated; 0.5 if not given."""
     unit: Literal["m", "cm", "mm", "in"] = "m"
     """Length of one unit in a mesh file."""
     faces: Literal["auto", "planar", "patches"] = "auto"
-    """Exact planar faces, or nearly flat patches of a curved or scanned surface."""
+    """Faces to plan on: exact planar faces, or nearly flat patches of a curved or scanned surface.
+    """
     limits: Literal["none", "ramp", "bisection"] = "none"
     """Also find the largest multiple of each wrench in simulation."""
     random_wrenches: Annotated[int, at_least(0, up_to=MOST_RANDOM_WRENCHES)] = 0
-    """Number of random wrenches to hold as well."""
+    """Number of random wrenches that each grasp must hold as well."""
     seed: Annotated[int, at_least(0, up_to=2**63 - 1)] = 0
-    """Seed of everything random."""
+    """Seed of all random choices."""
     scenes: bool = False
     """Also write each grasp as a MuJoCo scene."""
     title: str = "four-finger grasps"
-    """Title of the dataset in its card."""
+    """Title of the dataset, for its README.md."""
     license: str = ""
-    """License of the dataset, such as CC-BY-4.0, for its card."""
+    """License of the dataset, such as CC-BY-4.0, for its README.md."""
     creator: str = ""
-    """Who makes the dataset, for its card."""
+    """Who makes the dataset, for its README.md."""
     url: str = ""
-    """Address where the dataset will be found, for its card."""
+    """Web address at which the dataset will be found, for its README.md."""
     published: str = ""
-    """Date of publication, such as 2026-11-22, for its card."""
+    """Date of publication, such as 2026-11-22, for its README.md."""
 
 
 @dataclass(frozen=True, slots=True)
 class Build:
-    """Plan and try the grasps of many objects, and write tables; run it again to resume."""
+    """Plan and simulate grasps of many objects and write tables; run it again to resume."""
 
     objects: Positional[tuple[str, ...]]
-    """Mesh files, folders of mesh files, or names of built-in objects; or one TOML file that gives
-    everything but --out (see docs/datasets.md)."""
+    """Mesh files, folders of mesh files, or names of built-in objects; or one TOML file with all
+    settings but --out (see docs/datasets.md)."""
     out: Path
     """Folder of the dataset."""
     planning: OmitArgPrefixes[Planning] = field(default_factory=Planning)
@@ -89,7 +91,7 @@ class Build:
 
 @dataclass(frozen=True, slots=True)
 class Import:
-    """Judge the grasps of another tool, and write them as a dataset."""
+    """Judge grasps made by another tool, simulate them, and write them as a dataset."""
 
     contacts: Positional[Path]
     """A contacts file (JSON) or npz file of four contacts for each grasp (see docs/datasets.md)."""
@@ -98,7 +100,7 @@ class Import:
     out: Path
     """Folder of the dataset."""
     outward: bool = False
-    """Say that the file's normals point out of the object."""
+    """Tell that the file's normals point out of the object, not into it."""
     settings: OmitArgPrefixes[Settings] = field(default_factory=Settings)
     work: OmitArgPrefixes[Work] = field(default_factory=Work)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
@@ -106,14 +108,14 @@ class Import:
 
 @dataclass(frozen=True, slots=True)
 class Verify:
-    """Check a dataset: files, rows, each closure from the contacts, and a sample computed again."""
+    """Check a dataset: its files and rows, every closure again, and a sample computed again."""
 
     dataset: Positional[Path]
     """Folder of the dataset."""
     share: Annotated[float, FINITE, at_least(0.0, up_to=1.0)] = 0.01
     """Share of all objects and frictions that is computed again, at least one; 0 for none."""
     seed: Seed = 0
-    """Seed of the choice of what is computed again."""
+    """Seed of the random choice of the sample that is computed again."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
@@ -124,18 +126,18 @@ class Export:
     dataset: Positional[Path]
     """Folder of the dataset."""
     to: ExportFormat
-    """csv, jsonl: a text file per table. npz: arrays without pickle. hdf5: one file. isaac: an
-    Isaac grasp file per object and friction. mjcf: a MuJoCo scene per grasp."""
+    """csv, jsonl: a text file per table. npz: an archive of arrays without pickle per table. hdf5:
+    one file. isaac: an Isaac grasp file per object and friction. mjcf: a MuJoCo scene per grasp."""
     out: Path
-    """Folder to make; it must not exist, or be empty."""
+    """Folder to write to; it must be empty or not exist."""
     split: SplitName | None = None
-    """Export only the objects of this split; all if not given."""
+    """Export only the objects of this split; if not given, all objects."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
 class Dataset:
-    """Make a dataset of many objects, check one, or write one in another format."""
+    """Build a dataset of grasps of many objects, check a dataset, or export it."""
 
     action: OmitArgPrefixes[
         Annotated[Build, subcommand("build", prefix_name=False)]

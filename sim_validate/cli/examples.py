@@ -50,12 +50,12 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "baseline record": ("baseline record grasps.json -o wedge.baseline.json",),
     "baseline check": ("baseline check wedge.baseline.json --junit results.xml",),
 }
-"""Examples by the words of the command, without the program's name."""
+"""Examples of each command, without the program's name."""
 HELP = {"-h", "--help"}
 
 
 def examples_for(arguments: list[str]) -> str:
-    """Examples of a command if its help was asked for, else nothing."""
+    """Return the examples of a command if the arguments ask for its help, else an empty text."""
     if not HELP & set(arguments):
         return ""
     shown = next((EXAMPLES[" ".join(arguments[:words])] for words in (2, 1)

@@ -1,4 +1,4 @@
-"""The exit code of a command, and the message of an error."""
+"""Chooses the exit code of a command, and the message, when it ends with an error."""
 
 from enum import IntEnum
 
@@ -7,7 +7,7 @@ from sim_validate.cli.flag_bounds import FlagsError
 
 
 class Exit(IntEnum):
-    """Exit codes of the command."""
+    """Exit codes of the program `graspproof`."""
 
     GOOD = 0
     NEGATIVE = 1
@@ -17,20 +17,20 @@ class Exit(IntEnum):
     INPUT = 4
     """The input was refused: a file, a flag or a value."""
     NONE = 5
-    """The object has no grasp, as far as was asked."""
+    """No grasp of the object was found."""
     PARTIAL = 6
     INTERRUPTED = 130
 
 
 def reason_of(error: GraspError | OSError) -> str:
-    """The message of an error for people, with the file it is about."""
+    """Return the message of an error, with the name of the file that the error is about."""
     if isinstance(error, OSError):
         return f"{error.filename or 'output'}: {error.strerror or error}"
     return str(error)
 
 
 def exit_code(error: GraspError | OSError) -> Exit:
-    """The exit code of a command that ended with an error."""
+    """Choose the exit code of a command that ended with an error."""
     if isinstance(error, FlagsError):
         return Exit.USAGE
     ours = (SolverError, UndecidedError, UnfaithfulError)

@@ -1,4 +1,4 @@
-"""Bounds on the values of command-line flags, written into their types, and the check of them."""
+"""Bounds on the values of command-line flags, written into their types, and checks of them."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -10,7 +10,7 @@ from grasp_core.errors import InputError
 
 
 class FlagsError(InputError):
-    """Two flags that contradict each other were given."""
+    """Error for flags that contradict each other, or an unknown flag in a config file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class Bound:
     holds: Callable[[Any], bool]
 
     def __repr__(self) -> str:
-        """The text that messages about types show."""
+        """Return the text by which error messages about types show the bound."""
         return self.says
 
 
@@ -29,23 +29,23 @@ FINITE = Bound("must be finite", math.isfinite)
 
 
 def more_than(least: float, *, up_to: float = math.inf) -> Bound:
-    """Bound for numbers above `least`, up to and including `up_to`."""
+    """Make a bound for numbers above `least`, up to and including `up_to`."""
     return Bound(f"must be more than {least:g}{_end(up_to)}", lambda value: least < value <= up_to)
 
 
 def at_least(least: float, *, up_to: float = math.inf) -> Bound:
-    """Bound for numbers from `least` to `up_to`, both included."""
+    """Make a bound for numbers from `least` to `up_to`, both included."""
     return Bound(f"must be at least {least:g}{_end(up_to)}", lambda value: least <= value <= up_to)
 
 
 def ends_in(*endings: str) -> Bound:
-    """Bound for paths of files whose names end in one of `endings`, in upper or lower case."""
+    """Make a bound for paths that end in one of `endings`, in upper or lower case."""
     says = f"must end in {', '.join(endings[:-1])} or {endings[-1]}"
     return Bound(says, lambda path: path.suffix.lower() in endings)
 
 
 def not_zero(least: float, most: float) -> Bound:
-    """Bound for vectors: their largest component in size lies from `least` to `most`."""
+    """Make a bound for vectors: the largest component in size is from `least` to `most`."""
     says = f"must not be zero: the largest part is from {least:g} to {most:g}"
     return Bound(says, lambda vector: least <= max(abs(part) for part in vector) <= most)
 
@@ -71,7 +71,7 @@ def check(flags: object) -> None:
 
 
 def _bounded(kind: Any, value: Any) -> Iterator[tuple[Bound, Any]]:
-    """Yield each bound in a flag's type, with the part of the value that it applies to."""
+    """Yield each bound in the type of a flag, with the part of the value that it bounds."""
     inner = get_args(kind)
     if value is None:
         return

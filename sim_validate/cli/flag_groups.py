@@ -1,6 +1,6 @@
 """Groups of flags that several commands share.
 
-Nothing heavy is imported here, so that help and usage errors answer at once.
+This module imports nothing that is slow to load, so that help and usage errors answer at once.
 """
 
 from dataclasses import dataclass, field
@@ -42,19 +42,19 @@ RuleName = Literal["5cm-15deg", "contact-remains", "2cm", "3cm", "six-forces"]
 
 @dataclass(frozen=True, slots=True)
 class Speech:
-    """How much to print, and in which form."""
+    """How much a command prints, and in which form."""
 
     json: bool = False
-    """Print one JSON document on standard output, everything else on standard error."""
+    """Print one JSON document on standard output, and everything else on standard error."""
     quiet: Annotated[bool, arg(aliases=["-q"])] = False
-    """Print nothing but errors."""
+    """Print only errors."""
     verbose: Annotated[bool, arg(aliases=["-v"])] = False
     """Print more, and show where an internal error happened."""
 
 
 @dataclass(frozen=True, slots=True)
 class MeshLimits:
-    """How large a mesh file and what it holds may be."""
+    """How large a mesh file and its contents may be."""
 
     max_mesh_bytes: Count = USUAL_MESH.max_bytes
     """Largest size of a mesh file that is read [bytes]."""
@@ -71,15 +71,15 @@ class Mesh:
     """How a mesh file is read."""
 
     unit: Literal["m", "cm", "mm", "in"] = "m"
-    """Length of one unit in a mesh file."""
+    """Unit of length in a mesh file."""
     faces: Literal["auto", "planar", "patches"] = "auto"
-    """Exact planar faces, or nearly flat patches of a curved or scanned surface, which may have
-    holes; auto takes patches where there are more than 200 planar faces."""
+    """Faces to plan on: exact planar faces, or nearly flat patches of a curved or scanned surface,
+    which may have holes; auto takes patches where there are more than 200 planar faces."""
     patches: Annotated[int, at_least(4, up_to=200)] = 20
     """Keep at most this many patches, those with the largest inscribed discs."""
     patch_spread_deg: Annotated[float, more_than(0.0, up_to=45.0)] = 10.0
-    """Largest angle between the surface and a patch's plane [deg]; the friction angle shrinks by
-    it."""
+    """Largest angle between the surface and a patch's plane [deg]; the friction angle to plan with
+    shrinks by as much."""
     patch_depth: Annotated[float, more_than(0.0, up_to=0.1)] = 0.01
     """Largest distance of the surface from a patch's plane, relative to the object's extent."""
     center_of_mass_m: Annotated[Point | None, arg(metavar="X Y Z")] = None
@@ -96,27 +96,30 @@ class Planning:
     friction: Friction = 0.5
     """Coulomb coefficient at every contact."""
     theta_deg: Positive | None = None
-    """Half-angle of the friction cones to plan with [deg]; the friction angle if not given."""
+    """Half-angle of the friction cones to plan with [deg]; if not given, that of the friction
+    coefficient."""
     family: UseAppendAction[tuple[Literal["concurrent", "pencil", "regulus", "free"], ...]] = ()
-    """Construction to try, may be repeated; all if not given. `free` looks for grasps of any type
-    on the faces that the others leave over. For faces without a grasp it proves that there is none,
-    or says that it is undecided."""
+    """Family of grasps to construct; may be repeated; all families if not given. `free` looks for
+    grasps of any type on the faces that the other families leave over. For faces without a grasp it
+    proves that they have none, or says that it is undecided."""
     cones: Literal["normal", "tilted"] = "tilted"
-    """Force cones to construct with: only those around the normals as in the paper, or tilted ones
-    too, which serve boxes, prisms and any friction."""
+    """Axes of the force cones that grasps are constructed with: only the face normals, as in the
+    paper, or tilted ones too, which serve boxes, prisms and any friction."""
     limit: Count | None = None
-    """Keep at most this many grasps, the best ones; None keeps all."""
+    """Keep at most this many grasps, the best ones; if not given, `plan` keeps all."""
     rank_by: Literal["radius", "friction-margin", "ferrari-canny", "diverse"] = "radius"
     """Which grasps are best: those with the largest discs, of each family in turn; with the least
     critical friction; with the largest quality; or each next one the farthest from those before
     it."""
     max_parts: Count = 1
-    """Number of parts into which the free method may cut the four faces where it is undecided."""
+    """Number of parts into which the family `free` may divide the four faces while it is undecided.
+    """
     complete: bool = False
-    """Cut the faces that stay undecided until each is decided."""
+    """Divide the faces on which it is undecided whether a grasp exists, until each case is decided.
+    """
     approach_m: Positive | None = None
-    """With --finger-radius-m: keep only grasps that fingers of that radius reach on straight free
-    lines of this length [m]."""
+    """With --finger-radius-m: keep only grasps that fingers of that radius reach along straight
+    paths of this length that do not meet the object [m]."""
     edge_clearance_m: NotNegative = 0.0
     """How far contacts and their regions stay from the edges of their faces [m]."""
     share_faces_m: NotNegative | None = None
@@ -124,82 +127,85 @@ class Planning:
     optimize: bool = False
     """Move the contacts of each grasp on their faces to raise its Ferrari-Canny quality."""
     regions: bool = False
-    """After the grasps are chosen, certify regions around their contacts by separate proofs, as the
-    command `regions` does. They replace the regions of the construction where the discs in them
-    around all contacts are larger."""
+    """After the grasps are chosen, prove regions around their contacts, as the command `regions`
+    does. They replace the regions of the construction if the discs in them around all contacts are
+    larger."""
     finger_radius_m: Positive | None = None
-    """Radius of the fingertips that --approach-m lets come [m]. With --optimize, moved contacts
-    stay this far from edges, or half the radius of the largest disc in a face if that is less. If
-    not given, they stay a twentieth of the object's radius from edges, or as far as planned."""
+    """Radius of the fingertips whose path --approach-m keeps free [m]. With --optimize, moved
+    contacts stay this far from edges, or half the radius of the largest disc in a face if that is
+    less. If not given, they stay a twentieth of the object's radius from edges, or as far as
+    planned."""
     ceiling: Count | None = None
-    """With --optimize: also prove an upper bound of the quality of all contacts on the same faces
-    that are as far from edges, cut into at most this many parts."""
+    """With --optimize: also prove an upper bound of the quality that contacts on the same faces can
+    reach, as far from edges; the number says into how many parts the faces may be divided."""
     seed: Seed = 0
-    """Seed of everything random."""
+    """Seed of all random choices."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fingers:
-    """How fingertips are built; what is not given is chosen to suit the grasp."""
+    """How fingertips are built; values that are not given are chosen to suit the grasp."""
 
     max_normal_force: Usual = 10.0
     """Largest normal force of each finger [N]."""
     fingertip_radius_m: Usual | None = None
-    """Radius of the fingertips; if not given, the one planned for, or a tenth of the object's
-    radius, or what fits [m]."""
+    """Radius of the fingertips [m]; if not given, the one planned for, or a tenth of the object's
+    radius, or less if that does not fit."""
     fingertip_mass_kg: Usual | None = None
-    """Mass of a fingertip; if not given, it is chosen so that similar grasps behave alike [kg]."""
+    """Mass of a fingertip [kg]; if not given, it is chosen so that similar grasps behave alike."""
     stiffness_n_per_m: Usual | None = None
-    """Stiffness of the servos that drive a fingertip; chosen like the mass if not given [N/m]."""
+    """Stiffness of the servos that drive a fingertip [N/m]; if not given, it is chosen so that
+    similar grasps behave alike."""
     approach: Annotated[Direction | None, arg(metavar="X Y Z")] = None
-    """Direction in which fingers arrive in the scene's keyframe; if not given, as planned or along
-    the normals."""
+    """Direction in which fingers approach in the scene's keyframe; if not given, as planned, or
+    else along the normals."""
 
 
 @dataclass(frozen=True, slots=True)
 class Repeats:
-    """Whether to repeat with noise, and how much: standard deviations of normal distributions."""
+    """Whether to repeat trials with noise, and the standard deviations of the noise."""
 
     trials: Annotated[int, at_least(0, up_to=MOST_TRIALS)] = 0
     """Number of times to repeat all holds with noise, to see how often the grasp holds."""
     noise_shift: Annotated[float, at_least(0.0, up_to=1.0)] = 0.01
-    """Noise of the object's position along each axis, in object radii."""
+    """Standard deviation of the object's position along each axis, in object radii."""
     noise_turn_deg: Annotated[float, at_least(0.0, up_to=45.0)] = 1.0
-    """Noise of the object's orientation about each axis [deg]."""
+    """Standard deviation of the object's orientation about each axis [deg]."""
     noise_normal_deg: Annotated[float, at_least(0.0, up_to=45.0)] = 1.0
-    """Noise of the surface's normal at each contact [deg]."""
+    """Standard deviation of the direction of the surface normal at each contact [deg]."""
     noise_friction: Annotated[float, at_least(0.0, up_to=1.0)] = 0.05
-    """Noise of the friction, relative to it."""
+    """Standard deviation of the friction coefficient, relative to the coefficient."""
     noise_mass: Annotated[float, at_least(0.0, up_to=1.0)] = 0.05
-    """Noise of the mass, and with it of every load, relative to them."""
+    """Standard deviation of the mass and of every load, relative to the planned values."""
 
 
 @dataclass(frozen=True, slots=True)
 class Testing:
-    """Which trials to simulate, and how."""
+    """Which trials to simulate, and how they are simulated."""
 
     fingers: OmitArgPrefixes[Fingers] = Fingers()
     random_wrenches: Annotated[int, at_least(0, up_to=MOST_RANDOM_WRENCHES)] = 0
-    """Number of random wrenches to hold as well, each at a share of what the analysis says is
-    resisted."""
+    """Number of random wrenches to hold as well, each at a share of the largest multiple that is
+    resisted according to the analysis."""
     wrenches: Path | None = None
-    """A file of wrenches to hold as they are (see docs/files.md)."""
+    """A file of wrenches that each grasp must hold in full (see docs/files.md)."""
     weight_n: Usual | None = None
     """Also hold the object's weight [N], along and against each axis or in the directions given."""
     down: Annotated[UseAppendAction[tuple[Direction, ...]], arg(metavar="X Y Z")] = ()
-    """With --weight-n: a direction of gravity; may be repeated."""
+    """With --weight-n: a direction in which the weight acts; may be repeated."""
     limits: Literal["none", "ramp", "bisection"] = "none"
     """Also find the largest multiple of each wrench in simulation."""
     independent: bool = False
-    """Also try rigid fingertips, a fixed squeeze and the first instant, none of which uses the
-    planned forces."""
+    """Also run trials that do not use the planned finger forces: rigid fingertips, a fixed squeeze,
+    and the first instant of motion."""
     also_judge_by: UseAppendAction[tuple[RuleName, ...]] = ()
-    """Show what the acceptance rule of another tool makes of the same trials; may be repeated."""
+    """Also show which grasps the acceptance rule of another tool would accept; may be repeated."""
     repeats: OmitArgPrefixes[Repeats] = Repeats()
     traces: bool = False
-    """With --out: also write how each contact moved over time."""
+    """With --out: also write how the object and each contact moved over time."""
     surface: Literal["pads", "mesh"] = "pads"
-    """What fingertips touch: one pad each, exact on any object, or a convex object's own mesh."""
+    """What fingertips touch: flat pads at the contacts, which are exact on any object, or the mesh
+    of a convex object."""
     setup: Path | None = None
     """A TOML file with settings of the simulation (see docs/files.md)."""
     timeout_s: Positive = 600.0

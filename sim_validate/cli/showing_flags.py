@@ -1,6 +1,6 @@
-"""Flags of the commands that show results: pictures of grasps, reports of runs.
+"""The flags of the commands that show results: pictures of grasps and reports of runs.
 
-Nothing heavy is imported here, so that help and usage errors answer at once.
+This module imports nothing that is slow to load, so that help and usage errors answer at once.
 """
 
 from dataclasses import dataclass, field
@@ -19,21 +19,21 @@ PAGES = (".html", ".htm")
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """Look at a grasp: in MuJoCo's viewer where there is a display, or in a file."""
+    """Look at a grasp: in MuJoCo's viewer if there is a display, or in a file."""
 
     grasps: Positional[Path]
-    """A grasps.json, or the folder of a run."""
+    """The grasps.json with the grasp to show, or the folder of a run."""
     grasp: str | None = None
-    """Id of the grasp; the first one if not given."""
+    """Id of the grasp to show; if not given, the first one."""
     friction: Friction | None = None
-    """Coulomb coefficient; the one planned for if not given."""
+    """Coulomb coefficient; if not given, the one planned for."""
     picture: Annotated[Path, ends_in(*PICTURES)] | None = None
     """Write the grasp as a picture like the paper's (png, svg, pdf, webp, jpg)."""
     page: Annotated[Path, ends_in(*PAGES)] | None = None
-    """Write a page on which the grasp can be turned (html)."""
+    """Write a page (html) on which the grasp can be turned."""
     clip: Annotated[Path, ends_in(*CLIPS)] | None = None
-    """Write a clip (webp, gif) of the fingers closing, rendered by MuJoCo; without graphics it
-    shows the picture turning."""
+    """Write a clip (webp, gif) of the fingers closing, rendered by MuJoCo; without graphics the
+    clip shows the picture turning."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
@@ -44,12 +44,12 @@ class Report:
     folder: Positional[Path]
     """Folder of a run, with its grasps.json; or a folder of such folders."""
     limit: Count | None = None
-    """Draw only this many grasps per run, those with problems before others; all if not given."""
+    """Draw only this many grasps per run, those with problems before others; if not given, all."""
     clips: Annotated[int, at_least(0)] = 0
-    """Number of grasps per run of which a trial is filmed, those with problems first, where
+    """Number of grasps per run of which a clip of a trial is made, those with problems first, if
     graphics are available."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
-    """Folder for the pages; `report` in the run's folder if not given."""
+    """Folder for the pages; if not given, `report` in the run's folder."""

@@ -1,8 +1,8 @@
 """Standard output and error that do not stop the work when nobody reads them.
 
 If a reader leaves (`| head`), it gets no more, and the command goes on: the files it writes and its
-exit code do not depend on who reads. Results that standard output cannot take are an error;
-messages that standard error cannot take are not.
+exit code do not depend on who reads. If standard output cannot take results for another reason,
+that is an error; if standard error cannot take messages, that is not.
 """
 
 import io

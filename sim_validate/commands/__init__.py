@@ -1,5 +1,5 @@
 """What does each command do?
 
-Each command takes an instance of its class of flags. It writes files and tables on the console, and
-returns an exit code.
+Each module here runs one or a few commands. A command takes an instance of its class of flags,
+writes files and console output, and returns an exit code.
 """

@@ -1,4 +1,4 @@
-"""The command `analyze`: it judges contacts of any origin and prints a document and tables."""
+"""Runs the command `analyze`, which judges contacts of any origin and prints tables or JSON."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -19,13 +19,14 @@ from sim_validate.records.analysis_json import analyses_to_document, summary
 
 DIGITS = 7
 STEP = 10.0**-DIGITS
-"""The step in which both ends of an interval are printed; to this they are reproducible."""
+"""Step to which both ends of a printed interval are rounded; results are reproducible to this step.
+"""
 UNKNOWN = "?"
-"""The word in tables for what could not be decided."""
+"""The word in tables for a value that could not be decided."""
 
 
 def analyze_file(command: command_flags.Analyze, reporter: Reporter) -> int:
-    """Analyse the grasps of a file; results so far are shown even when interrupted."""
+    """Analyse the grasps of a contacts file; an interrupted run still shows its results so far."""
     sets = _read(command)
     check_edges(sets, command.edges)
     question = Question(command.max_normal_force, command.wrench, command.edges)
@@ -98,7 +99,7 @@ def _say_measures(contacts: ContactSet, reporter: Reporter) -> None:
 
 
 def _facts(found: Analysis) -> list[tuple[str, str]]:
-    """All facts about one grasp, as rows of a table."""
+    """List all facts about one grasp, as rows of a table."""
     certificate = found.certificate
     rows = [("contacts", str(len(found.contacts.positions))), ("closed", _closed(found))]
     if certificate is not None:
@@ -164,7 +165,7 @@ def _friction(critical: float | None) -> str:
 
 
 def _ends(found: FrictionInterval | None) -> str:
-    """Print a proved interval, both ends rounded outwards, so that the printed one holds too."""
+    """Print a proved interval, with both ends rounded outwards so that it still holds."""
     if found is None:
         return UNKNOWN
     lower, upper = np.array([np.floor(found.lower / STEP), np.ceil(found.upper / STEP)]) * STEP
@@ -179,7 +180,7 @@ def _bounds(found: Bounds | None) -> str:
 
 
 def _number(value: float | None, digits: int = 6) -> str:
-    """Print a number, without minus zero."""
+    """Print a number; minus zero is printed as zero."""
     return UNKNOWN if value is None else f"{value + 0.0:.{digits}g}"
 
 

@@ -1,4 +1,4 @@
-"""The object and the fingers that the flags of a command ask to plan for."""
+"""Loads the object that a command's flags name, and builds the fingers to plan for."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -33,11 +33,15 @@ def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
             ),
         )
     if path.suffix or len(path.parts) > 1:
-        raise InputError(f"{name}: no such file, and the ending is none of {', '.join(FORMATS)}")
+        raise InputError(
+            f"{name}: expected a mesh file ({', '.join(FORMATS)}) or a built-in object; no such "
+            "file exists"
+        )
     if replace(mesh, limits=flag_groups.MeshLimits()) != flag_groups.Mesh():
         raise InputError(
-            f"{name} is built in; --unit, --faces, --patches, --patch-spread-deg, --patch-depth "
-            "and --center-of-mass-m say how mesh files are read"
+            f"{name} is a built-in object, so leave out "
+            "--unit, --faces, --patches, --patch-spread-deg, --patch-depth and "
+            "--center-of-mass-m, which say how mesh files are read"
         )
     return example_object(name)
 
@@ -49,16 +53,21 @@ def object_to_plan(name: str, planning: flag_groups.Planning, reporter: Reporter
         InputError: The object or a setting is refused.
     """
     if planning.ceiling is not None and not planning.optimize:
-        raise InputError("--ceiling bounds what --optimize may reach; give both or neither")
+        raise InputError(
+            "--ceiling needs --optimize, because it bounds the quality that moved contacts can "
+            "reach"
+        )
     _check_optimize(planning)
     if planning.regions and planning.share_faces_m is not None:
         raise InputError(
-            "--regions would let fingers that share a face meet; leave one of them out"
+            "--regions and --share-faces-m exclude each other, because regions on one face could "
+            "let fingers collide; leave one of the two flags out"
         )
     body = load_object(name, planning.mesh)
     if planning.optimize and body.patches:
         raise InputError(
-            f"{body.name} has a curved surface; --optimize is for exact planar faces only"
+            f"{body.name} has a curved surface, but --optimize needs exact planar faces; leave "
+            "out --optimize"
         )
     for note in body.notes:
         reporter.warn(f"{body.name}: {note}")
@@ -70,18 +79,19 @@ def _check_optimize(planning: flag_groups.Planning) -> None:
     kept = (planning.edge_clearance_m, planning.share_faces_m, planning.approach_m)
     if planning.optimize and any(kept):
         raise InputError(
-            "--optimize moves contacts without regard to --edge-clearance-m, --share-faces-m and "
-            "--approach-m; leave out --optimize or these"
+            "--optimize moves contacts and would ignore --edge-clearance-m, --share-faces-m and "
+            "--approach-m; leave out --optimize or these three flags"
         )
 
 
 def asked_finger(planning: flag_groups.Planning) -> Finger | None:
-    """The fingers whose free lines are planned, or None if no flag asks for them."""
+    """Build the finger whose straight free path is planned, or None if no flag asks for it."""
     if planning.approach_m is None:
         if planning.finger_radius_m is not None and not planning.optimize:
             raise InputError(
-                "--finger-radius-m also needs --approach-m, the length of the free line on which "
-                "fingers come, or --optimize, which keeps contacts that far from edges"
+                "--finger-radius-m also needs --approach-m, the length of the straight free path "
+                "on which "
+                "fingers approach, or --optimize, which keeps contacts that far from edges"
             )
         return None
     if planning.finger_radius_m is None:

@@ -1,4 +1,4 @@
-"""The trials that the flags and files of a command ask for, as settings of the simulator."""
+"""Turns the flags and files of a command into the settings and trials of the simulator."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from sim_validate.simulation.setup import Agenda, Setup, with_planned_radius
 
 
 def finger_settings(given: flag_groups.Fingers) -> FingerSettings:
-    """Fingertip settings from the flags."""
+    """Build fingertip settings from the flags."""
     return FingerSettings(
         max_normal_force_n=given.max_normal_force,
         radius_m=given.fingertip_radius_m,
@@ -24,14 +24,17 @@ def finger_settings(given: flag_groups.Fingers) -> FingerSettings:
 
 
 def noise_of(given: flag_groups.Repeats) -> Noise:
-    """Noise settings from the flags.
+    """Build noise settings from the flags.
 
     Raises:
-        InputError: Flags set the noise, but ask for no repeat to add it to.
+        FlagsError: Flags set the noise, but ask for no repeats with noise.
     """
     plain = flag_groups.Repeats()
     if not given.trials and given != plain:
-        raise FlagsError("--noise-... sets the noise of repeats: give --trials too")
+        raise FlagsError(
+            "the flags --noise-... set the noise of repeated trials: give their number with "
+            "--trials too"
+        )
     return Noise(
         shift=given.noise_shift,
         turn_deg=given.noise_turn_deg,
@@ -44,7 +47,7 @@ def noise_of(given: flag_groups.Repeats) -> Noise:
 def prepared(
     testing: flag_groups.Testing, planned: Finger | None, seed: int, folder: Path | None
 ) -> tuple[Setup, Agenda]:
-    """Build the setup and the agenda from flags and files, checked before anything runs.
+    """Build the settings and the choice of trials from flags and files, before anything runs.
 
     Args:
         testing: The flags.
@@ -59,7 +62,7 @@ def prepared(
 
 
 def _setup(testing: flag_groups.Testing, planned: Finger | None) -> Setup:
-    """Build the setup from the flags, then from the setup file, which overrides them."""
+    """Build simulation settings from the flags; a setup file overrides them."""
     setup = Setup(
         fingers=with_planned_radius(finger_settings(testing.fingers), planned),
         surface=testing.surface,
@@ -69,11 +72,13 @@ def _setup(testing: flag_groups.Testing, planned: Finger | None) -> Setup:
 
 
 def _agenda(testing: flag_groups.Testing, seed: int, folder: Path | None) -> Agenda:
-    """Build the agenda that the flags ask for."""
+    """Choose the trials that the flags ask for."""
     if testing.down and testing.weight_n is None:
-        raise FlagsError("--down is a direction of the weight: give --weight-n too")
+        raise FlagsError(
+            "--down is the direction in which the weight acts: give the weight with --weight-n too"
+        )
     if testing.traces and folder is None:
-        raise FlagsError("--traces are written to files: give --out DIR too")
+        raise FlagsError("--traces writes files: give their folder with --out DIR too")
     own = () if testing.wrenches is None else wrenches_from_file(testing.wrenches)
     weight = () if testing.weight_n is None else weights(testing.weight_n, testing.down)
     return Agenda(

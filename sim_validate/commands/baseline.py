@@ -1,4 +1,4 @@
-"""The commands `baseline record` and `baseline check`: they notice when stability changes."""
+"""Runs `baseline record` and `baseline check`, which tell when the stability of grasps changes."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from sim_validate.simulation.setup import Agenda
 
 
 def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
-    """Simulate grasps and write their baseline."""
+    """Simulate grasps and write the results as a baseline, to compare later results with."""
     check_writable(command.out)
     saved = read_grasps(command.grasps)
     source = source_of(saved, command.grasps, [command.out.parent])
@@ -48,7 +48,7 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
 
 
 def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
-    """Simulate the grasps of a baseline again and report how each differs."""
+    """Simulate the grasps of a baseline again and report how each result differs."""
     before = read_baseline(command.baseline)
     path = command.grasps or command.baseline.parent / before.grasps_file
     saved = read_grasps(path)
@@ -77,7 +77,7 @@ def _say_source(source: Source, reporter: Reporter) -> None:
 
 
 def exit_code(findings: Sequence[Finding], *, strict: bool) -> int:
-    """1 if a grasp fails the check, 4 if one cannot be compared, else 0."""
+    """Return 1 if a grasp fails the check, 4 if a grasp cannot be compared, else 0."""
     came = {finding.status for finding in findings}
     if came & {*failing(strict=strict)}:
         return Exit.NEGATIVE
@@ -98,7 +98,7 @@ def _show(done: Checked, reporter: Reporter) -> None:
 
 
 def _why(finding: Finding) -> str:
-    """The reasons of a finding, then the differences that are not among them."""
+    """Join the reasons why a grasp changed, and the differences that the reasons do not name."""
     more = [text for text in finding.differences if text not in finding.reasons]
     return "; ".join([*finding.reasons, *more])
 

@@ -1,4 +1,4 @@
-"""The commands about datasets: to make one or resume making it, to check and to export it."""
+"""Runs the commands that build, import, verify and export datasets."""
 
 from contextlib import AbstractContextManager
 from dataclasses import asdict, fields, replace
@@ -24,17 +24,17 @@ from sim_validate.parallel.clusters import dask_workers, ray_workers
 from sim_validate.parallel.processes import local_processes
 
 FRICTION = 0.5
-"""Friction to plan and try at where no flag gives one."""
+"""Friction coefficient for planning and simulation if no flag gives one."""
 MEGABYTE = 2**20
 
 
 def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:
-    """Make a dataset, or resume making it."""
+    """Make a dataset, or resume a build that was interrupted."""
     return _build(_asked(command), command.out, command.work, reporter)
 
 
 def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:
-    """Judge the grasps of another tool and write them as a dataset."""
+    """Judge the grasps of another tool, and write the results as a dataset."""
     config = DatasetConfig(
         objects=(command.object,),
         contacts=str(command.contacts),
@@ -61,16 +61,19 @@ def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter:
 
 
 def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:
-    """Start the engine that computes units.
+    """Start the processes or the cluster that compute the dataset.
 
     Raises:
-        InputError: The engine is not installed, or there is no cluster.
+        InputError: Ray or Dask is not installed, or no cluster answers.
     """
     if work.engine != "local":
         start = ray_workers if work.engine == "ray" else dask_workers
         return start(work.jobs, work.address)
     if work.address is not None:
-        raise InputError("--address is for --engine ray and dask")
+        raise InputError(
+            "--address names a Ray or Dask cluster: give --engine ray or --engine dask too, or "
+            "leave it out"
+        )
     return local_processes(work.jobs)
 
 
@@ -102,7 +105,7 @@ def export_dataset(command: dataset_flags.Export, reporter: Reporter) -> int:
 
 
 def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
-    """Warn before the work about what the card will lack: it cannot be added later."""
+    """Warn of facts that the dataset's README.md will lack, as they cannot be added later."""
     missing = [name for name in CREDITS if not getattr(config, name)]
     if missing and not reporter.quiet:
         given = ", ".join(f"--{name}" for name in missing)
@@ -113,16 +116,19 @@ def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
 
 
 def _asked(command: dataset_flags.Build) -> DatasetConfig:
-    """Read from a TOML file or from the flags what a dataset is made of.
+    """Read a TOML file or flags that say which objects and grasps a dataset consists of.
 
     Raises:
-        InputError: A setting or the file is refused, or there are flags beside a file.
+        InputError: A setting or the file is refused, or flags are given beside a file.
     """
     first = Path(command.objects[0]) if command.objects else Path()
     if first.suffix == ".toml":
         unsaid = (dataset_flags.Planning(), dataset_flags.Settings())
         if len(command.objects) > 1 or (command.planning, command.settings) != unsaid:
-            raise InputError(f"{first} says what the dataset is made of: give nothing beside it")
+            raise InputError(
+                f"{first} holds all settings of the dataset: give no other objects and no flags "
+                "but --out beside it"
+            )
         config = config_from_toml(first)
         return replace(config, objects=_listed(config.objects))
     return DatasetConfig(
@@ -135,25 +141,27 @@ def _asked(command: dataset_flags.Build) -> DatasetConfig:
 
 
 def _settings(settings: dataset_flags.Settings) -> dict[str, Any]:
-    """The settings by the names that the configuration has for them."""
+    """Rename the flags' settings to the names that a dataset configuration has for them."""
     given = {each.name: getattr(settings, each.name) for each in fields(settings)}
     return {"frictions": given.pop("friction") or (FRICTION,), **given}
 
 
 def is_mesh(path: Path) -> bool:
-    """Whether a file of a folder counts as a mesh: its ending fits, and it is not hidden."""
+    """Tell whether a file of a folder is a mesh: its ending fits, and it is not hidden."""
     return path.suffix.lower()[1:] in FORMATS and not path.name.startswith(".")
 
 
 def _listed(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of objects, with folders replaced by the mesh files in them.
+    """List names of objects, with each folder replaced by the mesh files in it.
 
     Raises:
         InputError: A folder holds no mesh file.
     """
     found: list[str] = []
     if not names:
-        raise InputError("objects: expected mesh files, folders of them, or built-in objects")
+        raise InputError(
+            "objects: expected at least one mesh file, folder of mesh files, or built-in object"
+        )
     for name in names:
         folder = Path(name)
         if not folder.is_dir():
@@ -161,6 +169,6 @@ def _listed(names: tuple[str, ...]) -> tuple[str, ...]:
             continue
         meshes = sorted(path for path in folder.iterdir() if is_mesh(path))
         if not meshes:
-            raise InputError(f"{name}: holds no mesh file ({', '.join(FORMATS)})")
+            raise InputError(f"{name}: this folder holds no mesh file ({', '.join(FORMATS)})")
         found += map(str, meshes)
     return tuple(found)

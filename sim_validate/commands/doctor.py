@@ -1,4 +1,4 @@
-"""The command `doctor`: it checks an installation, and says how to repair it."""
+"""Runs the command `doctor`, which checks an installation and says how to repair it."""
 
 import math
 import os
@@ -26,9 +26,10 @@ from sim_validate.simulation.setup import Setup
 from sim_validate.validation.validation import validate
 
 AS_PLANNED = 2.0 * KEPT
-"""Relative tolerance of a planned radius against the closed form; programs give up half of it."""
+"""Relative tolerance of a planned radius, compared with the exact formula; solvers give up half of
+it."""
 USUAL_KERNEL = "grasp_core.solvers.lp_kernel"
-"""A kernel whose state stands for all."""
+"""Module of one compiled solver loop; it stands for all when their state is reported."""
 LOOPS = {
     "kept": "yes",
     "not kept": (
@@ -37,13 +38,13 @@ LOOPS = {
     ),
     "interpreted": "no, NUMBA_DISABLE_JIT says so: unset it, planning is a hundred times slower",
 }
-"""Reports on inner loops, by their state."""
+"""Sentences on whether solver loops are compiled, and whether the compiled code is kept on disk."""
 GATE = "gate: "
-"""Prefix of the names of the gate's checks."""
+"""Prefix of the names of checks that compare the simulator with known answers."""
 
 
 def check_installation(_: command_flags.Doctor, reporter: Reporter) -> int:
-    """Plan and validate the tetrahedron, whose answers are known in closed form."""
+    """Plan and simulate a tetrahedron whose answers are known, and report all checks."""
     body = example_object("tetrahedron")
     grasp = plan(body).grasps[0]
     gate = measured_gate(Setup())
@@ -67,7 +68,7 @@ def check_installation(_: command_flags.Doctor, reporter: Reporter) -> int:
 
 
 def _checks(body: Polyhedron, grasp: Grasp, gate: Gate) -> Mapping[str, bool]:
-    """Every check by its name, and whether it passed."""
+    """Name every check, and tell whether it passed."""
     verdict = validate(body, grasp) if gate.passed else None
     cone = math.tan(grasp.force_cones[0].half_angle) * inscribed_share()
     return {
@@ -87,7 +88,7 @@ def _state(passed: bool) -> str:
 
 
 def _machine() -> Mapping[str, str]:
-    """What this machine offers, and what to do where something is missing."""
+    """Describe what this machine offers, and what to do if something is missing."""
     try:
         graphics = f"MuJoCo draws with {available_graphics() or 'its default'}"
     except GraphicsError as error:
@@ -112,7 +113,8 @@ def _concluded(checks: Mapping[str, bool], reporter: Reporter) -> int:
         return Exit.GOOD
     if any(name.startswith(GATE) for name in failed):
         reporter.warn(
-            "the gate failed: this MuJoCo does not give the answers of statics, and `validate` "
+            "the simulator failed its checks: this MuJoCo does not give the answers of statics, "
+            "and `validate` "
             "will refuse to certify anything; install the versions of .ci/constraints.txt"
         )
     else:

@@ -1,4 +1,4 @@
-"""The commands `inspect` and `objects`: an object as a polyhedron, and the built-in objects."""
+"""Runs the commands `inspect` and `objects`, which show an object or list the built-in ones."""
 
 import math
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ WIDTH = 20
 
 
 def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
-    """Show the facts about a mesh."""
+    """Show the facts about a mesh, such as its faces and mass properties."""
     body = load_object(command.object, command.mesh)
     spanning = (
         count_spanning(body.normals, LEAST_SPAN_ANGLE) if len(body.faces) <= MAX_FACES else None
@@ -50,7 +50,7 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
 
 
 def _in_words(body: Polyhedron, spanning: int | None) -> Iterator[tuple[str, str]]:
-    """The facts for people: the name of each, and its value in words."""
+    """Yield the name and value of each fact about a mesh, in words for people."""
     yield "mesh", f"{len(body.vertices)} vertices, {len(body.triangles)} triangles"
     if body.patches is None:
         holed = sum(bool(face.holes) for face in body.faces)

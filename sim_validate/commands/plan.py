@@ -1,4 +1,4 @@
-"""The command `plan`: from an object to certified grasps, a file and tables."""
+"""Runs the command `plan`, which finds certified grasps of an object and writes them to a file."""
 
 import math
 import re
@@ -68,7 +68,7 @@ def with_regions(
     body: Polyhedron, found: Plan, planning: flag_groups.Planning, folder: Path | None, jobs: int,
     reporter: Reporter,
 ) -> Plan:  # fmt: skip
-    """Certify regions of a plan's grasps if asked for, and write their proofs to the folder."""
+    """Certify regions around a plan's contacts if asked for, and write the proofs to a folder."""
     if not (planning.regions and found.grasps):
         return found
     asked = Asked(found.friction, clearance=planning.edge_clearance_m)
@@ -88,7 +88,7 @@ def with_regions(
 
 
 def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
-    """Plan, write the grasps, and show the best ones."""
+    """Plan grasps, write them to a file, and show the best of them."""
     body = object_to_plan(command.object, command.planning, reporter)
     with alone_in(command.out):
         found, moves = plan_object(body, command.planning, command.jobs, reporter)
@@ -120,7 +120,7 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
 
 
 def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
-    """Say what was tried, and how it ended."""
+    """Say how many sets of faces were tried, and how many gave a certified grasp."""
     counts = found.counts
     reporter.say(
         f"{body.name}: {counts.faces} faces, {counts.quadruples} face quadruples, "
@@ -153,7 +153,7 @@ def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
 
 
 def _whoever(why: str) -> str:
-    """Replace the numbers of fingers in a reason, so that equal reasons can be counted together."""
+    """Remove the finger numbers from a reason, so that equal reasons can be counted together."""
     why = re.sub(r"fingertips \d+ and \d+", "two fingertips", why)
     return re.sub(r"(finger(?:tip)?) \d+", r"a \1", why)
 
@@ -163,7 +163,7 @@ def _listed(faces: FaceQuadruple) -> str:
 
 
 def show_gains(moves: Sequence[Moved], reporter: Reporter) -> None:
-    """Show how the quality changed, grasp by grasp and as percentiles."""
+    """Show how optimisation changed the quality of each grasp, with percentiles."""
     rows = [
         (move.id, f"{move.before[0]:.4f}", f"{move.after[0]:.4f}", f"{move.gain:.3f}",
          "" if move.ceiling is None else f"{move.ceiling:.4f}")

@@ -1,4 +1,4 @@
-"""The command `regions`: it certifies independent regions for the grasps of a file."""
+"""Runs the command `regions`, which proves where each finger of a grasp may stand."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -18,11 +18,12 @@ MILLI = 1e3
 
 
 def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
-    """Certify regions of a file's grasps, show them, and write them with their proofs."""
+    """Certify independent contact regions for a file's grasps, and write them with their proofs."""
     saved = read_grasps(command.grasps)
     chosen = [grasp for grasp in saved.grasps if command.grasp in (None, grasp.id)][: command.limit]
     if not chosen:
-        raise InputError(f"{command.grasps}: no grasp {command.grasp or ''}")
+        wanted = f"a grasp {command.grasp}" if command.grasp else "at least one grasp"
+        raise InputError(f"{command.grasps}: expected {wanted} to certify, found none")
     asked = Asked(
         saved.friction if command.friction is None else command.friction,
         command.reserve, command.balance, command.recenter, command.edge_clearance_m,

@@ -1,4 +1,4 @@
-"""The command `replay`: it simulates one trial of a file again and writes its trace and a clip."""
+"""Runs the command `replay`, which simulates one recorded trial again and writes its motion."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,14 +18,14 @@ from sim_validate.replaying.sources import recorded_in
 from sim_validate.simulation.hold_verdict import LET_GO, Outcome
 
 SHOWN = 12
-"""Number of rows of the trace that are shown; its file has all of them."""
+"""Number of rows of the motion that are shown; the trace file has all of them."""
 MICRO = 1e6
 SLOWER = 1.0 / (RATE * 0.01)
-"""Slow-down of clips, which show a sample of ten milliseconds in each frame."""
+"""Factor by which clips are slower than reality; a clip shows ten milliseconds in each frame."""
 
 
 def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
-    """Simulate a trial again and compare it with the outcome in the file."""
+    """Simulate a recorded trial again and compare its outcome with that in the file."""
     wanted = Wanted(command.grasp, command.control, command.trial, command.grasps)
     recorded = recorded_in(command.source, wanted)
     found = replayed(recorded, command.wrench)
@@ -38,7 +38,7 @@ def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
 
 
 def _as_it_must(found: Replayed, said: str | None) -> bool:
-    """Whether a trial ended as the file says or, without that, as the analysis predicts."""
+    """Tell whether a trial ended as recorded or, if nothing is recorded, as predicted."""
     outcome, limit = found.hold.outcome, found.predicted_limit
     if said is not None:
         return outcome.value == said
@@ -67,7 +67,7 @@ def _show(recorded: Recorded, found: Replayed, said: str | None, reporter: Repor
 
 
 def _written(found: Replayed, command: command_flags.Replay, reporter: Reporter) -> Iterator[Path]:
-    """Write the scene, the trace and the clip, and yield their paths."""
+    """Write the scene, the motion and a clip of a trial, and yield their paths."""
     folder = command.out or Path()
     folder.mkdir(parents=True, exist_ok=True)
     yield write_scene(found.scene, folder / "scene.xml")
@@ -85,7 +85,7 @@ def _written(found: Replayed, command: command_flags.Replay, reporter: Reporter)
 
 
 def trace_text(found: Replayed) -> str:
-    """The trace as CSV, one row for each sample from when friction was lowered."""
+    """Write the motion as CSV, one row for each sample from when friction was lowered."""
     trace = found.watched.trace
     fingers = range(trace.slips_m.shape[1])
     names = ["time_s", "displacement_m", "shift_m", "rotation_rad",

@@ -1,4 +1,4 @@
-"""The command `report`: it writes the pages of a run."""
+"""Runs the command `report`, which writes the results of a run as pages for a browser."""
 
 from sim_validate.cli import showing_flags
 from sim_validate.cli.console import Reporter
@@ -9,7 +9,7 @@ from sim_validate.reports.run_folder import folder_of
 
 
 def report_folder(command: showing_flags.Report, reporter: Reporter) -> int:
-    """Write the pages of a run, and print where they are."""
+    """Write the results of a run as pages, and print where they are."""
     at = command.out or folder_of(command.folder)
     with alone_in(at if command.out or at.is_dir() else None):
         report = shown_report(command, reporter)
@@ -18,7 +18,7 @@ def report_folder(command: showing_flags.Report, reporter: Reporter) -> int:
 
 
 def shown_report(asked: showing_flags.Report, reporter: Reporter) -> Report:
-    """Write a report, and say where it is."""
+    """Write the pages of a run, and say where they are."""
     with reporter.progress("drawing") as steps:
         report = write_report(
             asked.folder,

@@ -1,4 +1,4 @@
-"""The command `run`: it plans on an object, simulates the grasps and writes everything."""
+"""Runs the command `run`, which plans grasps, simulates them and writes all results."""
 
 import re
 from pathlib import Path
@@ -27,18 +27,18 @@ from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.setup import Agenda, Setup
 
 RESULTS = Path("graspproof-out")
-"""Folder that holds a folder of results for each object if --out is not given."""
+"""Folder in which each object gets its own folder of results if --out is not given."""
 HASHED = 8
-"""Number of digits of a hash that tell apart objects whose names look alike."""
+"""Number of hash digits in a folder's name that tell apart objects with similar names."""
 NAMED = 60
-"""Largest number of characters of a name in its folder's name; with four bytes each they still fit
-the limit of file systems."""
+"""Largest number of characters of an object's name in the name of its folder; with four bytes each
+they still fit the limit of file systems."""
 REPORTED = 200
-"""Largest number of grasps that a run draws by itself, in about a minute; `report` draws all."""
+"""Largest number of grasps that `run` draws, in about a minute; `report` draws all."""
 
 
 def run_object(command: command_flags.Run, reporter: Reporter) -> int:
-    """Plan on an object, simulate its grasps, write and show everything."""
+    """Plan grasps of an object, simulate them, and write and show all results."""
     planning = command.planning
     trials = prepared(
         command.testing, asked_finger(planning), planning.seed, command.out or RESULTS
@@ -83,7 +83,7 @@ def _run_in(
 
 
 def _report(folder: Path, jobs: int, reporter: Reporter) -> None:
-    """Write the results as pages; if that fails, the results stand all the same."""
+    """Write the results of a run as pages; a failure to do so only gives a warning."""
     try:
         shown_report(Report(folder, limit=REPORTED, jobs=jobs), reporter)
     except (GraspError, OSError) as error:
@@ -91,6 +91,6 @@ def _report(folder: Path, jobs: int, reporter: Reporter) -> None:
 
 
 def _folder_name(body: Polyhedron) -> str:
-    """A file name that is one plain part of a path; a changed name gets a hash added."""
+    """Turn an object's name into a safe folder name; a name that changes gets a hash added."""
     plain = re.sub(r"[^\w-]+", "_", body.name)[:NAMED] or "object"
     return plain if plain == body.name else f"{plain}-{body.content_sha256[:HASHED]}"

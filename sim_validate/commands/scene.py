@@ -1,4 +1,4 @@
-"""The command `scene`: it writes grasps as MuJoCo scenes."""
+"""Runs the command `scene`, which writes grasps as MuJoCo scenes."""
 
 from grasp_core.errors import InputError
 from scenes.mjcf import build_scene
@@ -13,13 +13,16 @@ from sim_validate.simulation.setup import with_planned_radius
 
 
 def write_scenes(command: command_flags.Scene, reporter: Reporter) -> int:
-    """Write the scenes of a file's grasps, or print a single one."""
+    """Write a MuJoCo scene for each grasp of a file, or print a single one."""
     saved = read_grasps(command.grasps)
     chosen = saved.grasps
     if command.grasp is not None:
         chosen = (grasp_with_id(command.grasps, saved, command.grasp),)
     if command.out is None and len(chosen) > 1:
-        raise InputError("several scenes need --out DIR; or choose one with --grasp ID")
+        raise InputError(
+            "several scenes cannot be printed: give a folder with --out DIR, or one grasp with "
+            "--grasp ID"
+        )
     friction = saved.friction if command.friction is None else command.friction
     fingers = with_planned_radius(finger_settings(command.fingers), saved.finger)
     written: list[str] = []

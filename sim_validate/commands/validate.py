@@ -1,4 +1,4 @@
-"""The command `validate`: it simulates grasps and writes verdicts to files and tables."""
+"""Runs the command `validate`, which simulates grasps and writes verdicts on them."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -26,7 +26,7 @@ from sim_validate.validation.wrench_verdict import WrenchVerdict
 
 
 def validate_file(command: command_flags.Validate, reporter: Reporter) -> int:
-    """Simulate the grasps of a file."""
+    """Simulate the grasps of a file and report which of them hold."""
     saved = read_grasps(command.grasps)
     if not saved.grasps:
         absence = f"{command.grasps} holds no grasp"
@@ -51,11 +51,11 @@ def simulate_grasps(
     saved: SavedGrasps, setup: Setup, agenda: Agenda, *, jobs: int, folder: Path | None,
     reporter: Reporter,
 ) -> int:  # fmt: skip
-    """Validate grasps, write what is done even when interrupted, and show the verdicts.
+    """Simulate grasps, show the verdicts, and write them even if the run is interrupted.
 
     Raises:
         InputError: A grasp is refused.
-        UnfaithfulError: The simulator fails the gate; no grasp is simulated then.
+        UnfaithfulError: The simulator fails its checks, so no grasp is simulated.
     """
     gate = require_faithful(setup, saved.friction, saved.body.radius)
     for check in gate.checks:
@@ -129,13 +129,13 @@ def _show(
 
 
 def _limit_range(verdict: Verdict) -> str:
-    """Least and largest simulated limit, relative to the predicted limits."""
+    """Give the least and largest simulated limit, relative to the predicted limits."""
     shares = [trial.simulated_limit.share for trial in verdict.wrenches if trial.simulated_limit]
     return f"{min(shares):.3f}-{max(shares):.3f}" if shares else "-"
 
 
 def _show_bounds(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
-    """Show what was found without planned forces, if asked for."""
+    """Show the bounds that trials without planned forces gave, if asked for."""
     rows: list[tuple[str, ...]] = []
     for verdict in verdicts[:TABLE_ROWS]:
         if (found := verdict.bounds) is None:
@@ -152,7 +152,7 @@ def _show_bounds(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
 
 
 def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
-    """Show how often grasps held with noise, if asked for."""
+    """Show how often grasps held in repeats with noise, if asked for."""
     rows: list[tuple[str, ...]] = []
     for verdict in verdicts[:TABLE_ROWS]:
         if (found := verdict.robustness) is None:
@@ -170,7 +170,7 @@ def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
 
 
 def _show_rules(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
-    """Show how many grasps and controls the rules of other tools accept, if asked for."""
+    """Show how many grasps and negative controls other tools would accept, if asked for."""
     names = verdicts[0].agenda.rules if verdicts else ()
     controls = [control for verdict in verdicts for control in verdict.controls]
     rows = [
@@ -191,7 +191,7 @@ def _expected(trial: WrenchVerdict) -> str:
 
 
 def _surprises(verdicts: Sequence[Verdict]) -> Iterable[str]:
-    """Lines about the trials that did not end as they should."""
+    """Yield a line about each trial that did not end as it should."""
     lines = [
         f"{verdict.id}: {trial.name}: {trial.hold.outcome.value}{_expected(trial)}: "
         f"{trial.hold.reason}"

@@ -1,4 +1,4 @@
-"""The command `view`: it shows one grasp in MuJoCo's viewer, or in files."""
+"""Runs the command `view`, which shows one grasp in MuJoCo's viewer or writes it to files."""
 
 import subprocess
 import sys
@@ -27,17 +27,17 @@ from sim_validate.reports.turntable import turntable_page
 from sim_validate.simulation.setup import with_planned_radius
 
 COMING, RESTING = 60, 20
-"""Number of frames in which fingers come in, and in which they then stay."""
+"""Number of clip frames in which fingers come in, and in which they then stay."""
 SWING_DEG, ELEVATION_DEG = 120.0, 25.0
-"""Angle by which the camera goes around meanwhile, and its elevation."""
+"""Angle by which the camera moves around during a clip, and its elevation [deg]."""
 
 
 def view_grasp(command: showing_flags.View, reporter: Reporter) -> int:
-    """Show a grasp in a window, or write it to the files that are asked for."""
+    """Show a grasp in MuJoCo's viewer, or write it to the files that are asked for."""
     path = command.grasps / GRASPS if command.grasps.is_dir() else command.grasps
     saved = read_grasps(path)
     if not saved.grasps:
-        raise InputError(f"{path}: holds no grasp")
+        raise InputError(f"{path}: expected at least one grasp to show, found none")
     grasp = grasp_with_id(path, saved, command.grasp or saved.grasps[0].id)
     friction = saved.friction if command.friction is None else command.friction
     if friction <= grasp.critical_friction:
@@ -63,7 +63,7 @@ def _in_viewer(scene: Scene, grasp: Grasp, reporter: Reporter) -> None:
     """Open MuJoCo's own viewer, and wait until it is closed.
 
     Raises:
-        InputError: There is no display.
+        InputError: No display is connected.
     """
     if not has_display():
         raise InputError(
@@ -76,7 +76,10 @@ def _in_viewer(scene: Scene, grasp: Grasp, reporter: Reporter) -> None:
         command = [sys.executable, "-m", "mujoco.viewer", f"--mjcf={path}"]
         ended = subprocess.run(command, check=False).returncode  # noqa: S603 - MuJoCo's own
     if ended:
-        raise GraphicsError(f"MuJoCo's viewer ended with {ended}: give --picture, --page or --clip")
+        raise GraphicsError(
+            f"MuJoCo's viewer failed with exit code {ended}; show the grasp with --picture, "
+            "--page or --clip"
+        )
 
 
 def _written(
@@ -100,11 +103,11 @@ def _written(
 
 
 def write_closing_clip(scene: Scene, grasp: Grasp, path: Path) -> Path:
-    """Draw fingers coming in to their contacts while the camera goes around them.
+    """Write a clip in which fingers come in to their contacts while the camera moves around.
 
     Raises:
         InputError: The file's name does not end in gif or webp.
-        GraphicsError: No graphics library draws here.
+        GraphicsError: No graphics library can render on this machine.
     """
     joints = closing(scene)
     azimuths = np.linspace(0.0, SWING_DEG, len(joints))
@@ -113,7 +116,7 @@ def write_closing_clip(scene: Scene, grasp: Grasp, path: Path) -> Path:
 
 
 def closing(scene: Scene) -> Array:
-    """Joint positions while fingertips come in along their lines and then stay, (n, 7 + 3k)."""
+    """Return joint positions while fingertips come in along their lines and then stay."""
     layout = scene.layout
     away = np.einsum("kij,ki->kj", layout.frames, layout.approach).ravel()
     left = np.linspace(1.0, 0.0, COMING) ** 2

@@ -1,6 +1,6 @@
-"""What is a dataset of grasps?
+"""What does a dataset of grasps consist of?
 
 A configuration names many objects and several frictions; the tables of a dataset hold objects,
-grasps and trials. `building` makes them, `verifying` checks them, `describing` documents them, and
-`exports` writes them for other programs.
+grasps and trials. The package `building` makes a dataset, `verifying` checks it, `describing`
+documents it, and `exports` writes it for other programs.
 """

@@ -1,7 +1,7 @@
-"""The tables of a dataset: every column with its type, unit and meaning.
+"""Defines the tables of a dataset: every column with its type, unit and meaning.
 
 Names end in their unit. Geometry is in the object's own frame, in float64, with normals into the
-object and torques about its centre of mass. What could not be measured is null.
+object and torques about its centre of mass. A value that could not be measured is null.
 """
 
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ Kind: TypeAlias = Literal["text", "bool", "int", "float"]
 Name: TypeAlias = Literal["objects", "grasps", "trials"]
 SplitName: TypeAlias = Literal["train", "validation", "test"]
 ExportFormat: TypeAlias = Literal["csv", "jsonl", "npz", "hdf5", "isaac", "mjcf"]
-"""Formats that `datasets.exports` writes."""
+"""Names of the formats that `datasets.exports` writes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column of a table."""
+    """Name, type, unit and meaning of one column of a table."""
 
     name: str
     kind: Kind
@@ -87,9 +87,9 @@ TABLES: dict[Name, tuple[Column, ...]] = {"objects": OBJECTS, "grasps": GRASPS, 
 KEYS: dict[Name, tuple[str, ...]] = {
     "objects": ("object_id",), "grasps": ("object_id", "grasp_id"), "trials": ("grasp_id", "trial"),
 }  # fmt: skip
-"""Columns by which the rows of a table are sorted, and in which they are unique."""
+"""Columns by which the rows of a table are sorted; no two rows have the same values in them."""
 REFERENCES: dict[tuple[Name, str], tuple[Name, str]] = {
     ("grasps", "object_id"): ("objects", "object_id"),
     ("trials", "grasp_id"): ("grasps", "grasp_id"),
 }
-"""Columns whose cells name a row of another table, with the column that holds the name there."""
+"""Columns whose cells name a row of another table, with the column there that holds the name."""

@@ -1,4 +1,4 @@
-"""The configuration of a dataset: a TOML file or flags -> one checked value, and back to TOML.
+"""Reads and checks the configuration of a dataset, from a TOML file or flags; writes it as TOML.
 
 Everything that decides a row is here. So the hash of the resolved text, together with the hashes of
 the meshes and the versions, identifies what a dataset can hold.
@@ -28,15 +28,15 @@ KINDS: dict[str, tuple[str, ...]] = {
     "cones": get_args(ConeKind),
     "limits": get_args(LimitsKind),
 }
-"""Settings that take one of a few words, with these words."""
+"""Settings whose value is one of a few words, with these words."""
 LEAST = {"limit": 1, "random_wrenches": 0, "seed": 0}
 """Settings that are whole numbers, with their least values."""
 MOST = {"limit": 10**9, "random_wrenches": MOST_RANDOM_WRENCHES, "seed": 2**63 - 1}
-"""Largest values of the settings that are whole numbers."""
+"""Settings that are whole numbers, with their largest values."""
 SWITCHES = ("scenes", "outward")
 """Settings that are true or false."""
 CREDITS = ("title", "license", "creator", "url", "published")
-"""Settings that inform people and decide no row."""
+"""Settings that only inform people; no row depends on them."""
 LISTS: dict[str, type[str] | type[float]] = {"objects": str, "frictions": float, "families": str}
 """Settings that are lists, with the type of their items."""
 WORDS: dict[type, str] = {
@@ -46,7 +46,7 @@ WORDS: dict[type, str] = {
 
 @dataclass(frozen=True, slots=True)
 class DatasetConfig:
-    """Objects x frictions x families, and how their grasps are planned and tried.
+    """Settings of a dataset: objects, frictions, families, and how grasps are planned and tried.
 
     Raises:
         InputError: A setting is out of range.
@@ -55,35 +55,36 @@ class DatasetConfig:
     objects: tuple[str, ...]
     """Mesh files, or names of built-in objects."""
     frictions: tuple[float, ...] = (0.5,)
-    """Coulomb coefficients; each object is planned and tried at each."""
+    """Coulomb coefficients; grasps of each object are planned and simulated at each of them."""
     families: tuple[Method, ...] = METHODS
     limit: int = 20
-    """Largest number of grasps of each object, friction and family."""
+    """Largest number of grasps for each object, friction and family."""
     cones: ConeKind = "tilted"
     unit: str = "m"
-    """Length of one unit in a mesh file."""
+    """Unit of length in mesh files, such as `mm`."""
     faces: FaceKind = "auto"
     limits: LimitsKind = "none"
     """How the largest multiples of wrenches are found in simulation."""
     random_wrenches: int = 0
-    """Number of random wrenches that are held beside the usual ones."""
+    """Number of random wrenches to hold besides the usual ones."""
     seed: int = 0
-    """Seed of everything random."""
+    """Seed of all random choices."""
     contacts: str = ""
-    """A file of contacts on the one object, judged in place of planning."""
+    """Path of a file of contacts on the one object, which are judged instead of planned ones; empty
+    to plan."""
     outward: bool = False
     """Whether normals in that file point out of the object."""
     scenes: bool = False
     """Whether each grasp is also written as a MuJoCo scene."""
     title: str = "four-finger grasps"
-    """Title of the dataset. The title and the settings below are for its card, and decide no
-    row."""
+    """Title of the dataset. The title and the settings below only appear in the dataset's
+    README.md; no row depends on them."""
     license: str = ""
     """Licence of the dataset, such as `CC-BY-4.0`."""
     creator: str = ""
     """Who made the dataset."""
     url: str = ""
-    """Address where the dataset will be found."""
+    """Web address at which the dataset will be found."""
     published: str = ""
     """Date of publication, such as `2026-11-22`. It is a setting, because a clock would make every
     build differ."""
@@ -95,17 +96,24 @@ class DatasetConfig:
             twice = [value for value, count in Counter(values).items() if count > 1]
             if not values or twice:
                 got = f"{shown(twice[0])} twice" if twice else "none"
-                raise InputError(f"{name}: expected one or more, each once, got {got}")
+                raise InputError(
+                    f"{name}: expected a list of one or more different items, got {got}"
+                )
         wrong = [friction for friction in self.frictions if not 0.0 < friction <= LARGEST_FRICTION]
         if wrong:
             most = f"{LARGEST_FRICTION:g}"
-            raise InputError(f"frictions: expected numbers above 0, up to {most}, got {wrong[0]}")
+            raise InputError(
+                f"frictions: expected numbers above 0 and at most {most}, got {wrong[0]}"
+            )
         if unknown := [family for family in self.families if family not in METHODS]:
             raise InputError(
                 f"families: expected some of {', '.join(METHODS)}, got {shown(unknown[0])}"
             )
         if self.contacts and len(self.objects) > 1:
-            raise InputError("objects: expected only the object that the contacts are on")
+            raise InputError(
+                "objects: expected only one object beside `contacts`, the one that the contacts "
+                "are on"
+            )
         self._check_words_and_counts()
 
     def _check_words_and_counts(self) -> None:
@@ -125,7 +133,7 @@ class DatasetConfig:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the resolved text."""
+        """SHA-256 of the text with all settings."""
         return hashlib.sha256(config_to_toml(self).encode()).hexdigest()
 
 
@@ -150,14 +158,16 @@ def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
     """
     known = [each.name for each in fields(DatasetConfig)]
     if unknown := [name for name in given if name not in known]:
-        raise InputError(f"{place(unknown[:1])}: no such setting; there are {', '.join(known)}")
+        raise InputError(f"{place(unknown[:1])}: no such setting; choose from {', '.join(known)}")
     if "objects" not in given:
-        raise InputError("objects: expected a list of mesh files or built-in objects")
+        raise InputError(
+            "objects: expected a list of mesh files or built-in objects, but the setting is missing"
+        )
     return DatasetConfig(**{name: _typed(name, value) for name, value in given.items()})
 
 
 def _typed(name: str, value: Any) -> Any:
-    """A setting, checked and converted to the type it has in the configuration."""
+    """Check a setting, and convert it to the type it has in the configuration."""
     kinds = {**LISTS, **dict.fromkeys(LEAST, int), **dict.fromkeys(SWITCHES, bool)}
     wanted = kinds.get(name, str)
     if name not in LISTS:
@@ -180,7 +190,7 @@ def _is(value: object, wanted: type) -> bool:
 
 
 def _is_date(text: str) -> bool:
-    """Whether a text is a day as YYYY-MM-DD, the form that all readers know."""
+    """Tell whether a text is a day as YYYY-MM-DD, the form that all readers know."""
     try:
         return date.fromisoformat(text).isoformat() == text
     except ValueError:
@@ -205,12 +215,12 @@ def _as_toml(value: object) -> str:
 
 
 def quoted(text: str) -> str:
-    """Write a text as a basic string of TOML, which YAML reads alike: printable, on one line."""
+    """Write a text as a basic string of TOML, printable and on one line; YAML reads it alike."""
     return '"' + "".join(map(_escaped, text)) + '"'
 
 
 def _escaped(letter: str) -> str:
-    """Write a letter inside such a string, escaped if necessary."""
+    """Write a character inside a quoted string, escaped if necessary."""
     if letter in '"\\':
         return "\\" + letter
     return letter if letter.isprintable() else f"\\U{ord(letter):08x}"

@@ -1,4 +1,4 @@
-"""Contacts of other tools, from a JSON or npz file; each set of four is one grasp to judge."""
+"""Reads contacts made by other tools, from JSON or npz; each set of four is one grasp to judge."""
 
 import hashlib
 import json
@@ -18,23 +18,23 @@ from sim_validate.files.npz import arrays_of
 from sim_validate.files.reading import read_bytes, text_of
 
 POINTS, NORMALS, NAMES = "contact_points_m", "contact_normals", "grasp_id"
-"""Names of the arrays of an npz file: points (n, 4, 3) [m], normals (n, 4, 3), and perhaps names
+"""Names of the arrays of an npz file: points (n, 4, 3) [m], normals (n, 4, 3), optionally names
 (n,)."""
 NO_FRICTION = 1.0
-"""Friction for files that state none; it is never used, because a dataset's configuration has its
-own."""
+"""Friction put in for files that state none; it is never used, because a dataset's configuration
+has its own."""
 
 Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class GivenGrasp:
-    """Four contacts as another tool gives them, in the object's frame."""
+    """Four contacts made by another tool, in the object's frame."""
 
     id: str
-    """Name given here, which a file can have."""
+    """Name that this package gives the grasp, which may be part of a file name."""
     name: str
-    """Name that the file gives it."""
+    """Name that the other tool's file gives the grasp."""
     points: tuple[Triple, ...]
     """Contact points, (4, 3) [m]."""
     normals: tuple[Triple, ...]
@@ -42,14 +42,14 @@ class GivenGrasp:
 
 
 def read_given(path: Path, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
-    """Read contacts to judge.
+    """Read contacts made by other tools.
 
     Args:
-        path: A contacts file (JSON, see docs/files.md), or an npz file with the arrays above.
+        path: A contacts file (JSON, see docs/files.md), or an npz file of points and normals.
         outward: Whether normals in the file point out of the object.
 
     Raises:
-        InputError: The file cannot be read, or does not have this form; the message names the
+        InputError: The file cannot be read, or is not of that form; the message names the
             field.
     """
     try:
@@ -61,7 +61,7 @@ def read_given(path: Path, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
 
 
 def given_text(given: Sequence[GivenGrasp]) -> str:
-    """Write a contacts file of the same grasps, with normals into the object."""
+    """Write given grasps as a contacts file, with normals into the object."""
     grasps = [
         {
             "id": grasp.name,
@@ -81,7 +81,7 @@ def given_sha256(given: Sequence[GivenGrasp]) -> str:
 
 
 def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
-    """Parse contacts to judge, from the text of a contacts file.
+    """Parse contacts to judge from the text of a contacts file.
 
     Raises:
         InputError: The text is not a contacts file with four contacts per grasp and no friction;
@@ -92,7 +92,9 @@ def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ..
     planned = "schema" in stated  # graspproof planned these, and they may be judged at any friction
     own = any((each.friction != NO_FRICTION).any() for each in sets)
     if not planned and ("friction" in stated or own):
-        raise InputError("friction: expected none in the file; a dataset has its own frictions")
+        raise InputError(
+            "friction: remove it from the contacts file, because a dataset has its own frictions"
+        )
     for each in sets:
         if len(each.positions) != FINGERS:
             raise InputError(f"grasp {each.id}: expected 4 contacts, got {len(each.positions)}")
@@ -106,25 +108,30 @@ def contacts_text(data: bytes) -> str:
     """Turn the bytes of an npz file into the text of a contacts file.
 
     Raises:
-        InputError: The bytes are not an npz file with such arrays.
+        InputError: The bytes are not an npz file of points and normals.
     """
     arrays = arrays_of(data, (POINTS, NORMALS, NAMES))
     for name in (POINTS, NORMALS):
         if name not in arrays:
-            raise InputError(f"no array {name}; expected {POINTS} and {NORMALS}, (n, 4, 3) each")
+            raise InputError(
+                f"the array {name} is missing; expected {POINTS} and {NORMALS}, of shape (n, 4, "
+                "3) each"
+            )
         array = arrays[name]
         if array.dtype.kind not in "fiu" or not (array.ndim and array.shape[1:] == (FINGERS, 3)):
             raise InputError(
-                f"{name}: expected numbers, (n, 4, 3), got {array.dtype} {array.shape}"
+                f"{name}: expected an array of numbers, of shape (n, 4, 3), got {array.dtype} "
+                f"{array.shape}"
             )
     points, normals = arrays[POINTS], arrays[NORMALS]
     names = arrays.get(NAMES, np.arange(len(points)))
     if names.ndim != 1 or not len(points) == len(normals) == len(names):
         raise InputError(
-            f"expected arrays of equal length, got {points.shape}, {normals.shape}, {names.shape}"
+            f"{POINTS}, {NORMALS} and {NAMES}: expected arrays of equal length, got shapes "
+            f"{points.shape}, {normals.shape} and {names.shape}"
         )
     if not (np.isfinite(points).all() and np.isfinite(normals).all()):
-        raise InputError(f"{POINTS} and {NORMALS}: expected finite numbers")
+        raise InputError(f"{POINTS} and {NORMALS}: expected finite numbers, got NaN or infinity")
     return given_text(
         [GivenGrasp("", str(name), _rows(p), _rows(n))
          for name, p, n in zip(names, points, normals, strict=True)]

@@ -1,7 +1,8 @@
-"""The manifest of a dataset: its files, and the versions that made them; written last.
+"""Reads and writes the manifest of a dataset: its files, and the versions that made them.
 
-A folder without a manifest is no dataset yet. The manifest does not say when or with how many
-processes the dataset was made: equal configuration, meshes and versions give equal bytes.
+A folder without a manifest is no finished dataset, as the manifest is written last. The manifest
+does not say when or with how many processes the dataset was made: equal configuration, meshes and
+versions give equal bytes.
 """
 
 import hashlib
@@ -28,48 +29,48 @@ Count = Annotated[int, Field(ge=0)]
 
 @dataclass(frozen=True, slots=True, config=STRICT)
 class Listed:
-    """One file of a dataset."""
+    """One file of a dataset, as the manifest lists it."""
 
     path: str
-    """Path in the dataset's folder."""
+    """Path of the file in the dataset's folder."""
     bytes: Count
     sha256: str
     table: Name | None = None
-    """Table that the file is a part of, if any."""
+    """Table that the file is a part of; None for other files."""
     split: str | None = None
-    """Split that its rows belong to, if any."""
+    """Split that the file's rows belong to; None for other files."""
     rows: Count | None = None
 
 
 @dataclass(frozen=True, slots=True, config=STRICT)
 class Manifest:
-    """What a dataset consists of."""
+    """The files of a dataset, and all that decided their contents."""
 
     config_sha256: str
     versions: dict[str, str]
     """Versions of the packages and of the interpreter, and the hash of this project's code."""
     arithmetic: str
-    """Hash of how the driver's processor rounds."""
+    """Hash that tells how the processor rounded that ran the build."""
     units: Count
-    """Number of objects at frictions that were asked for; many given grasps count in parts."""
+    """Number of units of work: objects at frictions; many given grasps make several units."""
     units_sha256: str
-    """Hash of the names of all units, which depend on everything that decides rows."""
+    """Hash of the names of all units of work, which depend on everything that decides rows."""
     quarantined: Count
-    """Number of units that were left out."""
+    """Number of units of work that were left out."""
     files: tuple[Listed, ...]
     schema: int = SCHEMA
 
     def rows(self) -> dict[Name, int]:
-        """The number of rows of each table."""
+        """Number of rows of each table."""
         return {name: sum(each.rows or 0 for each in self.of_table(name)) for name in TABLES}
 
     def of_table(self, name: Name) -> tuple[Listed, ...]:
-        """The files of a table."""
+        """List the files of a table."""
         return tuple(each for each in self.files if each.table == name)
 
 
 def listed(folder: Path, path: Path) -> Listed:
-    """Describe a file as the manifest lists it."""
+    """Describe a file as the manifest lists it: path, size and hash."""
     digest, size = hashlib.sha256(), 0
     with path.open("rb") as stream:
         while part := stream.read(2**20):
@@ -79,12 +80,12 @@ def listed(folder: Path, path: Path) -> Listed:
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> Path:
-    """Write the manifest, which makes a folder a dataset."""
+    """Write the manifest of a dataset, whose presence marks the dataset as finished."""
     return write_text(folder / MANIFEST, manifest_to_json(manifest))
 
 
 def manifest_to_json(manifest: Manifest) -> str:
-    """The text of a manifest; equal manifests give equal texts."""
+    """Write the text of a manifest; equal manifests give equal texts."""
     record = asdict(manifest)
     record["files"] = [
         {name: value for name, value in asdict(each).items() if value is not None}
@@ -97,11 +98,14 @@ def read_manifest(folder: Path) -> Manifest:
     """Read the manifest of a dataset.
 
     Raises:
-        InputError: The folder has none, or it is not as this version writes them.
+        InputError: The folder has no manifest, or not one as this version writes it.
     """
     path = folder / MANIFEST
     if not path.is_file():
-        raise InputError(f"{folder}: no dataset, or one that is not finished: no {MANIFEST}")
+        raise InputError(
+            f"{folder}: expected a finished dataset, but {MANIFEST} is missing; run `graspproof "
+            "dataset build` to the end"
+        )
     text = read_text(path)
     try:
         return manifest_from_json(text)
@@ -113,7 +117,7 @@ def manifest_from_json(text: str) -> Manifest:
     """Parse the text of a manifest.
 
     Raises:
-        InputError: The text is not as this version writes it; the message names the field.
+        InputError: The text is not a manifest of this version; the message names the field.
     """
     object_of(text, MANIFEST, schema=SCHEMA)
     try:
@@ -123,5 +127,5 @@ def manifest_from_json(text: str) -> Manifest:
     for i, each in enumerate(found.files):
         require_inside(each.path, place(["files", i, "path"]))
     if len({each.path for each in found.files}) < len(found.files):
-        raise InputError("files: a path is listed twice")
+        raise InputError("files: expected every path only once, got one path twice")
     return found

@@ -1,4 +1,4 @@
-"""Canonical meshes of a dataset: a file in metres that reads back as exactly the same solid."""
+"""Writes and reads the meshes of a dataset: files in metres that give exactly the same solid."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,14 +15,14 @@ FOLDER = "meshes"
 
 
 def mesh_text(body: Polyhedron) -> str:
-    """Write a solid as an OBJ file; every number reads back unchanged [m]."""
+    """Write a solid as an OBJ file in metres, whose numbers read back unchanged."""
     points = [f"v {x!r} {y!r} {z!r}\n" for x, y, z in body.vertices.tolist()]
     triangles = [f"f {i} {j} {k}\n" for i, j, k in (body.triangles + 1).tolist()]
     return "".join(points + triangles)
 
 
 def mesh_path(folder: Path, object_id: str) -> Path:
-    """Path of an object's mesh in a dataset.
+    """Return the path of an object's mesh in a dataset.
 
     Raises:
         InputError: The object's name cannot be that of a file.
@@ -34,13 +34,16 @@ def stored_surface(folder: Path, object_id: str) -> tuple[Array, Indices]:
     """Read the vertices (n, 3) [m] and triangles (t, 3) of an object of a dataset.
 
     Raises:
-        MeshError: The mesh is missing, or cannot be read.
-        InputError: The mesh is another object's.
+        MeshError: The mesh is missing or cannot be read.
+        InputError: The mesh is that of another object.
     """
     path = mesh_path(folder, object_id)
     vertices, triangles, _ = read_triangles(path, DEFAULT_LIMITS)
     if (found := content_hash(vertices, triangles)) != object_id:
-        raise InputError(f"{path}: is the mesh of another object, {found}")
+        raise InputError(
+            f"{path}: this is the mesh of another object, whose hash is {found}; see `graspproof "
+            "dataset verify`"
+        )
     return vertices, triangles
 
 
@@ -54,11 +57,14 @@ def stored_body(folder: Path, object_id: str, name: str, faces: FaceKind) -> Pol
         faces: How the object's faces were found.
 
     Raises:
-        MeshError: The mesh is missing, or is no solid.
-        InputError: The mesh is another object's.
+        MeshError: The mesh is missing or is not a solid.
+        InputError: The mesh is that of another object.
     """
     path = mesh_path(folder, object_id)
     body = load_polyhedron(path, faces=faces)
     if body.content_sha256 != object_id:
-        raise InputError(f"{path}: is the mesh of another object, {body.content_sha256}")
+        raise InputError(
+            f"{path}: this is the mesh of another object, whose hash is {body.content_sha256}; "
+            "see `graspproof dataset verify`"
+        )
     return replace(body, name=name)

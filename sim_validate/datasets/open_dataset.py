@@ -1,4 +1,4 @@
-"""Reading a finished dataset, or one split of it: tables as arrays, and how they were made."""
+"""Reads a finished dataset, or one split of it: its tables as arrays, and how they were made."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,15 +24,15 @@ class Selection:
     split: str | None
 
     def paths(self, name: Name) -> list[Path]:
-        """Paths of a table's files, each checked to be whole.
+        """List the files of a table, each checked to be unchanged.
 
         Raises:
-            InputError: A file is missing, or not as it was written.
+            InputError: A file is missing, or differs from what was written.
         """
         return [self._whole(each) for each in self._listed(name)]
 
     def counts(self) -> dict[Name, int]:
-        """The number of rows of each table."""
+        """Number of rows of each table."""
         return {name: sum(each.rows or 0 for each in self._listed(name)) for name in TABLES}
 
     def rows(self, name: Name) -> Iterator[dict[str, Any]]:
@@ -56,17 +56,23 @@ class Selection:
                 found += batch.num_rows
                 yield batch
             if found != each.rows:
-                raise InputError(f"{each.path}: {found} rows, but the manifest lists {each.rows}")
+                raise InputError(
+                    f"{each.path}: the file has {found} rows, but the manifest lists {each.rows}; "
+                    "see `graspproof dataset verify`"
+                )
 
     def _whole(self, each: Listed) -> Path:
-        """Path of a file, once it matches the manifest's hash; page checksums miss some bytes."""
+        """Check that a file has the manifest's hash, as page checksums miss some bytes."""
         path = path_inside(self.folder, each.path)
         if not path.is_file():
-            raise InputError(f"{path}: missing; see `graspproof dataset verify`")
+            raise InputError(
+                f"{path}: this file of the dataset is missing; see `graspproof dataset verify`"
+            )
         found = listed(self.folder, path)
         if (found.bytes, found.sha256) != (each.bytes, each.sha256):
             raise InputError(
-                f"{path}: damaged, differs from what was written; see `graspproof dataset verify`"
+                f"{path}: this file of the dataset differs from what was written; see `graspproof "
+                "dataset verify`"
             )
         return path
 
@@ -82,7 +88,7 @@ class Selection:
         return config_from_toml(self.folder / "config.toml")
 
     def facts(self) -> dict[str, str]:
-        """The versions and settings that made the dataset, and its credits, by name.
+        """Versions and settings that made the dataset, and statements on its origin, by name.
 
         Raises:
             InputError: The dataset's config.toml is damaged.
@@ -103,10 +109,10 @@ def select(folder: Path, split: str | None = None) -> Selection:
 
     Args:
         folder: Folder of the dataset.
-        split: `train`, `validation` or `test`; everything if not given.
+        split: `train`, `validation` or `test`; all splits if not given.
 
     Raises:
-        InputError: The split is unknown, or there is no finished dataset.
+        InputError: The split is unknown, or the folder holds no finished dataset.
     """
     splits = [name for name, _ in SPLITS]
     if split is not None:
@@ -119,14 +125,14 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
 
     Args:
         folder: Folder of the dataset.
-        split: `train`, `validation` or `test`; everything if not given.
+        split: `train`, `validation` or `test`; all splits if not given.
 
     Returns:
         Arrays by table and column, with one entry per row: contact points, for example, are (n, 4,
         3) [m]. Missing numbers are NaN, or -1 in columns of whole numbers; missing text is None.
 
     Raises:
-        InputError: The split is unknown, there is no finished dataset, or a file is damaged.
+        InputError: The split is unknown, the dataset is not finished, or a file is damaged.
     """
     chosen = select(path_of(folder, "folder"), split)
     return {name: read_columns(chosen.paths(name), name) for name in TABLES}

@@ -1,7 +1,7 @@
-"""Rows of a table <-> the bytes of a Parquet file, equal for equal rows.
+"""Writes the rows of a table as the bytes of a Parquet file, and reads them back.
 
-Every page carries a checksum, and reading checks it: without that, a flipped bit goes unnoticed.
-Units and meanings are in the metadata of the columns.
+Equal rows give equal bytes. Every page carries a checksum, and reading checks it: without that, a
+flipped bit goes unnoticed. Units and meanings are in the metadata of the columns.
 """
 
 import importlib
@@ -24,12 +24,12 @@ from sim_validate.datasets.columns import KEYS, TABLES, Column, Name
 Columns: TypeAlias = dict[str, NDArray[Any]]
 TYPES = {"text": "string", "bool": "bool_", "int": "int64", "float": "float64"}
 MISSING: Mapping[str, float] = {"float": math.nan, "int": -1}
-"""What stands for null in arrays."""
+"""Value that stands for null in arrays, by type of column."""
 GROUP_ROWS = 20_000
 """Number of rows that are written or read at a time, some tens of megabytes in memory."""
 MOST_ROWS, MOST_GROUP_BYTES = 10_000_000, 2**30
-"""Largest number of rows of a file, and of bytes in a group, that are read: twenty times what is
-written."""
+"""Largest number of rows of a file, and of bytes in a row group, that are read: twenty times what
+is written."""
 PAGES: Mapping[str, Any] = {
     "compression": "zstd",
     "write_page_checksum": True,
@@ -38,21 +38,21 @@ PAGES: Mapping[str, Any] = {
 
 
 def pyarrow() -> Any:
-    """The library that reads and writes Parquet.
+    """Import pyarrow, the library that reads and writes Parquet.
 
     Raises:
-        InputError: It is not installed.
+        InputError: The library is not installed.
     """
     try:
         return importlib.import_module("pyarrow")
     except ImportError as error:
         raise InputError(
-            "datasets are Parquet files, which need pyarrow: pip install 'graspproof[dataset]'"
+            "datasets are Parquet files, which need pyarrow: run pip install 'graspproof[dataset]'"
         ) from error
 
 
 def pyarrow_parquet() -> Any:
-    """The part of pyarrow that knows Parquet."""
+    """Import the part of pyarrow that reads and writes Parquet."""
     return importlib.import_module("pyarrow.parquet")
 
 
@@ -72,7 +72,10 @@ def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[
     listed = sorted(rows, key=lambda row: _key(name, row))
     for one, other in itertools.pairwise(listed):
         if _key(name, one) == _key(name, other):
-            raise InputError(f"{name}: two rows have the key {_key(name, one)}")
+            raise InputError(
+                f"table {name}: expected rows with different keys, got two rows with the key "
+                f"{_key(name, one)}"
+            )
     schema = schema_of(name).with_metadata(dict(sorted(about.items())))
     columns = [[_cell(row.get(column.name)) for row in listed] for column in TABLES[name]]
     try:
@@ -80,14 +83,14 @@ def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[
                   for values, each in zip(columns, schema, strict=True)]  # fmt: skip
         table = arrow.Table.from_arrays(arrays, schema=schema)
     except (arrow.ArrowInvalid, arrow.ArrowTypeError) as error:
-        raise InputError(f"{name}: {error}") from error
+        raise InputError(f"table {name}: a cell does not fit its column: {error}") from error
     held = io.BytesIO()
     parquet.write_table(table, held, **PAGES)
     return held.getvalue()
 
 
 def as_read(name: Name, rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """The rows as they come back from a file: sorted, with null for numbers that are not finite."""
+    """Return rows as a file would give them: sorted, null for numbers that are not finite."""
     held = pyarrow().BufferReader(parquet_bytes(name, rows, {}))
     return pyarrow_parquet().ParquetFile(held).read().to_pylist()
 
@@ -96,7 +99,7 @@ def read_rows(path: Path, name: Name | None = None) -> list[dict[str, Any]]:
     """Read the rows of a file and check all of its checksums.
 
     Raises:
-        InputError: The file is not that of a table, or is damaged.
+        InputError: The file does not hold the table, or is damaged.
     """
     return read_table(path, name).to_pylist()
 
@@ -105,7 +108,7 @@ def each_batch(path: Path, name: Name) -> Iterator[Any]:
     """Yield the rows of a file as Arrow's record batches, without holding all of them in memory.
 
     Raises:
-        InputError: The file is not that of the table, or is damaged.
+        InputError: The file does not hold the table, or is damaged.
     """
     with _opened(path, name) as file:
         yield from file.iter_batches(GROUP_ROWS)
@@ -119,7 +122,7 @@ def read_table(path: Path, name: Name | None = None) -> Any:
         name: Name of its table; any table if None.
 
     Raises:
-        InputError: The file is not that of a table, or is damaged.
+        InputError: The file does not hold the table, or is damaged.
     """
     with _opened(path, name) as file:
         return file.read()
@@ -130,7 +133,7 @@ def _opened(path: Path, name: Name | None = None) -> Generator[Any]:
     """Open a file of one of the tables; any damage is raised as an `InputError`.
 
     Raises:
-        InputError: The file is not that of a table, has other columns, or is damaged.
+        InputError: The file holds no table, has other columns, or is damaged.
     """
     arrow, parquet = pyarrow(), pyarrow_parquet()
     try:
@@ -141,7 +144,9 @@ def _opened(path: Path, name: Name | None = None) -> Generator[Any]:
     # ValueError: also for names that are not valid text
     except (OSError, ValueError, arrow.ArrowException) as error:
         said = shown(" ".join(str(error).split()))
-        raise InputError(f"{path}: cannot be read, or is damaged ({said})") from error
+        raise InputError(
+            f"{path}: this file cannot be read as Parquet, or is damaged ({said})"
+        ) from error
 
 
 def _check_columns(path: Path, came: Any, names: Sequence[Name]) -> None:
@@ -152,7 +157,9 @@ def _check_columns(path: Path, came: Any, names: Sequence[Name]) -> None:
     ):
         return
     what = "columns of other types" if came.names in known else "other columns"
-    raise InputError(f"{path}: has {what} than {' or '.join(names)} of this version")
+    raise InputError(
+        f"{path}: the file has {what} than the table {' or '.join(names)} has in this version"
+    )
 
 
 def _check_size(path: Path, claimed: Any) -> None:
@@ -161,7 +168,8 @@ def _check_size(path: Path, claimed: Any) -> None:
     rows, largest = claimed.num_rows, max((each.total_byte_size for each in groups), default=0)
     if not 0 <= rows <= MOST_ROWS or not 0 <= largest <= MOST_GROUP_BYTES:
         raise InputError(
-            f"{path}: claims {rows} rows, and {largest} bytes in one group of them; the limits are "
+            f"{path}: the file claims {rows} rows, and {largest} bytes in one group of rows; the "
+            "limits are "
             f"{MOST_ROWS} and {MOST_GROUP_BYTES}"
         )
 
@@ -204,7 +212,7 @@ def _cell(value: Any) -> Any:
 
 @cache
 def schema_of(name: Name) -> Any:
-    """The columns of a table as an Arrow schema, with units and meanings as metadata."""
+    """Return the columns of a table as an Arrow schema, with units and meanings as metadata."""
     arrow = pyarrow()
     return arrow.schema([_field(column) for column in TABLES[name]])
 

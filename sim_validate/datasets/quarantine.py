@@ -1,4 +1,4 @@
-"""The lines of a dataset's `quarantine.jsonl`: which units have no rows, and why."""
+"""Reads and writes `quarantine.jsonl`: which units of work of a dataset have no rows, and why."""
 
 import json
 from collections.abc import Iterable
@@ -12,7 +12,7 @@ from sim_validate.files.reading import read_text
 
 
 class LeftOut(BaseModel):
-    """A unit without rows."""
+    """A unit of work without rows, with the reason."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
@@ -20,17 +20,17 @@ class LeftOut(BaseModel):
     source_sha256: str
     friction: float
     given: list[str]
-    """Ids of the given grasps that are missing, if the unit is about given grasps."""
+    """Ids of the given grasps that have no rows, if the unit is about given grasps."""
     reason: str
 
 
 def left_out_text(units: Iterable[LeftOut]) -> str:
-    """The text of the file, one line per unit."""
+    """Write the text of `quarantine.jsonl`, one line per unit of work without rows."""
     return "".join(json.dumps(each.model_dump(), sort_keys=True) + "\n" for each in units)
 
 
 def read_left_out(path: Path) -> list[LeftOut]:
-    """Read the units of a file.
+    """Read `quarantine.jsonl`: the units of work that have no rows.
 
     Raises:
         InputError: The file cannot be read, or a line is invalid; the message names line and key.
@@ -43,7 +43,7 @@ def read_left_out(path: Path) -> list[LeftOut]:
 
 
 def left_out_from(text: str) -> list[LeftOut]:
-    """Parse the units of a text.
+    """Parse the text of `quarantine.jsonl`.
 
     Raises:
         InputError: A line is invalid.

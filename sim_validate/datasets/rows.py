@@ -1,4 +1,4 @@
-"""Verdicts as rows of the tables: an object, its grasps with their controls, their trials."""
+"""Turns verdicts into rows of a dataset: objects, grasps with negative controls, and trials."""
 
 import hashlib
 from collections.abc import Callable, Iterable, Mapping
@@ -21,31 +21,31 @@ from sim_validate.validation.wrench_verdict import WrenchVerdict
 Row: TypeAlias = Mapping[str, Any]
 Rows: TypeAlias = Mapping[Name, tuple[Row, ...]]
 SPLITS = (("test", 0.1), ("validation", 0.2), ("train", 1.0))
-"""Upper ends of each split's share of hashes: an object is in the first split that its hash is
-below."""
+"""Upper ends of each split's share of hashes: an object is in the first split whose end is above
+its hash."""
 GIVEN = "given"
 """Label of grasps that another tool made."""
 NOT_TRIED = "not_tried"
-"""Outcome of given grasps that cannot be tried: their `note` says why, and no cell claims anything
-else about them."""
+"""Outcome of given grasps that cannot be simulated: their `note` says why, and no cell claims
+anything else about them."""
 SHORT = 16
 """Number of digits of an object's hash in the names of its grasps."""
 
 
 def id_beginning(object_id: str, friction: float) -> str:
-    """Beginning of the names of all grasps of a unit."""
+    """Return the first part of the names of all grasps of one object at one friction."""
     return f"{object_id[:SHORT]}-{friction}-"
 
 
 def split_of(object_id: str, seed: int) -> str:
-    """The split of an object: it depends on its hash, so that more objects move none."""
+    """Choose the split of an object by its hash, so that adding objects moves no other object."""
     digest = hashlib.sha256(f"{seed} {object_id}".encode()).digest()
     share = int.from_bytes(digest[:8], "big") / 2.0**64
     return next(name for name, upto in SPLITS if share < upto)
 
 
 def object_row(body: Polyhedron, unit: WorkUnit) -> Row:
-    """The row of a unit's object."""
+    """Make the row of a unit's object."""
     return {
         "object_id": body.content_sha256,
         "source_name": Path(unit.object).name,
@@ -80,7 +80,7 @@ class GraspRows:
         self._add_closed(grasp, verdict, about)
 
     def add_given(self, given: GivenGrasp, grasp: Grasp, verdict: Verdict, moved_m: float) -> None:
-        """Add the rows of a force-closed given grasp, its negative controls, and all trials."""
+        """Add rows of a force-closed given grasp, its negative controls, and all trials."""
         about: dict[str, Any] = {"name": given.name, "label": GIVEN, "moved_m": moved_m}
         if self.body.patches is not None:
             # on curved surfaces the contacts' faces are made for this grasp alone
@@ -88,12 +88,12 @@ class GraspRows:
         self._add_closed(grasp, verdict, about)
 
     def add_open(self, given: GivenGrasp, verdict: ControlVerdict, moved_m: float) -> None:
-        """Add the rows of a given grasp that is not force-closed, which is tried as a control."""
+        """Add rows of a given grasp that is not force-closed; it is a negative control."""
         about = {"name": given.name, "label": GIVEN, "control_of": None, "moved_m": moved_m}
         self._add_refuted(self.name(given.id), verdict, about)
 
     def add_untried(self, given: GivenGrasp, why: str) -> None:
-        """Add the row of a given grasp that cannot be tried."""
+        """Add the row of a given grasp that cannot be simulated."""
         contacts = [
             Contact(np.array(point), np.array(normal))
             for point, normal in zip(given.points, given.normals, strict=True)
@@ -160,7 +160,7 @@ class GraspRows:
         self._add_trials(name, verdict.tried, lambda _: {})
 
     def name(self, grasp: str) -> str:
-        """Name of a grasp in the whole dataset."""
+        """Return the name of a grasp, which no other grasp of the dataset has."""
         return id_beginning(self.body.content_sha256, self.unit.friction) + grasp
 
     def _common(self, name: str, contacts: Iterable[Contact]) -> dict[str, Any]:
@@ -202,7 +202,7 @@ def _wrench_row(trial: WrenchVerdict) -> dict[str, Any]:
 
 
 def _for_fingers(values: Iterable[Any], missing: Any) -> list[Any]:
-    """Pad a list to four fingers: controls may have fewer."""
+    """Pad a list to four fingers, as negative controls may have fewer."""
     listed = list(values)
     return listed + [missing] * (FINGERS - len(listed))
 

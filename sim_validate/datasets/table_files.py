@@ -1,4 +1,4 @@
-"""The Parquet files of a finished dataset, written one group of rows after another."""
+"""Writes the Parquet files of a dataset, one group of rows after another."""
 
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -11,7 +11,7 @@ from sim_validate.datasets.columns import KEYS, Name
 from sim_validate.datasets.parquet import GROUP_ROWS, PAGES, pyarrow, pyarrow_parquet, read_table
 
 FILE_ROWS = 500_000
-"""Number of rows at which a file is ended and the next one begun, about 100 MB of grasps."""
+"""Number of rows at which a file is closed and the next one begun, about 100 MB of grasps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,14 +53,17 @@ class TableFiles:
         table = arrow.concat_tables([read_table(path) for path in paths])
         table = table.sort_by([(key, "ascending") for key in keys])
         if table.group_by(keys).aggregate([]).num_rows < table.num_rows:
-            raise InputError(f"{name}: two rows have the same {' and '.join(keys)}")
+            raise InputError(
+                f"table {name}: two rows have the same {' and '.join(keys)}; build the dataset "
+                "again into an empty folder"
+            )
         if not table.num_rows:
             return
         part = self._parts.setdefault((name, split), _Part(self._folder / name, split))
         part.add(table.replace_schema_metadata(self._about))
 
     def close(self) -> list[WrittenTable]:
-        """Write the rows that wait, and list the files."""
+        """Write the rows that still wait, and list the files."""
         return [
             WrittenTable(name, split, path, rows)
             for (name, split), part in sorted(self._parts.items())

@@ -1,4 +1,4 @@
-"""A configuration -> work units, each of which can be computed anywhere, in any order.
+"""Splits a configuration into units of work, each of which can be computed anywhere, in any order.
 
 A unit is one object at one friction. Its name is a hash of all that decides its rows: the bytes of
 the mesh, the configuration, the versions of the packages, and this project's own code. So results
@@ -25,14 +25,14 @@ from sim_validate.datasets.given_contacts import GivenGrasp, given_sha256, read_
 
 CHUNK = 2**20
 PART = 25
-"""Largest number of given grasps of one unit, half a minute's work."""
+"""Largest number of given grasps in one unit, which take half a minute."""
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 APART = ("objects", "frictions", "contacts", "outward", *CREDITS)
-"""Settings that each unit has for itself, or that decide no row."""
+"""Settings that differ between units, or that decide no row."""
 
 
 class WorkerError(GraspError):
-    """A worker cannot compute units for its driver."""
+    """Error of a worker process that cannot compute units of work."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class WorkUnit:
     friction: float
     config: DatasetConfig
     given: tuple[GivenGrasp, ...] = ()
-    """Grasps to judge; if there are none, grasps are planned."""
+    """Grasps to judge; empty if grasps are to be planned."""
 
     @property
     def id(self) -> str:
@@ -61,15 +61,15 @@ class WorkUnit:
 
 
 def units_sha256(units: Iterable[WorkUnit]) -> str:
-    """A hash of the names of units; two are equal only if all rows come out the same."""
+    """Hash the names of units; two hashes are equal only if all rows come out the same."""
     return hashlib.sha256("".join(sorted(unit.id for unit in units)).encode()).hexdigest()
 
 
 @cache
 def provenance() -> Mapping[str, str]:
-    """Versions of all packages, and the hash of this project's own code.
+    """List the versions of all packages, and the hash of this project's own code.
 
-    Results depend on nothing else but how the processor rounds.
+    Apart from these, results depend only on how the processor rounds.
     """
     digest = hashlib.sha256()
     for package in PACKAGES:
@@ -82,14 +82,14 @@ def provenance() -> Mapping[str, str]:
 
 
 def shared_settings(config: DatasetConfig) -> dict[str, object]:
-    """The settings that decide the rows of every unit, such as the seed, but no objects."""
+    """Return the settings that decide the rows of every unit, such as the seed, but no objects."""
     return {
         each.name: getattr(config, each.name) for each in fields(config) if each.name not in APART
     }
 
 
 def units_of(config: DatasetConfig) -> list[WorkUnit]:
-    """Split a configuration into all its units, sorted by their names.
+    """Split a configuration into units of work, each one object at one friction, sorted by name.
 
     Raises:
         InputError: An object is neither a readable file nor built in, or the contacts are refused.
@@ -106,12 +106,12 @@ def units_of(config: DatasetConfig) -> list[WorkUnit]:
 
 
 def of_unit(config: DatasetConfig, name: str, friction: float) -> DatasetConfig:
-    """The settings of one unit, which do not grow with the number of objects."""
+    """Return the settings of one unit, whose size does not grow with the number of objects."""
     return replace(config, objects=(name,), frictions=(friction,))
 
 
 def _parts(config: DatasetConfig) -> list[tuple[GivenGrasp, ...]]:
-    """Given grasps in parts, one for each unit; a single empty part where grasps are planned."""
+    """Divide the given grasps among units; one empty part if grasps are planned."""
     if not config.contacts:
         return [()]
     given = read_given(Path(config.contacts), outward=config.outward)
@@ -122,20 +122,25 @@ def body_of(unit: WorkUnit) -> Polyhedron:
     """Load the object of a unit.
 
     Raises:
-        MeshError: The mesh is no solid.
-        WorkerError: The file is missing, or not the one that the unit is about.
+        MeshError: The mesh is not a solid.
+        WorkerError: The file is missing, or has changed since the build began.
     """
     if unit.path is None:
         return example_object(unit.object)
     if not unit.path.is_file():
-        raise WorkerError(f"{unit.path}: is not there; driver and workers must share their meshes")
+        raise WorkerError(
+            f"{unit.path}: a worker process cannot find this mesh; all processes must share a "
+            "file system"
+        )
     if _source_sha256(str(unit.path)) != unit.source_sha256:
-        raise WorkerError(f"{unit.path}: is not what the driver read; was it changed meanwhile?")
+        raise WorkerError(
+            f"{unit.path}: this mesh has changed since the build began; start the build again"
+        )
     return load_polyhedron(unit.path, unit=unit.config.unit, faces=unit.config.faces)
 
 
 def is_mesh_file(name: str) -> bool:
-    """Whether an object is a file, by its ending or because it exists; else it is built in."""
+    """Tell whether an object is a mesh file, by its ending or as it exists, or is built in."""
     path = Path(name)
     return path.suffix.lower().lstrip(".") in FORMATS or path.is_file()
 
@@ -149,5 +154,5 @@ def _source_sha256(name: str) -> str:
             while part := stream.read(CHUNK):
                 digest.update(part)
     except OSError as error:
-        raise InputError(f"{name}: cannot be read ({error.strerror})") from error
+        raise InputError(f"{name}: this mesh file cannot be read ({error.strerror})") from error
     return digest.hexdigest()

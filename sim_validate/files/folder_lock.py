@@ -29,7 +29,7 @@ def alone_in(folder: Path | None) -> Generator[None]:
 
     Raises:
         InputError: The folder cannot be made, no file can be written there, or another command is
-            at work in it.
+            writing to it.
     """
     if folder is None:
         yield

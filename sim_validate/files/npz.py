@@ -66,20 +66,25 @@ def arrays_of(data: bytes, names: Collection[str]) -> dict[str, NDArray[Any]]:
         raise
     except Exception as error:  # a damaged file can make zipfile and numpy raise anything
         raise InputError(
-            f"cannot be read as npz ({shown(str(error))}); save it again with numpy.savez"
+            f"the file cannot be read as npz ({shown(str(error))}); save it again with numpy.savez"
         ) from error
 
 
 def _checked(listed: list[zipfile.ZipInfo]) -> dict[str, zipfile.ZipInfo]:
     """Index the arrays of an archive by name, and refuse an archive that claims too much."""
     if len(listed) > MOST_MEMBERS:
-        raise InputError(f"{len(listed)} members; an npz file has up to {MOST_MEMBERS} arrays")
+        raise InputError(
+            f"the npz file has {len(listed)} members, more than the {MOST_MEMBERS} arrays allowed"
+        )
     claimed = sum(each.file_size for each in listed)
     if claimed > MOST_BYTES:
-        raise InputError(f"{claimed} bytes of arrays are over the limit of {MOST_BYTES}")
+        raise InputError(
+            f"the arrays of the npz file take {claimed} bytes, over the limit of {MOST_BYTES}; "
+            "save fewer numbers"
+        )
     members = {each.filename: each for each in listed}
     if len(members) < len(listed):
-        raise InputError("two members have the same name; write the file again")
+        raise InputError("two arrays of the npz file have the same name; write the file again")
     return members
 
 
@@ -89,16 +94,25 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> NDAr
         readers = {(1, 0): np.lib.format.read_array_header_1_0,
                    (2, 0): np.lib.format.read_array_header_2_0}  # fmt: skip
         if version not in readers:
-            raise InputError(f"{name}: arrays of format {version} are not read; save it again")
+            raise InputError(
+                f"{name}: expected an array in npy format 1.0 or 2.0, got {version}; save it again"
+            )
         shape, by_columns, dtype = readers[version](stream, max_header_size=MOST_HEADER)
         if dtype.kind not in KINDS or dtype.subdtype is not None:
-            raise InputError(f"{name}: expected numbers or text, got {shown(str(dtype))}")
+            raise InputError(
+                f"{name}: expected an array of numbers or text, got {shown(str(dtype))}"
+            )
         size = math.prod(shape) * dtype.itemsize
         if min(shape, default=0) < 0 or size > member.file_size:
-            raise InputError(f"{name}: its shape {shown(str(shape))} does not fit its numbers")
+            raise InputError(
+                f"{name}: the array's shape {shown(str(shape))} does not fit its data; save it "
+                "again"
+            )
         held = stream.read(size)
         if len(held) < size or stream.read(1):
-            raise InputError(f"{name}: does not have as many numbers as its shape {shape} needs")
+            raise InputError(
+                f"{name}: the array does not hold as many numbers as its shape {shape} needs"
+            )
     array = np.ndarray(shape, dtype, held, order="F" if by_columns else "C")
     _check_letters(array, name)
     return array
@@ -111,4 +125,6 @@ def _check_letters(array: NDArray[Any], name: str) -> None:
     codes = np.frombuffer(array.tobytes(), array.dtype.str[0].replace("|", "=") + "u4")
     halves = (codes >= FIRST_HALF) & (codes <= LAST_HALF)
     if codes.max() > LARGEST_LETTER or halves.any():
-        raise InputError(f"{name}: its text has invalid Unicode characters; write it again")
+        raise InputError(
+            f"{name}: the text in this array has invalid Unicode characters; write it again"
+        )

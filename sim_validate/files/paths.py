@@ -17,18 +17,20 @@ def require_inside(name: object, field: str) -> str:
         field: Field of the file that holds the path, for messages.
 
     Raises:
-        InputError: The value is no path, or leads out of the folder.
+        InputError: The value is not a path, or leads out of the folder.
     """
     if not isinstance(name, str) or not name or len(name) > LONGEST:
         raise InputError(f"{field}: expected the path of a file, got {shown(name)}")
     parts = PurePosixPath(name).parts
     if name.startswith("/") or ".." in parts or not parts or not _plain(name):
-        raise InputError(f"{field}: expected a path inside the folder, got {shown(name)}")
+        raise InputError(
+            f"{field}: expected a relative path that stays in the file's folder, got {shown(name)}"
+        )
     return name
 
 
 def path_inside(folder: Path, name: str) -> Path:
-    """The path of a file in a folder, checked that no link leads out of the folder.
+    """Return the path of a file in a folder, after a check that no link leads out of it.
 
     Raises:
         InputError: The path leads out of the folder.

@@ -21,23 +21,23 @@ MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
 
 
 class NotTextError(InputError):
-    """The bytes of a file are not UTF-8 text."""
+    """Error for a file whose bytes are not UTF-8 text."""
 
 
 def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
     """Read a regular file; pipes and devices are refused, because they may never end.
 
     Raises:
-        InputError: The file cannot be read, is no regular file, or is larger than `most` bytes.
+        InputError: The file cannot be read, is not a regular file, or is larger than `most` bytes.
     """
     try:
         data = bounded_bytes(path, most)
     except OSError as error:
         raise InputError(
-            f"{path}: cannot be read ({error.strerror}); give a readable file"
+            f"{path}: the file cannot be read ({error.strerror}); give a readable file"
         ) from error
     if len(data) > most:
-        raise InputError(f"{path}: larger than {most} bytes; give a smaller file")
+        raise InputError(f"{path}: the file is larger than {most} bytes; give a smaller file")
     return data
 
 
@@ -60,12 +60,12 @@ def text_of(data: bytes) -> str:
         NotTextError: The bytes are not UTF-8.
     """
     if data.startswith(MARKS):
-        raise NotTextError("begins with a byte order mark; save it as UTF-8 without one")
+        raise NotTextError("the text begins with a byte order mark; save it as UTF-8 without one")
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise NotTextError(
-            f"not UTF-8 text ({error.reason} at byte {error.start}); save it as UTF-8"
+            f"the file is not UTF-8 text ({error.reason} at byte {error.start}); save it as UTF-8"
         ) from error
     return text.replace("\r\n", "\n")
 

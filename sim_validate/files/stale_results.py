@@ -1,6 +1,6 @@
-"""Removing the results of earlier commands from a folder before new ones are written.
+"""Removes the results of earlier commands from a folder before new ones are written.
 
-Results that would contradict new ones are removed first, so that a folder holds no mixture,
+Results that would contradict new ones are removed first, so that old and new results never mix,
 whatever ends a command. Files of other names are left alone.
 """
 
@@ -40,7 +40,7 @@ def remove_regions(folder: Path) -> None:
 
 
 def _of_grasps(folder: Path, suffix: str) -> list[Path]:
-    """Files in a folder that are named after grasps."""
+    """List the files in a folder that are named after grasps."""
     return [path for path in folder.glob(f"*{suffix}") if ID.fullmatch(path.stem)]
 
 
@@ -53,10 +53,12 @@ def require_report_folder(folder: Path) -> None:
     """Refuse to write pages into a folder that is neither empty nor a report.
 
     Raises:
-        InputError: The folder holds other things.
+        InputError: The folder holds other files.
     """
     if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():
-        raise InputError(f"{folder}: exists and holds no report; give another --out")
+        raise InputError(
+            f"{folder}: this folder holds other files than a report; give another --out"
+        )
 
 
 def remove_report(folder: Path) -> None:

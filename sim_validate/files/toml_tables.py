@@ -43,19 +43,17 @@ def tables_of_toml(text: str) -> dict[str, Any]:
         InputError: The text is not TOML, or holds a value that no setting can have.
     """
     if LONG_KEY.search(ASIDE.sub(lambda found: "q" if found[0][0] != "#" else "", text)):
-        raise InputError(
-            f"not TOML that is read: a key has more than {DEEPEST} parts; use shorter keys"
-        )
+        raise InputError(f"a key of the TOML file has more than {DEEPEST} parts; use shorter keys")
     try:
         found = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not TOML: {_printable(str(error))}") from error
+        raise InputError(f"the text is not TOML: {_printable(str(error))}") from error
     except RecursionError as error:
         raise InputError(
-            "not TOML that is read: values are nested too deeply; use fewer levels"
+            "values of the TOML file are nested too deeply; use fewer levels"
         ) from error
     except ValueError as error:  # numbers of thousands of digits, days that do not exist
-        raise InputError(f"not TOML: {_printable(str(error))}") from error
+        raise InputError(f"the text is not TOML: {_printable(str(error))}") from error
     check_values(found)
     return found
 

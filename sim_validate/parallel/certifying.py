@@ -90,7 +90,7 @@ def wider(grasp: Grasp, proved: CertifiedRegions | str) -> Grasp:
 
 
 def _room(polygon: Array, point: Array, normal: Array) -> float:
-    """Distance of a point from the nearest edge of a convex polygon (c, 3), in its plane [m]."""
+    """Compute how far a point lies from the nearest edge of a convex polygon (c, 3) [m]."""
     edges = np.roll(polygon, -1, axis=0) - polygon
     inward = np.cross(normal, edges)
     inward /= np.linalg.norm(inward, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Runs work units on a Ray or Dask cluster, which may be started here.
+"""Runs units of work on a Ray or Dask cluster, or starts one on this machine.
 
 Neither cluster repeats a unit by itself, because one place decides for all engines when to give up
 on a unit. Without `address`, Ray and Dask start workers on this machine and stop them afterwards.
@@ -32,7 +32,7 @@ ANSWER_S = 10.0
 
 
 class RayCluster:
-    """The workers of a Ray cluster."""
+    """The worker processes of a Ray cluster."""
 
     ended = ("WorkerCrashedError", "OutOfMemoryError", "LocalRayletDiedError", "NodeDiedError")
 
@@ -42,14 +42,14 @@ class RayCluster:
         self._remote: dict[Callable[..., Any], Any] = {}
 
     def submit(self, function: Callable[[Unit], Result], unit: Unit, /) -> "Future[Result]":
-        """Call a function on a worker; its future fails if the worker ends."""
+        """Call a function on a worker process; the future fails if that process dies."""
         if function not in self._remote:
             self._remote[function] = self._ray.remote(max_retries=0, num_cpus=1)(function)
         return self._remote[function].remote(unit).future()
 
 
 class DaskCluster:
-    """The workers of a Dask cluster."""
+    """The worker processes of a Dask cluster."""
 
     ended = ("KilledWorker",)
 
@@ -58,7 +58,7 @@ class DaskCluster:
         self._executor = client.get_executor(pure=False, retries=0)
 
     def submit(self, function: Callable[[Unit], Result], unit: Unit, /) -> "Future[Result]":
-        """Call a function on a worker; its future fails if the worker ends."""
+        """Call a function on a worker process; the future fails if that process dies."""
         return self._executor.submit(function, unit)
 
 
@@ -71,7 +71,7 @@ def ray_workers(workers: int, address: str | None) -> Generator[RayCluster]:
         address: Address of a running cluster, such as `auto` or `ray://head:10001`.
 
     Raises:
-        InputError: Ray is not installed, or there is no cluster.
+        InputError: Ray is not installed, or no cluster answers.
     """
     os.environ.update(dict(RAY_SETTINGS) | dict(os.environ))  # Ray reads these when it is imported
     ray = _imported("ray", "ray")
@@ -98,7 +98,7 @@ def _require_listener(address: str) -> None:
     """Refuse a host and port where nothing listens, because Ray itself retries for minutes.
 
     Raises:
-        InputError: Nothing listens there; addresses such as `auto` are left to Ray.
+        InputError: No program listens at the address; addresses such as `auto` are left to Ray.
     """
     host, colon, port = address.split("://")[-1].rpartition(":")
     if not (colon and port.isdigit()):
@@ -119,14 +119,15 @@ def dask_workers(workers: int, address: str | None) -> Generator[DaskCluster]:
             workers must have one thread each, because limits of time end a whole process.
 
     Raises:
-        InputError: Dask is not installed, there is no scheduler, or a worker has several threads.
+        InputError: Dask is not installed, no scheduler answers, or a worker has several threads.
     """
     distributed = _imported("distributed", "dask")
     with _dask_client(distributed, workers, address) as client:
         threads: dict[str, int] = client.nthreads()
         if any(count > 1 for count in threads.values()):
             raise InputError(
-                "a Dask worker has several threads, but a unit that takes too long ends its "
+                "a Dask worker has several threads, but work that takes too long must end its "
+                "whole "
                 "process: start workers with --nthreads 1"
             )
         yield DaskCluster(client, max(1, len(threads)))

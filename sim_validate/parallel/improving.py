@@ -65,7 +65,7 @@ def improved(
 
 
 def _same_contacts(one: Grasp, two: Grasp, slack: float) -> bool:
-    """Whether two grasps touch the same faces at the same points, in whatever order."""
+    """Tell whether two grasps touch the same faces at the same points, in any order."""
     order, other = np.argsort(one.faces), np.argsort(two.faces)
     faces = np.array_equal(np.array(one.faces)[order], np.array(two.faces)[other])
     return faces and float(np.abs(one.positions[order] - two.positions[other]).max()) <= slack

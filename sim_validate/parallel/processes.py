@@ -1,4 +1,4 @@
-"""Runs work units in processes of this machine.
+"""Runs units of work in processes of this machine.
 
 Results do not depend on the number of processes: a unit sees only its own arguments.
 """
@@ -22,7 +22,7 @@ long as eight validations."""
 
 
 def available_cores() -> int:
-    """Number of cores that this process may use, limited by the share that its container has."""
+    """Count the cores that this process may use, limited by the share of its container."""
     own = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     try:
         share, period = SHARE.read_text().split()
@@ -32,7 +32,7 @@ def available_cores() -> int:
 
 
 def processes(units: int, jobs: int) -> int:
-    """The number of processes worth starting for a number of units, at least one."""
+    """Compute how many processes are worth starting for a number of units, at least one."""
     return max(1, min(jobs, units // UNITS_PER_PROCESS))
 
 
@@ -59,7 +59,7 @@ def each(
 
 
 class Processes:
-    """Processes of this machine that compute single tasks."""
+    """Processes of this machine, each of which computes one task at a time."""
 
     ended = ("ProcessExpired",)
 
@@ -68,7 +68,7 @@ class Processes:
         self._pool = pool
 
     def submit(self, function: Callable[[Unit], Result], unit: Unit, /) -> "Future[Result]":
-        """Call a function in a process; its future fails if the process ends."""
+        """Call a function in a process; the future fails if that process dies."""
         return self._pool.schedule(function, args=[unit])
 
 

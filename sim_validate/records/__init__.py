@@ -1,5 +1,5 @@
 """What does each file hold that is written or read?
 
-One module per format turns verdicts, regions, setups or wrenches into text, or text into checked
-values. Its schema is part of it.
+Each module is about one file format: it turns verdicts, regions, setups or wrenches into text, or
+text into checked values, and defines the fields of the file.
 """

@@ -29,15 +29,19 @@ def grasp_with_id(path: Path, saved: SavedGrasps, wanted: str | None) -> Grasp:
     """Find the grasp with an id; the id may be left out if the file has one grasp only.
 
     Raises:
-        InputError: The grasp is not there; the message begins with the path and lists some that
-            are.
+        InputError: The file has no such grasp; the message begins with the path and lists some
+            that it has.
     """
     if wanted is None and len(saved.grasps) == 1:
         return saved.grasps[0]
     found = next((grasp for grasp in saved.grasps if grasp.id == wanted), None)
     if found is None:
-        asked = "give --grasp ID" if wanted is None else f"no grasp {wanted}"
-        raise InputError(f"{path}: {asked}; there is {some(grasp.id for grasp in saved.grasps)}")
+        asked = (
+            "choose a grasp with --grasp ID" if wanted is None else f"no grasp is named {wanted}"
+        )
+        raise InputError(
+            f"{path}: {asked}; the file has {some(grasp.id for grasp in saved.grasps)}"
+        )
     return found
 
 

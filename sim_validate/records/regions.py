@@ -126,7 +126,7 @@ def _record(
 
 
 def area_of(region: ContactRegion) -> float:
-    """Area of a convex region [m^2]."""
+    """Compute the area of a convex region [m^2]."""
     sides = region.polygon[1:] - region.polygon[0]
     crossed = np.cross(sides[:-1], sides[1:])
     return 0.5 * float(np.linalg.norm(crossed.sum(axis=0)))
@@ -135,7 +135,7 @@ def area_of(region: ContactRegion) -> float:
 def proof_arrays(
     proved: CertifiedRegions, grasp: Grasp, body: Polyhedron
 ) -> dict[str, NDArray[Any]]:
-    """The regions of a grasp and their proof, as arrays by name."""
+    """Return the regions of a grasp and their proof, as arrays by name."""
     cover, choice, wrench = proved.cover, proved.open_choice, proved.open_wrench
     polygons = [region.polygon for region in proved.regions]
     return {
@@ -163,7 +163,7 @@ def read_regions(path: str | Path) -> CertifiedRegions:
     """Read regions and their proof, as `graspproof regions` writes them; nothing is verified yet.
 
     Raises:
-        InputError: The file is not the proof of a grasp's regions.
+        InputError: The file does not hold the proof of a grasp's regions.
     """
     path = path_of(path, "path")
     try:
@@ -194,7 +194,9 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
     numbers = {name: frozen(finite[name], shape, name) for name, shape in SHAPES.items()}
     scale = numbers["scale_m"].item()
     if not SMALLEST_SCALE <= scale <= LARGEST:
-        raise InputError(f"scale_m: expected {SMALLEST_SCALE:g} to {LARGEST:g}, got {scale:g}")
+        raise InputError(
+            f"scale_m: expected a length from {SMALLEST_SCALE:g} to {LARGEST:g} m, got {scale:g}"
+        )
     normals = frozen_units(numbers["normals"], (FINGERS, 3), "normals")
     choice, wrench = numbers["open_choice_m"], numbers["open_wrench"]
     return CertifiedRegions(
@@ -221,13 +223,16 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
 def _region(name: str, polygon: Array, normal: Array, scale: float) -> ContactRegion:
     if not FEWEST_CORNERS <= len(polygon) <= MOST_CORNERS or np.abs(polygon).max() > LARGEST:
         raise InputError(
-            f"{name}: expected {FEWEST_CORNERS} to {MOST_CORNERS} corners within {LARGEST:g} m"
+            f"{name}: expected a polygon of {FEWEST_CORNERS} to {MOST_CORNERS} corners within "
+            f"{LARGEST:g} m"
         )
     try:
         with np.errstate(invalid="ignore", divide="ignore"):  # edges without length divide by zero
             return ContactRegion("certified", polygon, _inscribed(polygon, normal, scale))
     except SolverError as error:
-        raise InputError(f"{name}: its corners do not form a convex polygon") from error
+        raise InputError(
+            f"{name}: expected the corners of a convex polygon in order, got other points"
+        ) from error
 
 
 def _inscribed(polygon: Array, normal: Array, scale: float) -> float:

@@ -11,7 +11,7 @@ from sim_validate.records.verdicts_schema import Finite, ObjectRecord, Positive
 
 
 class RegionRecord(TypedDict):
-    """The region of one finger."""
+    """Fields about the region of one finger."""
 
     kind: NotRequired[str]
     polygon_m: Annotated[list[tuple[Finite, Finite, Finite]], Field(min_length=FEWEST_CORNERS)]
@@ -20,15 +20,15 @@ class RegionRecord(TypedDict):
 
 
 class ProofRecord(TypedDict):
-    """The file that proves a grasp's regions."""
+    """Fields about the file that proves a grasp's regions."""
 
     file: Annotated[str, Field(pattern=r"^proofs/[A-Za-z0-9][A-Za-z0-9_-]{0,99}\.npz$")]
-    """Path of the proof, relative to the folder of the document."""
+    """Path of the proof, relative to the folder of `regions.json`."""
     sha256: NotRequired[str]
 
 
 class NamedGrasp(TypedDict):
-    """The grasp that regions belong to."""
+    """Fields about the grasp that regions belong to."""
 
     id: str
     contacts_sha256: str
@@ -37,7 +37,7 @@ class NamedGrasp(TypedDict):
 
 
 class GraspRecord(NamedGrasp):
-    """The regions of one grasp, or the reason why there are none."""
+    """Fields about the regions of one grasp, or the reason why it has none."""
 
     disc_radius_m: Finite | None
     centers_m: NotRequired[list[list[Finite]]]

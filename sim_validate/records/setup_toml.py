@@ -80,11 +80,12 @@ def tables_of(setup: Setup) -> dict[str, dict[str, Any]]:
 
 
 def _filled(path: str, table: str, values: Any, given: dict[str, Any]) -> Any:
-    """Replace the given fields of a settings value, each checked against its type."""
+    """Replace some fields of a group of settings, each checked against its type."""
     for name in given:
         if name not in OF_USERS[table]:
             raise InputError(
-                f"{path}: [{table}] has {', '.join(OF_USERS[table])}; got {shown(name)}"
+                f"{path}: [{table}]: no setting is named {shown(name)}; choose from "
+                f"{', '.join(OF_USERS[table])}"
             )
     kind = cast("type[Any]", type(values))
     try:

@@ -21,7 +21,7 @@ Count = Annotated[int, Field(ge=0)]
 
 
 class ObjectRecord(TypedDict):
-    """The object that a file is about."""
+    """Fields about the object that a `verdicts.json` is about."""
 
     name: NotRequired[str]
     source_sha256: NotRequired[str | None]
@@ -29,7 +29,7 @@ class ObjectRecord(TypedDict):
 
 
 class CheckRecord(TypedDict):
-    """One figure of the simulator on a known case, and the interval in which it must lie."""
+    """Fields about one check of the simulator: the measured figure and its allowed interval."""
 
     name: str
     value: Finite
@@ -38,7 +38,7 @@ class CheckRecord(TypedDict):
 
 
 class GateRecord(TypedDict):
-    """The checks of the simulator."""
+    """Fields about the checks of the simulator on cases with known answers."""
 
     passed: NotRequired[bool]
     mujoco: NotRequired[str]
@@ -46,7 +46,7 @@ class GateRecord(TypedDict):
 
 
 class Summary(TypedDict):
-    """The number of grasps and controls, and of those that held or let go."""
+    """Numbers of grasps and of negative controls, and of those that held or let go."""
 
     grasps: Count
     grasps_held: Count
@@ -57,7 +57,7 @@ class Summary(TypedDict):
 
 
 class CriticalFrictionRecord(TypedDict):
-    """The critical friction by analysis and in simulation."""
+    """Fields about the critical friction by analysis and in simulation."""
 
     predicted: Finite
     simulated: Finite | None
@@ -65,7 +65,7 @@ class CriticalFrictionRecord(TypedDict):
 
 
 class HoldRecord(TypedDict):
-    """How a trial ended."""
+    """Fields about how a trial ended."""
 
     outcome: Outcome
     reason: NotRequired[str]
@@ -77,7 +77,7 @@ class HoldRecord(TypedDict):
 
 
 class ControlTrialRecord(HoldRecord):
-    """A trial of a negative control."""
+    """Fields about a trial of a negative control."""
 
     name: str
     wrench: Wrench
@@ -85,7 +85,7 @@ class ControlTrialRecord(HoldRecord):
 
 
 class TrialRecord(HoldRecord):
-    """A trial of a grasp; limits are multiples of the wrench."""
+    """Fields about a trial of a grasp; limits are multiples of the wrench."""
 
     name: str
     wrench: Wrench
@@ -96,14 +96,14 @@ class TrialRecord(HoldRecord):
 
 
 class ContactRecord(TypedDict):
-    """A contact in the object's frame."""
+    """Fields about a contact, in the object's frame."""
 
     position_m: tuple[Finite, Finite, Finite]
     normal: tuple[Finite, Finite, Finite]
 
 
 class ControlRecord(TypedDict):
-    """A negative control and its trials."""
+    """Fields about a negative control and its trials."""
 
     held: bool
     friction: Finite
@@ -115,7 +115,7 @@ class ControlRecord(TypedDict):
 
 
 class LostRecord(TypedDict):
-    """A repeat with noise that was not held."""
+    """Fields about a repeat with noise in which the grasp did not hold."""
 
     trial: Count
     predicted: NotRequired[bool | None]
@@ -125,7 +125,7 @@ class LostRecord(TypedDict):
 
 
 class RobustnessRecord(TypedDict):
-    """The repeats with noise."""
+    """Fields about the repeats with noise."""
 
     trials: Count
     held: Count
@@ -137,13 +137,13 @@ class RobustnessRecord(TypedDict):
 
 
 class FingersRecord(TypedDict):
-    """The settings of fingertips; a replay checks the others by their names."""
+    """Fields about fingertips; the code that replays a trial checks further ones by name."""
 
     max_normal_force_n: Positive
 
 
 class SettingsRecord(TypedDict):
-    """The settings of a verdict's trials, with tables that `--setup` accepts."""
+    """Fields about the settings of a verdict's trials; `--setup` accepts its tables."""
 
     physics: dict[str, Any]
     fingers: FingersRecord
@@ -162,7 +162,7 @@ class SettingsRecord(TypedDict):
 
 
 class VerdictRecord(TypedDict):
-    """The verdict on one grasp."""
+    """Fields about the verdict on one grasp."""
 
     id: str
     contacts_sha256: str

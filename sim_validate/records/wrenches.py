@@ -61,7 +61,9 @@ def wrenches_from_json(text: str) -> tuple[NamedWrench, ...]:
     for number, each in enumerate(given):
         if each.name in names:
             where = place(["wrenches", number, "name"])
-            raise InputError(f"{where}: another wrench has the name {shown(each.name)}; rename one")
+            raise InputError(
+                f"{where}: expected wrenches with different names, got two named {shown(each.name)}"
+            )
         names.add(each.name)
     return tuple(_named(each, i) for i, each in enumerate(given))
 

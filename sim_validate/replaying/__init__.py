@@ -1,5 +1,5 @@
 """What moved in one recorded trial?
 
-This room takes a verdict, a grasp or a row of a dataset, simulates its trial again, and returns the
+Modules here take a verdict, a grasp or a row of a dataset, simulate its trial again, and return the
 motion sample by sample.
 """

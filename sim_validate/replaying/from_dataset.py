@@ -1,4 +1,4 @@
-"""A row of a dataset as a contact set to replay, with how its trials ended."""
+"""Reads a row of a dataset as contacts whose trials are to be simulated again."""
 
 from itertools import islice
 from pathlib import Path
@@ -15,19 +15,24 @@ from sim_validate.simulation.setup import Agenda, Setup
 
 
 def from_dataset(folder: Path, wanted: Wanted) -> Recorded:
-    """Read a grasp or a control from the tables of a dataset.
+    """Read a grasp or a negative control from the tables of a dataset.
 
     Raises:
         InputError: The dataset is damaged, or has no such row.
     """
     chosen = select(folder)
     if wanted.grasp is None or wanted.trial is not None or wanted.grasps is not None:
-        raise InputError(f"{folder}: give --grasp GRASP_ID of its table of grasps, and no --trial")
+        raise InputError(
+            f"{folder} is a dataset: name a grasp with --grasp GRASP_ID, and give neither --trial "
+            "nor --grasps"
+        )
     name = wanted.grasp if wanted.control is None else f"{wanted.grasp}:{wanted.control}"
     row = next((row for row in chosen.rows("grasps") if row["grasp_id"] == name), None)
     if row is None or row["outcome"] == NOT_TRIED:
         there = some(row["grasp_id"] for row in islice(chosen.rows("grasps"), NAMED))
-        raise InputError(f"{folder}: {name} is not among its tried grasps; it has {there}, ...")
+        raise InputError(
+            f"{folder}: no simulated grasp is named {name}; the dataset has {there}, ..."
+        )
     config = chosen.config()
     contacts = [
         Contact(point, normal)

@@ -1,4 +1,4 @@
-"""Grasps of a `grasps.json` as contact sets to replay: a grasp, or a control made from it."""
+"""Reads a grasp of a `grasps.json`, or makes a negative control from it, to simulate again."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,23 +15,28 @@ from sim_validate.validation.controls import negative_controls
 
 
 def grasps_behind(path: Path, content_sha256: str, friction: float) -> SavedGrasps:
-    """Read the grasps behind a file, at the friction that they were tried at.
+    """Read the grasps that recorded results are about, at the friction that they were tested at.
 
     Raises:
-        InputError: The grasps are missing, or belong to another object.
+        InputError: The file of grasps is missing, or is about another object.
     """
     if not path.is_file():
-        raise InputError(f"{path}: this file of grasps is missing; name it with --grasps")
+        raise InputError(
+            f"{path}: this file of grasps is missing; say with --grasps where the file is"
+        )
     saved = read_grasps(path)
     if saved.body.content_sha256 != content_sha256:
-        raise InputError(f"{path}: its object is not that of the file to replay")
+        raise InputError(
+            f"{path}: these grasps are on another object than the results to replay; give the "
+            "right --grasps"
+        )
     return SavedGrasps(saved.body, friction, saved.seed, saved.grasps, saved.finger)
 
 
 def of_grasp(
     path: Path, saved: SavedGrasps, setup: Setup, agenda: Agenda, wanted: Wanted
 ) -> Recorded:
-    """Choose a grasp of a file, or a control made from it."""
+    """Choose a grasp of a file, or a negative control made from it."""
     grasp = grasp_with_id(path, saved, wanted.grasp)
     found = Recorded(
         grasp.id, saved.body, grasp.contacts, saved.friction, setup, agenda,
@@ -48,7 +53,8 @@ def of_grasp(
     }
     if wanted.control not in controls:
         raise InputError(
-            f"{path}: {grasp.id} has no control {wanted.control!r}; there is {some(controls)}"
+            f"{path}: grasp {grasp.id} has no negative control {wanted.control!r}; choose from "
+            f"{some(controls)}"
         )
     control = controls[wanted.control]
     return replace(
@@ -62,21 +68,24 @@ def of_grasp(
 
 
 def require_contacts(path: Path, grasp: Grasp, known: str) -> None:
-    """Refuse a grasp whose contacts are not those that a file is about.
+    """Refuse a grasp whose contacts differ from those that recorded results are about.
 
     Raises:
-        InputError: The hash of the contacts is not the file's.
+        InputError: The hash of the contacts differs from the recorded hash.
     """
     if contacts_sha256(grasp.contacts) != known:
-        raise InputError(f"{path}: is about other contacts of {grasp.id} than the grasps have now")
+        raise InputError(
+            f"{path}: the contacts of {grasp.id} have changed since these results were recorded; "
+            "record them again"
+        )
 
 
 def require_repeat(path: Path, trial: int, trials: int) -> None:
-    """Refuse the number of a repeat with noise that a file does not have.
+    """Refuse the number of a repeat with noise that a file does not hold.
 
     Raises:
-        InputError: The file has fewer repeats.
+        InputError: The file holds fewer repeats.
     """
     if trial >= trials:
-        said = f"they are 0 to {trials - 1}" if trials else "there were none (--trials)"
-        raise InputError(f"{path}: there is no repeat {trial} with noise; {said}")
+        said = f"choose from 0 to {trials - 1}" if trials else "it was recorded without --trials"
+        raise InputError(f"{path}: the file has no repeat with noise numbered {trial}; {said}")

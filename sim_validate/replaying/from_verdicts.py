@@ -1,4 +1,4 @@
-"""A `verdicts.json` as contact sets to replay, with how their trials ended."""
+"""Reads contacts from a `verdicts.json`, with how their trials ended, to simulate them again."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -27,7 +27,7 @@ GRASPS = "grasps.json"
 
 
 def from_verdicts(path: Path, text: str, wanted: Wanted) -> Recorded:
-    """Read a grasp, a control or a repeat from verdicts.
+    """Read a grasp, a negative control or a repeat with noise from a `verdicts.json`.
 
     Args:
         path: Path of the file, for messages; the grasps are beside it unless `wanted` names others.
@@ -35,7 +35,7 @@ def from_verdicts(path: Path, text: str, wanted: Wanted) -> Recorded:
         wanted: Which contact set to read.
 
     Raises:
-        InputError: The file is not what `validate` writes, or does not hold what is wanted.
+        InputError: The file is not as `validate` writes it, or lacks the wanted contact set.
     """
     try:
         record = record_of(VerdictsFile, text, "verdicts.json", schema=SCHEMA)
@@ -46,23 +46,25 @@ def from_verdicts(path: Path, text: str, wanted: Wanted) -> Recorded:
     verdicts = {each["id"]: each for each in record["verdicts"]}
     grasp = grasp_with_id(path, saved, wanted.grasp)
     if grasp.id not in verdicts:
-        raise InputError(f"{path}: no verdict on {grasp.id}; there is {some(verdicts)}")
+        raise InputError(
+            f"{path}: no verdict on the grasp {grasp.id}; the file has verdicts on {some(verdicts)}"
+        )
     return of_verdict(path, saved, verdicts[grasp.id], replace(wanted, grasp=grasp.id))
 
 
 def of_verdict(
     path: Path, saved: SavedGrasps, verdict: Mapping[str, Any], wanted: Wanted
 ) -> Recorded:
-    """Read a contact set from one verdict.
+    """Read a contact set from the verdict on one grasp.
 
     Args:
-        path: Path of its file, for messages.
-        saved: The grasps that it belongs to.
+        path: Path of the verdict's file, for messages.
+        saved: The grasps that the file of verdicts is about.
         verdict: An entry of the file.
         wanted: Which contact set to read, with the grasp's id.
 
     Raises:
-        InputError: The verdict is about other contacts, or does not hold what is wanted.
+        InputError: The verdict is about other contacts, or lacks the wanted contact set.
     """
     grasp = grasp_with_id(path, saved, wanted.grasp)
     require_contacts(path, grasp, verdict["contacts_sha256"])
@@ -72,7 +74,7 @@ def of_verdict(
 
 
 def _asked(path: Path, verdict: Mapping[str, Any]) -> tuple[Setup, Agenda]:
-    """Rebuild the setup and agenda of a verdict's trials."""
+    """Rebuild the settings and the choice of trials that a verdict was made with."""
     settings = verdict["settings"]
     tables = {name: settings[name] for name in OF_USERS}
     setup = setup_from_tables(tables, Setup(surface=settings["surface"]), str(path))
@@ -95,7 +97,7 @@ def _asked(path: Path, verdict: Mapping[str, Any]) -> tuple[Setup, Agenda]:
 def _with_outcomes(
     path: Path, found: Recorded, verdict: Mapping[str, Any], wanted: Wanted
 ) -> Recorded:
-    """Add how the trials of a contact set ended."""
+    """Add to a contact set how its trials ended."""
     if wanted.trial is not None:
         nothing: Mapping[str, Any] = {"trials": 0, "not_held": []}
         repeats: Mapping[str, Any] = verdict.get("robustness") or nothing

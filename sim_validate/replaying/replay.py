@@ -1,4 +1,4 @@
-"""A recorded contact set on the bench again: one of its loads is held once more.
+"""Simulates one trial of a recorded contact set again.
 
 Trials of a scene do not influence each other, so one by itself moves as it did among the others.
 """
@@ -27,16 +27,16 @@ from sim_validate.validation.repeats import OPEN, disturbed_in, for_repeats, noi
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Replayed:
-    """One trial, simulated again."""
+    """The motion and outcome of one trial that was simulated again."""
 
     name: str
-    """Name of the wrench."""
+    """Name of the wrench that is applied."""
     load: Load
     predicted_limit: float | None
-    """Largest multiple of the wrench that the analysis says is resisted. It is None for contacts
-    without force closure, whose loads nothing resists."""
+    """Largest multiple of the wrench that is resisted, according to the analysis. It is None for
+    contacts without force closure, whose loads nothing resists."""
     required_friction: float | None
-    """Friction that the planned forces need; None where no forces balance the wrench."""
+    """Friction coefficient that the planned forces need; None if no forces balance the wrench."""
     friction: float
     hold: HoldVerdict
     watched: Watched
@@ -45,7 +45,7 @@ class Replayed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Held:
-    """A load, and how it is applied."""
+    """A load that can be simulated again, and how it is applied."""
 
     load: Load
     predicted_limit: float | None
@@ -55,7 +55,7 @@ class _Held:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Case:
-    """Contacts squeezed by their fingers, and the loads that can be applied."""
+    """Contacts squeezed by their fingers, and the loads that can be applied to them."""
 
     rig: Rig
     loads: Mapping[str, _Held]
@@ -63,7 +63,7 @@ class _Case:
 
 
 def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
-    """Simulate one trial again.
+    """Simulate one trial of a recorded contact set again.
 
     Args:
         recorded: The contact set of a file.
@@ -71,13 +71,13 @@ def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
             hold.
 
     Raises:
-        InputError: The wrench is unknown, or there is nothing to simulate.
+        InputError: The wrench is unknown, or a finger misses its face so that no trial exists.
     """
     case = _case(recorded)
     name = wrench or recorded.usual or _likeliest(recorded, case)
     if name not in case.loads:
         known = ", ".join(case.loads)
-        raise InputError(f"{recorded.name}: no wrench {name!r}; there are {known}")
+        raise InputError(f"{recorded.name}: no wrench is named {name!r}; choose from {known}")
     held, rig = case.loads[name], case.rig
     watched = rig.watch(held.load, held.settling)
     scene = rig.bench.scene
@@ -95,7 +95,7 @@ def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
 
 
 def _likeliest(recorded: Recorded, case: _Case) -> str:
-    """The wrench that is hardest to hold."""
+    """Choose the wrench that is hardest to hold."""
     if recorded.trial is None and WEAKEST in case.loads:
         return WEAKEST
     return min(case.loads, key=lambda name: case.loads[name].predicted_limit or 0.0)
@@ -122,7 +122,8 @@ def _noisy(
     case = disturbed_in(body, grasp, recorded.friction, recorded.agenda, trial)
     if case.missed:
         raise InputError(
-            f"{recorded.name}: nothing to simulate: finger {case.missed[0]} misses its face"
+            f"{recorded.name}: this repeat has no trial to simulate, because noise made finger "
+            f"{case.missed[0]} miss its face"
         )
     if not force_closure(*stacked(case.contacts), case.friction).closed:
         return _opened(body, OPEN, case.contacts, case.friction, setup)
@@ -134,10 +135,13 @@ def _noisy(
 def _opened(
     body: Polyhedron, name: str, contacts: tuple[Contact, ...], friction: float, setup: Setup
 ) -> _Case:
-    """Prepare contacts without force closure as a control."""
+    """Prepare contacts without force closure as a negative control."""
     certificate = force_closure(*stacked(contacts), friction)
     if certificate.closed:
-        raise InputError(f"{name}: its contacts are in force closure at friction {friction}")
+        raise InputError(
+            f"{name}: expected contacts without force closure, but these are force-closed at "
+            f"friction {friction}"
+        )
     control = Control(name, contacts, friction, certificate)
     rig, loads = control_case(body, control, setup)
     return _Case(

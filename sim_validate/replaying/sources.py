@@ -1,4 +1,4 @@
-"""A file or folder -> one contact set with its settings and how its trials ended.
+"""Reads one contact set from a file or folder, with its settings and how its trials ended.
 
 The source may be a grasps.json (then no outcome is recorded), a verdicts.json, the folder of a run,
 a baseline, or a dataset.
@@ -38,12 +38,13 @@ def recorded_in(source: Path, wanted: Wanted) -> Recorded:
         wanted: Which contact set to read.
 
     Raises:
-        InputError: The source is none of these, or does not hold what is wanted; the message lists
-            what there is.
+        InputError: The source is of no known kind, or lacks the wanted contact set; the message
+            lists the contact sets that the source has.
     """
     if wanted.trial is not None and wanted.control is not None:
         raise InputError(
-            "--trial is a repeat of the grasp, --control is another contact set: give one"
+            "--trial chooses a repeat of the grasp with noise, --control a negative control: "
+            "give only one of them"
         )
     if source.is_dir() and (source / MANIFEST).is_file():
         return from_dataset(source, wanted)
@@ -61,7 +62,10 @@ def recorded_in(source: Path, wanted: Wanted) -> Recorded:
     if "object" in record and "grasps" in record:
         saved = read_grasps(path)
         if wanted.trial is not None:
-            raise InputError(f"{path}: records no repeats with noise: give verdicts or a baseline")
+            raise InputError(
+                f"{path}: a file of grasps records no repeats with noise: for --trial give a "
+                "verdicts.json or a baseline"
+            )
         agenda = Agenda(seed=saved.seed)
         return of_grasp(path, saved, setup_for(saved, None), agenda, wanted)
     raise InputError(
@@ -79,7 +83,7 @@ def _from_baseline(path: Path, wanted: Wanted) -> Recorded:
     entry = next((each for each in baseline.entries if each.id == grasp.id), None)
     if entry is None:
         there = some(each.id for each in baseline.entries)
-        raise InputError(f"{path}: has no {grasp.id}; there is {there}")
+        raise InputError(f"{path}: the baseline has no grasp {grasp.id}; it has {there}")
     require_contacts(path, grasp, entry.contacts_sha256)
     if wanted.control is not None:
         return found

@@ -1,4 +1,4 @@
-"""What do people see of a run?
+"""How are the results of a run shown to people?
 
-This room turns the folder of a run into charts, and into pages that open from disk.
+Modules here turn the folder of a run into charts, and into pages that a browser opens from disk.
 """

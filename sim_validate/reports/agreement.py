@@ -1,9 +1,9 @@
-"""How far verdicts in JSON agree with the analysis: pairs of figures, and counts of trials.
+"""Compares verdicts with the analysis: pairs of predicted and simulated numbers, counts of trials.
 
 Four counts say whether a load was predicted to be resisted, and whether the object held. A trial
 that was predicted to hold and did not, or the reverse, contradicts the analysis or the simulation.
-As in `validate`, loads within `AGREEMENT` of their limit, and trials that say nothing, count as
-neither.
+As in `validate`, neither is counted for loads within `AGREEMENT` of their limit and for trials that
+prove nothing, such as those that diverged.
 """
 
 import math
@@ -22,40 +22,40 @@ Record = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """One quantity, predicted and simulated."""
+    """Predicted and simulated values of one quantity, such as the critical friction."""
 
     quantity: str
     """Name of the quantity, with its unit."""
     pairs: tuple[tuple[float, float], ...]
-    """Pairs (predicted, simulated)."""
+    """Pairs of a predicted and a simulated value."""
     below: int = 0
-    """Number of cases that held at the least friction that is tried, and so have no figure."""
+    """Number of grasps that held even at the least friction tried, so no value was found."""
 
     def differ(self) -> tuple[bool, ...]:
-        """Whether each pair is a mismatch."""
+        """Whether each pair differs by more than is allowed."""
         return tuple(abs(two - one) > AGREEMENT * one for one, two in self.pairs)
 
     @property
     def worst(self) -> float:
-        """Largest relative difference; 0 without pairs."""
+        """Largest relative difference between prediction and simulation; 0 without pairs."""
         shares = [abs(two - one) / one if one > 0.0 else math.inf for one, two in self.pairs]
         return max(shares, default=0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Quadrants:
-    """Numbers of trials by what was predicted and what happened."""
+    """Numbers of trials, counted by what was predicted and what happened."""
 
     resisted_held: int = 0
     resisted_let_go: int = 0
     not_resisted_held: int = 0
     not_resisted_let_go: int = 0
     neither: int = 0
-    """Number of trials that say nothing, such as those that diverged, or are too near the limit."""
+    """Number of trials that do not count, because they diverged or are too near the limit."""
 
 
 def frictions_in(verdicts: Iterable[Record]) -> Agreement:
-    """Critical frictions; a simulated one of zero means that the least one tried was enough."""
+    """Compare critical frictions; a simulated zero means that the least one tried sufficed."""
     found = [verdict["critical_friction"] for verdict in verdicts]
     measured = [each for each in found if each["simulated"] is not None]
     pairs = tuple((each["predicted"], each["simulated"]) for each in measured if each["simulated"])
@@ -63,7 +63,7 @@ def frictions_in(verdicts: Iterable[Record]) -> Agreement:
 
 
 def limits_in(verdicts: Iterable[Record]) -> Agreement:
-    """Sizes of the largest wrenches that were resisted."""
+    """Compare the sizes of the largest wrenches that were resisted."""
     pairs = tuple(
         (size * trial["predicted_limit"], size * trial["simulated_limit"])
         for verdict in verdicts
@@ -75,13 +75,13 @@ def limits_in(verdicts: Iterable[Record]) -> Agreement:
 
 
 def wrench_size(verdict: Record, trial: Record) -> float:
-    """Size of a trial's wrench [N], with torques divided by the size of the grasp."""
+    """Compute the size of a trial's wrench [N], with torques divided by the grasp's size."""
     force, torque = np.reshape(trial["wrench"], (2, 3))
     return math.hypot(*force, *(torque / verdict["settings"]["grasp_size_m"]))
 
 
 def quadrants_in(verdicts: Sequence[Record]) -> Quadrants:
-    """Count trials of grasps and of their controls; nothing resists the loads of controls."""
+    """Count trials of grasps and of negative controls; nothing resists the loads of a control."""
     counts = Counter[str]()
     for verdict in verdicts:
         counts.update(_place(trial, resisted(trial)) for trial in verdict["wrenches"])
@@ -91,7 +91,7 @@ def quadrants_in(verdicts: Sequence[Record]) -> Quadrants:
 
 
 def resisted(trial: Record) -> bool | None:
-    """Whether a load is predicted to be resisted; None where it is too near the limit to say."""
+    """Tell whether a load is predicted to be resisted; None if it is too near its limit."""
     limit = trial["predicted_limit"]
     if limit is not None and abs(limit - 1.0) <= AGREEMENT:
         return None
@@ -99,7 +99,7 @@ def resisted(trial: Record) -> bool | None:
 
 
 def as_predicted(trial: Record) -> bool:
-    """Whether a trial ended as predicted, or in a way that the prediction leaves open."""
+    """Tell whether a trial ended as predicted, or in a way that the prediction leaves open."""
     wanted = resisted(trial)
     ends = (HELD, *GONE) if wanted is None else (HELD,) if wanted else GONE
     return trial["outcome"] in ends
@@ -116,11 +116,11 @@ def _place(trial: Record, wanted: bool | None) -> str:
 HELD = Outcome.HELD.value
 GONE = tuple(outcome.value for outcome in LET_GO)
 GOOD, BAD, QUIET = "good", "bad", "quiet"
-"""Tones of a verdict, which are also classes in pages."""
+"""Kinds of verdict, which are also the style classes of the pages."""
 
 
 def said_of(verdict: Record | None) -> tuple[str, str]:
-    """The verdict on a grasp in words, and its tone."""
+    """Say in words what the verdict on a grasp is, and of which kind: good, bad or quiet."""
     if verdict is None:
         return "not simulated", QUIET
     outcome, controls = str(verdict["outcome"]), verdict["controls"].values()
@@ -136,5 +136,5 @@ def said_of(verdict: Record | None) -> tuple[str, str]:
 
 
 def let_go(control: Record) -> bool:
-    """Whether each of a control's loads moved the object, as the analysis says."""
+    """Tell whether every load moved the object of a negative control, as it must."""
     return all(trial["outcome"] in GONE for trial in control["wrenches"])

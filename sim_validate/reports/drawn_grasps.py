@@ -1,7 +1,8 @@
-"""One grasp -> the pictures and charts of its page, in files; any process can do the work.
+"""Draws one grasp: writes the pictures and charts of its page; any process can do the work.
 
 Charts of motion need a trial. The first trial that was not held, or else the weakest wrench, is
-simulated again, which gives bit for bit what was judged, unless it was stopped then.
+simulated again. This gives bit for bit the motion that was judged, unless the trial was stopped
+early.
 """
 
 from dataclasses import dataclass, replace
@@ -31,49 +32,50 @@ from sim_validate.reports.wrench_charts import wrench_figure
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """A grasp to draw, as it is sent to a worker."""
+    """A grasp to draw, in a form that can be sent to another process."""
 
     saved: SavedGrasps
-    """The grasp alone, with its object."""
+    """The grasp and its object."""
     friction: float
     verdict: Record | None
     regions: Record | None
-    """Record of its certified regions, if any."""
+    """Record of the grasp's certified regions, if it has any."""
     source: Path
-    """Path of the file with the verdict, for messages."""
+    """Path of the file with the verdict, which error messages name."""
     folder: Path
     """Folder of the report."""
     name: str
     """Beginning of the names of the grasp's files."""
     clip: bool
-    """Whether to draw a clip of the trial, too."""
+    """Whether to draw a clip of a trial, too."""
 
     @property
     def grasp(self) -> Grasp:
-        """The grasp, with its certified regions if there are any."""
+        """The grasp, with its certified regions if it has any."""
         return certified(self.saved.grasps[0], self.regions)
 
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """Paths of a grasp's files, relative to the report's folder, and what they show."""
+    """Paths of a grasp's pictures and charts, relative to the report's folder."""
 
     picture: str
     wrenches: str | None
-    """Chart of wrenches; None for contacts that are not in force closure at this friction."""
+    """Path of the chart of wrenches; None if the contacts are not in force closure at this
+    friction."""
     margins: str | None
     motion: str | None = None
-    """Chart of motion; None where nothing was simulated."""
+    """Path of the chart of motion; None if no trial was simulated."""
     clip: str | None = None
     trial: str = ""
-    """Name of the trial's wrench."""
+    """Name of the wrench in the trial that is shown."""
     outcome: str = ""
     no_clip: str = ""
-    """Why a clip could not be drawn."""
+    """Reason why no clip could be drawn; empty if there is a clip or none was asked for."""
 
 
 def tasks_of(run: RunFolder, folder: Path, prefix: str, clips: int) -> list[Task]:
-    """List what there is to draw of a run, with clips of some grasps, those with problems first."""
+    """List the grasps of a run to draw, with clips of some, those with problems first."""
     grasps = run.saved.grasps
     filmed = {each.id for each in sorted(grasps, key=lambda each: not run.alarms(each.id))[:clips]}
     return [
@@ -92,7 +94,7 @@ def tasks_of(run: RunFolder, folder: Path, prefix: str, clips: int) -> list[Task
 
 
 def certified(grasp: Grasp, record: Record | None) -> Grasp:
-    """Replace the regions of a grasp by those of a record, if it has any."""
+    """Replace the regions of a grasp by those of a record, if the record has regions."""
     if record is None or record["regions"] is None:
         return grasp
     regions = [
@@ -103,10 +105,10 @@ def certified(grasp: Grasp, record: Record | None) -> Grasp:
 
 
 def draw(task: Task) -> Drawn:
-    """Write the files of one grasp.
+    """Draw one grasp and write its pictures and charts.
 
     Raises:
-        InputError: The verdict is about other contacts.
+        InputError: The verdict is about other contacts than those of the grasp.
     """
     body, grasp = task.saved.body, task.grasp
     view = best_view(body, grasp)
@@ -161,7 +163,7 @@ def _written(task: Task, kind: str, ending: str, figure: Any) -> str:
 
 
 def largest_push(verdict: Record | None) -> float:
-    """Largest normal force of each finger [N]."""
+    """Look up the largest normal force that each finger may apply [N]."""
     if verdict is None:
         return FingerSettings().max_normal_force_n
     return float(verdict["settings"]["fingers"]["max_normal_force_n"])

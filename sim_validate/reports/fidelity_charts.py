@@ -1,4 +1,4 @@
-"""Charts of simulated against predicted figures; all points should lie on the line of identity."""
+"""Charts of simulated over predicted values; points should lie on the line of equal values."""
 
 import math
 from collections.abc import Sequence
@@ -13,17 +13,17 @@ from sim_validate.reports.agreement import Agreement
 from sim_validate.validation.wrench_verdict import AGREEMENT
 
 LONG_RANGE = 300.0
-"""Ratio of the ends of an axis from which on it shows only powers of ten."""
+"""Ratio of an axis's ends above which the axis shows only powers of ten."""
 LEAST_SHOWN = 0.5
-"""Place of zero on a logarithmic axis, relative to the least figure above zero."""
+"""Place of zero on a logarithmic axis, relative to the least value above zero."""
 
 
 @in_style
 def fidelity_figure(agreements: Sequence[Agreement]) -> Any:
-    """Draw simulated over predicted values on logarithmic axes, with the line of identity.
+    """Draw simulated over predicted values on logarithmic axes.
 
     Args:
-        agreements: One or more agreements; each gets a panel.
+        agreements: Predicted and simulated values; each quantity gets a panel.
 
     Returns:
         A matplotlib figure.
@@ -71,7 +71,7 @@ def _scale(axes: Any, ends: Array) -> None:
 
 
 def ticks_between(low: float, high: float) -> list[float]:
-    """Numbers 1, 2 and 5 times powers of ten in a range, or powers of ten alone in a long range."""
+    """List 1, 2 and 5 times powers of ten in a range, or only powers of ten in a long range."""
     powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     steps = (1.0, 2.0, 5.0) if high < LONG_RANGE * low else (1.0,)
     found = [step * 10.0**power for power in powers for step in steps]

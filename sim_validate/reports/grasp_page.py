@@ -1,4 +1,4 @@
-"""A grasp, what was found about it, and its pictures -> its page."""
+"""Writes the page about one grasp: what was found about it, and its pictures."""
 
 import math
 import shlex
@@ -24,12 +24,12 @@ from sim_validate.reports.turntable import as_text, grasp_data
 
 MILLI, MICRO = 1e3, 1e6
 LESS = 1e-9
-"""Share of a size below which a part of a vector is printed as zero."""
+"""Size below which a component of a vector is printed as zero, as a share of a given size."""
 
 
 @dataclass(frozen=True, slots=True)
 class Neighbours:
-    """The pages before and after one, where there are any."""
+    """The pages of the previous and the next grasp; None at either end."""
 
     before: str | None = None
     after: str | None = None
@@ -38,7 +38,7 @@ class Neighbours:
 def grasp_page(
     run: RunFolder, grasp: Grasp, drawn: Drawn, object_script: str, neighbours: Neighbours
 ) -> str:
-    """Write the text of a page about one grasp."""
+    """Write the text of the page about one grasp."""
     verdict = run.verdicts.get(grasp.id)
     shown = certified(grasp, run.shaded.get(grasp.id))
     said, tone = said_of(verdict)
@@ -71,7 +71,7 @@ def grasp_page(
 
 
 def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[tuple[str, str]]:
-    """Names and values of the figures in the page's list."""
+    """Yield names and values of the measured numbers in the page's list."""
     lower, upper = grasp.ferrari_canny
     planned = run.saved.friction
     at_plan = "" if planned == run.friction else f", at friction {planned:g} as planned"
@@ -170,7 +170,7 @@ def _controls(controls: Record) -> Sequence[Record]:
 
 
 def _commands(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[str]:
-    """Commands that show the grasp, and simulate it again."""
+    """Yield shell commands that show the grasp, and that simulate it again."""
     asked = f"--grasp {shlex.quote(grasp.id)}"
     other = "" if run.friction == run.saved.friction else f" --friction {run.friction:g}"
     yield f"graspproof view {GRASPS} {asked}{other}"
@@ -181,6 +181,6 @@ def _commands(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[
 
 
 def vector(parts: Array, size: float) -> str:
-    """The parts of a vector for people; parts that are tiny beside a size are zero."""
+    """Write a vector for people; components that are tiny beside a size become zero."""
     small = LESS * size
     return ", ".join(f"{0.0 if abs(part) < small else part:.4g}" for part in parts)

@@ -1,4 +1,4 @@
-"""Runs and the pictures of their grasps -> the page that shows them all."""
+"""Writes the first page of a report: all runs, and the pictures of their grasps."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from sim_validate.reports.run_folder import RunFolder
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """A grasp in the gallery."""
+    """A grasp in the gallery of the first page."""
 
     run: RunFolder
     grasp: Grasp
@@ -32,7 +32,7 @@ class Shown:
 
 
 def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown]) -> str:
-    """Write the text of the page."""
+    """Write the text of the report's first page."""
     verdicts = all_verdicts(runs)
     cards = [_card(each) for each in shown]
     found = agreements(verdicts)
@@ -55,12 +55,12 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown]) -> str:
 
 
 def all_verdicts(runs: Iterable[RunFolder]) -> list[Record]:
-    """The verdicts of several runs, in order."""
+    """List the verdicts of several runs, in order."""
     return [verdict for run in runs for verdict in run.verdicts.values()]
 
 
 def agreements(verdicts: Sequence[Record]) -> list[Agreement]:
-    """Agreement of critical frictions and, where they were simulated, of limits."""
+    """Compare predicted and simulated critical frictions and, if simulated, largest wrenches."""
     frictions, limits = frictions_in(verdicts), limits_in(verdicts)
     return [frictions, limits] if limits.pairs else [frictions]
 
@@ -84,7 +84,7 @@ def _card(shown: Shown) -> dict[str, Any]:
 
 
 def _weakest(verdict: Record) -> float | None:
-    """The least of the limits [N], with torques divided by the grasp's size."""
+    """Find the smallest wrench limit of a grasp [N], with torques divided by the grasp's size."""
     found = [
         trial["predicted_limit"] * wrench_size(verdict, trial)
         for trial in verdict["wrenches"]
@@ -138,7 +138,7 @@ def _about(run: RunFolder) -> Iterable[tuple[str, str]]:
 
 
 def _controls(verdicts: Sequence[Record]) -> list[dict[str, Any]]:
-    """Count the controls of each kind that were let go, held, or undecided."""
+    """Count the negative controls of each kind that were let go, held, or undecided."""
     kinds = dict[str, dict[str, Any]]()
     for verdict in verdicts:
         for name, control in verdict["controls"].items():

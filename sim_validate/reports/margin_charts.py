@@ -1,6 +1,6 @@
-"""How much a grasp resists in every direction: forces and torques on maps of the sphere.
+"""Draws how much a grasp resists in every direction: forces and torques on maps of the sphere.
 
-The maps are Hammer's projection: equal areas are equal, the middle is +x, the rim -x.
+The maps use Hammer's projection, which keeps areas; +x is in the middle and -x at the rim.
 """
 
 import math
@@ -21,26 +21,26 @@ from scenes.drawing.pictures import check_drawn
 from scenes.fingertips import FingerSettings
 
 LONGITUDES, LATITUDES = 21, 11
-"""Number of nodes of a map: around, where the first is also the last, and from pole to pole."""
+"""Numbers of a map's nodes: around, where the first is also the last, and from pole to pole."""
 COLOURS = "cividis"
-"""Colours from small to large values; they differ in brightness, too."""
+"""Name of the colour map from small to large values; its colours differ in brightness, too."""
 MILLI = 1e3
 USUAL_PUSH_N = FingerSettings().max_normal_force_n
 SAME = 12
-"""Number of decimals to which equal directions agree."""
+"""Number of decimals to which two directions must agree to count as equal."""
 NAMED = {
     "+x": (0.0, 0.0), "+y": (90.0, 0.0), "-y": (-90.0, 0.0), "+z": (0.0, 80.0), "-z": (0.0, -80.0),
     "-x": (172.0, 0.0),
 }  # fmt: skip
-"""Longitudes and latitudes at which directions are labelled [deg]; the labels of z are a little off
-the poles."""
+"""Longitudes and latitudes of the labels that name directions on a map [deg]; the labels of z are a
+little off the poles."""
 
 
 @in_style
 def margin_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, max_normal_force_n: float = USUAL_PUSH_N
 ) -> Any:
-    """Draw the largest resisted force and torque in every direction.
+    """Draw the largest force and torque that a grasp resists in every direction.
 
     Args:
         body: The object.
@@ -58,8 +58,8 @@ def margin_figure(
     positive(max_normal_force_n, "max_normal_force_n")
     if not force_closure(grasp, friction=friction).closed:
         raise InputError(
-            f"{grasp.id} is not in force closure at friction {friction:g}, so nothing is resisted "
-            f"in some direction; it needs more than {grasp.critical_friction:.4g}"
+            f"{grasp.id} is not in force closure at friction {friction:g}, so it resists nothing "
+            f"in some direction; draw it at a friction above {grasp.critical_friction:.4g}"
         )
     figure = new_figure(9.0, 2.5)
     around = Around(left=0.01, right=0.02, below=0.02, above=0.12, between=0.05)
@@ -77,7 +77,7 @@ def margin_figure(
 def _limits(
     body: Polyhedron, grasp: Grasp, friction: float, largest: float, wrenches: Array
 ) -> Array:
-    """Largest multiples of a map's wrenches, (LATITUDES, LONGITUDES), each computed once."""
+    """Compute how far each wrench of a map is resisted, (LATITUDES, LONGITUDES)."""
     different, same = np.unique(np.round(wrenches, SAME), axis=0, return_inverse=True)
     found = wrench_limits(
         grasp, None, friction, different, max_normal_force=largest, center=body.center_of_mass
@@ -87,14 +87,14 @@ def _limits(
 
 
 def _nodes() -> tuple[Array, Array]:
-    """Longitudes and latitudes of a map's nodes, (LATITUDES, LONGITUDES) each [rad]."""
+    """Return longitudes and latitudes of a map's nodes, (LATITUDES, LONGITUDES) each [rad]."""
     around = np.linspace(-np.pi, np.pi, LONGITUDES)
     longitudes, latitudes = np.meshgrid(around, np.linspace(-0.5 * np.pi, 0.5 * np.pi, LATITUDES))
     return longitudes, latitudes
 
 
 def directions_of_map() -> Array:
-    """Unit vectors of a map's nodes, (LATITUDES, LONGITUDES, 3)."""
+    """Return unit vectors to a map's nodes, (LATITUDES, LONGITUDES, 3)."""
     longitudes, latitudes = _nodes()
     flat = np.cos(latitudes)
     return np.stack(
@@ -103,7 +103,7 @@ def directions_of_map() -> Array:
 
 
 def on_map(longitudes: Array, latitudes: Array) -> tuple[Array, Array]:
-    """Project directions [rad] to a map, at most 2 to the side and 1 up."""
+    """Project directions [rad] onto a map, whose sides are at +-2 and whose poles are at +-1."""
     scale = np.sqrt(1.0 + np.cos(latitudes) * np.cos(0.5 * longitudes))
     return 2.0 * np.cos(latitudes) * np.sin(0.5 * longitudes) / scale, np.sin(latitudes) / scale
 

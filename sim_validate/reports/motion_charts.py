@@ -1,4 +1,4 @@
-"""Charts of one trial over time: how far things moved, how hard fingers pushed, friction used."""
+"""Charts of one trial over time: how far object and fingers moved, and how hard fingers pushed."""
 
 import math
 from typing import Any
@@ -12,14 +12,14 @@ from sim_validate.replaying.replay import Replayed
 
 MICRO = 1e6
 LEAST_UM = 1e-4
-"""Displacement below which the chart's axis ends [um]."""
+"""Displacement at which the chart's logarithmic axis begins [um]."""
 LEAST_PUSH = 1e-3
-"""Share of a finger's largest push below which its friction says nothing."""
+"""Share of a finger's largest push below which its use of friction is not shown."""
 
 
 @in_style
 def motion_figure(found: Replayed, threshold_m: float) -> Any:
-    """Draw displacement, normal forces, and friction used, over the time of one trial.
+    """Draw displacement, normal forces and use of friction over the time of one trial.
 
     Args:
         found: The replayed trial.
@@ -56,7 +56,7 @@ def motion_figure(found: Replayed, threshold_m: float) -> Any:
 
 
 def friction_used(pushes: Array, friction: Array) -> Array:
-    """Ratio of tangential to normal force over friction, (n, k); NaN where fingers hardly push.
+    """Compute tangential over normal force, over friction, (n, k); NaN if fingers hardly push.
 
     Args:
         pushes: Forces along (normal, tangent, tangent), (n, k, 3) [N].

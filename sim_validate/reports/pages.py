@@ -1,4 +1,4 @@
-"""Templates and values -> the text of pages; the only module that uses jinja2.
+"""Fills page templates with values; the only module that uses jinja2.
 
 Values are escaped and lose unprintable characters, because names of files and objects come from
 anywhere.
@@ -16,7 +16,7 @@ NOTHING = "-"
 
 
 def page(template: str, **values: object) -> str:
-    """Fill a template with values.
+    """Fill a page template with values.
 
     Args:
         template: File name of the template.
@@ -26,7 +26,7 @@ def page(template: str, **values: object) -> str:
 
 
 def asset(name: str) -> str:
-    """Read the text of a style or script."""
+    """Read the text of a style sheet or script that pages use."""
     return (ASSETS / name).read_text(encoding="utf-8")
 
 
@@ -46,12 +46,12 @@ def _environment() -> Any:
 
 
 def _printed(value: object) -> object:
-    """Remove control characters from text; other values stay as they are."""
+    """Remove control characters from text; return other values unchanged."""
     if type(value) is not str or value.isprintable():
         return value
     return "".join(c if c.isprintable() or c == "\n" else " " for c in value)
 
 
 def number(value: float | None, digits: int = 4) -> str:
-    """A number for people."""
+    """Write a number for people; a missing one becomes a dash."""
     return NOTHING if value is None else f"{value:.{digits}g}"

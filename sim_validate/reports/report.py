@@ -1,4 +1,4 @@
-"""The folder of a run -> a folder of pages that open from disk and need no network."""
+"""Turns the folder of a run into a folder of pages that open from disk and need no network."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -32,13 +32,13 @@ MARKED = "The pages here were written by graspproof, which may replace them.\n"
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A report that was written."""
+    """The paths of a written report."""
 
     index: Path
-    """Path of its first page."""
+    """Path of the report's first page."""
     grasps: int
     no_clip: str
-    """Why clips that were asked for are missing; empty if none is."""
+    """Reason why clips that were asked for are missing; empty if none is missing."""
 
 
 def write_report(
@@ -50,7 +50,7 @@ def write_report(
     clips: int = 0,
     progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> Report:
-    """Write the results of a run as pages to look at.
+    """Write the results of a run as pages for a browser.
 
     Args:
         folder: Folder of a run, with its grasps.json; or a folder of such folders.
@@ -65,8 +65,8 @@ def write_report(
         The paths of the report, and why clips are missing.
 
     Raises:
-        InputError: The folder holds no run, a file in it is invalid, or the pages' folder holds
-            other things.
+        InputError: The folder holds no run, a file in it is invalid, or the folder for the pages
+            holds other files.
     """
     folder = folder_of(path_of(folder, "folder"))
     out = folder / REPORT if out is None else path_of(out, "out")

@@ -1,4 +1,4 @@
-"""The files of a run -> the values that a report is made of."""
+"""Reads the folder of a run: its grasps, verdicts and regions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -29,9 +29,9 @@ class RunFolder:
     path: Path
     saved: SavedGrasps
     friction: float
-    """Friction at which the grasps were tried; if they were not, at which they were planned."""
+    """Friction at which the grasps were tested; if they were not, at which they were planned."""
     verdicts: Mapping[str, Record]
-    """Verdicts by the grasps' ids; empty if no grasp was tried."""
+    """Verdicts by the ids of the grasps; empty if no grasp was tested."""
     summary: Record
     """All of `verdicts.json` but the verdicts; empty if the file does not exist."""
     regions: Mapping[str, Record]
@@ -39,7 +39,7 @@ class RunFolder:
     regions_friction: float | None
     """Friction for which the regions are certified; None if there are none."""
     left_out: int = 0
-    """Number of grasps in the files that are not among the `saved` ones."""
+    """Number of grasps in the files that `saved` leaves out."""
 
     def first(self, limit: int | None) -> "RunFolder":
         """Keep some of the run's grasps, those with problems before others, and all verdicts."""
@@ -53,23 +53,23 @@ class RunFolder:
         return replace(self, saved=replace(self.saved, grasps=kept), left_out=len(grasps) - limit)
 
     def alarms(self, name: str) -> bool:
-        """Whether the verdict on a grasp is a problem."""
+        """Tell whether the verdict on a grasp is a problem."""
         return said_of(self.verdicts.get(name))[1] == BAD
 
     @property
     def shaded(self) -> Mapping[str, Record]:
-        """Regions that are certified for the friction of the verdicts, or less."""
+        """Certified regions that may be drawn: those for the friction of the verdicts, or less."""
         enough = self.regions_friction is not None and self.regions_friction <= self.friction
         return self.regions if enough else {}
 
     @property
     def verdicts_path(self) -> Path:
-        """Path of the verdicts, for messages."""
+        """Path of the verdicts, which error messages name."""
         return self.path / VERDICTS
 
 
 def folder_of(path: Path) -> Path:
-    """The folder that is named by its own path, or by the path of its grasps.json."""
+    """Return the folder of a run, given by its own path or by that of its grasps.json."""
     return path.parent if path.name == GRASPS else path
 
 
@@ -77,16 +77,18 @@ def runs_in(folder: Path) -> tuple[RunFolder, ...]:
     """Read the run in a folder, or the runs in its subfolders.
 
     Raises:
-        InputError: There is no run, or a file is invalid.
+        InputError: The folder holds no run, or a file is invalid.
     """
     folder = folder_of(folder)
     if not folder.is_dir():
-        raise InputError(f"{folder}: not a folder; give one that `graspproof run` has written")
+        raise InputError(
+            f"{folder}: expected the folder of a run; give one that `graspproof run` has written"
+        )
     inside = [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]
     found = [path for path in inside if (path / GRASPS).is_file()]
     if not found:
         raise InputError(
-            f"{folder}: has no {GRASPS}, and neither has a folder in it; "
+            f"{folder}: the folder has no {GRASPS}, and neither has a folder in it; "
             f"`graspproof run OBJECT --out {folder}` writes one"
         )
     own = found[0] == folder
@@ -113,17 +115,18 @@ def _run(path: Path) -> RunFolder:
 
 
 def _by_id(path: Path, records: Sequence[Record], saved: SavedGrasps) -> Mapping[str, Record]:
-    """Index records by id, after a check that they are about the contacts that the grasps have."""
+    """Index records by id, after a check that they are about the contacts of the grasps."""
     contacts = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
     for each in records:
         if contacts.get(each["id"]) != each["contacts_sha256"]:
             raise InputError(
-                f"{path}: {each['id']} has other contacts than in {GRASPS} beside it, or is not "
-                "there: make the file anew, or remove it"
+                f"{path}: the contacts of {each['id']} differ from those in {GRASPS} beside it, "
+                "or the grasp is not "
+                "in that file: write {path.name} again, or remove it"
             )
     found = {each["id"]: each for each in records}
     if len(found) < len(records):
-        raise InputError(f"{path}: a grasp is listed twice; write the file again, or remove it")
+        raise InputError(f"{path}: the file lists a grasp twice; write it again, or remove it")
     return found
 
 
@@ -136,8 +139,9 @@ def _check_summary(path: Path, summary: Record, verdicts: Sequence[Record]) -> N
     for number, each in enumerate(verdicts):
         if each["held"] != (each["outcome"] == Outcome.HELD):
             raise InputError(
-                f"{path}: verdicts[{number}]: held is {each['held']} and outcome "
-                f"{each['outcome'].value}; make the file anew, or remove it"
+                f"{path}: verdicts[{number}]: `held` is {each['held']}, which contradicts "
+                "`outcome` "
+                f"{each['outcome'].value}; write the file again, or remove it"
             )
     counted = {
         "grasps": len(verdicts),
@@ -148,13 +152,14 @@ def _check_summary(path: Path, summary: Record, verdicts: Sequence[Record]) -> N
     for name, count in counted.items():
         if summary[name] != count:
             raise InputError(
-                f"{path}: summary.{name}: says {summary[name]}, the verdicts below {count}; make "
-                "the file anew, or remove it"
+                f"{path}: summary.{name}: expected {count}, as the verdicts say, got "
+                f"{summary[name]}; write "
+                "the file again, or remove it"
             )
 
 
 def _read(path: Path, kind: type[Record], saved: SavedGrasps) -> Record | None:
-    """Read a file about the same object; None where the file does not exist."""
+    """Read a file about the same object; return None if the file does not exist."""
     if not path.is_file():
         return None
     schema = SCHEMAS[path.name]
@@ -164,5 +169,8 @@ def _read(path: Path, kind: type[Record], saved: SavedGrasps) -> Record | None:
     except InputError as error:
         raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
     if found["object"]["content_sha256"] != saved.body.content_sha256:
-        raise InputError(f"{path}: is about another object than {GRASPS} beside it")
+        raise InputError(
+            f"{path}: the file is about another object than {GRASPS} beside it; write it again, "
+            "or remove it"
+        )
     return found

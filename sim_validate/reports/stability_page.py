@@ -1,6 +1,6 @@
-"""The results of a run of tests -> a folder with a page, and the same data as JSON.
+"""Writes the results of a test run as a page, and the same data as JSON.
 
-A line is a dictionary of plain values, as test processes send it.
+Each result is a dictionary of plain values, as test processes send it.
 """
 
 import json
@@ -23,7 +23,7 @@ CALM = ("same", "within bands", "stable", "blessed")
 
 
 def write_report(folder: Path, lines: Iterable[Line]) -> Path:
-    """Write the page and the data.
+    """Write a page and a JSON file about how each grasp ended in a test run.
 
     Args:
         folder: Folder to write to; it is made if it does not exist.
@@ -58,7 +58,7 @@ def _page(lines: Sequence[Line]) -> str:
 
 
 def _row(line: Line) -> dict[str, Any]:
-    """The contents of a row of the table."""
+    """Build the contents of one row of the page's table."""
     after: Line = line["after"] or {}
     before: Line = line["before"] or {}
     trials = after.get("noisy_trials")
@@ -75,7 +75,7 @@ def _row(line: Line) -> dict[str, Any]:
 
 
 def _measured(name: str, before: Line, after: Line) -> tuple[str, str]:
-    """A figure, and its former value if that differs."""
+    """Write a measured number, and its former value if that differs."""
     now, was = _said(name, after), _said(name, before)
     return now, was if before and was != now else ""
 

@@ -1,7 +1,7 @@
-"""A drawing -> the numbers of a page on which it can be turned.
+"""Turns a drawing into the numbers of a page on which a reader can rotate it.
 
 Lengths are whole thousandths of the object's radius from its centre of mass. That is finer than a
-screen, and takes a tenth of the text of full numbers.
+screen shows, and takes a tenth of the text of full numbers.
 """
 
 import json
@@ -21,16 +21,16 @@ from scenes.drawing.views import best_view
 from sim_validate.reports.pages import asset, page
 
 UNITS = 1000.0
-"""Units of length in one object radius."""
+"""Number of units of length in one object radius."""
 
 
 def object_data(body: Polyhedron) -> list[dict[str, Any]]:
-    """The drawing of an object, which all of its grasps share."""
+    """Return the drawing of an object, which all of its grasps share."""
     return _data(glass(body), body)
 
 
 def grasp_data(body: Polyhedron, grasp: Grasp, friction: float) -> dict[str, Any]:
-    """The drawing of a grasp without the object, and the view from which it is seen first."""
+    """Return the drawing of a grasp without the object, and the view in which it is first seen."""
     beyond = drawing_of(body, grasp, friction)[len(glass(body)) :]
     return {
         "shapes": _data(beyond, body),
@@ -40,7 +40,7 @@ def grasp_data(body: Polyhedron, grasp: Grasp, friction: float) -> dict[str, Any
 
 
 def turntable_page(body: Polyhedron, grasp: Grasp, friction: float) -> str:
-    """Write a page that stands alone and on which a grasp can be turned."""
+    """Write a page that needs no other file and on which a reader can rotate a grasp."""
     return page(
         "turntable.html",
         id=grasp.id,
@@ -55,7 +55,7 @@ def turntable_page(body: Polyhedron, grasp: Grasp, friction: float) -> str:
 
 
 def as_text(data: object) -> str:
-    """Write JSON that can stand inside a page: no tag can begin in it."""
+    """Write JSON that can stand inside a page: no HTML tag can begin in it."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 

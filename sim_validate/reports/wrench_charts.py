@@ -1,10 +1,11 @@
-"""Charts of the wrenches that a grasp can apply: shadows of the wrench set on three planes.
+"""Charts of the wrenches that a grasp can apply, projected onto three planes.
 
-The set W of wrenches that contact forces with normal parts of sum 1 N can apply is convex, with a
-known support. So its shadow on any plane can be drawn exactly: it is bounded by the points of W
-farthest along each direction of the plane. The largest ball in W around zero, whose radius is the
-Ferrari-Canny quality, casts a disc. It touches W where its support is least; in a plane that holds
-this direction, the limiting facet is a line that touches disc and shadow.
+The set W of wrenches that contact forces with normal parts of sum 1 N can apply is convex, and its
+farthest point along any direction is known. So its projection onto any plane can be drawn exactly:
+it is bounded by the points of W farthest along each direction of the plane. The largest ball in W
+around zero, whose radius is the Ferrari-Canny quality, is projected to a disc. The ball touches the
+border of W in its weakest direction; in a plane that holds this direction, the limiting facet is a
+line that touches the disc and the projection.
 """
 
 from typing import Any
@@ -22,7 +23,7 @@ from scenes.drawing.pictures import check_drawn
 from scenes.drawing.views import View, best_view
 
 TURNS = 181
-"""Number of points on the border of a shadow; the first is also the last."""
+"""Number of points on the border of a projection; the first is also the last."""
 TINY = np.finfo(np.float64).tiny
 
 
@@ -30,7 +31,7 @@ TINY = np.finfo(np.float64).tiny
 def wrench_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None
 ) -> Any:
-    """Draw shadows of the wrench set on a plane of its weakest direction, of forces and of torques.
+    """Draw projections of the wrench set: on its weakest direction, on forces and on torques.
 
     Args:
         body: The object.
@@ -68,7 +69,7 @@ def wrench_figure(
 
 
 def _weakest_plane(wrenches: WrenchSet, direction: Array) -> Array:
-    """Two unit vectors: the direction, and one towards the point that is farthest along it."""
+    """Return two unit vectors: the direction, and one towards the point farthest along it."""
     _, forces = wrenches.support(direction)
     point = wrenches.G @ forces
     across = point - (point @ direction) * direction
@@ -81,7 +82,7 @@ def _weakest_plane(wrenches: WrenchSet, direction: Array) -> Array:
 
 
 def shadow_of(wrenches: WrenchSet, plane: Array) -> Array:
-    """Border of the shadow of an `l1` wrench set.
+    """Compute the border of the projection of an `l1` wrench set onto a plane.
 
     Each point of the border is the wrench of one contact alone, whose force is at the rim of its
     cone.

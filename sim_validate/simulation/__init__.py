@@ -1,5 +1,6 @@
 """How does an object move when forces act on it between fingertips?
 
-This room takes a scene and schedules of forces, wrenches and friction. It returns traces of the
-motion, and what they mean: held or let go, the critical friction, the largest wrench.
+Modules here take a scene and schedules of forces, wrenches and friction. They return traces of the
+motion, and what the traces mean: whether the object was held, the critical friction, and the
+largest wrench that is resisted.
 """

@@ -1,10 +1,11 @@
-"""The critical friction of a grasp in simulation: friction is lowered until the object lets go.
+"""Finds the critical friction of a grasp by simulation: friction falls until the object slips.
 
 Fingers squeeze with forces that balance at the predicted critical friction mu*, and need it. Above
-mu* these forces are inside their cones. Below mu* there are no balanced forces with which all of
-these fingers push, so the object must move. Where two fingers alone need mu*, the others must push
-as well: otherwise the object turns about the line between the two far above mu*. The forces used
-are therefore those just above mu* whose smallest push is largest.
+mu* these forces are inside their friction cones. Below mu* there are no balanced forces with which
+all of these fingers push, so the object must move. Where two fingers alone need mu*, the others
+must push as well: otherwise the object turns about the line between the two far above mu*.
+Therefore the forces are planned for a friction just above mu*, with the smallest push as large as
+possible.
 """
 
 from collections.abc import Callable
@@ -22,15 +23,15 @@ from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.simulate import Bench
 
 ABOVE = (5e-4, 1e-3, 2e-3, 3e-3)
-"""Excess of the friction for which forces are computed, relative to the critical friction. The
-values are tried in turn. The simulated critical friction is too high by the same excess."""
+"""Excess of the friction that forces are planned for, relative to the critical friction. The values
+are tried in turn. The simulated critical friction is too high by the same excess."""
 LEAST_PUSH = 1e-3
-"""Least normal force that is enough, relative to the largest one. With less than half of it, boxes
-were seen to turn up to 9 % above their critical friction."""
+"""Least normal force that counts as pushing, relative to the largest one. With less than half of
+it, boxes were seen to turn up to 9 % above their critical friction."""
 TILT = 2e-3
-"""Largest displacement, in grasp sizes times the critical friction. A tilt acts like that much
-additional friction; servos hide a force imbalance of five times as much, in largest normal
-forces."""
+"""Largest displacement, in grasp sizes times the critical friction. A tilt of the object acts like
+that much additional friction; servos hide a force imbalance of five times as much, in largest
+normal forces."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,16 +40,16 @@ class CriticalFriction:
 
     predicted: float
     simulated: float | None = None
-    """The middle of the bracket. It is zero if the object stays at `least_friction`, and None if
-    nothing was measured or found near the prediction."""
+    """The middle of the bracket. It is zero if the object stays even at `least_friction`, and None
+    if nothing was measured or the object does not begin to slip near the prediction."""
     bracket: tuple[float, float] | None = None
-    """A friction at which the object slipped, and one at which it stayed."""
+    """Two frictions close together: the object slipped at the first and stayed at the second."""
 
 
 def released_friction(
     bench: Bench, positions: Array, normals: Array, predicted: float, setup: Setup
 ) -> CriticalFriction:
-    """Measure the critical friction on a bench; the friction of its scene does not matter.
+    """Measure the critical friction of a grasp whose scene is compiled, whatever friction it has.
 
     Args:
         bench: The compiled scene whose fingertips stand at the contacts.
@@ -58,7 +59,7 @@ def released_friction(
         setup: How trials are simulated.
 
     Raises:
-        UndecidedError: No forces with which every finger pushes were found just above `predicted`.
+        UndecidedError: No balanced forces in which every finger pushes were found.
     """
     protocol = setup.friction
     high = protocol.settling_friction * max(predicted, protocol.least_friction)
@@ -104,13 +105,13 @@ def bisected(
 
 
 def forces_just_above(positions: Array, normals: Array, critical: float) -> Array:
-    """Balanced forces that need almost exactly the critical friction, the largest push 1 N, (k, 3).
+    """Find balanced forces that need almost the critical friction, (k, 3), largest push 1 N.
 
     These are the forces nearest to the critical friction with which every finger pushes enough. If
     there are none, they are the forces for the largest friction in `ABOVE` that has any.
 
     Raises:
-        UndecidedError: No forces with which every finger pushes were found.
+        UndecidedError: No balanced forces in which every finger pushes were found.
     """
     forces = None
     for above in ABOVE:
@@ -122,7 +123,7 @@ def forces_just_above(positions: Array, normals: Array, critical: float) -> Arra
             break
     if forces is None:
         raise UndecidedError(
-            f"no forces with which every finger pushes were found just above the critical "
-            f"friction {critical:.6g}"
+            "no balanced forces were found in which every finger pushes, at frictions just above "
+            f"the critical friction {critical:.6g}"
         )
     return forces

@@ -1,4 +1,4 @@
-"""Trace -> outcome: held, or what went wrong, where and when.
+"""Judges a recorded trial: whether the object was held, or else what went wrong, where and when.
 
 The functions are pure, so that old traces can be judged again.
 """
@@ -29,8 +29,8 @@ class Outcome(StrEnum):
 
 
 LET_GO = (Outcome.SLIPPED, Outcome.LOST_CONTACT)
-"""Outcomes that say that the object was not held. All other outcomes but `HELD` say nothing about
-whether it is."""
+"""Outcomes which say that the object was not held. All other outcomes but `HELD` leave open whether
+it is held."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,8 +41,8 @@ class HoldVerdict:
     reason: str
     """What happened, in words; empty if the object was held."""
     displacement_m: float
-    """Largest displacement while holding [m]: motion of the point between the contacts plus grasp
-    size times rotation."""
+    """Largest displacement while the object had to be held [m]: motion of the point between the
+    contacts plus grasp size times rotation."""
     start_displacement_m: float
     """Displacement before friction was lowered, while the object was loaded at high friction
     [m]."""
@@ -55,7 +55,7 @@ class HoldVerdict:
 
 
 def judge(trace: Trace, layout: Layout, protocol: HoldProtocol) -> HoldVerdict:
-    """Apply the thresholds of a protocol to a trace.
+    """Judge a trial: compare its motion with the thresholds of a protocol.
 
     Args:
         trace: Motion from the moment friction was lowered.
@@ -77,18 +77,18 @@ def judge(trace: Trace, layout: Layout, protocol: HoldProtocol) -> HoldVerdict:
 
 
 def holds(trace: Trace, layout: Layout, protocol: HoldProtocol) -> bool | None:
-    """Whether a trace shows that the object is held; None if the trace says nothing about it."""
+    """Tell whether a trace shows the object held; None if the trace does not decide it."""
     outcome = judge(trace, layout, protocol).outcome
     return outcome is Outcome.HELD if outcome in (Outcome.HELD, *LET_GO) else None
 
 
 def invalid_start(verdict: HoldVerdict, reasons: Sequence[str]) -> HoldVerdict:
-    """Replace the outcome of a verdict because fingertips cannot be where they were put."""
+    """Replace the outcome of a verdict because fingertips cannot stand where they were put."""
     return replace(verdict, outcome=Outcome.INVALID_START, reason="; ".join(reasons))
 
 
 def _failing(trace: Trace, size: float, protocol: HoldProtocol) -> Indices:
-    """Indices of the samples in which a threshold is crossed."""
+    """Find the samples in which displacement or gap crosses a threshold; return their indices."""
     moved = trace.displacements_m >= protocol.hold_threshold * size
     strayed = trace.start_m + trace.displacements_m >= protocol.total_threshold * size
     apart = (trace.gaps_m > protocol.gap_threshold * size).any(axis=1)
@@ -115,7 +115,7 @@ def _outcome(
 def _how_it_let_go(
     trace: Trace, layout: Layout, protocol: HoldProtocol, first: int
 ) -> tuple[Outcome, str]:
-    """Name the finger that lost its face, or slid the farthest, at the first crossed threshold."""
+    """Name the finger that lost its face, or slid farthest, when a threshold was first crossed."""
     gaps, slips = trace.gaps_m[first], trace.slips_m[first]
     rolled = np.flatnonzero([not on for on in _on_faces(trace.touched_m[first], layout)])
     if rolled.size:
@@ -131,7 +131,7 @@ def _how_it_let_go(
 
 
 def _on_faces(touched: Array, layout: Layout) -> list[bool]:
-    """Whether each point is on its contact's face; True where that face is not known."""
+    """Tell for each point whether it lies on its contact's face; True if that face is not known."""
     return [
         not border or any(within(point, piece, frame[:, 0], 0.0) for piece in border)
         for point, border, frame in zip(touched, layout.borders, layout.frames, strict=True)

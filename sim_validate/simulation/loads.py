@@ -1,4 +1,4 @@
-"""The wrenches a grasp is tested with, how far each is resisted, and the planned forces."""
+"""Chooses the wrenches that a grasp is tested with, and plans finger forces that balance them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,22 +17,22 @@ from sim_validate.simulation.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, S
 from sim_validate.simulation.wrench_limits import part
 
 NO_PUSH = 1e-9
-"""Normal forces below this, relative to the largest one, count as zero."""
+"""Normal forces below this share of the largest one count as zero."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedLoad:
-    """One wrench to hold, with what the analysis predicts about it."""
+    """One wrench that a grasp is tested with, and what the analysis predicts about it."""
 
     name: str
     load: Load
-    """The wrench that is applied, and the forces planned for it."""
+    """The wrench that is applied, and the finger forces planned for it."""
     predicted_limit: float
-    """Largest multiple of the wrench that the analysis says is resisted."""
+    """Largest multiple of the wrench that the grasp resists, according to the analysis."""
     limit: Load
-    """The wrench at that multiple, and the forces that balance it."""
+    """The wrench at its predicted limit, and the finger forces that balance it."""
     required_friction: float
-    """The friction that the planned forces need."""
+    """The friction coefficient that the planned forces need."""
 
 
 def planned_loads(
@@ -43,15 +43,15 @@ def planned_loads(
     agenda: Agenda,
     setup: Setup,
 ) -> tuple[PlannedLoad, ...]:
-    """Build the loads of an agenda in its order: axes, weakest, random, a user's own.
+    """Plan all wrenches to test, in order: along axes, weakest, random, the user's own.
 
     Args:
         body: The object.
         contacts: Contacts in force closure at this friction.
         friction: Coulomb coefficient at every contact.
-        idle: The load without a wrench: only the forces of the gentle grasp.
-        agenda: The wrenches to apply.
-        setup: The settings with the largest normal force and the applied share of the limit.
+        idle: The load without a wrench: only the forces with which fingers squeeze gently.
+        agenda: The choice of wrenches to test.
+        setup: Settings that hold the largest normal force and the share of the limit to apply.
     """
     resisted, (_, normals) = _resisted(body, contacts, friction, setup), stacked(contacts)
     share = setup.hold.load_share
@@ -72,15 +72,15 @@ def loads_as_they_are(
     wrenches: Sequence[tuple[str, Array]],
     setup: Setup,
 ) -> tuple[PlannedLoad, ...]:
-    """Build loads from wrenches that are applied as they are given.
+    """Plan finger forces for wrenches that are applied as given, not at a share of a limit.
 
     Args:
         body: The object.
         contacts: Contacts in force closure at this friction.
         friction: Coulomb coefficient at every contact.
-        idle: The load without a wrench: only the forces of the gentle grasp.
-        wrenches: Named wrenches to hold, (6,) each [N, N m].
-        setup: The settings with the largest normal force.
+        idle: The load without a wrench: only the forces with which fingers squeeze gently.
+        wrenches: Named wrenches to test, (6,) each [N, N m].
+        setup: Settings that hold the largest normal force.
     """
     resisted, (_, normals) = _resisted(body, contacts, friction, setup), stacked(contacts)
     return tuple(
@@ -103,7 +103,7 @@ def _resisted(
 def _relative(
     resisted: WrenchBody, torque_scale: float, agenda: Agenda
 ) -> list[tuple[str, WrenchLimit]]:
-    """Name the wrenches that are applied at a share of their limit, and compute that limit."""
+    """Name the wrenches that are applied at a share of their limit, and compute each limit."""
     axes = [resisted.limit(wrench) for wrench in axis_wrenches(torque_scale)]
     weakest = weakest_from(resisted, axes, torque_scale)
     rng = np.random.default_rng(agenda.seed)
@@ -117,7 +117,7 @@ def _relative(
 def _load(
     name: str, found: WrenchLimit, multiple: float, idle: Load, normals: Array
 ) -> PlannedLoad:
-    """Apply a multiple of a wrench, with forces between those at rest and those at the limit."""
+    """Plan a multiple of a wrench, with forces between those at rest and those at the limit."""
     wrench = to_digits(multiple * found.wrench)
     predicted = found.limit / multiple
     limit = Load(predicted * wrench, to_digits(found.forces))
@@ -127,7 +127,7 @@ def _load(
 
 
 def _needed(forces: Array, normals: Array) -> float:
-    """The friction that forces (k, 3) need: the largest ratio of tangential to normal force."""
+    """Compute the friction that forces (k, 3) need: the largest ratio of tangential to normal."""
     along, across = normal_and_tangential(forces, normals)
     pushing = along > NO_PUSH * along.max()
     return float(to_digits((across[pushing] / along[pushing]).max()))

@@ -1,13 +1,13 @@
-"""Seeded noise on a grasp: where the object stands, how its surface leans, friction, mass.
+"""Draws seeded noise on a grasp: in the object's pose, its surface normals, friction and mass.
 
-The fingers come along their planned lines, but the object is displaced. Each contact is where such
-a line enters the same face (on a curved object, the surface near the planned contact), if it does.
-There the surface leans a little from its model. Friction is the same at all contacts; mass scales
-the simulated mass and every load. Loads turn with the object.
+The fingers come along their planned lines, but the object is displaced. Each finger touches where
+its line enters the same face, if the line does (on a curved object, the surface near the planned
+contact). There the surface normal leans a little from that of the model. Friction is the same at
+all contacts; mass scales the simulated mass and every load. Loads turn with the object.
 
 All noise is drawn from normal distributions; friction and mass are multiplied by the exponential of
-what is drawn. The draws of a trial depend only on the seed and the trial's number. So they are the
-same for every grasp, and only larger with more noise.
+the drawn number. The draws of a trial depend only on the seed and the trial's number. So every
+grasp gets the same draws, and a larger deviation only scales them.
 """
 
 import math
@@ -24,13 +24,14 @@ from grasp_core.values import Contact, Grasp
 from sim_validate.simulation.traces import rotated
 
 STREAM = 1
-"""Number of the random stream of noise; other streams with the same seed share no draws with it."""
+"""Number of the random stream that noise is drawn from, apart from other draws with the same
+seed."""
 LARGEST = {"shift": 1.0, "turn_deg": 45.0, "normal_deg": 45.0, "friction": 1.0, "mass": 1.0}
 
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """How uncertain a grasp is, as standard deviations.
+    """How uncertain the pose, surface, friction and mass are, as standard deviations.
 
     Raises:
         InputError: A number is negative or out of its range.
@@ -39,13 +40,13 @@ class Noise:
     shift: float = 0.01
     """Deviation of the object's position along each axis, in object radii."""
     turn_deg: float = 1.0
-    """Deviation of its orientation about each axis, through its centre of mass [deg]."""
+    """Deviation of the object's orientation about each axis through its centre of mass [deg]."""
     normal_deg: float = 1.0
     """Deviation of the surface normal at each contact, about two axes in the surface [deg]."""
     friction: float = 0.05
-    """Deviation of the friction, relative to it."""
+    """Deviation of the friction coefficient, relative to the coefficient."""
     mass: float = 0.05
-    """Deviation of the mass and with it of every load, relative to them."""
+    """Deviation of the mass and of every load, relative to the planned values."""
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
@@ -54,15 +55,15 @@ class Noise:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Disturbed:
-    """A grasp under one draw of noise."""
+    """A grasp after one draw of noise."""
 
     landed: tuple[Contact, ...]
     """Where fingers meet the surface, with the model's normals; fewer than k contacts if some
     miss."""
     contacts: tuple[Contact, ...]
-    """The contacts in `landed`, with the leaning normals of the trial."""
+    """The contacts in `landed`, with surface normals tilted by the noise."""
     missed: tuple[int, ...]
-    """Indices of the fingers whose lines pass beside their faces."""
+    """Indices of the fingers whose lines do not meet their faces."""
     friction: float
     mass: float
     """Mass of the trial, relative to the planned mass."""
@@ -108,7 +109,7 @@ def disturbed(
 
 
 def _quaternion(rotation: Array) -> Array:
-    """Unit quaternion wxyz of a rotation vector [rad], (4,)."""
+    """Convert a rotation vector [rad] into a unit quaternion wxyz, (4,)."""
     angle = float(np.linalg.norm(rotation))
     return np.append(math.cos(0.5 * angle), 0.5 * np.sinc(0.5 * angle / math.pi) * rotation)
 
@@ -120,7 +121,7 @@ def _leaning(normal: Array, lean: Array) -> Array:
 
 
 def _landing(body: Polyhedron, face: int, point: Array, way: Array) -> Contact | None:
-    """Where a line enters a face, or a curved object's surface next to a point; None if nowhere."""
+    """Find where a line enters a face, or a curved surface near a point; None if nowhere."""
     if body.patches is None:
         plane = body.faces[face]
         at = _crossing(plane.centroid[None], plane.normal[None], point, way)[0]
@@ -143,7 +144,7 @@ def _landing(body: Polyhedron, face: int, point: Array, way: Array) -> Contact |
 
 
 def _crossing(points: Array, normals: Array, point: Array, way: Array) -> Array:
-    """Points where a line enters each of n planes, (n, 3); NaN where it does not."""
+    """Find the points where a line enters each of n planes, (n, 3); NaN where it enters none."""
     falling = normals @ way
     entering = falling > 0.0
     share = np.einsum("ni,ni->n", normals, points - point) / np.where(entering, falling, np.nan)

@@ -1,8 +1,8 @@
-"""Acceptance rules of other grasp validators: what each would have accepted.
+"""Applies the acceptance rules of other grasp validators: what would each have accepted?
 
-None of them applies a torque: an object is pulled or weighed along the six directions of the axes,
-and is accepted if it roughly stays. Here they judge the traces of our own trials, which are shorter
-(0.4 s) than theirs (0.5 to 2 s), with forces that are planned, not merely closed.
+None of these rules applies a torque: an object is pulled or weighed along the six directions of the
+axes, and is accepted if it roughly stays. Here they judge the traces of our own trials, which are
+shorter (0.4 s) than theirs (0.5 to 2 s), with forces that are planned, not merely closed.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,21 +17,21 @@ from sim_validate.simulation.protocol import HoldProtocol
 from sim_validate.simulation.traces import Trace
 
 FORCE_AXES = tuple(f"{sign}force_{axis}" for sign in "+-" for axis in "xyz")
-"""Names of the trials that the rules judge: forces along the axes, without torque."""
+"""Names of the six trials that the rules judge: forces along the axes, without torque."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """How another validator decides that a grasp is good."""
+    """A named rule by which another validator accepts a grasp."""
 
     name: str
     source: str
     accepts: Callable[[Trace, Layout, HoldProtocol], bool]
-    """Function that decides whether one trial passes; all six trials must."""
+    """Function that decides whether one trial passes; a grasp must pass all six trials."""
 
 
 def accepted(rule: Rule, trials: Sequence[Trace], layout: Layout, protocol: HoldProtocol) -> bool:
-    """Whether a rule accepts a grasp: all trials of its six forces must end and pass."""
+    """Tell whether a rule accepts a grasp: all trials of its six forces must end and pass."""
     return all(not trace.fault and rule.accepts(trace, layout, protocol) for trace in trials)
 
 
@@ -64,12 +64,14 @@ RULES = {
 
 
 def rules_named(names: Sequence[str]) -> tuple[Rule, ...]:
-    """Look up rules by name.
+    """Look up acceptance rules of other validators by name.
 
     Raises:
-        InputError: A name is not the name of a rule.
+        InputError: No acceptance rule has one of the names.
     """
     unknown = [name for name in names if name not in RULES]
     if unknown:
-        raise InputError(f"no rule {unknown[0]!r}; there are {', '.join(RULES)}")
+        raise InputError(
+            f"no acceptance rule is named {unknown[0]!r}; choose from {', '.join(RULES)}"
+        )
     return tuple(RULES[name] for name in names)

@@ -1,4 +1,4 @@
-"""The steps of each trial, and what counts as holding: numbers only.
+"""Holds the durations, loads and thresholds of each kind of trial; it computes nothing.
 
 Wrench hold. The fingers squeeze with planned forces while friction is raised, so that the
 transients of loading cannot slip a contact that would hold at rest. Then the wrench and the forces
@@ -36,12 +36,12 @@ RANGES = {
     "least_friction": (1e-6, 0.01),
     "settling_friction": (1.0, 100.0),
 }
-"""Least and largest value of the numbers that are neither just durations nor just positive."""
+"""Least and largest value of each number that needs more than being positive."""
 
 
 @dataclass(frozen=True, slots=True)
 class HoldProtocol:
-    """Durations, loads and thresholds of a wrench hold.
+    """Durations, loads and thresholds of a trial in which the object must hold a wrench.
 
     Thresholds are relative to the size of the grasp, which is the lever of its contacts about the
     axis they are closest to: 2e-4 is 10 um for contacts that span a decimetre. A servo hides an
@@ -57,23 +57,27 @@ class HoldProtocol:
     settle_s: float = 0.10
     hold_s: float = 0.40
     settling_friction: float = 3.0
-    """Friction while loading, relative to the friction under test. For negative controls it is
-    relative to the larger of that friction and the one that the planned forces need."""
+    """Friction while loading, relative to the friction under test. In trials of negative controls
+    (contacts that must fail) it is relative to the larger of that friction and the one that the
+    planned forces need."""
     load_share: float = 0.8
-    """Applied wrench relative to the largest one the analysis says is resisted."""
+    """Applied wrench, relative to the largest one that is resisted according to the analysis."""
     control_load: float = 0.2
-    """Wrench applied to a contact set that resists none, relative to the largest normal force."""
+    """Wrench applied to a negative control (contacts that must fail), relative to the largest
+    normal force."""
     least_normal_share: float = 0.005
-    """Least planned normal force, relative to the largest; it keeps idle fingers in touch."""
+    """Least planned normal force, relative to the largest; it keeps fingers without load in
+    contact."""
     hold_threshold: float = 2e-4
-    """Largest displacement while holding, in grasp sizes."""
+    """Largest displacement while the object must be held, in grasp sizes."""
     total_threshold: float = 2e-4
-    """Largest displacement from the planned pose, in grasp sizes; a tilt acts like that much
-    additional friction."""
+    """Largest displacement from the planned pose, in grasp sizes; a tilt of the object acts like
+    that much additional friction."""
     least_excess: float = 5e-4
-    """Share of the sum of forces, equal to minus the closure margin. Contacts whose forces must
-    leave their cones by at least this share even without a load have to slip without one. With
-    less, the servos, which hide a few thousandths of the largest normal force, might hold them."""
+    """Share of the sum of forces by which the forces must leave their friction cones even without a
+    load; it equals minus the closure margin. Contacts that need at least this share have to slip
+    without a load. With less, the servos, which hide a few thousandths of the largest normal force,
+    might hold them."""
     gap_threshold: float = 2e-4
     """A fingertip farther than this from its face has lost contact, in grasp sizes."""
 
@@ -83,22 +87,22 @@ class HoldProtocol:
 
 @dataclass(frozen=True, slots=True)
 class LimitProtocol:
-    """How the largest resisted wrench is found, relative to the predicted one.
+    """How the largest wrench that a grasp resists is found in simulation.
 
     Raises:
         InputError: A number is not positive and finite, or out of its range.
     """
 
     spans: tuple[float, ...] = (0.02, 0.1, 0.5)
-    """Half widths of the intervals around the predicted limit, relative to it, that are searched in
+    """Half widths of the intervals around the predicted limit, relative to it. They are searched in
     turn until the limit is found."""
     ramp_s: float = 0.5
-    """Duration of one rise through the span [s]."""
+    """Duration of the slow rise of the load through one interval [s]."""
     ramp_threshold: float = 2e-5
     """Displacement that ends a ramp, in grasp sizes. It is smaller than in a hold, because nothing
-    else moves the object meanwhile."""
+    but the load moves the object during a ramp."""
     rounds: int = 4
-    """How often bisection halves the span."""
+    """How often bisection halves an interval."""
 
     def __post_init__(self) -> None:
         _check(asdict(self))
@@ -106,27 +110,27 @@ class LimitProtocol:
 
 @dataclass(frozen=True, slots=True)
 class FrictionProtocol:
-    """How the critical friction is found, relative to the predicted one.
+    """How the critical friction of a grasp is found in simulation.
 
     Raises:
         InputError: A number is not positive and finite, or out of its range.
     """
 
     spans: tuple[float, ...] = (0.01, 0.1, 0.5)
-    """Half widths of the intervals around the predicted critical friction, relative to it, that are
+    """Half widths of the intervals around the predicted critical friction, relative to it. They are
     searched in turn until the critical friction is found."""
     rounds: int = 4
-    """How often bisection halves the span."""
+    """How often bisection halves an interval."""
     settling_friction: float = 5.0
-    """Friction while squeezing, relative to the predicted critical friction."""
+    """Friction while the fingers squeeze, relative to the predicted critical friction."""
     least_friction: float = 1e-3
-    """Friction that is tried alone where the prediction is smaller than it."""
+    """Least friction that is simulated; the only one tried where the prediction is smaller."""
     settle_s: float = 0.10
     hold_s: float = 0.40
     threshold: float = 2e-5
-    """Largest displacement while holding, in grasp sizes. Within it the servos hide an imbalance of
-    a ten-thousandth of the largest normal force. Fingers that hardly push let the object creep by
-    up to 1e-5 above the critical friction."""
+    """Largest displacement while the object must be held, in grasp sizes. Within it the servos hide
+    an imbalance of a ten-thousandth of the largest normal force. Fingers that hardly push let the
+    object creep by up to 1e-5 above the critical friction."""
 
     def __post_init__(self) -> None:
         _check(asdict(self))
@@ -139,7 +143,9 @@ def _check(numbers: Mapping[str, Any]) -> None:
                 value, partial(number, name=name, above=0.0, below=1.0), name, "shares"
             )
             if not (shares and _rising(shares)):
-                raise InputError(f"{name} must be one or more rising shares below 1, got {value}")
+                raise InputError(
+                    f"{name} must be one or more numbers from 0 to 1 in rising order, got {value}"
+                )
         elif name == "rounds":
             whole(value, name, least=1, most=MOST_ROUNDS)
         else:

@@ -1,4 +1,4 @@
-"""An object squeezed on the bench; the wrench holds, ramps and releases start from there."""
+"""Holds an object between squeezing fingers; wrench holds, ramps and releases start from there."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from sim_validate.simulation.traces import Trace, trace
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Watched:
-    """One hold from the closed fingers to its end."""
+    """The motion in one hold, from the closed fingers to the end."""
 
     joints: Array
     """Joint positions as in `Motion.joints`, (n, 7 + 3k)."""
@@ -25,28 +25,29 @@ class Watched:
     times_s: Array
     """Times of the samples, zero at the moment friction was lowered, (n,) [s]."""
     pushes_n: Array
-    """Forces of each fingertip's servos along the axes of its contact, (n, k, 3) [N]."""
+    """Forces that the servos of each fingertip apply along the axes of its contact, (n, k, 3)
+    [N]."""
     friction: Array
-    """Friction in each sample, (n,)."""
+    """Friction coefficient in each sample, (n,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """An unloaded object squeezed by its fingers."""
+    """An object without load, squeezed by its fingers."""
 
     bench: Bench
     setup: Setup
     friction: float
-    """The friction at which the object is to be held."""
+    """The friction coefficient at which the object is to be held."""
     idle: Load
     """The load without a wrench: only the forces that squeeze the object."""
     closed: Motion | None
-    """How the fingers closed; None for rigid fingers, which are put where they are."""
+    """The motion of the fingers while they closed; None for rigid fingers, which do not move."""
 
     def hold(
         self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None
     ) -> tuple[Trace, ...]:
-        """Simulate a hold under each load and trace it from the moment friction is lowered.
+        """Simulate a hold under each load, and trace it from the moment friction is lowered.
 
         Args:
             loads: The loads to hold.
@@ -95,7 +96,7 @@ class Rig:
         return self._traces([schedule for schedule, _ in rises]), rises[0][1]
 
     def release(self, settling_friction: float, frictions: Sequence[float]) -> tuple[Trace, ...]:
-        """Lower the friction of the unloaded object to each of several values, and trace it."""
+        """Lower the friction of the unloaded object to several values, and trace its motion."""
         return self._traces(self._releases(settling_friction, frictions))
 
     def _releases(self, settling_friction: float, frictions: Sequence[float]) -> list[Schedule]:
@@ -106,11 +107,11 @@ class Rig:
         ]
 
     def motions_of_holds(self, loads: Sequence[Load]) -> Array:
-        """Joint positions under each load, from the closed fingers on, (trials, n, 7 + 3k)."""
+        """Return joint positions under each load, from closed fingers on, (trials, n, 7 + 3k)."""
         return self._joints(self._holds(loads, None))
 
     def motions_of_releases(self, settling_friction: float, frictions: Sequence[float]) -> Array:
-        """Joint positions after each release, from the closed fingers on, (trials, n, 7 + 3k)."""
+        """Return joint positions after each release from closed fingers, (trials, n, 7 + 3k)."""
         return self._joints(self._releases(settling_friction, frictions))
 
     def _joints(self, trials: Sequence[Schedule]) -> Array:
@@ -129,7 +130,7 @@ class Rig:
 
 
 def pushes(planned: Array, joints: Array, layout: Layout) -> Array:
-    """The forces of the servos: the planned forces, less what their springs gave way.
+    """Compute the forces of the servos: the planned forces, less what their springs gave way.
 
     Args:
         planned: Forces that the fingers are commanded to apply, (n, k, 3) [N], world axes.
@@ -149,10 +150,10 @@ def squeezed(
     bench: Bench, setup: Setup, forces: Array, friction: float,
     settling_friction: float | None = None,
 ) -> Rig:  # fmt: skip
-    """Close the fingers of a bench on the unloaded object.
+    """Close the fingers of a compiled scene on the unloaded object.
 
     Args:
-        bench: A bench whose scene has fingers driven by servos.
+        bench: A compiled scene with fingers driven by servos.
         setup: How trials are simulated.
         forces: Planned forces, (k, 3) [N].
         friction: Friction at which the object is to be held.

@@ -1,4 +1,4 @@
-"""Schedules: what is applied to an object in each sample of one trial. No simulator is used here.
+"""Schedules say what is applied to an object in each sample of a trial; they need no simulator.
 
 Every trial is a schedule: the forces planned for the fingers, the external wrench and the friction
 in each sample. Loads change smoothly, because long objects spring loose under a sudden start.
@@ -24,31 +24,31 @@ class Load:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Schedule:
-    """Loads and friction in the n samples of a trial."""
+    """The wrench, the finger forces and the friction in each of the n samples of a trial."""
 
     wrenches: Array
-    """(n, 6) [N, N m]"""
+    """External wrench in each sample, (n, 6) [N, N m]."""
     forces: Array
-    """(n, k, 3) [N]"""
+    """Planned finger forces in each sample, (n, k, 3) [N]."""
     friction: Array
-    """(n,)"""
+    """Friction coefficient in each sample, (n,)."""
     watched: int
-    """First sample in which the object must stay where it is."""
+    """Index of the first sample from which the object must stay where it is."""
 
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """The length of a sample; it converts durations to numbers of samples."""
+    """The duration of a sample; it converts durations to numbers of samples."""
 
     sample_s: float
 
     def samples(self, duration_s: float) -> int:
-        """The whole number of samples nearest to a duration, at least one."""
+        """Return the whole number of samples nearest to a duration, at least one."""
         return max(1, round(duration_s / self.sample_s))
 
 
 def squeeze(forces: Array, friction: float, clock: Clock, protocol: HoldProtocol) -> Schedule:
-    """Close the fingers on the unloaded object."""
+    """Schedule the fingers to close on the unloaded object."""
     shares = smooth(clock.samples(protocol.squeeze_s))
     closing = shares[:, None, None] * forces
     count = len(shares)
@@ -58,7 +58,7 @@ def squeeze(forces: Array, friction: float, clock: Clock, protocol: HoldProtocol
 def hold(
     idle: Load, load: Load, frictions: tuple[float, float], clock: Clock, protocol: HoldProtocol
 ) -> Schedule:
-    """Apply a load to the squeezed object at high friction, settle, lower the friction, watch."""
+    """Schedule a hold: load the squeezed object at high friction, settle, lower friction, watch."""
     rise, rest = clock.samples(protocol.load_s), clock.samples(protocol.settle_s)
     shares = np.concatenate([smooth(rise), np.ones(rest + clock.samples(protocol.hold_s))])
     return _between(idle, load, shares, frictions, rise + rest)
@@ -68,7 +68,7 @@ def ramp(
     idle: Load, limit: Load, shares: tuple[float, float], friction: float, clock: Clock,
     protocols: tuple[HoldProtocol, LimitProtocol],
 ) -> tuple[Schedule, Array]:  # fmt: skip
-    """Raise a load through the largest one that is resisted.
+    """Schedule a load that rises slowly through the largest one that is resisted.
 
     The load rises to the first share of the limit as in `hold`, then slowly to the second. The
     forces balance the load all the way, whether the fingers can apply them or not.
@@ -90,7 +90,7 @@ def release(
     forces: Array, settling_friction: float, friction: float, clock: Clock,
     protocol: FrictionProtocol,
 ) -> Schedule:  # fmt: skip
-    """Lower the friction of a squeezed object that bears no load, and watch."""
+    """Schedule a release: lower the friction of a squeezed object without load, and watch."""
     rest, watched = clock.samples(protocol.settle_s), clock.samples(protocol.hold_s)
     still = Load(np.zeros(6), forces)
     shares = np.ones(rest + watched)
@@ -98,7 +98,7 @@ def release(
 
 
 def smooth(count: int) -> Array:
-    """Shares from zero to one with no slope at either end, (count,)."""
+    """Return numbers that rise from zero to one with no slope at either end, (count,)."""
     time = np.arange(1, count + 1) / count
     return time**2 * (3.0 - 2.0 * time)
 

@@ -1,4 +1,4 @@
-"""How trials are simulated, and which trials a grasp goes through: the choices of a user."""
+"""Settings that users may choose: how trials are simulated, and which trials a grasp undergoes."""
 
 import math
 import re
@@ -53,13 +53,13 @@ PARTS = {
 }
 MOST_THREADS = 1024
 HARD_FINGER = 3
-"""`condim` of a contact whose force has a normal and two tangential parts."""
+"""MuJoCo's `condim` of a contact whose force has a normal and two tangential parts."""
 LimitSearch: TypeAlias = Literal["none", "ramp", "bisection"]
 
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """How trials are simulated.
+    """How trials are simulated: physics, fingertips, surface, durations and thresholds.
 
     Raises:
         InputError: A part has the wrong type, a number is out of its range, or the physics is not
@@ -69,13 +69,13 @@ class Setup:
     fingers: FingerSettings = field(default_factory=FingerSettings)
     physics: PhysicsSettings = field(default_factory=PhysicsSettings)
     surface: Surface = "pads"
-    """What fingertips touch: pads, which are exact on any object, or the mesh of a convex
-    object."""
+    """What fingertips touch: flat pads at the contacts, which are exact on any object, or the mesh
+    of a convex object."""
     hold: HoldProtocol = field(default_factory=HoldProtocol)
     limit: LimitProtocol = field(default_factory=LimitProtocol)
     friction: FrictionProtocol = field(default_factory=FrictionProtocol)
     threads: int = 1
-    """Number of the simulator's threads; results do not depend on it."""
+    """Number of threads that the simulator uses; results do not depend on it."""
     timeout_s: float = math.inf
     """Time after which the trials of one contact set are stopped [s]."""
 
@@ -88,18 +88,19 @@ class Setup:
         number(self.timeout_s, "timeout_s", above=0.0, most=math.inf)
 
     def scene(self, body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float) -> Scene:
-        """Build the scene of a grasp with these settings."""
+        """Build the MuJoCo scene of a grasp with these settings."""
         return build_scene(
             body, grasp, friction, fingers=self.fingers, physics=self.physics, surface=self.surface
         )
 
 
 def _check_model(physics: PhysicsSettings) -> None:
-    """Refuse physics with forces that the predictions do not know."""
+    """Refuse physics settings with forces that the analysis does not model."""
     if any(physics.gravity):
         raise InputError(
             f"physics.gravity must be zero, got {physics.gravity}: masses are scaled, so it would "
-            "not be the object's weight; give that as a wrench (--weight-n, or Agenda.wrenches)"
+            "not be the object's weight; give the weight as a wrench "
+            "(--weight-n, or Agenda.wrenches)"
         )
     if physics.condim != HARD_FINGER:
         raise InputError(
@@ -110,11 +111,11 @@ def _check_model(physics: PhysicsSettings) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NamedWrench:
-    """An external wrench that a user names."""
+    """An external wrench with a name that the user gives it."""
 
     name: str
     wrench: Array
-    """(6,) [N, N m], torque about the centre of mass, in the object's frame."""
+    """Force, then torque about the centre of mass, in the object's frame, (6,) [N, N m]."""
 
     def __post_init__(self) -> None:
         """Refuse a wrench that cannot be tested, or a name that a file cannot hold."""
@@ -124,7 +125,7 @@ class NamedWrench:
         size = float(np.abs(self.wrench).max())
         if not SMALLEST <= size <= LARGEST:
             raise InputError(
-                f"wrench {shown(self.name)}: the largest part must be from {SMALLEST:g} to "
+                f"wrench {shown(self.name)}: its largest component must be from {SMALLEST:g} to "
                 f"{LARGEST:g} (N or N m), got {size:g}"
             )
         if not NAME.fullmatch(self.name):
@@ -148,23 +149,22 @@ class Agenda:
     critical_friction: bool = True
     """Whether to find the critical friction in simulation."""
     limits: LimitSearch = "none"
-    """How to find the largest multiple of each wrench in simulation, if at all."""
+    """How the largest multiple of each wrench is found in simulation, if at all."""
     independent: bool = False
-    """Whether to also run the trials of `unplanned_bounds`, which do not know the planned
-    forces."""
+    """Whether to run the trials of `unplanned_bounds` too, which use no planned finger forces."""
     controls: bool = True
     rules: tuple[str, ...] = ()
-    """Names of other tools' acceptance rules that also judge the same traces."""
+    """Names of other validators' acceptance rules that also judge the same trials."""
     trials: int = 0
-    """How many times all holds are repeated with noise."""
+    """How many times all trials that hold a wrench are repeated with noise."""
     noise: Noise = field(default_factory=Noise)
     keep_traces: bool = False
     seed: int = 0
-    """Seed of the random wrenches, of noise, and of how contacts are moved for a negative
-    control."""
+    """Seed of the random wrenches, of noise, and of how contacts are moved to make a negative
+    control (contacts that must fail)."""
 
     def __post_init__(self) -> None:
-        """Refuse settings that no trial can be made of, and names that two wrenches would share."""
+        """Refuse settings that no trial can use, and names that two wrenches would share."""
         one_of(self.limits, get_args(LimitSearch), "limits")
         whole(self.random_wrenches, "random_wrenches", most=MOST_RANDOM_WRENCHES)
         whole(self.trials, "trials", most=MOST_TRIALS)
@@ -180,12 +180,14 @@ class Agenda:
         taken = {*AXIS_NAMES, WEAKEST, *drawn}
         for each in self.wrenches:
             if each.name in taken:
-                raise InputError(f"two wrenches are named {each.name!r}: rename yours")
+                raise InputError(
+                    f"two wrenches are named {each.name!r}: give one of them another name"
+                )
             taken.add(each.name)
 
 
 def with_planned_radius(fingers: FingerSettings, planned: Finger | None) -> FingerSettings:
-    """Give fingertips the radius that was planned for, unless they have one of their own."""
+    """Give fingertips the radius that grasps are planned for, unless they have their own."""
     if planned is None or fingers.radius_m is not None:
         return fingers
     return replace(fingers, radius_m=planned.radius_m)

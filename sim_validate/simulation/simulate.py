@@ -1,8 +1,8 @@
-"""Scene and schedules -> motions; the only module that steps MuJoCo.
+"""Simulates scenes under schedules and returns motions; the only module that steps MuJoCo.
 
-The scene's text is always what is compiled, so that the text is the whole experiment. All trials of
-a scene run together on MuJoCo's own threads; each is bit for bit what a plain loop over `mj_step`
-gives, whatever the number of threads.
+The text of a scene is always what is compiled, so that the text is the whole experiment. All trials
+of a scene run together on MuJoCo's own threads; each is bit for bit what a plain loop over
+`mj_step` gives, whatever the number of threads.
 """
 
 # pyright: basic, reportAttributeAccessIssue=false
@@ -26,38 +26,38 @@ try:
     from mujoco import batch as mujoco_batch  # noqa: TID251
 except (ImportError, RuntimeError, AttributeError, OSError) as error:
     raise InputError(  # importing mujoco looks for graphics, which nothing here needs
-        f"MuJoCo cannot be imported ({error}); is MUJOCO_GL set to graphics that are missing? "
-        "Unset it, or reinstall the package"
+        f"MuJoCo cannot be imported ({error}). If MUJOCO_GL names graphics that are missing, "
+        "unset it; otherwise reinstall the package"
     ) from error
 
 CHUNK = 5
-"""Steps per sample: loads change, and motion is recorded, once every so many steps."""
+"""Simulation steps per sample; loads change, and motion is recorded, once per sample."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Where everything was after each of the n samples of one trial, in the world frame."""
+    """Where object and fingertips were in each of the n samples of a trial, in the world frame."""
 
     times_s: Array
-    """(n,) [s]"""
+    """Times of the samples, (n,) [s]."""
     joints: Array
     """Joint positions, (n, 7 + 3k), or (n, 7) for rigid fingertips [m]: position (3) and quaternion
     (4) of the object's frame, then the slides (3) of each fingertip along its contact's axes."""
     state: Array
     """Complete state of the simulator at the end, from which a further trial can start."""
     finite: bool
-    """Whether every number of the state stayed finite."""
+    """Whether every number of the simulator's state stayed finite."""
     warnings: int
     """How many warnings the simulator raised."""
     clock_error_s: float
     """Simulated time minus the time stepped [s]; it is not zero after a silent reset."""
     error: str
-    """The simulator's own message if it gave up, else empty."""
+    """The simulator's own message if it gave up, otherwise empty."""
     timed_out: bool
     """Whether the trial was stopped before its end."""
 
     def after(self, earlier: "Motion") -> "Motion":
-        """Add the faults of the motion whose end state this motion started from."""
+        """Add the faults of the earlier motion whose end state this motion started from."""
         return replace(
             self,
             finite=earlier.finite and self.finite,
@@ -123,7 +123,7 @@ class Bench:
     def _step_through(
         self, trials: mujoco_batch.Batch, schedules: Sequence[Schedule]
     ) -> tuple[Array, dict[int, str]]:
-        """Joint positions of m trials in the samples done, (m, n, q), and errors by trial."""
+        """Step m trials; return joint positions so far, (m, n, q), and errors by trial."""
         layout = self.scene.layout
         wrenches = np.array([schedule.wrenches for schedule in schedules])
         wrenches[..., 3:] -= np.cross(layout.center, wrenches[..., :3])
@@ -156,7 +156,7 @@ def _compiled(scene: Scene) -> mujoco.MjModel:
     try:
         return mujoco.MjModel.from_xml_string(scene.xml)
     except ValueError as error:
-        raise InputError(f"the simulator refuses the scene: {error}") from error
+        raise InputError(f"MuJoCo cannot compile the scene: {error}") from error
 
 
 def _step(trials: mujoco_batch.Batch, errors: dict[int, str]) -> None:
@@ -209,7 +209,7 @@ def first_touch(scene: Scene) -> tuple[Array, Array]:
 
 
 def acceleration(scene: Scene, wrenches: Array) -> Array:
-    """The object's instant acceleration under each of several wrenches, with unloaded fingers.
+    """Compute the object's first acceleration under several wrenches, with unloaded fingers.
 
     Args:
         scene: A scene with rigid fingertips that touch the object.

@@ -1,8 +1,8 @@
-"""Motion -> trace: how far the object moved and turned, and what each contact did.
+"""Measures a simulated motion: how far the object moved and turned, and what each contact did.
 
-Displacements are differences of the object's pose from its pose at the moment when it had to stay
-where it was; contact counts play no part. A rotation counts as the path of a point one grasp size
-away.
+Displacements are differences between the object's pose and its pose at the moment from which it had
+to stay; the number of contacts plays no part. A rotation counts as the path of a point one grasp
+size away.
 """
 
 from dataclasses import dataclass
@@ -15,22 +15,22 @@ from scenes.layout import Layout
 from sim_validate.simulation.simulate import Motion
 
 CLOCK_SLACK_S = 1e-9
-"""Largest clock error that is rounding [s]: simulated time is a sum of equal steps, and a reset
-would change it by milliseconds."""
+"""Largest clock error that counts as rounding [s]: simulated time is a sum of equal steps, and a
+reset would change it by milliseconds."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trace:
-    """Motion of the object and fingertips in the n samples from the moment watching began."""
+    """Motion of object and fingertips in the n samples from the moment the object must stay."""
 
     times_s: Array
-    """(n,) [s]"""
+    """Times of the samples, (n,) [s]."""
     displacements_m: Array
     """Motion of the point between the contacts plus grasp size times rotation, (n,) [m]."""
     shifts_m: Array
     """Motion of the point between the contacts alone, (n,) [m]."""
     rotations_rad: Array
-    """(n,) [rad]"""
+    """Rotation of the object, (n,) [rad]."""
     slips_m: Array
     """Tangential motion of each fingertip over its face, (n, k) [m]."""
     gaps_m: Array
@@ -39,21 +39,21 @@ class Trace:
     """Where each fingertip touches, in the object's frame about its centre of mass, (n, k, 3)
     [m]."""
     start_m: float
-    """Displacement from the planned pose at the moment watching began [m]."""
+    """Displacement from the planned pose at the first sample of the trace [m]."""
     finite: bool
-    """Whether every number of the state stayed finite."""
+    """Whether every number of the simulator's state stayed finite."""
     warnings: int
     """How many warnings the simulator raised."""
     clock_error_s: float
     """Simulated time minus the time stepped [s]; it is not zero after a silent reset."""
     error: str = ""
-    """The simulator's own message if it gave up, else empty."""
+    """The simulator's own message if it gave up, otherwise empty."""
     timed_out: bool = False
     """Whether the trial was stopped before its end."""
 
     @property
     def fault(self) -> str:
-        """Why the trace says nothing about the object; empty if it does."""
+        """Why the trial proves nothing about the object, such as divergence; else empty."""
         if self.error:
             return self.error
         if self.timed_out:
@@ -67,12 +67,12 @@ class Trace:
         return ""
 
     def stayed(self, threshold_m: float) -> bool | None:
-        """Whether no displacement reached a threshold [m]; None if the trace says nothing."""
+        """Tell whether no displacement reached a threshold [m]; None if the trial is not valid."""
         return None if self.fault else bool((self.displacements_m < threshold_m).all())
 
 
 def trace(motion: Motion, layout: Layout, watched: int) -> Trace:
-    """Measure displacements, slips and gaps on a motion.
+    """Measure displacements, slips and gaps in a motion.
 
     Args:
         motion: Motion of one trial.
@@ -108,14 +108,14 @@ def trace(motion: Motion, layout: Layout, watched: int) -> Trace:
 
 
 def _moved(joints: Array, start: Array, layout: Layout) -> tuple[Array, Array]:
-    """Motion of the point between the contacts [m] and rotation [rad] since a start, (n,) each."""
+    """Measure motion of the point between the contacts [m] and rotation [rad], (n,) each."""
     ahead = joints[:, :3] + rotated(joints[:, 3:7], layout.center)
     shifts = np.linalg.norm(ahead - start[:3] - rotated(start[None, 3:7], layout.center), axis=1)
     return shifts, rotation_angles(joints[:, 3:7], start[3:7])
 
 
 def _tips(joints: Array, layout: Layout) -> Array:
-    """Fingertip centres in the object's frame, (n, k, 3)."""
+    """Compute fingertip centres in the object's frame, (n, k, 3)."""
     slides = joints[:, 7:].reshape(len(joints), (joints.shape[1] - 7) // 3, 3)
     if not slides.shape[1]:  # rigid fingertips
         slides = np.zeros((1, len(layout.contacts), 3))
@@ -134,7 +134,7 @@ def rotated(quaternions: Array, vectors: Array) -> Array:
 
 
 def rotation_angles(quaternions: Array, start: Array) -> Array:
-    """Angles between orientations (n, 4) and one (4,), exact for small angles, (n,) [rad]."""
+    """Compute angles between orientations (n, 4) and one (4,), exact when small, (n,) [rad]."""
     w, v = quaternions[:, 0], quaternions[:, 1:]
     along = np.abs(quaternions @ start)
     across = start[0] * v - w[:, None] * start[1:] - np.cross(v, start[1:])

@@ -1,7 +1,7 @@
-"""Bounds on a grasp that simulation finds without knowing the planned forces.
+"""Bounds on friction and wrenches that simulation finds without knowing the planned forces.
 
-Forces planned for a load presume the analysis that they are to confirm. Three kinds of trial need
-none:
+Forces planned for a load presume the analysis that they are to confirm. Three kinds of trial
+need none of these forces:
 
 * Rigid fingertips are each put equally deep into their faces, so that elasticity alone squeezes the
   object. The least friction at which the object stays is never below the critical friction: where
@@ -31,43 +31,46 @@ from sim_validate.simulation.simulate import Bench, acceleration
 from sim_validate.simulation.traces import Trace
 
 INDENTATION = 2e-5
-"""Depth of rigid fingertips, in grasp sizes. Much deeper ones let the object turn and adapt, and
-accept frictions below the critical one; without depth, contacts open and nothing holds."""
+"""Depth to which rigid fingertips are put into the faces, in grasp sizes. Much deeper ones let the
+object turn and adapt, and accept frictions below the critical one; without depth, contacts open and
+nothing holds."""
 TOUCH = 2e-6
-"""Depth of rigid fingertips for the first instant, in grasp sizes. It is not zero because vertices
+"""Depth of rigid fingertips that only just touch, in grasp sizes. It is not zero because vertices
 of a mesh have single precision."""
 STEPS = (0.98, 1.02, 1.05, 1.1, 1.2, 1.4, 1.7, 2.0, 3.0, 5.0)
-"""Frictions at which rigid fingertips are tried, relative to the critical one."""
+"""Frictions at which rigid fingertips are tried, relative to the critical friction."""
 STIFFER = 20.0
-"""Stiffness of servos that keep a fixed squeeze, relative to those that follow planned forces."""
+"""Stiffness of the servos that keep a fixed squeeze, relative to servos that follow planned
+forces."""
 RISE_S = 2.0
 LARGEST_SHARE = 1.2
-"""Largest load with a fixed squeeze, relative to the predicted limit. The load rises to it in
-`RISE_S` seconds, which is slow enough."""
+"""Largest load that is tried with a fixed squeeze, relative to the predicted limit. The load rises
+to it in `RISE_S` seconds, which is slow enough."""
 SLIDING = 1e-3
-"""Slide of a fingertip at which a fixed squeeze has given way, in grasp sizes."""
+"""Slide of a fingertip at which a fixed squeeze counts as given way, in grasp sizes."""
 SLACK = 0.05
-"""Relative excess by which a fixed squeeze may seem to pass a limit: the object moves under the
-load by some per cent of the grasp size."""
+"""Relative excess by which a fixed squeeze may seem to pass a predicted limit: the object moves
+under the load by some per cent of the grasp size."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """What was found without planned forces."""
+    """Bounds on friction and wrenches that trials without planned forces gave."""
 
     friction_at_most: float | None
-    """Least friction tried at which rigid fingertips hold the object; None if they never did. It
-    must not be below the critical friction."""
+    """Least friction tried at which rigid fingertips hold the object; None if they never did. If
+    the analysis is right, it is not below the critical friction."""
     friction_slipped: float | None
-    """Largest friction tried below that at which they did not hold it; None if they always did."""
+    """Largest friction below `friction_at_most` at which the object slipped; None if it never
+    did."""
     limit_shares: tuple[float, ...]
-    """Share of the predicted limit of each wrench at which a fixed squeeze gives way."""
+    """For each wrench, the share of its predicted limit at which a fixed squeeze gives way."""
     residual: float
-    """Largest share of an axis wrench that is left to accelerate the object in the first instant.
-    Below about 0.3 every wrench is opposed; near one some wrench is not."""
+    """Largest share of an axis wrench that accelerates the object in the first instant. Below about
+    0.3 every wrench is opposed; near one some wrench is not."""
 
     def agree(self, critical: float) -> bool:
-        """Whether the bounds lie on the right side of the predictions."""
+        """Tell whether the bounds lie on the right side of the predictions."""
         lowest = self.friction_at_most is None or self.friction_at_most >= critical
         return lowest and max(self.limit_shares) <= 1.0 + SLACK
 
@@ -75,7 +78,7 @@ class Bounds:
 def independent_bounds(
     body: Polyhedron, grasp: Grasp, critical: float, rig: Rig, limits: Sequence[Load]
 ) -> Bounds:
-    """Bounds from rigid fingertips, a fixed squeeze and the first instant.
+    """Measure bounds with rigid fingertips, with a fixed squeeze, and in the first instant.
 
     Args:
         body: The object.
@@ -96,7 +99,7 @@ def independent_bounds(
 def _rigid_friction(
     body: Polyhedron, grasp: Grasp, critical: float, setup: Setup
 ) -> tuple[float | None, float | None]:
-    """Largest friction tried at which the object slipped, and least at which it stayed."""
+    """Find the largest friction at which the object slipped, and the least at which it stayed."""
     protocol = setup.friction
     frictions = [step * max(critical, protocol.least_friction) for step in STEPS]
     high = protocol.settling_friction * max(frictions)
@@ -121,7 +124,7 @@ def _rigid(
 def _fixed_squeeze(
     body: Polyhedron, grasp: Grasp, rig: Rig, limits: Sequence[Load]
 ) -> tuple[float, ...]:
-    """The share of each limit at which a finger begins to slide, with unchanged forces.
+    """Find the share of each limit at which a finger slides although forces stay unchanged.
 
     The servos are stiffer than usual, because without planned forces their springs give way to the
     whole load.
@@ -140,7 +143,7 @@ def _fixed_squeeze(
 
 
 def _until(trace: Trace, shares: Array, threshold: float) -> float:
-    """The share that is applied before a finger slides over its face, or leaves it."""
+    """Return the share of the load that is applied when a finger slides over or leaves its face."""
     moved = np.maximum(trace.slips_m, trace.gaps_m).max(axis=1)
     sliding = np.flatnonzero(~(moved < threshold))
     count = int(sliding[0]) if sliding.size else len(trace.times_s)
@@ -148,7 +151,7 @@ def _until(trace: Trace, shares: Array, threshold: float) -> float:
 
 
 def first_residual(body: Polyhedron, grasp: Grasp, friction: float, setup: Setup) -> float:
-    """Largest share of an axis wrench that accelerates the object before anything can move."""
+    """Compute the largest share of an axis wrench that accelerates the object at first."""
     physics = replace(
         setup.physics, diagexact=True, solref=(0.02, 1.0), tolerance=1e-15,
         solimp=(0.9999, 0.9999, 0.001, 0.5, 2.0),

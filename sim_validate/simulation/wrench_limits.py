@@ -1,10 +1,10 @@
-"""The largest multiple of each wrench that a grasp resists in simulation, by ramp or bisection.
+"""Finds the largest multiple of each wrench that a grasp resists in simulation.
 
-Both methods load the object with a share of the predicted limit and the forces planned for it,
-which lie that share of the way from the gentle squeeze to the forces at the limit. They balance the
-load, because both ends do. Below the limit they are inside the cones and the limits on the push,
-again because both ends are. Above it, up to twice the limit, the forces still balance on paper, but
-friction gives way, or a finger cannot push harder.
+There are two methods, ramp and bisection. Both load the object with a share of the predicted limit
+and the forces planned for it, which lie that share of the way from the gentle squeeze to the forces
+at the limit. They balance the load, because both ends do. Below the limit they are inside the cones
+and the limits on the push, again because both ends are. Above it, up to twice the limit, the forces
+still balance on paper, but friction gives way, or a finger cannot push harder.
 
 A ramp passes the limit slowly. The load left over grows in proportion to the time since, so the
 displacement grows with its third power and the ramp ends late. A displacement eight times as large
@@ -24,24 +24,26 @@ from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.traces import Trace
 
 LATER = 8.0
-"""Displacement at the second reading of a ramp, relative to the threshold; 8 = 2 cubed."""
+"""Displacement at the second reading of a ramp, relative to the first; 8 = 2 cubed."""
 OVERLOAD = 2.0
-"""Largest share of the limit for which forces are planned; for larger loads the forces stay."""
+"""Largest share of the limit for which forces are planned; for larger loads the forces stay the
+same."""
 HELD, SLID, UNKNOWN = 1, 0, -1
 
 
 @dataclass(frozen=True, slots=True)
 class SimulatedLimit:
-    """The shares of the predicted limit between which the object lets go."""
+    """Two shares of a wrench's predicted limit: the object holds the first and not the second."""
 
     lower: float
     upper: float
     share: float
-    """The best estimate: where a ramp passed its threshold, or the middle of a bisection."""
+    """Best estimate of the share of the predicted limit at which the object lets go: where a ramp
+    passed its threshold, or the middle of a bisection."""
 
 
 def ramped_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | None, ...]:
-    """Find by ramps the shares of the limits at which the object lets go; None where it does not.
+    """Find by slowly rising loads the shares of the limits at which the object lets go.
 
     Args:
         rig: The squeezed object.
@@ -61,7 +63,7 @@ def _in_some_span(
     limits: Sequence[Load],
     search: Callable[[Sequence[Load], float], Sequence[SimulatedLimit | None]],
 ) -> tuple[SimulatedLimit | None, ...]:
-    """Search near each predicted limit first, then in wider spans; None where nothing is found."""
+    """Search near each predicted limit first, then in wider intervals; None if nothing is found."""
     found: dict[int, SimulatedLimit] = {}
     for span in rig.setup.limit.spans:
         rest = [place for place in range(len(limits)) if place not in found]
@@ -73,7 +75,7 @@ def _in_some_span(
 
 
 def _onset(trace: Trace, shares: Array, threshold: float) -> SimulatedLimit | None:
-    """Find where a ramp lets go; None if it does not, or does at its very start.
+    """Find where a ramp lets go; None if it does not let go, or does at its very start.
 
     Within a sample the displacement grows with the third power of time.
     """
@@ -94,7 +96,7 @@ def _onset(trace: Trace, shares: Array, threshold: float) -> SimulatedLimit | No
 
 
 def bisected_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | None, ...]:
-    """Bisect the shares of the limits between holding and letting go; None where in no span.
+    """Find the shares of the limits at which the object lets go, by bisection.
 
     Args:
         rig: The squeezed object.
@@ -122,7 +124,7 @@ def bisected_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | 
 
 
 def _ends(rig: Rig, limits: Sequence[Load], shares: Array) -> Indices:
-    """Whether shares of loads hold: `HELD`, `SLID`, or `UNKNOWN` if a trial says nothing."""
+    """Tell whether shares of loads hold: `HELD`, `SLID`, or `UNKNOWN` if a trial is not valid."""
     loads = [part(rig.idle, limit, share) for limit, share in zip(limits, shares, strict=True)]
     layout, protocol = rig.bench.scene.layout, rig.setup.hold
     ends = [holds(trace, layout, protocol) for trace in rig.hold(loads)]
@@ -130,7 +132,7 @@ def _ends(rig: Rig, limits: Sequence[Load], shares: Array) -> Indices:
 
 
 def part(idle: Load, limit: Load, share: float) -> Load:
-    """A share of a limiting wrench, with forces between those without load and at the limit.
+    """Return a share of a wrench, with forces between those without load and those at the limit.
 
     Args:
         idle: The forces that squeeze the unloaded object, without a wrench.

@@ -13,7 +13,7 @@ from sim_validate.validation.validation import validate
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One grasp to validate, as it is sent to a worker."""
+    """One grasp to validate, as it is sent to a worker process."""
 
     body: Polyhedron
     grasp: Grasp

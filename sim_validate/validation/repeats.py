@@ -116,7 +116,7 @@ def for_repeats(setup: Setup, scene: Scene) -> Setup:
 def disturbed_in(
     body: Polyhedron, grasp: Grasp, friction: float, agenda: Agenda, number: int
 ) -> Disturbed:
-    """Disturb a grasp by the noise of one repeat."""
+    """Disturb a grasp by the noise of one repeated trial."""
     return disturbed(body, grasp, friction, agenda.noise, (agenda.seed, number))
 
 

@@ -61,7 +61,7 @@ def validate(
 
     Raises:
         InputError: The contacts are not on the body's faces, or not closed at this friction.
-        UnfaithfulError: The simulator fails the gate with these settings.
+        UnfaithfulError: The simulator fails its checks with these settings.
     """
     check_on_faces(body, grasp)
     coefficient(friction)
@@ -109,7 +109,7 @@ def simulated_critical_friction(
 
     Raises:
         InputError: The contacts are not on the body's faces, or never in force closure.
-        UnfaithfulError: The simulator fails the gate with these settings.
+        UnfaithfulError: The simulator fails its checks with these settings.
     """
     check_on_faces(body, grasp)
     setup = _given(setup, Setup(), "setup")

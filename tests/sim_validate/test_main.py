@@ -350,7 +350,7 @@ def test_planning_flags_reach_the_planner(capsys):
         (["--edge-clearance-m", "5"], "clearance must be a number from 0"),
         (["--complete", "--family", "pencil"], "takes the free method"),
         (["--optimize", "--share-faces-m", "0.01"], "leave out --optimize or these"),
-        (["--unit", "mm"], "box is built in"),
+        (["--unit", "mm"], "box is a built-in object"),
     ],
 )
 @pytest.mark.usefixtures("here")

@@ -1,4 +1,5 @@
-"""How is a dataset made, on one machine or many, and resumed?
+"""How is a dataset made, on one machine or many, and resumed after an interruption?
 
-A configuration becomes staged units of work, and these become whole tables.
+The work is split into units: one object at one friction each. Every finished unit is kept in a
+staging folder; in the end the rows of all units become the tables of the dataset.
 """

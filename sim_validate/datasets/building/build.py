@@ -1,6 +1,6 @@
-"""From a configuration to a finished dataset in a folder; finished units are not computed again.
+"""Builds a dataset in a folder; work finished by an earlier, interrupted build is not repeated.
 
-The manifest is written last; once it is there, the staging folder is removed.
+The manifest, which lists all files, is written last; then the staging folder is removed.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,16 +32,16 @@ from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.setup import Setup
 
 OWN = ("staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST)
-"""Names of all files and folders that a dataset's folder may hold."""
+"""Names of all files and folders that the folder of a dataset may hold."""
 
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """The result of a build: how many units and rows there are."""
+    """The result of a build: how many units of work and rows the dataset has."""
 
     units: int
     made: int
-    """Units that were computed in this run."""
+    """Number of units of work that were computed in this run."""
     quarantined: int
     rows: dict[Name, int]
 
@@ -53,21 +53,21 @@ def build(
     report: Callable[[int, int], None],
     limits: Limits | None = None,
 ) -> Built:
-    """Make a dataset, or resume making it.
+    """Build a dataset, or resume an interrupted build.
 
     Args:
         config: What the dataset is made of.
         folder: Folder of the dataset; it may hold an unfinished or finished dataset of the same
             configuration.
-        engine: The engine that computes units.
+        engine: What computes the units of work: processes of this machine, or a cluster.
         report: Called with (finished, total) after each unit.
-        limits: Time and memory for each unit; only for engines with processes of their own.
+        limits: Time and memory for each unit; not for an engine that computes in this process.
 
     Raises:
-        InputError: An object does not exist, the folder holds something else, or another command is
-            at work in it.
-        UnfaithfulError: The simulator fails the gate.
-        WorkerError: A worker cannot compute units for this driver.
+        InputError: An object does not exist, the folder holds other files, or another command is
+            writing to it.
+        UnfaithfulError: The simulator fails its checks on cases with known answers.
+        WorkerError: A worker process cannot compute units of work.
     """
     pyarrow()  # before any work, so that a missing library is named at once
     units = units_of(config)
@@ -92,16 +92,18 @@ def build(
 
 
 def _refuse_sources_inside(units: Sequence[WorkUnit], config: DatasetConfig, folder: Path) -> None:
-    """Refuse to write over the meshes or contacts that the dataset is made of."""
+    """Refuse an output folder that holds the meshes or contacts that the dataset is made of."""
     sources = [unit.path for unit in units if unit.path is not None]
     sources += [Path(config.contacts).resolve()] if config.contacts else []
     for path in sources:
         if path.is_relative_to(folder.resolve()):
-            raise InputError(f"{path}: lies in {folder}; give an --out that holds nothing else")
+            raise InputError(
+                f"{path}: this input lies in the output folder {folder}; give another --out"
+            )
 
 
 def _refuse_others(folder: Path, config: DatasetConfig) -> None:
-    """Refuse a folder of something else, and remove half-written files of a killed build.
+    """Refuse a folder with other files, and remove half-written files of a killed build.
 
     Raises:
         InputError: The folder holds other files, or a dataset of another configuration.
@@ -113,16 +115,20 @@ def _refuse_others(folder: Path, config: DatasetConfig) -> None:
         if path.name.startswith(half_written):
             path.unlink()
         elif path.name not in own:
-            raise InputError(f"{path}: exists, but is not part of this dataset; give another --out")
+            raise InputError(
+                f"{path}: this file is not part of the dataset to write; give an empty or new "
+                "folder as --out"
+            )
     if stated.is_file() and read_text(stated) != config_to_toml(config):
         raise InputError(
-            f"{folder}: holds a dataset of another configuration (see its {CONFIG}); give "
-            "another --out, or the same settings to go on"
+            f"{folder}: the folder holds a dataset made with other settings (see its {CONFIG}); "
+            "give "
+            "another --out, or the same settings to resume that dataset"
         )
 
 
 def _as_built(folder: Path, units: Sequence[WorkUnit], made: int = 0) -> Built:
-    """Describe a finished dataset, after a check that it is the wanted one.
+    """Describe a finished dataset, after a check that it is the one asked for.
 
     Raises:
         InputError: The dataset was made from other meshes or contacts, or by other versions, or is
@@ -131,14 +137,14 @@ def _as_built(folder: Path, units: Sequence[WorkUnit], made: int = 0) -> Built:
     manifest = read_manifest(folder)
     if manifest.units_sha256 != units_sha256(units):
         raise InputError(
-            f"{folder}: is finished, but its meshes, its contacts or the versions of packages "
-            "have changed since; give another --out to make it again"
+            f"{folder}: this dataset is finished, but its meshes, contacts or package versions "
+            "have changed since then; give another --out to make it again"
         )
     for each in manifest.files:
         path = path_inside(folder, each.path)
         if not path.is_file() or path.stat().st_size != each.bytes:
             raise InputError(
-                f"{path}: is missing or damaged, though the dataset was finished (see `dataset "
+                f"{path}: this file of a finished dataset is missing or damaged (see `dataset "
                 "verify`); give another --out to make it again"
             )
     return Built(len(units), made, manifest.quarantined, manifest.rows())

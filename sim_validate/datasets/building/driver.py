@@ -1,9 +1,10 @@
-"""The loop that has an engine compute work units, and records how each of them ended.
+"""Distributes units of work to worker processes, and records how each unit ended.
 
-An engine submits a task and returns a future. A unit whose worker ends, or that takes too long, is
-tried once more when nothing else is under way; then it is quarantined with its reason. A unit that
-fails with an error of this project is quarantined at once, by the worker: it would fail again. A
-failure that would befall every unit - a full disk, a worker with other packages - ends the run.
+An engine submits a unit to a worker process and returns a future. A unit whose worker dies, or that
+takes too long, is tried once more when nothing else is under way; then it is quarantined: left out,
+with the reason recorded. A unit that fails with an error of this project is quarantined at once,
+because it would fail again. A failure that would befall every unit - a full disk, a worker with
+other packages - ends the build.
 """
 
 import time
@@ -18,23 +19,23 @@ from sim_validate.datasets.units import WorkUnit, provenance
 from sim_validate.parallel import interrupts
 
 AHEAD = 3
-"""Units under way per worker, so that no worker waits for the driver."""
+"""Number of units submitted per worker process, so that no worker waits for the next unit."""
 LOOK_S = 1.0
 """Time between two checks for an interrupt [s]."""
 
 
 class Engine(Protocol):
-    """Something that computes units on some workers."""
+    """What computes units of work: processes of this machine, or a Ray or Dask cluster."""
 
     workers: int
 
     @property
     def ended(self) -> tuple[str, ...]:
-        """Names of the errors which say that a worker ended, not that it could not begin."""
+        """Names of the errors which say that a worker process died while it computed."""
         ...
 
     def submit(self, function: Callable[[Task], None], task: Task, /) -> "Future[None]":
-        """Start a task on a worker."""
+        """Start a task on a worker process."""
         ...
 
 
@@ -46,7 +47,7 @@ def drive(
     limits: Limits | None = None,
     work: Work = do_unit,
 ) -> None:
-    """Have units computed; each is kept or quarantined in the end.
+    """Have all units computed; each one is kept or quarantined in the end.
 
     Args:
         units: The units to compute.
@@ -57,8 +58,8 @@ def drive(
         work: The function that computes a unit.
 
     Raises:
-        WorkerError: A worker cannot compute units for this driver.
-        OSError: Rows cannot be written.
+        WorkerError: A worker process cannot compute units of work.
+        OSError: The rows of a unit cannot be written.
     """
     own = dict(provenance())
     told = -1
@@ -87,7 +88,7 @@ def drive(
 
 
 def _try_alone(task: Task, engine: Engine) -> None:
-    """Try a unit once more by itself; a second failure is its own fault."""
+    """Try a unit once more with no other unit under way; quarantine it if it fails again."""
     began = time.monotonic()
     future = engine.submit(do_task, task)
     while not wait([future], timeout=LOOK_S).done:
@@ -101,10 +102,10 @@ def _try_alone(task: Task, engine: Engine) -> None:
 
 
 def _succeeded(future: "Future[None]", task: Task, engine: Engine) -> bool:
-    """Whether a unit was computed; False if its worker ended, or was ended.
+    """Tell whether a unit was computed; False if its worker process died or was stopped.
 
     Raises:
-        WorkerError: The worker cannot compute units for this driver.
+        WorkerError: The worker process cannot compute units of work.
         OSError: The unit's rows could not be written.
     """
     error = future.exception()
@@ -112,12 +113,16 @@ def _succeeded(future: "Future[None]", task: Task, engine: Engine) -> bool:
         if task.staging.finished(task.unit):
             return True
         raise WorkerError(
-            f"{task.staging.folder}: a unit is finished, but its rows are missing; --out must be "
-            "on a file system that driver and workers share"
+            f"{task.staging.folder}: a worker process has computed rows that do not appear here; "
+            "--out must be "
+            "on a file system that all processes share"
         )
     if type(error).__name__ in engine.ended:
         return False
     if isinstance(error, WorkerError | OSError | KeyboardInterrupt):
         raise error
     name = type(error).__name__
-    raise WorkerError(f"a worker cannot compute units: {name}: {error}") from error
+    raise WorkerError(
+        f"a worker process failed before it could compute ({name}: {error}); install the same "
+        "packages for all workers"
+    ) from error

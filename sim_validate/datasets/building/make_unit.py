@@ -1,4 +1,4 @@
-"""A work unit -> rows and files: grasps are planned or given, and tried in simulation."""
+"""Computes one unit of work: grasps are planned or given, simulated, and turned into rows."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,24 +22,24 @@ from sim_validate.validation.validation import validate
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """The rows and files of a unit."""
+    """The rows and files of one unit of work."""
 
     object_id: str
     split: str
     rows: Rows
     files: Mapping[str, str]
-    """Texts of the files by their paths in the dataset's folder."""
+    """Texts of the files, by their paths in the dataset's folder."""
 
 
 def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
-    """Plan the grasps of a unit or judge the given ones, try each, and make rows of everything.
+    """Plan the grasps of a unit or judge the given ones, simulate them, and make their rows.
 
     Args:
         unit: The unit to compute.
         body: The object of the unit.
 
     Raises:
-        GraspError: The simulator fails its gate.
+        GraspError: The simulator fails its checks on cases with known answers.
     """
     making = _Making(unit, body)
     if unit.given:
@@ -55,7 +55,7 @@ def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
 
 
 class _Making:
-    """The rows and files of a unit while they are made."""
+    """The rows and files of a unit of work while they are made."""
 
     def __init__(self, unit: WorkUnit, body: Polyhedron) -> None:
         self.unit, self.body = unit, body
@@ -68,7 +68,7 @@ class _Making:
         )
 
     def plan(self) -> None:
-        """Plan and try the best grasps of each family, planned separately."""
+        """Plan the best grasps of each family separately, and simulate them."""
         config = self.unit.config
         for family in config.families:
             planned = plan(
@@ -79,7 +79,7 @@ class _Making:
                 self.found.add(grasp, self._tried(grasp, self.body))
 
     def judge(self) -> None:
-        """Judge the given grasps; those that cannot be tried get a row with the reason."""
+        """Judge the given grasps; a grasp that cannot be simulated gets a row with the reason."""
         for given in self.unit.given:
             try:
                 self._judge(given)
@@ -87,11 +87,11 @@ class _Making:
                 self.found.add_untried(given, str(error))
 
     def _judge(self, given: GivenGrasp) -> None:
-        """Try a given grasp, as a grasp if its contacts are closed, else as a control.
+        """Simulate a given grasp: as a grasp if force-closed, else as a negative control.
 
         Raises:
             InputError: A contact is not on the object, or fingertips find no room.
-            UndecidedError: Closure is too close to decide.
+            UndecidedError: Rounding does not let closure be decided.
         """
         friction = self.unit.friction
         seated = seat(self.body, given.points, given.normals)

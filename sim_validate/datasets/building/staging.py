@@ -1,7 +1,7 @@
-"""Finished units in a folder: one subfolder per unit, renamed into place in one step.
+"""Keeps finished units of work in a staging folder: one subfolder per unit, renamed in one step.
 
 A unit that was killed leaves only a temporary folder, which the next run removes. So every
-subfolder is complete, and a restarted run repeats only the units that were under way.
+subfolder is complete, and a resumed build repeats only the units that were under way.
 """
 
 import hashlib
@@ -27,9 +27,9 @@ from sim_validate.files.reading import read_bytes, read_text
 
 RECORD = "unit.json"
 OTHERS = "others"
-"""Folder of a unit's files that are no tables."""
+"""Subfolder for those files of a unit that are not tables."""
 UNFINISHED = "."
-"""First letter of the names of temporary folders."""
+"""First character of the names of temporary folders."""
 
 
 MOST_BYTES = 2**31
@@ -37,7 +37,7 @@ MOST_BYTES = 2**31
 
 
 class UnitRecord(BaseModel):
-    """The record of a unit: where its rows belong, or why it has none."""
+    """Record of a finished unit of work: where its rows belong, or why it has none."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
@@ -52,7 +52,7 @@ class UnitRecord(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """A unit that has rows."""
+    """A finished unit of work that has rows."""
 
     unit: WorkUnit
     object_id: str
@@ -61,7 +61,7 @@ class Finished:
 
 @dataclass(frozen=True, slots=True)
 class Staging:
-    """The folder of finished units."""
+    """The folder that holds finished units of work until the dataset is complete."""
 
     folder: Path
 
@@ -70,11 +70,11 @@ class Staging:
         self.folder.mkdir(parents=True, exist_ok=True)
         for path in self.folder.iterdir():
             if path.name.startswith(UNFINISHED):
-                # a worker of a killed driver may still write here
+                # a worker process of a killed build may still write here
                 shutil.rmtree(path, ignore_errors=True)
 
     def remove(self) -> None:
-        """Remove the whole folder, once its contents are in a finished dataset."""
+        """Remove the whole staging folder, once a finished dataset holds its contents."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def write(self, unit: WorkUnit, made: Made) -> None:
@@ -84,11 +84,11 @@ class Staging:
         self._put(unit, {**tables, **others}, object_id=made.object_id, split=made.split)
 
     def quarantine(self, unit: WorkUnit, reason: str) -> None:
-        """Record that a unit cannot be computed."""
+        """Record that a unit cannot be computed, with the reason."""
         self._put(unit, {}, reason=reason)
 
     def result(self, unit: WorkUnit) -> Finished | str:
-        """Look up the result of a unit: its object and split, or why it has no rows.
+        """Look up how a unit ended: with its object and split, or with a reason for no rows.
 
         Raises:
             InputError: The record of the unit is damaged.
@@ -98,12 +98,13 @@ class Staging:
             return record.reason
         if record.object_id is None or record.split is None:
             raise InputError(
-                f"{self._of(unit) / RECORD}: records neither rows nor a reason; build again"
+                f"{self._of(unit) / RECORD}: this record names neither rows nor a reason for "
+                "having none; remove its folder and build again"
             )
         return Finished(unit, record.object_id, record.split)
 
     def done(self, unit: WorkUnit) -> bool:
-        """Whether a unit is finished or quarantined, with all its files as they were written."""
+        """Tell whether a unit is finished or quarantined, and all its files are as written."""
         try:
             record = self._record(unit)
             self.result(unit)  # raises if the record says nothing
@@ -115,19 +116,19 @@ class Staging:
             return False
 
     def finished(self, unit: WorkUnit) -> bool:
-        """Whether a unit has a folder, with its rows or the reason why it has none."""
+        """Tell whether a unit has a folder, with its rows or the reason why it has none."""
         return self._of(unit).is_dir()
 
     def table(self, unit: WorkUnit, name: Name) -> Path:
-        """Path of a finished unit's rows in one of the tables."""
+        """Return the path of a finished unit's rows in one of the tables."""
         return self._of(unit) / _file(name)
 
     def copy_files(self, unit: WorkUnit, folder: Path) -> None:
-        """Copy the files that a finished unit made beside its rows into the dataset."""
+        """Copy the files that a finished unit made besides its rows into the dataset."""
         shutil.copytree(self._of(unit) / OTHERS, folder, dirs_exist_ok=True)
 
     def forget(self, unit: WorkUnit) -> None:
-        """Remove a unit whose files are damaged."""
+        """Remove the results of a unit whose files are damaged."""
         shutil.rmtree(self._of(unit), ignore_errors=True)
 
     def _of(self, unit: WorkUnit) -> Path:

@@ -1,8 +1,9 @@
-"""One work unit in a worker: the worker is checked, limits are enforced, rows are kept.
+"""Computes one unit in a worker process, which is checked first and limited in time and memory.
 
-A worker must run the code and the packages of the driver, or its rows would not be those of the
-driver. The system enforces the limits, whatever a unit does: a timer ends a process in which a unit
-takes too long, also inside a call that never comes back, and memory beyond the limit is refused.
+A worker process must run the same code and packages as the process that started it, or its rows
+could differ. The system enforces the limits, whatever a unit does: a timer ends a process in which
+a unit takes too long, also inside a call that never comes back, and memory beyond the limit is
+refused.
 """
 
 import errno
@@ -25,22 +26,23 @@ from sim_validate.datasets.units import WorkerError, WorkUnit, body_of, provenan
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Time and memory that one unit may use."""
+    """Time and memory that one unit of work may use."""
 
     timeout_s: float
     memory_bytes: int | None = None
-    """Address space beyond what a process needs to start; None for no limit."""
+    """Address space that a unit may use beyond that of a process that has just started; None for no
+    limit."""
 
 
 Work: TypeAlias = Callable[[WorkUnit, Staging], None]
 
 
 def do_unit(unit: WorkUnit, staging: Staging) -> None:
-    """Make the rows of a unit and keep them, or the reason why there are none.
+    """Compute the rows of a unit and keep them, or the reason why there are none.
 
     Raises:
-        WorkerError: The worker cannot see the unit's mesh.
-        OSError: Nothing can be written.
+        WorkerError: The worker process cannot see the unit's mesh.
+        OSError: The rows cannot be written.
     """
     try:
         staging.write(unit, made_of(unit, body_of(unit)))
@@ -60,23 +62,23 @@ def do_unit(unit: WorkUnit, staging: Staging) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A unit as it is sent to a worker."""
+    """A unit of work, with all that a worker process needs to compute it."""
 
     unit: WorkUnit
     staging: Staging
     provenance: Mapping[str, str]
-    """Versions and code hash of the driver."""
+    """Versions of packages, and the hash of the code, that the worker process must have, too."""
     limits: Limits | None = None
-    """Limits of the unit; None where the worker is the driver's own process."""
+    """Limits of the unit; None if the unit is computed in the process that runs the build."""
     work: Work = do_unit
 
 
 def do_task(task: Task) -> None:
-    """Compute a unit in a worker.
+    """Compute a unit in a worker process, and keep its rows.
 
     Raises:
-        WorkerError: The worker's packages are not the driver's, or it cannot see the driver's
-            folder.
+        WorkerError: The worker process has other packages, or cannot see the folder of the
+            dataset.
     """
     _check_worker(task)
     if task.limits is None:
@@ -91,13 +93,14 @@ def _check_worker(task: Task) -> None:
     for name, wanted in task.provenance.items():
         if own.get(name) != wanted:
             raise WorkerError(
-                f"a worker has another {name} than this driver: {own.get(name)} instead of "
-                f"{wanted}; install the same on both"
+                f"a worker process has another version of {name}: {own.get(name)} instead of "
+                f"{wanted}; install the same version everywhere"
             )
     if not task.staging.folder.is_dir():
         raise WorkerError(
-            f"{task.staging.folder}: a worker cannot see this folder; --out must be on a file "
-            "system that driver and workers share"
+            f"{task.staging.folder}: a worker process cannot see this folder; --out must be on a "
+            "file "
+            "system that all processes share"
         )
 
 
@@ -130,14 +133,14 @@ def _memory_kept(more: int | None) -> Generator[None]:
 
 @cache
 def _load() -> None:
-    """Compute a small unit, so that everything that units need is loaded."""
+    """Compute a small unit, so that all code is loaded before limits are set."""
     config = DatasetConfig(objects=("tetrahedron",), families=("concurrent",), limit=1)
     (unit,) = units_of(config)
     made_of(unit, body_of(unit))
 
 
 def _address_space() -> int:
-    """Size of this process's address space in bytes; 0 where the system does not say."""
+    """Return the size of this process's address space in bytes; 0 if it is not known."""
     sizes = Path("/proc/self/statm")
     if not sizes.is_file():
         return 0

@@ -1,4 +1,4 @@
-"""From the rows of all units to the files of a dataset, one object at a time.
+"""Writes the rows of all units of work into the tables of a dataset, one object at a time.
 
 Rows are sorted by object, then by their table's key, so the files do not depend on when, where or
 in which run each unit was computed. Only the rows of one object, and rows that wait to be written,
@@ -25,13 +25,12 @@ from sim_validate.files.reading import write_text
 
 DATA = "data"
 TWIN = "the same object as"
-"""Beginning of the reason why an object's rows are not in the tables a second time."""
+"""First words of the reason why an object with the same mesh as another has no rows."""
 CONTACTS = "contacts.json"
-"""Name of the file with the contacts that were judged, if any; its normals point into the
-object."""
+"""Name of the file with the given contacts, if there are any; its normals point into the object."""
 CONFIG, QUARANTINE = "config.toml", "quarantine.jsonl"
 EXTRAS = ("meshes", "scenes")
-"""Folders of files that units make beside their rows."""
+"""Folders of the files that units make besides their rows."""
 
 
 def finish(
@@ -71,7 +70,7 @@ def finish(
 def _sorted_out(
     units: Sequence[WorkUnit], staging: Staging
 ) -> tuple[list[Finished], list[LeftOut]]:
-    """Units with rows of their own, sorted by object, and why the others have none."""
+    """List units with rows of their own, sorted by object, and the reasons why others have none."""
     good, quarantined = list[Finished](), list[LeftOut]()
     first: dict[tuple[str, float], str] = {}
     for unit in sorted(units, key=lambda each: (each.object, each.friction)):

@@ -1,4 +1,5 @@
-"""What does a dataset say about itself?
+"""How does a dataset describe itself to its readers?
 
-This room writes the card of a finished dataset.
+Modules here write the README.md of a finished dataset, the page that also describes it on the
+Hugging Face Hub, a website for datasets.
 """

@@ -1,6 +1,7 @@
-"""The card of a dataset, `README.md`, which the Hugging Face Hub and people read first.
+"""Writes the README.md of a dataset, which describes it to people and to the Hugging Face Hub.
 
-A user's own words are escaped: in the header as quoted strings, in the text as Markdown.
+The Hub is a website for datasets and calls this page a card. A user's own words are escaped: in the
+header as quoted strings, in the text as Markdown.
 """
 
 import re
@@ -26,39 +27,40 @@ from sim_validate.datasets.rows import SPLITS
 
 CARD = "README.md"
 FIRST: Name = "grasps"
-"""The table that is loaded if none is named."""
+"""Name of the table that is loaded if the reader names none."""
 SIZES = (
     (10**3, "n<1K"), (10**4, "1K<n<10K"), (10**5, "10K<n<100K"), (10**6, "100K<n<1M"),
     (10**7, "1M<n<10M"), (10**8, "10M<n<100M"), (10**9, "100M<n<1B"), (10**10, "1B<n<10B"),
 )  # fmt: skip
-"""Bounds on the number of rows, and the Hub's name for datasets below each."""
+"""Bounds on the number of rows, and the name that the Hugging Face Hub has for datasets below each.
+"""
 LARGEST = "10B<n<100B"
 MARKS = frozenset("\\`*_[]<>|~&#!$@")
-"""Letters that can begin Markdown or HTML within a line."""
+"""Characters that can begin Markdown or HTML within a line."""
 NAMED_ALIKE = (
     "CC0-1.0", "CC-BY-3.0", "CC-BY-4.0", "CC-BY-SA-3.0", "CC-BY-SA-4.0", "CC-BY-NC-3.0",
     "CC-BY-NC-4.0", "CC-BY-ND-4.0", "CC-BY-NC-ND-3.0", "CC-BY-NC-ND-4.0", "CC-BY-NC-SA-3.0",
     "CC-BY-NC-SA-4.0", "CDLA-Permissive-1.0", "CDLA-Permissive-2.0", "CDLA-Sharing-1.0",
     "Apache-2.0", "BSD-2-Clause", "BSD-3-Clause", "MIT", "Unlicense",
 )  # fmt: skip
-"""SPDX names of licences whose names on the Hub differ only by small letters."""
+"""SPDX names of licences whose names on the Hugging Face Hub are the same in small letters."""
 LICENSES = {
     **{name: name.lower() for name in NAMED_ALIKE},
     "ODbL-1.0": "odbl",
     "ODC-By-1.0": "odc-by",
     "PDDL-1.0": "pddl",
 }
-"""Usual licences of data: their names on the Hub, by their names in SPDX."""
+"""Usual licences of data: their names on the Hugging Face Hub, by their names in SPDX."""
 ADDRESS = re.compile(r"https?://[^\s<>\"'`\\|{}^]+")
-"""Pattern of an address that can be a link as it is."""
+"""Pattern of a web address that can stand in Markdown as a link unchanged."""
 
 
 def card_text(config: DatasetConfig, manifest: Manifest) -> str:
-    """Write the card of a dataset.
+    """Write the README.md of a dataset.
 
     Args:
         config: What the dataset is made of.
-        manifest: The files of its tables, and the versions that made them.
+        manifest: The files of the dataset's tables, and the versions that made them.
     """
     sections = (
         _header(config, manifest),
@@ -81,7 +83,7 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
 
 
 def _header(config: DatasetConfig, manifest: Manifest) -> str:
-    """The card's header for the Hub, in YAML."""
+    """Write the header of the README.md in YAML, which the Hugging Face Hub reads."""
     lines = [f"pretty_name: {quoted(config.title)}", *_license_lines(config.license)]
     lines += ["task_categories:", f"- {quoted('robotics')}", "tags:"]
     lines += [f"- {quoted(word)}" for word in KEYWORDS]
@@ -100,13 +102,13 @@ def _license_lines(name: str) -> list[str]:
 
 
 def _known_license(name: str) -> str | None:
-    """The SPDX name of a licence, given in any letters by either name; None if it is unusual."""
+    """Look up the SPDX name of a licence, given in any letters; None if it is unusual."""
     wanted = name.lower()
     return next((spdx for spdx, hub in LICENSES.items() if wanted in (spdx.lower(), hub)), None)
 
 
 def _config_lines(name: Name, manifest: Manifest) -> list[str]:
-    """The header's lines about the files of a table, by split; none if the table has no files."""
+    """Write the header's lines on the files of a table, by split; none if it has no files."""
     splits = _splits(name, manifest)
     if not splits:
         return []
@@ -120,7 +122,7 @@ def _config_lines(name: Name, manifest: Manifest) -> list[str]:
 
 
 def _splits(name: Name, manifest: Manifest) -> list[str]:
-    """The splits in which a table has rows, the one to train with first."""
+    """List the splits in which a table has rows, the one to train with first."""
     there = {each.split for each in manifest.of_table(name)}
     return [split for split, _ in reversed(SPLITS) if split in there]
 
@@ -130,7 +132,7 @@ def _size(rows: int) -> str:
 
 
 def _credits(config: DatasetConfig) -> str:
-    """The user's statements about the dataset, as a list."""
+    """Write the user's statements about the dataset, such as its creator, as a list."""
     name = _known_license(config.license) or config.license
     said = {
         "By": _as_markdown(config.creator),
@@ -153,7 +155,7 @@ def _counts(manifest: Manifest) -> str:
 
 
 def _table(name: Name) -> str:
-    """A Markdown table of all columns of a table."""
+    """Write a Markdown table of all columns of a table."""
     lines = [
         f"### {name}", "",
         f"Sorted by, and unique in, {' and '.join(f'`{key}`' for key in KEYS[name])}.", "",
@@ -188,7 +190,7 @@ def _labels() -> str:
 
 
 def _loading(manifest: Manifest) -> str:
-    """Code that loads the dataset from a folder called `ds`; the tests run it."""
+    """Write code that loads the dataset from a folder called `ds`; the tests run it."""
     split = next(iter(_splits(FIRST, manifest)), "train")
     return f"""\
 ## Loading
@@ -242,6 +244,6 @@ def _is_address(text: str) -> bool:
 
 
 def _as_markdown(text: str) -> str:
-    """A user's text on one line, with all Markdown and HTML escaped."""
+    """Write a user's text on one line, with all Markdown and HTML escaped."""
     line = "".join(letter if letter.isprintable() else " " for letter in text).strip()
     return "".join(f"\\{letter}" if letter in MARKS else letter for letter in line)

@@ -1,4 +1,4 @@
-"""The prose of a dataset's card: what its rows are, how they were made, and their limits."""
+"""Sentences in the README.md of a dataset: what its rows are, how they were made, their limits."""
 
 from collections.abc import Mapping
 
@@ -16,7 +16,7 @@ ROWS: Mapping[Name, str] = {
     "grasps": "four contacts on an object at one friction, or a negative control made from them",
     "trials": "a grasp or control under one wrench, in simulation",
 }
-"""What a row of each table is."""
+"""Meaning of one row of each table."""
 LABELS: Mapping[str, str] = {
     "grasp": "a planned grasp, proved to be in force closure",
     "given": "contacts from elsewhere, put on the object and judged",
@@ -26,7 +26,7 @@ LABELS: Mapping[str, str] = {
     "contacts_moved": "contacts moved on their faces",
     "uncorrected": "what the paper's construction as printed takes for a grasp on these faces",
 }
-"""Values of the column `label`, with their meanings."""
+"""Meanings of the values of the column `label`."""
 PLANNED = (
     "Each object is planned at each friction, each family of grasps by itself. Every grasp has "
     "a certificate of force closure."
@@ -63,7 +63,7 @@ SOURCES = (
 
 
 def summary(config: DatasetConfig, manifest: Manifest) -> str:
-    """A few sentences about what the dataset holds, without a user's words."""
+    """Say in a few sentences what the dataset holds, without a user's words."""
     rows = manifest.rows()
     frictions = ", ".join(f"{friction:g}" for friction in config.frictions)
     return (
@@ -74,12 +74,12 @@ def summary(config: DatasetConfig, manifest: Manifest) -> str:
 
 
 def made(config: DatasetConfig) -> str:
-    """How the grasps were made."""
+    """Say how the grasps of the dataset were made."""
     return f"{JUDGED if config.contacts else PLANNED} {TRIED}"
 
 
 def choice(config: DatasetConfig, manifest: Manifest) -> str:
-    """Which objects and grasps were chosen, so in which way the dataset is no fair sample."""
+    """Say which objects and grasps were chosen, so that readers know how the sample is biased."""
     left_out = (
         f"Of {manifest.units} units of work {manifest.quarantined} were left out, for the reasons "
         "in `quarantine.jsonl`."
@@ -94,7 +94,7 @@ def choice(config: DatasetConfig, manifest: Manifest) -> str:
 
 
 def splitting() -> str:
-    """How rows are split."""
+    """Say how objects are assigned to splits."""
     shares, before = list[str](), 0.0
     for name, upto in SPLITS:
         shares.append(f"{name} {upto - before:.0%}")
@@ -107,6 +107,6 @@ def splitting() -> str:
 
 
 def makers(manifest: Manifest) -> tuple[str, ...]:
-    """The programs that made the dataset, with versions."""
+    """List the programs that made the dataset, with versions."""
     named = (("graspproof", "graspproof"), ("MuJoCo", "mujoco"), ("Python", "python"))
     return tuple(f"{name} {manifest.versions.get(key, 'unknown')}" for name, key in named)

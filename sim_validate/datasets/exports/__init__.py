@@ -1,4 +1,4 @@
-"""How do other programs read a dataset?
+"""How can other programs read a dataset?
 
-This room writes a finished dataset, or one split of it, in the formats of other programs.
+Modules here write a finished dataset, or one split of it, in the formats of other programs.
 """

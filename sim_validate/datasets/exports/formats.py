@@ -1,4 +1,4 @@
-"""A finished dataset, or one of its splits -> the formats that other programs read."""
+"""Exports a finished dataset, or one of its splits, to formats that other programs read."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ EXPORTERS: Mapping[ExportFormat, Exporter] = {
     "mjcf": write_mjcf,
 }
 """Functions that write each format into a folder and return the number of rows used. The first four
-formats hold all rows, negative controls too; the last two hold closed grasps only."""
+formats hold all rows, also of negative controls; the last two hold force-closed grasps only."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,9 @@ def export(
     pyarrow()  # before any work, so that a missing library is named at once
     chosen = select(folder, split)
     if out.resolve().is_relative_to(folder.resolve()):
-        raise InputError(f"{out}: is in the dataset, which holds nothing else; give another --out")
+        raise InputError(
+            f"{out}: this folder is inside the dataset to export; give an --out outside of it"
+        )
     with whole_folder(out) as place:
         rows = EXPORTERS[to](chosen, place, report)
         files = sum(1 for _ in place.iterdir())

@@ -1,4 +1,4 @@
-"""Grasps of a dataset -> Isaac grasp files, format version 1.0: one per object and friction.
+"""Exports grasps of a dataset as Isaac grasp files, version 1.0: one per object and friction.
 
 The format describes a gripper by a pose and the positions of joints, so the four fingertips are
 taken as one gripper: `fingerI_x`, `fingerI_y` and `fingerI_z` slide fingertip I along the axes of
@@ -98,7 +98,7 @@ def _grasp_lines(body: Polyhedron, grasp: StoredGrasp, radius: float) -> Iterato
 
 
 def _contacts(grasp: StoredGrasp) -> tuple[Array, Array]:
-    """Positions (4, 3) [m] and normals (4, 3) of a grasp's contacts."""
+    """Return positions (4, 3) [m] and normals (4, 3) of a grasp's contacts."""
     points = np.array([contact.position for contact in grasp.contacts])
     return points, np.array([contact.normal for contact in grasp.contacts])
 
@@ -114,6 +114,6 @@ def _list(values: Array) -> str:
 
 
 def yaml_number(value: float) -> str:
-    """Write a number in full; YAML 1.1 takes a number with an exponent and no point for text."""
+    """Write a number for YAML 1.1, which takes one with an exponent and no point for text."""
     text = repr(value)
     return text if "." in text else text.replace("e", ".0e")

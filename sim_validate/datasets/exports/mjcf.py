@@ -1,4 +1,4 @@
-"""Grasps of a dataset -> MuJoCo scenes with keyframes, one file each."""
+"""Exports grasps of a dataset as MuJoCo scenes with keyframes, one file each."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +13,7 @@ from sim_validate.files.reading import write_text
 def write_mjcf(
     chosen: Selection, folder: Path, report: Callable[[int, int], None]
 ) -> dict[Name, int]:
-    """Write the scene in which each grasp was simulated, rebuilt from mesh and contacts.
+    """Write the MuJoCo scene of each grasp, rebuilt from its mesh and contacts.
 
     Raises:
         InputError: The dataset is damaged.

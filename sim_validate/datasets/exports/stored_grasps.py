@@ -1,4 +1,4 @@
-"""The closed grasps of a dataset with their solids, one object at a time."""
+"""Reads the force-closed grasps of a dataset and their objects, one object at a time."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -16,17 +16,17 @@ from sim_validate.datasets.rows import GIVEN
 
 UNSAFE = re.compile(r"[^A-Za-z0-9._-]")
 GRASPS = ("grasp", GIVEN)
-"""Labels of rows that are no negative controls."""
+"""Labels of rows that are grasps, not negative controls."""
 LONGEST = 150
-"""Largest number of letters in a file's name; every file system allows more."""
+"""Largest number of characters in a file's name; every file system allows more."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoredGrasp:
-    """A grasp as the tables hold it."""
+    """A grasp as the tables of a dataset hold it."""
 
     id: str
-    """Name of the grasp in the whole dataset."""
+    """Name of the grasp, which no other grasp of the dataset has."""
     name: str
     """Family and faces of the grasp, or the name that its file gave it."""
     friction: float
@@ -36,7 +36,7 @@ class StoredGrasp:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GraspedObject:
-    """An object with all of its closed grasps."""
+    """An object with all of its force-closed grasps."""
 
     object_id: str
     body: Polyhedron
@@ -55,14 +55,15 @@ def grasped_objects(chosen: Selection) -> Iterator[GraspedObject]:
     for object_id, rows in groupby(planned, key=lambda row: row["object_id"]):
         if object_id not in names:
             raise InputError(
-                f"{chosen.folder}: {object_id} has grasps, but is not among the objects"
+                f"{chosen.folder}: the object {object_id} has grasps, but its row is missing in "
+                "the table of objects; see `graspproof dataset verify`"
             )
         body = stored_body(chosen.folder, object_id, names[object_id], faces)
         yield GraspedObject(object_id, body, tuple(map(_grasp, rows)))
 
 
 def is_grasp(row: Mapping[str, Any]) -> bool:
-    """Whether a row is a planned or given grasp that is proved to be closed."""
+    """Tell whether a row is a planned or given grasp that is proved to be force-closed."""
     return row["label"] in GRASPS and bool(row["force_closed"])
 
 
@@ -78,12 +79,14 @@ def _grasp(row: Mapping[str, Any]) -> StoredGrasp:
 
 
 def new_path(folder: Path, name: str, ending: str) -> Path:
-    """Path for a file with a given name, whatever letters the name has.
+    """Make a path for a file with a given name, whatever characters the name has.
 
     Raises:
-        InputError: A file of that name exists.
+        InputError: A file of the same name exists.
     """
     path = folder / f"{UNSAFE.sub('_', name).lstrip('.')[:LONGEST]}.{ending}"
     if path.exists():
-        raise InputError(f"{name}: two files would be called {path.name}")
+        raise InputError(
+            f"{name}: two grasps would get the same file name, {path.name}; rename one of them"
+        )
     return path

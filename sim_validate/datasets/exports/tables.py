@@ -1,4 +1,4 @@
-"""Tables of a dataset -> CSV by pyarrow, JSON Lines, NumPy archives, or one HDF5 file by h5py.
+"""Exports the tables of a dataset as CSV, JSON Lines, NumPy archives, or one HDF5 file.
 
 CSV has one column per number: `contact_points_m_0_x` belongs to the first contact, `wrench_n_nm_fx`
 is a force. Text that a spreadsheet could take for a formula, or that begins with an apostrophe,
@@ -28,12 +28,12 @@ from sim_validate.datasets.parquet import Columns, pyarrow, read_columns, schema
 from sim_validate.files.reading import write_arrays, write_bytes, write_lines, write_text
 
 PARTS = {3: tuple("xyz"), 4: tuple("0123"), 6: ("fx", "fy", "fz", "tx", "ty", "tz")}
-"""Names of the places in a cell, by how many there are: a point, fingers, a wrench."""
+"""Names of the components of a cell, by their number: of a point, four fingers, or a wrench."""
 FORMULA = "^[=+\\-@\uff1d\uff0b\uff0d\uff20'\\pC\\pZ]"
-"""Pattern of cells that spreadsheets may calculate, also where signs are in full width or behind
+"""Pattern of cells that a spreadsheet may calculate, also where signs are in full width or behind
 space, and of cells that begin with the apostrophe that marks text."""
 NULLS = {"float": "NaN", "int": "-1", "text": "empty", "bool": "-1"}
-"""What stands for null in arrays, by kind of column."""
+"""Value that stands for null in arrays, by type of column."""
 
 
 def write_tables(
@@ -78,7 +78,7 @@ def csv_file(chosen: Selection, name: Name, folder: Path) -> None:
 
 
 def json_lines(chosen: Selection, name: Name, folder: Path) -> None:
-    """Write a table as JSON Lines, one nested row per line."""
+    """Write a table as JSON Lines: one row per line, nested."""
     lines = (json.dumps(row, allow_nan=False) + "\n" for row in chosen.rows(name))
     write_lines(folder / f"{name}.jsonl", lines)
 
@@ -100,7 +100,7 @@ def write_hdf5(
         h5py: Any = importlib.import_module("h5py")
     except ImportError as error:
         raise InputError(
-            "HDF5 files need h5py: pip install 'graspproof[hdf5]'; the other formats do not"
+            "writing HDF5 needs h5py: run pip install 'graspproof[hdf5]', or choose another format"
         ) from error
     held = io.BytesIO()
     with h5py.File(held, "w") as file:
@@ -123,7 +123,7 @@ def write_hdf5(
 
 
 def _flat(table: Any, name: Name) -> Any:
-    """An Arrow table with one column per number, whose text no spreadsheet takes for a formula."""
+    """Return an Arrow table with one column per number; no text can pass for a formula."""
     compute: Any = importlib.import_module("pyarrow.compute")
     columns = dict[str, Any]()
     for column in TABLES[name]:
@@ -142,7 +142,7 @@ def _flat(table: Any, name: Name) -> Any:
 
 
 def _plain_columns(chosen: Selection, name: Name) -> Columns:
-    """The columns of a table as arrays (rows, ..) of numbers and fixed-width text."""
+    """Return the columns of a table as arrays (rows, ..) of numbers and fixed-width text."""
     found = read_columns(chosen.paths(name), name)
     return {column.name: _plain(column, found[column.name]) for column in TABLES[name]}
 

@@ -1,5 +1,5 @@
-"""Is a dataset what it says, and are its rows right?
+"""Is a dataset what it claims to be, and are its rows right?
 
-This room takes the folder of a finished dataset and returns its faults: hashes that differ, rows
-that the analysis contradicts, units that come out otherwise when they are computed again.
+Modules here take the folder of a finished dataset and return its faults: hashes that differ, rows
+that the analysis contradicts, units of work whose rows differ when they are computed again.
 """

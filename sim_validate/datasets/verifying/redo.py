@@ -1,4 +1,4 @@
-"""Plan and simulate a sample of a dataset again: do the same rows come out?
+"""Plans and simulates a sample of a dataset again, and compares the rows.
 
 With the same packages and code, on processors that round alike, every cell must be the same.
 Otherwise each family must have as many grasps as before, and grasps that come out with the same
@@ -34,28 +34,28 @@ from sim_validate.datasets.verifying.rows_by_object import ObjectRows, Row, by_o
 from sim_validate.files.reading import read_text
 
 ROUNDING = 1e-6
-"""Relative difference that numbers may have when other packages or processors round them."""
+"""Relative difference that other packages or processors may cause in numbers by rounding."""
 MOST_NAMED = 20
-"""Largest number of faults of one unit that are listed."""
+"""Largest number of faults that are listed for one object at one friction."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Which units to compute again."""
+    """Which part of a dataset to compute again."""
 
     share: float
-    """Share of all units; at least one is computed."""
+    """Share of all objects at frictions that is computed again, at least one of them."""
     seed: int = 0
-    """Seed of the choice."""
+    """Seed of the random choice."""
 
 
 def sample_faults(folder: Path, manifest: Manifest, sample: Sample) -> Iterator[str]:
-    """Compute a sample again and yield each difference as a line.
+    """Compute a sample of a dataset again, and yield a sentence about each difference.
 
     Args:
         folder: Folder of the dataset.
         manifest: The manifest of the dataset.
-        sample: Which units to compute again.
+        sample: Which part of the dataset to compute again.
 
     Raises:
         InputError: A file of the dataset is damaged.
@@ -76,7 +76,7 @@ def sample_faults(folder: Path, manifest: Manifest, sample: Sample) -> Iterator[
 
 
 class _Redoing:
-    """Computes units of a dataset again."""
+    """Computes parts of a dataset again."""
 
     def __init__(self, folder: Path, manifest: Manifest) -> None:
         self._folder = folder
@@ -87,19 +87,19 @@ class _Redoing:
         self._left_out = _left_out(folder)
 
     def frictions(self, row: Mapping[str, Any]) -> list[float]:
-        """The frictions at which an object has rows, though perhaps no grasp."""
+        """List the frictions at which an object has rows, perhaps without a grasp."""
         return [f for f in self._config.frictions if not self._all_left_out(row, f)]
 
     def faults(
         self, row: Mapping[str, Any], rows: ObjectRows, chosen: Set[tuple[str, float]]
     ) -> Iterator[str]:
-        """Yield what is wrong with an object at the chosen frictions."""
+        """Yield sentences on what is wrong with an object at the chosen frictions."""
         for friction in self._config.frictions:
             stored = _of_unit(rows, row["object_id"], friction)
             where = f"{row['source_name']} at friction {friction}"
             if self._all_left_out(row, friction):
                 if stored["grasps"]:
-                    yield f"{where}: is quarantined, but has rows"
+                    yield f"{where}: {QUARANTINE} lists this object as left out, but it has rows"
             elif (row["object_id"], friction) in chosen:
                 found = islice(self._unit_faults(row, friction, stored), MOST_NAMED)
                 yield from (f"{where}: {fault}" for fault in found)
@@ -118,7 +118,7 @@ class _Redoing:
             body = stored_body(self._folder, row["object_id"], name, self._config.faces)
             made = made_of(WorkUnit(name, None, source, friction, self._config, given), body)
         except GraspError as error:
-            yield f"cannot be done again ({error})"
+            yield f"the grasps cannot be computed again ({error})"
             return
         now: ObjectRows = {table: as_read(table, made.rows[table]) for table in TABLES}
         if not self._exact:
@@ -128,11 +128,11 @@ class _Redoing:
             yield from _differences(table, stored[table], now[table])
         for path, text in made.files.items():
             if read_text(self._folder / path) != text:
-                yield f"{path}: is not what comes out again"
+                yield f"{path}: the file differs from what is computed again"
 
 
 def _left_out(folder: Path) -> dict[tuple[str, float], set[str]]:
-    """Quarantined units, with the given grasps that are missing if only some are."""
+    """Read which objects have no rows at a friction, with the given grasps that are missing."""
     found: dict[tuple[str, float], set[str]] = {}
     for each in read_left_out(folder / QUARANTINE):
         if not each.reason.startswith(TWIN):
@@ -141,7 +141,7 @@ def _left_out(folder: Path) -> dict[tuple[str, float], set[str]]:
 
 
 def drawn(units: Sequence[tuple[str, float]], sample: Sample) -> list[tuple[str, float]]:
-    """Choose units in an order that only the seed decides: a larger share holds a smaller."""
+    """Choose units at random, in an order that only the seed decides."""
 
     def place(unit: tuple[str, float]) -> bytes:
         return hashlib.sha256(f"{sample.seed} {unit}".encode()).digest()
@@ -159,34 +159,44 @@ def _of_unit(rows: ObjectRows, object_id: str, friction: float) -> ObjectRows:
 
 
 def _differences(name: Name, stored: Sequence[Row], made: Sequence[Row]) -> Iterator[str]:
-    """Yield cells that differ, and rows that only one side has."""
+    """Yield sentences on cells that differ, and on rows that only one side has."""
     before = {tuple(row[key] for key in KEYS[name]): row for row in stored}
     after = {tuple(row[key] for key in KEYS[name]): row for row in made}
-    yield from (f"{name}: {key[-1]} is not found again" for key in before.keys() - after.keys())
     yield from (
-        f"{name}: {key[-1]} is found, but not there" for key in after.keys() - before.keys()
+        f"{name}: {key[-1]} has a row, but is not computed again"
+        for key in before.keys() - after.keys()
+    )
+    yield from (
+        f"{name}: {key[-1]} is computed again, but has no row"
+        for key in after.keys() - before.keys()
     )
     for key in before.keys() & after.keys():
         for column in TABLES[name]:
             one, other = before[key][column.name], after[key][column.name]
             if one != other:
-                yield f"{name}: {key}: {column.name} is {one}, done again {other}"
+                yield f"{name}: {key}: {column.name} is {one}, but {other} when computed again"
 
 
 def _loose_differences(stored: ObjectRows, made: ObjectRows) -> Iterator[str]:
-    """Yield differences that rounding cannot cause; it may choose other, equally good grasps."""
+    """Yield differences beyond rounding, which may choose other, equally good grasps."""
     before = {row["grasp_id"]: row for row in stored["grasps"] if row["control_of"] is None}
     after = {row["grasp_id"]: row for row in made["grasps"] if row["control_of"] is None}
     counts = [Counter(row["family"] for row in rows.values()) for rows in (before, after)]
     if counts[0] != counts[1]:
-        yield f"grasps: {dict(counts[0])} by family, done again {dict(counts[1])}"
+        yield f"grasps: {dict(counts[0])} by family, but {dict(counts[1])} when computed again"
     for name in sorted(before.keys() & after.keys()):
         one, other = before[name], after[name]
         points = [np.array(row["contact_points_m"], dtype=np.float64) for row in (one, other)]
         if not np.allclose(*points, rtol=ROUNDING, atol=0.0):
             continue  # the best contacts are not unique
         if one["held"] != other["held"] or one["force_closed"] != other["force_closed"]:
-            yield f"grasps: {name}: is {one['outcome']}, done again {other['outcome']}"
+            yield (
+                f"grasps: {name}: outcome is {one['outcome']}, but {other['outcome']} when "
+                "computed again"
+            )
         frictions = [float(row["critical_friction"] or 0.0) for row in (one, other)]
         if not np.isclose(*frictions, rtol=ROUNDING, atol=0.0):
-            yield f"grasps: {name}: critical friction {frictions[0]}, done again {frictions[1]}"
+            yield (
+                f"grasps: {name}: critical friction is {frictions[0]}, but {frictions[1]} when "
+                "computed again"
+            )

@@ -1,4 +1,4 @@
-"""The rows of a dataset, grouped by object, with only one object in memory.
+"""Reads the rows of a dataset grouped by object, with only one object in memory.
 
 All tables are sorted by the beginning of their rows' names, which are the first letters of the
 object's hash. Rows whose object is missing form groups of their own.
@@ -20,7 +20,7 @@ BEGINNINGS: Mapping[Name, Callable[[Row], str]] = {
     "grasps": lambda row: str(row["object_id"])[:SHORT],
     "trials": lambda row: str(row["grasp_id"])[:SHORT],
 }
-"""The part of a row that all rows of an object share."""
+"""Functions that return the part of a row's name that all rows of its object share."""
 
 
 def by_object(chosen: Selection) -> Iterator[ObjectRows]:

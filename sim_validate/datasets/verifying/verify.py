@@ -1,4 +1,4 @@
-"""Is a dataset what its manifest says, and are its rows consistent with the theory?"""
+"""Checks whether a dataset is as its manifest says, and whether its rows agree with the theory."""
 
 from collections.abc import Iterator, Mapping, Sequence, Set
 from pathlib import Path
@@ -26,13 +26,14 @@ from sim_validate.datasets.verifying.rows_by_object import ObjectRows, by_object
 from sim_validate.files.paths import path_inside
 
 SAME_MARGIN = 1e-6
-"""Largest difference of a closure margin from that of the contacts, relative to the friction."""
+"""Largest difference between a closure margin in a row and that of the contacts, relative to the
+friction."""
 ON_SURFACE, NEAR_SURFACE = 1e-5, 0.05
-"""Largest distance of contacts from the object's mesh, for grasps and for controls, relative to the
-object's radius. Planar faces are as flat as six digits show. Controls are moved in the planes of
-patches, and a curved surface leaves these."""
+"""Largest distance of contacts from the mesh, for grasps and negative controls, relative to the
+object's radius. Planar faces are as flat as six digits show. Negative controls are moved in
+the planes of patches, from which a curved surface departs."""
 UNIT = 1e-9
-"""Largest difference of a normal's length from one."""
+"""Largest difference between a normal's length and one."""
 
 
 def verify(folder: Path, sample: Sample | None = None) -> list[str]:
@@ -62,12 +63,12 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
     except InputError as error:
         faults.append(str(error))
     except (TypeError, KeyError, ValueError) as error:  # a cell is null that must not be
-        faults.append(f"data: a row is not such as are written ({shown(str(error))})")
+        faults.append(f"data: a row is not as this version writes rows ({shown(str(error))})")
     return faults
 
 
 def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
-    """Yield what is wrong with rows and meshes, one object at a time.
+    """Yield sentences on what is wrong with rows and meshes, one object at a time.
 
     Raises:
         InputError: A file is damaged, or its number of rows differs from the manifest's.
@@ -75,7 +76,10 @@ def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
     frictions = config_from_toml(folder / CONFIG).frictions
     for each in manifest.files:
         if each.table and not Path(each.path).name.startswith(f"{each.split}-"):
-            yield f"{each.path}: is listed as of split {each.split}"
+            yield (
+                f"{each.path}: the manifest lists this file under the split {each.split}, unlike "
+                "its name"
+            )
     for split in sorted({each.split for each in manifest.files if each.split is not None}):
         for rows in by_object(Selection(folder, manifest, split)):
             yield from _split_faults(split, rows)
@@ -92,10 +96,12 @@ def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
     }
     # staged files no longer matter
     there = {name for name in there if not name.startswith("staging/")}
-    yield from (f"{path}: not in the manifest" for path in sorted(there - names))
+    yield from (
+        f"{path}: this file is not listed in the manifest" for path in sorted(there - names)
+    )
     for each in files:
         if each.path not in there:
-            yield f"{each.path}: missing"
+            yield f"{each.path}: this file is listed in the manifest, but missing"
             continue
         try:
             found = listed(folder, path_inside(folder, each.path))
@@ -103,39 +109,47 @@ def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
             yield str(error)
             continue
         if found.bytes != each.bytes:
-            yield f"{each.path}: {found.bytes} bytes, listed are {each.bytes}"
+            yield (
+                f"{each.path}: the file has {found.bytes} bytes, but the manifest lists "
+                f"{each.bytes}"
+            )
         elif found.sha256 != each.sha256:
-            yield f"{each.path}: its contents are not what was written (sha256 differs)"
+            yield f"{each.path}: the file differs from what was written (its sha256 differs)"
 
 
 def _split_faults(split: str, rows: ObjectRows) -> Iterator[str]:
-    """Check that rows are in files of their split."""
+    """Check that rows are in the files of their split."""
     for name in ("objects", "grasps"):
         if any(row["split"] != split for row in rows[name]):
-            yield f"{name}: files of {split} have rows of another split"
+            yield f"{name}: files of the split {split} have rows of another split"
 
 
 def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
-    """Check that the manifest agrees with the files it lists."""
+    """Check that the manifest agrees with the files that it lists."""
     config = config_from_toml(folder / CONFIG)
     if config.sha256 != manifest.config_sha256:
-        yield f"{CONFIG}: is not the configuration that the manifest names"
+        yield f"{CONFIG}: the file is not the configuration that the manifest names"
     lines = len(read_left_out(folder / QUARANTINE))
     if lines != manifest.quarantined:
-        yield f"{QUARANTINE}: {lines} lines, the manifest says {manifest.quarantined}"
+        yield (
+            f"{QUARANTINE}: the file has {lines} lines, but the manifest says "
+            f"{manifest.quarantined}"
+        )
 
 
 def _row_faults(rows: ObjectRows, frictions: Sequence[float]) -> Iterator[str]:
     for name in TABLES:
         keys = [tuple(row[key] for key in KEYS[name]) for row in rows[name]]
         if len(set(keys)) < len(keys):
-            yield f"{name}: rows with the same {' and '.join(KEYS[name])}"
+            yield f"{name}: two rows have the same {' and '.join(KEYS[name])}"
     splits = {row["object_id"]: row["split"] for row in rows["objects"]}
     names = {row["grasp_id"] for row in rows["grasps"]}
     ended: dict[str, list[str]] = {}
     for trial in rows["trials"]:
         ended.setdefault(trial["grasp_id"], []).append(trial["outcome"])
-    yield from (f"trials: {name} is no grasp" for name in sorted(ended.keys() - names))
+    yield from (
+        f"trials: {name} has no row in the table of grasps" for name in sorted(ended.keys() - names)
+    )
     for row in rows["grasps"]:
         name = row["grasp_id"]
         faults = [
@@ -143,28 +157,28 @@ def _row_faults(rows: ObjectRows, frictions: Sequence[float]) -> Iterator[str]:
             *_outcome_faults(row, ended.get(name, [])),
         ]
         if row["control_of"] is None and row["friction"] not in frictions:
-            faults.append(f"friction {row['friction']} is none of the configuration's")
+            faults.append(f"friction {row['friction']} is not among those of {CONFIG}")
         if row["outcome"] != NOT_TRIED:
             faults += _contact_faults(row)
         yield from (f"grasps: {name}: {fault}" for fault in faults)
 
 
 def _outcome_faults(row: Mapping[str, Any], trials: Sequence[str]) -> Iterator[str]:
-    """Check that a row agrees with its trials, and that one that was not tried claims nothing."""
+    """Check that a row agrees with its trials, and claims nothing if it was not tried."""
     if row["outcome"] == NOT_TRIED:
         claims = [row[name] for name in ("held", "force_closed", "closure_margin")]
         if row["label"] != GIVEN or any(claim is not None for claim in claims) or trials:
-            yield "was not tried, but claims something"
+            yield "the row claims results, although the grasp was not tried"
         return
     held = all(one == "held" for one in trials)
     if not trials or len(trials) != row["trials"] or row["held"] != held:
-        yield "its trials say something else"
+        yield "the row contradicts the table of trials"
     elif (row["outcome"] == "held") != held:
-        yield f"outcome {row['outcome']!r}, but held is {held}"
+        yield f"`outcome` is {row['outcome']!r}, but `held` is {held}"
 
 
 def _mesh_faults(folder: Path, rows: ObjectRows) -> Iterator[str]:
-    """Check that meshes are those of their objects, and that contacts lie on them."""
+    """Check that meshes belong to their objects, and that contacts lie on the meshes."""
     claimed: dict[str, list[tuple[Array, Array | None, float]]] = {
         row["object_id"]: [] for row in rows["objects"]
     }
@@ -199,38 +213,43 @@ def _mesh_faults(folder: Path, rows: ObjectRows) -> Iterator[str]:
 def _reference_faults(
     row: Mapping[str, Any], splits: Mapping[str, str], names: Set[str]
 ) -> Iterator[str]:
-    """Yield references of a row to missing rows."""
+    """Yield sentences on references of a row to rows that are missing."""
     if splits.get(row["object_id"]) != row["split"]:
-        yield "its object is not there, or in another split"
+        yield "the row's object is missing, or in another split"
     if row["control_of"] is not None and row["control_of"] not in names:
-        yield f"{row['control_of']} is no grasp"
+        yield f"{row['control_of']}, named in control_of, has no row"
 
 
 def _contact_faults(row: Mapping[str, Any]) -> Iterator[str]:
-    """Check the normals of a contact set, and its closure from the contacts alone."""
+    """Check the normals of a contact set, and compute its closure from the contacts alone."""
     count = row["contacts"]
     closed = row["force_closed"]
     if not 1 <= count <= FINGERS or closed is None or (closed and row["closure_margin"] is None):
-        yield "its contacts, or what is claimed of them, are missing"
+        yield "the row lacks its contacts, or results about them"
         return
     points = np.array(row["contact_points_m"][:count], dtype=np.float64)
     normals = np.array(row["contact_normals"][:count], dtype=np.float64)
     if not (np.abs(np.linalg.norm(normals, axis=1) - 1.0) <= UNIT).all():
-        yield "a normal is no unit vector"
+        yield "a contact normal is not a unit vector"
         return
     try:
         certificate = force_closure(points, normals, row["friction"])
     except UndecidedError as error:
         if row["force_closed"]:
-            yield f"closure cannot be decided ({error})"
+            yield f"force closure of the contacts cannot be decided ({error})"
         return
     except GraspError as error:
-        yield f"closure cannot be asked for ({error})"
+        yield f"force closure of the contacts cannot be computed ({error})"
         return
     if certificate.closed != row["force_closed"]:
-        yield f"force-closed is {row['force_closed']}, the contacts say {certificate.closed}"
+        yield (
+            f"force_closed is {row['force_closed']}, but from the contacts it is "
+            f"{certificate.closed}"
+        )
     elif certificate.closed and not np.isclose(
         certificate.margin, row["closure_margin"], rtol=0.0, atol=SAME_MARGIN * row["friction"]
     ):
         stated = row["closure_margin"]
-        yield f"closure margin {stated:.9g}, the contacts say {certificate.margin:.9g}"
+        yield (
+            f"closure margin is {stated:.9g}, but from the contacts it is {certificate.margin:.9g}"
+        )

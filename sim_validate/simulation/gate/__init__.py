@@ -1,5 +1,5 @@
-"""Is the simulator right under these settings?
+"""Does the simulator give right answers with these settings?
 
-The gate takes a setup, a friction and a size, and checks cases with known answers. If one check
-fails, nothing is simulated.
+Modules here form the gate: checks of the simulator on cases whose answers are known from statics.
+They take the settings, a friction and an object size. If one check fails, no grasp is simulated.
 """

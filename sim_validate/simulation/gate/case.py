@@ -1,4 +1,4 @@
-"""The settings with which the gate's known cases are measured, and the checks that they give."""
+"""The settings with which the simulator is checked on known cases, and results of the checks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,24 +17,24 @@ from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.simulate import Bench
 
 LEAST_OFFSET, LARGEST_OFFSET = 0.01, 1.0
-"""Least and largest critical friction for which fingers can be offset on the box."""
+"""Least and largest critical friction that two offset fingers on the box can be made to need."""
 PUSH = 0.6
-"""Normal force of the fingers on the box, relative to the largest normal force."""
+"""Normal force of the fingers on the box, relative to the largest normal force allowed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One measured figure, and the interval in which it must lie."""
+    """One figure measured in simulation, and the interval in which it must lie."""
 
     name: str
     value: float
-    """The measured figure, NaN where nothing could be measured."""
+    """The measured figure, or NaN if it could not be measured."""
     least: float
     largest: float
 
     @property
     def passed(self) -> bool:
-        """Whether the figure lies in its interval."""
+        """Whether the measured figure lies in its interval."""
         return self.least <= self.value <= self.largest
 
     def __str__(self) -> str:
@@ -46,7 +46,7 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """The settings, friction and object size with which the known cases are measured."""
+    """The settings, friction and object size with which the simulator is checked on known cases."""
 
     setup: Setup
     friction: float
@@ -54,7 +54,7 @@ class Case:
 
     @property
     def offset_friction(self) -> float:
-        """The friction under test, or the nearest that fingers on a box can be made to need."""
+        """The friction under test, or the nearest one that offset fingers on a box can need."""
         return min(max(self.friction, LEAST_OFFSET), LARGEST_OFFSET)
 
     def body(self, name: str) -> Polyhedron:
@@ -72,7 +72,7 @@ class Case:
 
 
 def tetrahedron(case: Case) -> tuple[Rig, list[Load]]:
-    """A tetrahedron held at the centres of its faces, and its limits along twelve axes."""
+    """Squeeze a tetrahedron at its face centres, and find its limit wrenches on twelve axes."""
     body, largest = case.body("tetrahedron"), case.setup.fingers.max_normal_force_n
     contacts = [Contact(face.centroid, face.normal) for face in body.faces]
     rig = case.squeezed(body, contacts, PUSH * largest * body.normals, case.friction)

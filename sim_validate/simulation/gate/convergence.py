@@ -1,4 +1,4 @@
-"""Whether the solver iterates far enough: solving to the last digit must not change the motion.
+"""Checks that the contact solver iterates enough: more iterations must not change the motion.
 
 A solver that stops early lets contacts slip that would hold. This shows first in two places: where
 fingers push so lightly that hardly anything keeps the object from turning about the line between
@@ -21,23 +21,26 @@ from sim_validate.simulation.rig import Rig
 from sim_validate.simulation.wrench_limits import part
 
 GAP_LIMIT = 1e-9
-"""Largest difference of a position or angle, in grasp sizes: a ten-thousandth of the finest
-threshold. Usual solvers differ by 2e-10 at most, on a millimetre at friction 0.02, and else by
-1e-15. Solvers that are known to slip falsely differ by 1.6e-9 and more."""
+"""Largest difference of a position or angle between the two solvers, in grasp sizes: a
+ten-thousandth of the finest threshold. Usual solvers differ by 2e-10 at most, on a millimetre at
+friction 0.02, and else by 1e-15. Solvers that are known to slip falsely differ by 1.6e-9 and more.
+"""
 LOW_GAP_LIMIT = 1e-7
-"""Largest difference at low friction, in grasp sizes: a hundredth of the finest threshold. Usual
-solvers differ by 2e-8 at most, on a millimetre. Solvers under which boxes of that size were seen to
-let go far above their critical friction, implicit integrators among them, differ by 4e-5."""
+"""Largest difference between the two solvers at low friction, in grasp sizes: a hundredth of the
+finest threshold. Usual solvers differ by 2e-8 at most, on a millimetre. Solvers under which boxes
+of that size were seen to let go far above their critical friction, implicit integrators among them,
+differ by 4e-5."""
 SHARE = 0.8
 """Load on the tetrahedron, relative to the largest load that it resists."""
 LIGHT = 1e-3
-"""Normal force of the light fingers, relative to that of the others."""
+"""Normal force of the two fingers that hardly push, relative to that of the others."""
 ABOVE = (1.01, 1.05, 2.0)
-"""Frictions at which the box is released, relative to the one that it needs, so it stays."""
+"""Frictions at which the box is released, relative to the friction that it needs; it stays at
+each."""
 
 
 def solver_gaps(case: Case) -> tuple[Check, Check]:
-    """Compare the motions under this solver with those under one that goes to the last digit."""
+    """Compare motions under the chosen solver with motions under one that iterates to the end."""
     physics = replace(
         case.setup.physics, solver="Newton", jacobian="dense", tolerance=1e-18, iterations=300,
         ls_iterations=100, ls_tolerance=1e-3,
@@ -58,14 +61,14 @@ def _gap(motions: Sequence[Array], others: Sequence[Array]) -> float:
 
 
 def _held(case: Case) -> Array:
-    """Joint positions of the held tetrahedron in all samples, (trials, n, q), in grasp sizes."""
+    """Simulate the held tetrahedron; return joint positions (trials, n, q) in grasp sizes."""
     rig, limits = tetrahedron(case)
     held = rig.motions_of_holds([part(rig.idle, limit, SHARE) for limit in limits])
     return _in_sizes(held, rig)
 
 
 def _released(case: Case, needed: float) -> Array:
-    """Joint positions of a box that needs a friction and is released above it, as in `_held`."""
+    """Release a box at frictions above the one it needs; return joint positions as `_held` does."""
     box = _lightly_held_box(case, needed)
     settling = case.setup.friction.settling_friction * needed
     released = box.motions_of_releases(settling, [above * needed for above in ABOVE])

@@ -1,4 +1,4 @@
-"""Is this simulator faithful? Known cases are measured before any grasp is certified."""
+"""Checks the simulator on cases with known answers before any grasp is simulated."""
 
 import math
 from dataclasses import dataclass, replace
@@ -15,11 +15,11 @@ USUAL_FRICTION, USUAL_RADIUS_M = 0.5, 0.07
 
 @dataclass(frozen=True, slots=True)
 class Gate:
-    """The checks of the known cases, and the simulator that was checked."""
+    """The results of checking the simulator on cases with known answers."""
 
     checks: tuple[Check, ...]
     mujoco: str
-    """Version of MuJoCo."""
+    """Version of MuJoCo that was checked."""
 
     @property
     def passed(self) -> bool:
@@ -30,7 +30,7 @@ class Gate:
 def require_faithful(
     setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
 ) -> Gate:
-    """Measure the known cases and refuse settings under which a check fails.
+    """Check the simulator on known cases, and refuse settings under which a check fails.
 
     Raises:
         UnfaithfulError: A check failed; nothing simulated with this setup would count.
@@ -39,7 +39,8 @@ def require_faithful(
     if not gate.passed:
         failed = "; ".join(str(check) for check in gate.checks if not check.passed)
         raise UnfaithfulError(
-            f"the simulator is not faithful with these settings, so nothing is certified: {failed}"
+            "the simulator is not faithful with these settings, so no grasp is certified; "
+            f"these checks failed: {failed}"
         )
     return gate
 
@@ -47,7 +48,7 @@ def require_faithful(
 def measured_gate(
     setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
 ) -> Gate:
-    """Measure the known cases, once per process for the same settings.
+    """Check the simulator on known cases, once per process for the same settings.
 
     Args:
         setup: How trials are simulated.

@@ -1,4 +1,4 @@
-"""Known answers of statics, measured in this simulator.
+"""Checks the simulator on cases whose answers are known from statics.
 
 With mu the friction and N the normal force of a contact:
 
@@ -46,13 +46,14 @@ AZIMUTHS_DEG = (0.0, 22.5, 45.0, 67.5)
 SLIP_TOLERANCE = 0.005
 """Largest error of the load at which a box slips, relative to the load that statics predicts."""
 CREEP_LIMIT = 1e-4
-"""Fastest creep under load, in grasp sizes per second; good settings show a twentieth of it."""
+"""Fastest creep allowed under load, in grasp sizes per second; good settings show a twentieth of
+it."""
 CREEP_SHARE = 0.2
-"""Largest share of the threshold of a hold that creep may use up."""
+"""Largest share of a hold's displacement threshold that creep may use up."""
 CREEP_LOAD = 0.8
 HIDDEN_LIMIT = 0.01
-"""Largest force that the thresholds may let pass, relative to the largest normal force. It is ten
-times what the usual thresholds let pass."""
+"""Largest force that may act without a threshold noticing it, relative to the largest normal force.
+It is ten times what the usual thresholds let pass."""
 NEAR = 0.01
 """Distance from the critical friction, relative to it, at which a hold must tell whether the object
 stays."""
@@ -63,7 +64,7 @@ BLOW_UP = 1e14
 
 
 def known_answers(case: Case) -> tuple[Check, ...]:
-    """Measure all known cases on the surface of the case's setup."""
+    """Check the simulator on all known cases, on the surface that the settings name."""
     return (
         *_incline(case), *_pulled_box(case), *_offset_fingers(case), _creep(case), _hidden(case),
         *solver_gaps(case), _blow_up(case),
@@ -71,7 +72,7 @@ def known_answers(case: Case) -> tuple[Check, ...]:
 
 
 def _incline(case: Case) -> list[Check]:
-    """Put a box on four rigid supports, let it weigh on them and pull it at their level."""
+    """Let a box weigh on four rigid supports, pull it at their level, and check when it slides."""
     body = case.body("box")
     length, width, height = np.ptp(body.vertices, axis=0)
     corners = [(s * length / 4, t * width / 4) for s in (-1, 1) for t in (-1, 1)]
@@ -91,7 +92,7 @@ def _incline(case: Case) -> list[Check]:
 
 
 def _pulled_box(case: Case) -> list[Check]:
-    """Pull a box across the normals of four fingers on two opposite faces."""
+    """Pull a box that fingers hold on two opposite faces, and check when it slips."""
     body = case.body("box")
     length, width, _ = np.ptp(body.vertices, axis=0)
     contacts = [
@@ -129,7 +130,7 @@ def _slips(name: str, found: Sequence[SimulatedLimit | None]) -> list[Check]:
 
 
 def _offset_fingers(case: Case) -> list[Check]:
-    """Offset two fingers on each of two opposite faces, so that their nearest line is oblique."""
+    """Offset two fingers on each of two opposite faces, and check at which friction they let go."""
     body = case.body("box")
     length, _, distance = np.ptp(body.vertices, axis=0)
     critical = case.offset_friction
@@ -168,7 +169,7 @@ def _offset_fingers(case: Case) -> list[Check]:
 
 
 def _creep(case: Case) -> Check:
-    """Measure the fastest creep of a tetrahedron held at its face centres, under twelve loads."""
+    """Check how fast a tetrahedron held at its face centres creeps under twelve loads."""
     rig, limits = tetrahedron(case)
     traces = rig.hold([part(rig.idle, limit, CREEP_LOAD) for limit in limits])
     # the maximum is NaN if one speed is
@@ -180,7 +181,7 @@ def _creep(case: Case) -> Check:
 
 
 def _hidden(case: Case) -> Check:
-    """Compute the force that servos give way to before a threshold notices a motion."""
+    """Check how large a force may be before the displacement thresholds notice it."""
     rig, _ = tetrahedron(case)
     layout, setup = rig.bench.scene.layout, case.setup
     threshold = max(
@@ -194,7 +195,7 @@ def _hidden(case: Case) -> Check:
 
 
 def mesh_touches(case: Case) -> tuple[Check, Check]:
-    """Measure how fingertips touch the faces of a mesh with many faces."""
+    """Check how fingertips touch the faces of a mesh with many faces."""
     body = case.body(MANY_FACED)
     contacts = [Contact(face.centroid, face.normal) for face in body.faces]
     groups = [contacts[start : start + FINGERS] for start in range(0, len(contacts), FINGERS)]
@@ -209,7 +210,7 @@ def mesh_touches(case: Case) -> tuple[Check, Check]:
 
 
 def _speed(trace: Trace) -> float:
-    """Mean speed of a trace's second half [m/s]; NaN if the trace has a fault or is too short."""
+    """Return the mean speed in a trace's second half [m/s]; NaN if the trial is not valid."""
     half = len(trace.times_s) // 2
     if trace.fault or not half:
         return math.nan
@@ -218,7 +219,7 @@ def _speed(trace: Trace) -> float:
 
 
 def _blow_up(case: Case) -> Check:
-    """Measure the error of the simulator's clock after a load that makes numbers overflow."""
+    """Check the simulator's clock after a load so large that numbers overflow."""
     rig, _ = tetrahedron(case)
     (trace,) = rig.hold([Load(np.full(6, BLOW_UP), rig.idle.forces)])
     seen = not trace.finite or trace.warnings > 0

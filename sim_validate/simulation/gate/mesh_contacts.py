@@ -1,4 +1,4 @@
-"""Whether fingertips touch a mesh with the normals and depths of its faces.
+"""Checks that fingertips touch a mesh with the normals and depths of its faces.
 
 If they do not, no verdict on the mesh counts.
 """
@@ -16,17 +16,18 @@ from sim_validate.simulation.simulate import first_touch
 
 DEPTH = 1e-4
 """Depth to which rigid fingertips are put into the faces, in object radii. It is a thousand times
-the rounding of a coordinate in single precision, which vertices of meshes have."""
+the rounding of a vertex coordinate, which meshes hold in single precision."""
 NORMAL_ERROR = 1e-4
-"""Largest angle between a contact's normal and its face's [rad]; it acts like that much additional
-friction."""
+"""Largest angle between the normal of a contact and the normal of its face [rad]; the angle acts
+like that much additional friction."""
 DEPTH_ERROR = 0.1
-"""Largest relative error of a depth: vertices may be three hundredths of it off their faces."""
+"""Largest relative error of a contact's depth: vertices may be three hundredths of it off their
+faces."""
 
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """The worst contact between fingertips and a mesh.
+    """The contact between fingertips and a mesh that differs most from the mesh's faces.
 
     The errors are NaN where a fingertip has no contact, or several.
     """
@@ -34,11 +35,11 @@ class Touch:
     finger: int
     normal_error_rad: float
     depth_error: float
-    """Error of the contact's depth, relative to that depth."""
+    """Error of the contact's depth, relative to the right depth."""
 
     @property
     def right(self) -> bool:
-        """Whether both errors are within their limits."""
+        """Whether the errors of normal and depth are within their limits."""
         return self.normal_error_rad <= NORMAL_ERROR and self.depth_error <= DEPTH_ERROR
 
 
@@ -66,17 +67,18 @@ def worst_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> 
 
 
 def require_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> None:
-    """Check the contacts of a grasp where fingertips touch the mesh itself.
+    """Check that fingertips touch a mesh as its faces lie, where no pads are put between.
 
     Raises:
-        UnfaithfulError: A contact differs from its face; what is simulated would not count.
+        UnfaithfulError: A contact differs from its face, so a simulation would prove nothing.
     """
     if setup.surface != "mesh":
         return
     worst = worst_touch(body, contacts, setup)
     if not worst.right:
         raise UnfaithfulError(
-            f"fingertip {worst.finger} does not touch the mesh as its face lies: the normal is off "
+            f"fingertip {worst.finger} does not touch the mesh as the planned face lies: the "
+            "normal is off "
             f"by {worst.normal_error_rad:.3g} rad (at most {NORMAL_ERROR:g}), the depth by "
             f"{worst.depth_error:.3g} of it (at most {DEPTH_ERROR:g}; nan is no contact); let "
             "fingertips touch pads, or raise ccd_iterations"

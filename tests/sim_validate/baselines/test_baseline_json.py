@@ -48,7 +48,7 @@ def with_entry(**changed):
     [
         ("", "not JSON"),
         ("[]", "expected an object, as a baseline is, got a list"),
-        ("{}", "is not a baseline"),
+        ("{}", "expected a baseline, as"),
         (spoiled(lambda r: r.update(schema=2)), "schema: .* by a newer graspproof"),
         (spoiled(lambda r: r.pop("friction")), "friction: missing"),
         (spoiled(lambda r: r.update(friction="x")), "friction: expected a number, got"),
@@ -67,17 +67,17 @@ def with_entry(**changed):
         (with_entry(outcome="holds"), "grasps\\[0\\].outcome: expected 'held'"),
         (
             with_entry(outcome="slipped"),
-            "grasps\\[0\\]: .*outcome is slipped, but wrenches not",
+            "grasps\\[0\\]: .*`outcome` slipped contradicts `not_held`",
         ),
         (
             with_entry(not_held=["lift"]),
-            "grasps\\[0\\]: .*outcome is held, but wrenches not",
+            "grasps\\[0\\]: .*`outcome` held contradicts `not_held`",
         ),
         (
             with_entry(controls_let_go=9),
-            "grasps\\[0\\]: .*more wrenches or controls ended in some way than were tried",
+            "grasps\\[0\\]: .*`not_held` or `controls_let_go` counts more than",
         ),
-        (with_entry(noisy_not_held=[100]), "grasps\\[0\\]: .*not below the number of repeats"),
+        (with_entry(noisy_not_held=[100]), "grasps\\[0\\]: .*numbers below `noisy_trials`"),
         (spoiled(lambda r: r["grasps"].append(r["grasps"][0])), "the same id"),
     ],
 )
@@ -115,7 +115,7 @@ def test_settings_that_are_none_are_refused(change, message):
 def test_only_baselines_are_overwritten(tmp_path):
     path = tmp_path / "grasps.json"
     path.write_text('{"grasps": []}')
-    with pytest.raises(gc.InputError, match="is not a baseline, and will not be overwritten"):
+    with pytest.raises(gc.InputError, match="is not a baseline and will not be overwritten"):
         write_baseline(path, BEFORE)
     assert path.read_text() == '{"grasps": []}'
     write_baseline(tmp_path / "b.json", BEFORE)

@@ -209,4 +209,4 @@ def test_files_of_another_kind_are_named(copy, capsys):
 def test_noise_without_repeats_is_refused(copy, capsys):
     line = ["baseline", "record", str(copy / "grasps.json"), "-o", str(copy / "n.json")]
     assert main([*line, "--noise-friction", ".2"]) == Exit.USAGE
-    assert "give --trials too" in capsys.readouterr().err
+    assert "with --trials too" in capsys.readouterr().err

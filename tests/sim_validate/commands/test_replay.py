@@ -172,15 +172,15 @@ def test_other_files_are_refused(tmp_path, capsys, name, text, message):
 @pytest.mark.parametrize(
     ("flags", "message"),
     [
-        ((), "give --grasp ID; there is "),
-        (("--grasp", "no"), "no grasp no; there is "),
-        (("--grasp", "FIRST", "--control", "no"), "has no control 'no'; there is "),
-        (("--grasp", "FIRST", "--wrench", "no"), "no wrench 'no'; there are "),
+        ((), "choose a grasp with --grasp ID; the file has "),
+        (("--grasp", "no"), "no grasp is named no; the file has "),
+        (("--grasp", "FIRST", "--control", "no"), "has no negative control 'no'; choose from "),
+        (("--grasp", "FIRST", "--wrench", "no"), "no wrench is named 'no'; choose from "),
         (
             ("--grasp", "FIRST", "--trial", "0"),
-            "no repeat 0 with noise; there were none",
+            "no repeat with noise numbered 0; it was recorded without",
         ),
-        (("--grasp", "FIRST", "--trial", "0", "--control", "x"), "give one"),
+        (("--grasp", "FIRST", "--trial", "0", "--control", "x"), "give only one of them"),
     ],
 )
 def test_what_is_not_there_is_named(folder, capsys, flags, message):
@@ -194,7 +194,7 @@ def test_grasps_of_another_object_are_refused(folder, tmp_path, capsys):
     assert main(["plan", "wedge", "--limit", "1", "--out", str(tmp_path), "-q"]) == Exit.GOOD
     other = str(tmp_path / "grasps.json")
     assert main(["replay", str(folder), "--grasp", "x", "--grasps", other]) == Exit.INPUT
-    assert "its object is not that" in capsys.readouterr().err
+    assert "are on another object" in capsys.readouterr().err
 
 
 def test_other_contacts_under_the_same_id_are_refused(folder, tmp_path, capsys):
@@ -207,7 +207,7 @@ def test_other_contacts_under_the_same_id_are_refused(folder, tmp_path, capsys):
         grasps = str(folder / "grasps.json")
         asked = ["replay", str(path), "--grasp", first["id"], "--grasps", grasps]
         assert main(asked) == Exit.INPUT
-        assert "is about other contacts" in capsys.readouterr().err
+        assert "have changed since these results" in capsys.readouterr().err
 
 
 def test_a_wrench_with_a_minus_sign_is_named_with_an_equals_sign(folder, replay):

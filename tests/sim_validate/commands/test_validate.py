@@ -124,8 +124,8 @@ def test_settings_of_a_file_are_in_force_and_in_the_record(planned, verdict):
 @pytest.mark.parametrize(
     ("flags", "code", "words"),
     [
-        (["--down", "0", "0", "-1"], Exit.USAGE, "give --weight-n too"),
-        (["--traces"], Exit.USAGE, "give --out DIR too"),
+        (["--down", "0", "0", "-1"], Exit.USAGE, "give the weight with --weight-n too"),
+        (["--traces"], Exit.USAGE, "with --out DIR too"),
         (["--wrenches", "none.json"], Exit.INPUT, "none.json"),
         (["--setup", "none.toml"], Exit.INPUT, "none.toml"),
         (["--also-judge-by", "1cm"], Exit.USAGE, "six-forces"),

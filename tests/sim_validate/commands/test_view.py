@@ -86,7 +86,7 @@ def test_what_cannot_be_shown_is_refused(planned, tmp_path, monkeypatch, capsys,
     assert main(["view", str(planned), *flags]) == Exit.USAGE
     assert says in capsys.readouterr().err
     assert main(["view", str(planned), "--picture", "a.png", "--grasp", "c-9"]) == Exit.INPUT
-    assert "no grasp c-9; there is" in capsys.readouterr().err
+    assert "no grasp is named c-9; the file has" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 

@@ -30,8 +30,8 @@ def test_names_with_quotes_and_control_characters_survive(tmp_path):
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        ({"objects": []}, "objects: expected one or more"),
-        ({"objects": ["wedge", "wedge"]}, "each once"),
+        ({"objects": []}, "objects: expected a list of one or more"),
+        ({"objects": ["wedge", "wedge"]}, "one or more different items"),
         ({"objects": "wedge"}, "objects: expected a list of text"),
         ({"frictions": [0.0]}, "frictions: expected numbers above 0"),
         ({"frictions": [True]}, "frictions: expected a list of numbers"),

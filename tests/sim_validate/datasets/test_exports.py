@@ -375,7 +375,7 @@ def test_two_grasps_are_not_written_to_one_file(copy, tmp_path):
             row["grasp_id"] = name
 
     forged(copy, "grasps", rename)
-    with pytest.raises(gc.InputError, match=r"two files would be called a_b\.xml"):
+    with pytest.raises(gc.InputError, match=r"the same file name, a_b\.xml"):
         export(copy, "mjcf", tmp_path / "out", None, silent)
     assert not (tmp_path / "out").exists()
 
@@ -388,7 +388,7 @@ def test_what_is_there_already_is_left_alone(dataset, tmp_path):
         for out in (mine, mine / "thesis.tex"):
             with pytest.raises(gc.InputError, match="not an empty folder"):
                 export(dataset, to, out, None, silent)
-        with pytest.raises(gc.InputError, match="is in the dataset"):
+        with pytest.raises(gc.InputError, match="inside the dataset to export"):
             export(dataset, to, dataset / "exports" / to, None, silent)
     assert [path.name for path in tmp_path.iterdir()] == ["mine"]
     assert (mine / "thesis.tex").read_text() == "all my work"
@@ -411,7 +411,7 @@ def test_a_damaged_dataset_is_refused_and_leaves_nothing(copy, tmp_path):
         with pytest.raises(gc.InputError):
             export(copy, to, tmp_path / "out", None, silent)
     (copy / "manifest.json").unlink()
-    with pytest.raises(gc.InputError, match="not finished"):
+    with pytest.raises(gc.InputError, match="expected a finished dataset"):
         export(copy, "csv", tmp_path / "out", None, silent)
     assert [path.name for path in tmp_path.iterdir()] == ["copy"]
 

@@ -145,7 +145,7 @@ GOOD = {"contact_points_m": np.eye(4, 3)[None] * 0.01, "contact_normals": NORMAL
 @pytest.mark.parametrize(
     ("arrays", "message"),
     [
-        ({"contact_points_m": POINTS}, "no array contact_normals"),
+        ({"contact_points_m": POINTS}, "the array contact_normals is missing"),
         ({"contact_points_m": POINTS[:, :3], "contact_normals": NORMALS}, "expected numbers"),
         ({"contact_points_m": POINTS.astype(str), "contact_normals": NORMALS}, "expected numbers"),
         ({"contact_points_m": POINTS[:1], "contact_normals": NORMALS}, "of equal length"),
@@ -173,7 +173,7 @@ def test_three_contacts_and_files_of_something_else_are_refused(tmp_path):
     with pytest.raises(gc.InputError, match="expected 4 contacts, got 3"):
         read_given(three)
     config = DatasetConfig(objects=("wedge",), contacts=str(three))
-    with pytest.raises(gc.InputError, match="only the object that the contacts are on"):
+    with pytest.raises(gc.InputError, match="one object beside `contacts`"):
         dataclasses.replace(config, objects=("wedge", "prism"))
 
 

@@ -60,7 +60,7 @@ def test_optimised_grasps_hold_in_simulation(tmp_path):
 @pytest.mark.parametrize(
     ("flags", "code", "message"),
     [
-        (["--ceiling", "10"], Exit.INPUT, "give both or neither"),
+        (["--ceiling", "10"], Exit.INPUT, "--ceiling needs --optimize"),
         (["--optimize", "--finger-radius-m", "-1"], Exit.USAGE, "--finger-radius-m must be"),
     ],
 )

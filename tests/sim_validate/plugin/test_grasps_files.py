@@ -104,7 +104,7 @@ def test_without_a_baseline_it_is_said_how_to_make_one(blessed, tmp_path):
         (tmp_path / name).write_bytes((blessed / name).read_bytes())
     code, said = run_pytest(tmp_path)
     assert code == 1
-    assert "there is no baseline yet: pytest --grasp-bless" in said
+    assert "this baseline does not exist yet; write it with pytest --grasp-bless" in said
 
 
 @pytest.mark.parametrize(

@@ -67,16 +67,16 @@ def test_marked_tests_run_with_each_grasp(blessed, tmp_path):
 @pytest.mark.parametrize(
     ("marker", "message"),
     [
-        ("", "needs a grasps.json, or object="),
+        ("", "needs the path of a grasps.json, or object="),
         ("object='wedge', taste=1", "got 'taste'"),
-        ("'grasps.json', limit=1", "beside a file takes friction; got 'limit'"),
-        ("'a.json', 'b.json'", "takes one file of grasps"),
-        ("3", "takes one file of grasps"),
+        ("'grasps.json', limit=1", "no setting 'limit' beside a file of grasps; it takes friction"),
+        ("'a.json', 'b.json'", "takes the path of one file of grasps"),
+        ("3", "takes the path of one file of grasps"),
         ("'nowhere.json'", "nowhere.json"),
         ("object='wedg'", "did you mean wedge"),
         ("object='wedge', friction='0.5'", "friction must be a number, got '0.5'"),
         ("object='wedge', limit='2'", "limit must be a whole number from 1"),
-        ("object='box', cones='normal', families=('pencil',)", "there is no grasp of box"),
+        ("object='box', cones='normal', families=('pencil',)", "no grasp of box was found"),
     ],
 )
 def test_a_wrong_marker_is_named(tmp_path, marker, message):
@@ -114,11 +114,11 @@ def test_assert_stable_in_code(tmp_path):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        ("assert_stable(grasp_case, min_pass_rate=0.9)", "give trials, too"),
+        ("assert_stable(grasp_case, min_pass_rate=0.9)", "as `trials`, too"),
         ("assert_stable(grasp_case, trials=2, min_pass_rate=80)", "from 0 to 1, got 80"),
         ("assert_stable(grasp_case, min_margin=float('nan'))", "min_margin must be from 0"),
         ("assert_stable(grasp_case, min_margin='0.2')", "min_margin must be from 0"),
-        ("assert_stable(grasp_case, trial=2)", "assert_stable takes wrenches, trials"),
+        ("assert_stable(grasp_case, trial=2)", "no argument 'trial'; it takes wrenches"),
         ("assert_stable(grasp_case, wrenches=[[1, 2]])", "must be NamedWrench values"),
         ("assert_stable(grasp_case.grasp)", "expected a grasp_case"),
         ("assert_stable(grasp_case, friction=0.01)", "needs friction above"),

@@ -43,7 +43,7 @@ def test_only_regular_files_are_read(tmp_path):
 )
 @pytest.mark.timeout(20)
 def test_settings_that_never_end_are_refused_at_once(text):
-    with pytest.raises(gc.InputError, match="not TOML"):
+    with pytest.raises(gc.InputError, match=r"not TOML|of the TOML file"):
         tables_of_toml(text)
 
 
@@ -86,7 +86,7 @@ def test_long_settings_are_refused_before_they_are_read(tmp_path):
     with pytest.raises(gc.InputError, match="larger than"):
         read_tables(path)
     for key in ("a.", '"a b" . ', "'=,'."):  # tomllib would take hours
-        with pytest.raises(gc.InputError, match="a key has more than 64 parts"):
+        with pytest.raises(gc.InputError, match="has more than 64 parts"):
             tables_of_toml("x = 1\n" + key * (MOST_LETTERS // 8) + "a = 1")
     with pytest.raises(gc.InputError, match="more than 64 deep"):
         tables_of_toml("[a.a]\na = " + "[" * 65 + "]" * 65)
@@ -148,10 +148,10 @@ GOOD = _npy(_header(), b"\0" * 8)
 ARCHIVES = {
     "encrypted": (_archive(("a.npy", GOOD), flag=1), "cannot be read as npz"),
     "twice": ("twice", "the same name"),
-    "object": (_archive(("a.npy", _npy(_header("'|O'"), b"\0" * 8))), "expected numbers or text"),
-    "structured": (_archive(("a.npy", _npy(_header("[('x', '<f8')]"), b"\0" * 8))), "expected num"),
-    "overflow": (_archive(("a.npy", _npy(_header(shape="(4294967296, 4294967296)")))), "its shape"),
-    "negative": (_archive(("a.npy", _npy(_header(shape="(-1,)"), b"\0" * 8))), "its shape"),
+    "object": (_archive(("a.npy", _npy(_header("'|O'"), b"\0" * 8))), "an array of numbers"),
+    "structured": (_archive(("a.npy", _npy(_header("[('x', '<f8')]"), b"\0" * 8))), "expected an"),
+    "overflow": (_archive(("a.npy", _npy(_header(shape="(4294967296, 4294967296)")))), "s shape"),
+    "negative": (_archive(("a.npy", _npy(_header(shape="(-1,)"), b"\0" * 8))), "s shape"),
     "short": (_archive(("a.npy", _npy(_header(shape="(2,)"), b"\0" * 8))), "as many numbers"),
     "long": (_archive(("a.npy", GOOD + b"\0")), "as many numbers"),
     "code": (_archive(("a.npy", _npy("__import__('os').abort()"))), "cannot be read as npz"),
@@ -178,7 +178,7 @@ def test_a_bomb_is_refused_by_what_it_claims_before_it_is_inflated(monkeypatch):
     monkeypatch.setattr(npz, "MOST_BYTES", 2**22)
     bomb = _archive(*((f"{i}.npy", b"\0" * 2**20) for i in range(5)))
     assert len(bomb) < 2**14
-    with pytest.raises(gc.InputError, match="bytes of arrays are over the limit"):
+    with pytest.raises(gc.InputError, match="the arrays of the npz file take"):
         arrays_of(bomb, ["a"])
     claims = bytearray(_archive(("a.npy", GOOD)))
     at = claims.find(b"PK\x01\x02")
@@ -205,7 +205,7 @@ def test_plain_arrays_come_back_as_numpy_writes_them(order):
 def test_given_contacts_in_an_archive_that_lies_are_refused_with_the_file(tmp_path):
     path = tmp_path / "g.npz"
     path.write_bytes(ARCHIVES["overflow"][0])
-    with pytest.raises(gc.InputError, match=r"g\.npz: no array contact_points_m"):
+    with pytest.raises(gc.InputError, match=r"g\.npz: the array contact_points_m is"):
         read_given(path)
 
 

@@ -29,7 +29,7 @@ def test_a_file_changes_what_it_names_and_nothing_else(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[physics]\ntimestp = 0.001\n", r"\[physics\] has .*timestep.* got .timestp."),
+        ("[physics]\ntimestp = 0.001\n", r"\[physics\]: no setting is named .timestp.*timestep"),
         ("[physic]\ntimestep = 0.001\n", "expected tables physics.* got .physic."),
         ("timestep = 0.001\n", "expected tables physics.* got .timestep."),
         ('[physics]\ntimestep = "slow"\n', r"\[physics\] timestep: .*number"),
@@ -68,7 +68,7 @@ def test_wrenches_of_a_task_are_read_as_they_are(tmp_path):
         ('{"wrenches": [{"name": "a", "force_n": [0, 0]}]}', "wrenches\\[0\\].force_n"),
         (
             '{"wrenches": [{"name": "a", "force_n": [0, 0, 0]}]}',
-            "wrench .a.: the largest part must be from 1e-09",
+            "wrench .a.: its largest component must be from 1e-09",
         ),
         (
             '{"wrenches": [{"name": "a", "force_n": [1, 0, 0], "mass": 1}]}',

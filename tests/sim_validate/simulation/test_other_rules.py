@@ -58,5 +58,5 @@ def test_the_forces_are_six_and_have_no_torque():
 
 
 def test_an_unknown_rule_is_refused_by_name():
-    with pytest.raises(gc.InputError, match="no rule '1cm'; there are 5cm-15deg"):
+    with pytest.raises(gc.InputError, match="rule is named '1cm'; choose from 5cm-15deg"):
         rules_named(["2cm", "1cm"])

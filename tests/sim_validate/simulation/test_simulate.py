@@ -133,7 +133,7 @@ def test_trials_past_their_time_are_stopped_and_say_so(held):
 def test_a_scene_that_the_simulator_refuses_is_refused_input(held):
     body, grasp, _ = held
     scene = scenes.build_scene(body, grasp, 0.5)
-    with pytest.raises(gc.InputError, match=r"refuses the scene.*Newtonian"):
+    with pytest.raises(gc.InputError, match=r"cannot compile the scene.*Newtonian"):
         Bench(replace(scene, xml=scene.xml.replace('"Newton"', '"Newtonian"')))
 
 

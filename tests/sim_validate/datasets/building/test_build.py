@@ -69,7 +69,7 @@ def test_a_killed_build_goes_on_where_it_was(dataset, tmp_path, killed_at):
     engine = Here(die)
     with pytest.raises(KilledError):
         build(CONFIG, folder, engine, silent)
-    with pytest.raises(gc.InputError, match="not finished"):
+    with pytest.raises(gc.InputError, match="expected a finished dataset"):
         verify(folder)
     again = Here()
     built = build(CONFIG, folder, again, silent)
@@ -186,7 +186,7 @@ def test_folders_of_something_else_are_refused(copy, tmp_path):
     (tmp_path / "mine" / "thesis.tex").write_text("all my work")
     with pytest.raises(gc.InputError, match=r"thesis\.tex: exists"):
         build(CONFIG, tmp_path / "mine", Here(), silent)
-    with pytest.raises(gc.InputError, match="no dataset"):
+    with pytest.raises(gc.InputError, match="expected a finished dataset"):
         verify(tmp_path / "mine")
 
 
@@ -195,7 +195,7 @@ def test_what_a_dataset_would_overwrite_in_a_folder_of_another_is_refused(tmp_pa
     path = tmp_path / "mine" / name
     path.parent.mkdir(parents=True)
     path.write_text("mine")
-    with pytest.raises(gc.InputError, match="not part of this dataset"):
+    with pytest.raises(gc.InputError, match="not part of the dataset"):
         build(CONFIG, tmp_path / "mine", Here(), silent)
     assert path.read_text() == "mine"
 
@@ -205,7 +205,7 @@ def test_meshes_inside_the_folder_are_refused(tmp_path):
     path.parent.mkdir(parents=True)
     trimesh.creation.box(extents=(0.04, 0.05, 0.06)).export(path)
     config = dataclasses.replace(CONFIG, objects=(str(path),))
-    with pytest.raises(gc.InputError, match="holds nothing else"):
+    with pytest.raises(gc.InputError, match="lies in the output folder"):
         build(config, tmp_path / "ds", Here(), silent)
     assert path.is_file()
 
