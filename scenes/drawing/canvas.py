@@ -190,5 +190,5 @@ def format_of(path: Path) -> str:
     """
     form = path.suffix.lower().removeprefix(".").replace("jpeg", "jpg")
     if form not in FORMATS:
-        raise InputError(f"{path}: a picture's name must end in {', '.join(FORMATS)}")
+        raise InputError(f"{path}: a picture's name must end in .{', .'.join(FORMATS)}")
     return form

@@ -46,15 +46,15 @@ def with_entry(**changed):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "not JSON"),
-        ("[]", "expected an object, as a baseline is, got a list"),
+        ("", "not complete JSON"),
+        ("[]", "a baseline must hold one JSON object, got a list"),
         ("{}", "is not a baseline"),
         (spoiled(lambda r: r.update(schema=2)), "schema: .* by a newer graspproof"),
         (spoiled(lambda r: r.pop("friction")), "friction: missing"),
         (spoiled(lambda r: r.update(friction="x")), "friction: expected a number, got"),
         (spoiled(lambda r: r.update(grasps_file=3)), "grasps_file: expected text, got 3"),
         (spoiled(lambda r: r.update(versions=[])), "versions: expected an object"),
-        (spoiled(lambda r: r.update(taste=1)), "taste: unknown key; expected are "),
+        (spoiled(lambda r: r.update(taste=1)), "taste: unknown key; known keys are "),
         (spoiled(lambda r: r.update(grasps=[])), "grasps: expected a list, got null"),
         (spoiled(lambda r: r.update(grasps=[1])), r"grasps\[0\]: "),
         (spoiled(lambda r: r["grasps"][0].pop("id")), r"grasps\[0\].id: missing"),
