@@ -121,9 +121,6 @@ def to_digits(values: Array, size: float = 0.0) -> Array:
     The last bits of the answers of solvers depend on where their numbers lie in memory; results
     that are simulated or written to files must not.
 
-    The last bits of solvers' and factorisations' answers depend on where their numbers lie in
-    memory; what is simulated or written must not.
-
     Args:
         values: Numbers in an array of any shape.
         size: Smallest size that the digits refer to, for values that are zero but for rounding.

@@ -45,8 +45,6 @@ class ForceCone:
     """A circular cone of force directions inside a friction cone.
 
     In the paper its axis is the contact normal and its half-angle the friction angle.
-
-    In the paper the normal is the axis and the friction angle the half-angle.
     """
 
     axis: Array
@@ -213,9 +211,6 @@ def _one_per_finger(value: Any, each: Callable[[Any], object], name: str, kind: 
 
 def four(items: Iterable[Item]) -> tuple[Item, Item, Item, Item]:
     """Return exactly four items, one per finger.
-
-    Raises:
-        InputError: There are more or fewer than four.
 
     Raises:
         InputError: There are more or fewer than four.

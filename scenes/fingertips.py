@@ -122,9 +122,6 @@ def _largest_apart(positions: Array, normals: Array) -> float:
     Between two contacts d is the difference of the positions and m that of the normals. The radius
     is the positive root of (4 - m.m) r^2 + 2 (d.m) r = d.d. Two fingers that face each other have
     no such root, and do not limit the radius.
-
-    It is the positive root of (4 - m.m) r^2 + 2 (d.m) r = d.d. Two fingers that face each other
-    have none, and do not limit it.
     """
     largest = math.inf
     for i, j in combinations(range(len(positions)), 2):
@@ -154,10 +151,6 @@ def _clear_radius(body: Polyhedron, position: Array, normal: Array, start: float
     The radius is at most `start`. Contacts may lie slightly below their faces, because positions in
     files are rounded. The surface of a curved patch does not count near the contact, because a
     fingertip is assumed to touch the plane of the patch.
-
-    Contacts may be a little below their own faces, because positions in files are rounded. The
-    surface of a curved patch does not count where it is touched: a finger is taken to touch its
-    plane.
     """
     slack, radius = ON_FACE * body.radius, start
     triangles = _triangles_near(body, position, normal, start)

@@ -124,11 +124,6 @@ def arrange(
     visible motions. Everything after the rounding is plain arithmetic with the same result on every
     machine.
 
-    Contacts are rounded to nine digits of the object's radius. Closing fingers strike and rebound,
-    which turns differences in the last digits of a number, such as those between machines, into
-    visible motions. What follows from the rounded contacts is plain arithmetic, the same
-    everywhere.
-
     Args:
         body: The object.
         grasp: A grasp, or contacts of any origin.
@@ -231,9 +226,6 @@ def _inertia(mass: float, positions: Array, size: float) -> Array:
     About the axis that the contacts are closest to, it is mass (size / 2)^2; about the other axes
     it grows with the contacts' levers. An equal inertia about all axes would let long grasps spring
     loose.
-
-    About the axis that the contacts are closest to, it is mass (size / 2)^2; about the others it
-    grows with their levers. An equal inertia about all axes would let long grasps spring loose.
     """
     arms = positions - positions.mean(axis=0)
     second = arms.T @ arms / len(arms)
@@ -247,11 +239,7 @@ def _inertia(mass: float, positions: Array, size: float) -> Array:
 def _pushes(positions: Array, normals: Array, friction: float) -> Array:
     """Compute forces in the contact frames, (k, 3), that balance under force closure.
 
-    The largest normal part is one. Contacts that are not in force closure just push along their
-    normals.
-
-    The largest normal part is one. Contacts that are not in force closure just push along their
-    normals.
+    The largest normal part is one. Contacts that are not in force closure push along their normals.
     """
     try:
         forces = force_closure(positions, normals, friction).forces

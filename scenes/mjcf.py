@@ -231,10 +231,6 @@ def _keyframes(root: ElementTree.Element, layout: Layout) -> None:
     but are commanded to squeeze gently, so that they move in. In `grasp` they touch and squeeze
     gently. In `squeeze` they touch and squeeze in the same proportions, as hard as the largest
     normal force allows.
-
-    `pregrasp`: the fingers stay away from the object. `approach`: they start at the same place, but
-    squeeze gently, so that they come in. `grasp`: they touch and squeeze gently. `squeeze`: they
-    touch and squeeze in the same proportions, as hard as the largest push allows.
     """
     fingers = len(layout.contacts)
     home = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], np.zeros(3 * fingers)])
@@ -257,9 +253,6 @@ def quaternion(rotation: Array) -> Array:
 
     The rows below are 4 q_i q for each component q_i of the quaternion q; the row of the largest
     component has the most accurate digits.
-
-    The rows below are 4 q_i q for each part q_i of the quaternion q; the row of the largest part
-    has the most digits.
     """
     (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
     rows = np.array(

@@ -20,9 +20,6 @@ class PhysicsSettings:
 
     Raises:
         InputError: A number is out of its range, or MuJoCo does not know a word.
-
-    Raises:
-        InputError: A number is out of its range, or MuJoCo does not know a word.
     """
 
     timestep: float = 0.002

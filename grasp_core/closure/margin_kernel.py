@@ -1,4 +1,4 @@
-"""The margin program of force closure at one friction is solved by an interior-point method.
+"""Solves the margin program of force closure at one friction by an interior-point method.
 
 Solved (see `force_closure`): how deep inside their friction cones k contacts can balance each
 other. In coordinates (normal, tangent, tangent) with tangential forces in units of the friction,
@@ -34,13 +34,14 @@ from grasp_core.compiled import loop
 
 WRENCH = 6
 MOST_STEPS = 40
-"""Most Newton steps; ten are usual."""
+"""Largest number of Newton steps; ten are usual."""
 SHARE = 0.1
-"""Gap, as a share of the distance of V from one, that leaves no doubt on which side of one V is."""
+"""Gap, as a share of the distance of V from one, at which it is certain on which side of one V is.
+"""
 SMALLEST_GAP = 1e-11
-"""Gaps below this are rounding, in programs of order one."""
+"""Gap below which only rounding is left, in programs of order one."""
 BALANCED = 1e-10
-"""Largest imbalance of the last point; 1e-15 is usual."""
+"""Largest accepted imbalance of the last point; 1e-15 is usual."""
 SHORTER = 0.99
 """Share of the way to the border of the cones that a step may take."""
 
@@ -49,7 +50,7 @@ SHORTER = 0.99
 def least_cone_sum(
     columns: Array, mean: Array, share: float, pair: Array, y: Array
 ) -> tuple[float, float]:
-    """Solve (1) and (2), up to a gap.
+    """Solve the programs (1) and (2), up to a gap between their values.
 
     Args:
         columns: Columns of each A_i, as rows, (k, 3, 6).
@@ -113,7 +114,7 @@ def _values(mean: Array, pair: Array, y: Array) -> tuple[float, float, float]:
 
 @loop("numpy")
 def _missing(columns: Array, mean: Array, pair: Array, missing: Array) -> float:
-    """Fill in what the forces lack to balance; return its largest part."""
+    """Fill in the wrench that the forces lack to balance; return its largest component."""
     for w in range(WRENCH):
         missing[w] = -mean[w]
     for i in range(len(columns)):
@@ -128,14 +129,16 @@ def _missing(columns: Array, mean: Array, pair: Array, missing: Array) -> float:
 
 @loop("numpy")
 def _depth(v: Array, i: int) -> float:
-    """Return v_0^2 - |(v_1, v_2)|^2 of the i-th vector; it is not positive outside the cone."""
+    """Return v_0^2 - |(v_1, v_2)|^2 of the i-th vector, which is positive inside the cone."""
     across = math.sqrt(v[i, 1] ** 2 + v[i, 2] ** 2)
     return (v[i, 0] - across) * (v[i, 0] + across) if v[i, 0] > 0.0 else -1.0
 
 
 @loop("numpy")
 def _scale(pair: Array, W: Array, middle: Array) -> bool:
-    """Fill in symmetric maps W_i of K and their inverses: W_i z_i = inverse(W_i) s_i = middle_i.
+    """Fill in symmetric maps W_i of the cone K and their inverses.
+
+    They satisfy W_i z_i = inverse(W_i) s_i = middle_i.
 
     Returns:
         False if rounding has put the point outside the cones.
@@ -201,7 +204,7 @@ def _factor(columns: Array, W: Array, V: Array, R: Array) -> bool:
 
 @loop("numpy")
 def _reflect(V: Array, v: int, X: Array, x: int) -> None:
-    """Reflect the x-th of some vectors by the v-th reflection."""
+    """Apply the v-th reflection to the x-th of some vectors."""
     share = _dot(V, v, X, x)
     for i in range(V.shape[1]):
         for j in range(3):
@@ -218,9 +221,9 @@ def _dot(V: Array, v: int, X: Array, x: int) -> float:
 
 @loop("numpy")
 def _direct(V: Array, R: Array, missing: Array, wanted: Array, step: Array, turn: Array) -> None:
-    """Find the step whose scaled parts for s and z sum to `wanted`, and its part `turn` for y.
+    """Find the step whose scaled parts for s and z sum to `wanted`, with its part `turn` for y.
 
-    The step also supplies what the forces lack to balance.
+    The step also supplies the wrench that the forces lack to balance.
     """
     for i in range(len(wanted)):
         for j in range(3):
@@ -267,7 +270,7 @@ def _towards_the_border(middle: Array, wanted: Array) -> None:
 
 @loop("numpy")
 def _towards_the_middle(middle: Array, ahead: Array, product: float, wanted: Array) -> None:
-    """Aim where the products become `product` e, given those of the step ahead."""
+    """Set the goal of a step: products equal to `product` e, corrected for the step ahead."""
     s, z = ahead[0], ahead[1]
     for i in range(len(wanted)):
         m0, m1, m2 = middle[i, 0], middle[i, 1], middle[i, 2]

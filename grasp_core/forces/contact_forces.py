@@ -1,4 +1,4 @@
-"""Contact forces that balance wrenches are found by strictly convex programs.
+"""Finds contact forces that balance wrenches, by strictly convex programs.
 
 Forces f are sought in pyramids inscribed in the friction cones, so that every answer lies in the
 true cones. With the map G from forces to their wrench, the external wrench w, the least and largest
@@ -43,12 +43,12 @@ from grasp_core.solvers.qp import QuadraticProgram, minimize
 from grasp_core.values import Grasp
 
 REGULAR = 1e-3
-"""Weight of the forces' own size that keeps the least-friction programs strictly convex."""
+"""Weight of the forces' size that keeps the least-friction programs strictly convex."""
 IMPROVEMENT = 1e-2
-"""The iteration ends when the coefficient falls by less than this share."""
+"""Share by which the coefficient must fall in a round for the iteration to go on."""
 MAX_ROUNDS = 20
 LEAST_CHARGE = 1e-3
-"""Weight of the forces' own size against the imbalance in `closest_forces`."""
+"""Weight of the forces' size relative to the imbalance in `closest_forces`."""
 
 
 def contact_forces(  # noqa: PLR0913 - the contract's arguments
@@ -95,7 +95,7 @@ def contact_forces(  # noqa: PLR0913 - the contract's arguments
     if missing.size:
         which = "this wrench" if single else f"wrench {missing[0]}, counting from 0"
         raise NoForcesError(
-            f"no forces found with friction {_text(mu)} and normal forces in "
+            f"no forces were found with friction {_text(mu)} and normal forces in "
             f"{normal_force} N that balance {which}; {_remedy(normal_force)}"
         )
     forces = balance.in_space(F)
@@ -106,9 +106,9 @@ def least_friction_forces(
     positions: Array, normals: Array, friction: float, wrench: Array, *,
     normal_force: tuple[float, float], center: Array,
 ) -> tuple[Array, float] | None:  # fmt: skip
-    """Find balancing forces (k, 3) of least friction, with that coefficient, whatever it is.
+    """Find balancing forces (k, 3) of least friction, with that coefficient.
 
-    `friction` is where the search starts; forces are found above it if they must be.
+    The search starts at `friction`, but the forces may need more than that.
 
     Returns:
         The forces [N] and the coefficient; None when the limits on the normal forces leave no
@@ -139,12 +139,17 @@ def closest_forces(
     if np.isnan(f[0]):
         f = _solve(P, q, rows, balance, balanced=False)
     if f is None:
-        raise SolverError("no forces in the cones were found, though a pure push is one")
+        raise SolverError(
+            "the solver found no forces in the friction cones, though pure pushes are some"
+        )
     return balance.in_space(balance.into_cones(f[None], friction))[0]
 
 
 def _least_imbalance(P: Array, q: Array, rows: Array, balance: Balance) -> Array:
-    """Minimise f'Pf/2 + q'f in the cones and limits: with P = L L', the least |L'f + inv(L) q|."""
+    """Minimise f'Pf/2 + q'f in the cones and limits.
+
+    With P = L L' this is the least |L'f + inv(L) q|.
+    """
     L = np.linalg.cholesky(P)
     back, shift = np.linalg.inv(L).T, np.linalg.solve(L, q)
     # (3), then (2), as rows; the balance (1) is in the objective
@@ -165,7 +170,10 @@ def _objective(name: str) -> Callable[[Balance, Array], Array]:
 
 
 def _least_norm(balance: Balance, friction: Array) -> Array:
-    """Find balanced forces of least norm, (n, 3k); NaN from the first wrench on that has none."""
+    """Find balanced forces of least norm, (n, 3k).
+
+    The first wrench without such forces, and all after it, get NaN.
+    """
     rows = balance.pyramids(friction)
     # |F0 + null z| is least where |z| is, F0 being orthogonal to the null space of (1)
     Z = least_distance(*balance.polyhedra(rows))
@@ -188,7 +196,10 @@ def _least_norm(balance: Balance, friction: Array) -> Array:
 
 
 def _least_friction_each(balance: Balance, friction: Array) -> Array:
-    """Find balanced forces of least friction, (n, 3k); NaN from the first wrench without any."""
+    """Find balanced forces of least friction, (n, 3k).
+
+    The first wrench without such forces, and all after it, get NaN.
+    """
     largest = float(friction.max())
     weights = friction / largest if largest > 0.0 else np.ones(len(friction))
     F = np.full(balance.F0.shape, np.nan)
@@ -209,14 +220,14 @@ def _least_friction_each(balance: Balance, friction: Array) -> Array:
 
 
 def _in_cones(f: Array, friction: Array) -> bool:
-    """Return whether local forces (3k,) are numbers and need no more than the friction."""
+    """Return whether local forces (3k,) are finite and stay within the friction cones."""
     return bool(needed_friction(f[None], friction)[0] <= 1.0 + RESIDUAL)
 
 
 def _least_friction(balance: Balance, start: float, weights: Array) -> Array | None:
-    """Find forces (3k,) that need the least r, each contact having the friction r times its weight.
+    """Find forces (3k,) with the least r, if contacts have r times their weight as friction.
 
-    The iteration starts from a coefficient on the way to it.
+    The iteration starts from a given coefficient.
     """
     best, friction = None, start
     for _ in range(MAX_ROUNDS):
@@ -233,10 +244,10 @@ def _least_friction(balance: Balance, start: float, weights: Array) -> Array | N
 
 
 def _toward_less_friction(balance: Balance, friction: float, weights: Array) -> Array:
-    """Find balanced forces with the least excess (4) over `friction`, which is a further variable.
+    """Find balanced forces with the least excess (4) over `friction`.
 
-    With the forces F0 + null @ z and the excess t, what is minimised is, but for a constant,
-    half the square of (sqrt(REGULAR) z, t + 1).
+    The excess t is a further variable. With the forces F0 + null @ z, half the square of
+    (sqrt(REGULAR) z, t + 1) is minimised, up to a constant.
     """
     rows = balance.pyramids(friction * weights)
     # the pyramids (3) widened by t: R f <= weight t
@@ -280,7 +291,7 @@ def _check_limits(normal_force: tuple[float, float]) -> None:
 
 
 def _rows(wrench: ArrayLike) -> tuple[Array, bool]:
-    """Return wrenches as rows, and whether a single one was given that was not a row."""
+    """Return wrenches as rows, and whether the caller gave a single one that was not a row."""
     try:
         single = np.ndim(wrench) != 2  # noqa: PLR2004 - rows and columns
     except ValueError:  # ragged, which `frozen` explains
@@ -289,17 +300,20 @@ def _rows(wrench: ArrayLike) -> tuple[Array, bool]:
     sizes: Array = np.abs(loads).max(axis=1, initial=0.0)
     if ((sizes > 0.0) & (sizes < SMALLEST_SIZE)).any():
         raise InputError(
-            f"wrench: the largest part must be 0 or from {SMALLEST_SIZE:g} on, got "
+            f"wrench: the largest component must be 0 or at least {SMALLEST_SIZE:g}, got "
             f"{float(sizes[sizes > 0.0].min()):.3g}"
         )
     return loads, single
 
 
 def _remedy(normal_force: tuple[float, float]) -> str:
-    """Return what may help: without limits, a load that has forces has them at any size."""
+    """Return advice for a wrench that no forces balance.
+
+    Without limits on the forces, the size of the load does not matter.
+    """
     if math.isfinite(normal_force[1]):
         return "lower the load or raise the limits"
-    return "use more friction or place the contacts otherwise"
+    return "use more friction or move the contacts"
 
 
 def _text(friction: Array) -> str:
@@ -309,7 +323,7 @@ def _text(friction: Array) -> str:
 def _solve(P: Array, q: Array, rows: Array, balance: Balance, *, balanced: bool) -> Array | None:
     """Minimise x'Px/2 + q'x with rows @ x <= 0 by ProxQP, for the first wrench.
 
-    The variables are its forces, and perhaps a last one that is free.
+    The variables are the forces, and perhaps a last one without bounds.
     """
     forces = balance.G.shape[1]
     lower, upper = np.full(len(q), -np.inf), np.full(len(q), np.inf)

@@ -26,10 +26,6 @@ def clearest_point(points: Array, segments: Array) -> tuple[Array, float]:
     Args:
         points: Candidates, (n, 2); if there are many, only some are tried.
         segments: End points of segments, (m, 2, 2).
-
-    Args:
-        points: Candidates, (n, 2); if there are many, only some are tried.
-        segments: End points of segments, (m, 2, 2).
     """
     tried = points[:: 1 + len(points) // CANDIDATES]
     room = np.array([_nearest(point, segments)[1].min() for point in tried])

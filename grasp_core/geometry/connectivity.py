@@ -27,9 +27,6 @@ def close_pairs(points: Array, reach: float) -> Indices:
     Close points have close projections on a line, so only neighbours there are compared. Equal
     points are linked in a row, and only one of them is compared with other points.
 
-    Close points have close shadows on a line, so only neighbours there are compared. Equal points
-    are linked in a row, and compared with others only once.
-
     Args:
         points: Points, (n, 3), in any unit of length.
         reach: Largest distance of a link, in the same unit.
@@ -72,10 +69,6 @@ def components(count: int, links: Indices) -> Indices:
     Args:
         count: Number of items.
         links: Pairs of indices of linked items, (k, 2).
-
-    Args:
-        count: Number of things.
-        links: Pairs of indices of linked things, (k, 2).
     """
     sparse: Any = importlib.import_module("scipy.sparse")
     csgraph: Any = importlib.import_module("scipy.sparse.csgraph")

@@ -54,8 +54,6 @@ def convex_polygon(corners: Array, slack: float) -> FlatPolygon | None:
     """Make a convex polygon from corners (k, 2); None if they are not its corners in order.
 
     A corner that coincides with the corner before it, as cutting leaves them, counts once.
-
-    Corners that coincide with the one before, as cutting leaves them, count once.
     """
     corners = tidy(corners)
     if len(corners) < FEWEST_CORNERS:

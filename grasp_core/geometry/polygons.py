@@ -134,8 +134,6 @@ def convex_hull(points: Array) -> Array:
     """Return the corners of the convex hull of points (n, 2), counter-clockwise, (k, 2).
 
     The first corner is the one that comes first among the points, however the figure is turned.
-
-    They begin with the corner that comes first among the points, however the figure is turned.
     """
     ordered = points[np.lexsort(points.T[::-1])]
 
@@ -189,10 +187,6 @@ def merge_into_convex_pieces(points: Array, triangles: Indices) -> list[Array]:
     Diagonals are removed one by one as long as the two pieces beside a diagonal form a convex
     piece; the result has at most four times the least possible number of pieces. The order matters,
     so a few orders are tried and the result with the fewest pieces is kept.
-
-    Diagonals are removed one by one as long as the two pieces beside them form a convex
-    piece; the result has at most four times the least possible number of pieces. The order
-    matters, so a few are tried and the one with the fewest pieces is kept.
 
     Args:
         points: Corners, (n, 2).

@@ -66,9 +66,6 @@ def triangulate(loops: Sequence[Array]) -> Indices:
 
     Corners are first rounded to a grid, on which corners of regular figures are exactly on one line
     or circle, so that rounding does not choose between triangulations.
-
-    Corners are put on a grid first, where corners of regular figures are exactly on one line or
-    circle, so that rounding does not choose between triangulations.
     """
     size = float(np.ptp(np.vstack(loops), axis=0).max())
     on_grid = [graded(loop / size, GRID_DIGITS) for loop in loops]
@@ -80,8 +77,6 @@ def inset_figure(loops: Sequence[Array], margin: float) -> list[list[Array]]:
 
     At corners that turn inwards a little more is cut off, so that the remaining parts have few
     corners.
-
-    At corners that turn inwards somewhat more is cut off, so that what is left has few corners.
 
     Args:
         loops: Outer border and holes, each (k, 2).

@@ -110,9 +110,6 @@ def check_choices(faces: FaceKind, patches: PatchLimits | None, flatness: Flatne
 
     Raises:
         InputError: A value is of the wrong kind.
-
-    Raises:
-        InputError: A choice is of the wrong kind.
     """
     one_of(faces, get_args(FaceKind), "faces")
     if patches is not None:

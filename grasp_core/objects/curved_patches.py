@@ -71,8 +71,6 @@ def _largest_apart(found: list[tuple[float, Face]], most: int, extent: float) ->
     A ring has dozens of equal patches, and without this rule the first ones would all be on one
     side.
 
-    A ring has dozens of equal patches, and the first ones of its list are all on one side.
-
     Args:
         found: Radius of the largest disc of each patch [m], and the patch.
         most: Number of patches to keep.

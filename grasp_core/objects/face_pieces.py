@@ -67,8 +67,6 @@ class FacePiece:
         """Return whether the fields describe one convex polygon, at about unit size.
 
         `face`, `spread` and `depth` are not checked, because they refer to the object.
-
-        `face`, `spread` and `depth` are not checked: they refer to the object.
         """
         with np.errstate(all="ignore"):
             count = len(self.corners) if is_array(self.corners, None, 2) else 0
@@ -175,10 +173,6 @@ def _outside(piece: FacePiece, point: Array) -> float:
 
 def inset_piece(piece: FacePiece, inset: float) -> FacePiece:
     """Cut off the part of a piece that is too near its edges.
-
-    Args:
-        piece: Any convex piece.
-        inset: Distance from the edges; at most half the radius of the largest disc counts.
 
     Args:
         piece: Any convex piece.

@@ -154,9 +154,6 @@ def _parts(points: Array, corners: Indices, most: int) -> list[Solid]:
 
     Raises:
         MeshError: There are too many parts.
-
-    Raises:
-        MeshError: There are too many parts.
     """
     across = triangle_neighbours(corners)
     links = np.column_stack([np.repeat(np.arange(len(corners)), SIDES + 1), across.ravel()])

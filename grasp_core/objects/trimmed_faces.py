@@ -46,9 +46,6 @@ def shared_quadruples(owners: Sequence[int]) -> Indices:
 
     Args:
         owners: The owners that `with_halves` returned.
-
-    Args:
-        owners: The owners that `with_halves` returned.
     """
     whole = [index for index, owner in enumerate(owners) if index == owner]
     halves: dict[int, list[int]] = {}

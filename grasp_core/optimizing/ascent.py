@@ -82,9 +82,6 @@ class ContactFaces:
 
         Wrenches are rounded to a grid, because a polytope that grows where it is weakest often has
         to choose between several equally near planes.
-
-        Its wrenches are on a grid: a polytope that grows where it is weakest has many equal planes
-        to choose from.
         """
         G = in_frames(grasp_map(self.positions(y)), self.frames)
         wrenches = WrenchSet(G, np.full(len(y), self.friction), "l1")

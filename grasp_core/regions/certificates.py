@@ -173,9 +173,6 @@ def _check_parts(found: CertifiedRegions) -> None:
 
     Raises:
         InputError: A field is not a region, a cover or a length, or one is missing.
-
-    Raises:
-        InputError: A part is not a region, a cover or a length, or one is missing.
     """
     each = partial(instance, kind=ContactRegion, name="regions")
     count = len(several(found.regions, each, "regions", "ContactRegion values"))

@@ -148,8 +148,6 @@ class _Unit:
 
     Both are rounded to few digits, so that places in this unit do not depend on the last digits of
     the contacts.
-
-    Both have few digits, so that places in this unit do not depend on the contacts' last digits.
     """
 
     origin: Array
@@ -180,8 +178,6 @@ def _pieces(
 
     If a face has several pieces, the one in which the contact is deepest is taken. The result is
     None if a face is too narrow.
-
-    If a face has several pieces, the piece that holds the contact deepest is taken.
     """
     found = list[FacePiece]()
     for index, contact in zip(grasp.faces, grasp.contacts, strict=True):
@@ -259,9 +255,7 @@ def _farthest(points: Array, centers: Array) -> float:
 def _radius_held(grounds: Grounds, proved: Proved, polygons: list[Array]) -> float:
     """Return the largest radius, up to the proved one, of discs inside the polygons.
 
-    Polygons grown for their area may begin with smaller discs than the proved ones.
-
-    Polygons grown for their area may begin with smaller discs than the proved ones.
+    Polygons that grew for their area may begin with smaller discs than the proved ones.
     """
     pairs = [
         (convex_polygon(polygon, PLACED), convex_polygon(piece.corners, PLACED), y)
@@ -294,9 +288,6 @@ def _open_choice(grounds: Grounds, proved: Proved, unit: _Unit) -> ClosureCertif
     """Return the proof, in the object's frame, that the contacts found are not closed.
 
     The result is None unless the exact test agrees and the contacts are on the pieces. Patches of
-    curved surfaces are not planes, so nothing is claimed about them.
-
-    The result is None unless the exact test says so and the choice is on the pieces. Patches of
     curved surfaces are not planes, so nothing is claimed about them.
     """
     if proved.choice is None or any(piece.depth or piece.spread for piece in grounds.pieces):

@@ -37,8 +37,6 @@ def pivot(ids: Indices, weights: Array, motions: Array, i: int, most: float) -> 
     """Compute a tangential force on the axis of the mean twist, if friction allows it.
 
     Along this axis a contact's force has the same power wherever the contact is.
-
-    A force along the axis has the same power wherever the contact is.
     """
     f, g, along = 0.0, 0.0, 0.0
     for place in range(RAYS):
@@ -128,9 +126,6 @@ def find_forces(
 
     `grasp_core.regions.sites` describes the method. It stops as soon as no force of any contact has
     power for the weights; the weights are then those of a twist that may be unresisted.
-
-    This is the game of `grasp_core.regions.sites`. It ends at once where no answer has power, and
-    leaves the weights of the bad twist.
     """
     regrets, powers = np.zeros(RAYS), np.empty(RAYS)
     weights[:] = 1.0 / RAYS

@@ -34,11 +34,6 @@ def search_cover(sites: Sites, axes: Array, cones: int) -> Searched:
         sites: Where contacts may be.
         axes: Twists of the first rays, as rows, (6, 6).
         cones: Largest number of cones; the 64 orthants are always tried.
-
-    Args:
-        sites: Where contacts may be.
-        axes: Twists of the first rays, as rows, (6, 6).
-        cones: Most cones; the sixty-four orthants are always tried.
     """
     # the search sees sites on a grid, so that it ends alike on all machines
     kernel, told = compiled(KERNEL), sites.on_grid()

@@ -92,8 +92,6 @@ class Grounds:
 
         Tangential speeds count in proportion to the friction. With these twists, long objects need
         no more cones than round ones.
-
-        With them, long objects need no more cones than round ones.
         """
         motions = list[Array]()
         for (x, y, z), F, mu in zip(self.points(ys), self.frames, self.friction, strict=True):

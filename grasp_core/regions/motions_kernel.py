@@ -81,10 +81,6 @@ def resists(motion: Array, sites: Sites, i: int, shift: Array) -> bool:
     Friction has no power on a contact that does not slide. Elsewhere the largest power that
     friction allows is convex in the place, and the search steps to where it is least. The result is
     also False, with a place that does resist, if too many steps would be needed.
-
-    Friction has no power on a contact that does not slide. Elsewhere the most power that friction
-    allows is convex in the place, and steps go to where it is least. The result is also False, with
-    a place that does resist, where the steps do not suffice.
     """
     most = sites.friction[i] * (1.0 - TINY)
     out, x, y = 0.0, 0.0, 0.0

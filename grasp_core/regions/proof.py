@@ -69,8 +69,6 @@ class TwistCover:
 
     The rays of a cone are whole numbers in the coordinates of `axes`, so that dividing cones is
     exact.
-
-    The rays of a cone are whole numbers in the coordinates of `axes`, so that cutting is exact.
     """
 
     axes: Array
@@ -176,9 +174,6 @@ def power_of(F: Array, twists: Array) -> tuple[Array, Array]:
 
     Returns:
         The slopes F x b, (m, r, 3), and the constants F.a, (m, r).
-
-    Returns:
-        The slopes F x b, (m, r, 3), and the constant parts F.a, (m, r).
     """
     return np.cross(F[:, None], twists[..., 3:]), np.einsum("mi,mri->mr", F, twists[..., :3])
 
@@ -186,9 +181,7 @@ def power_of(F: Array, twists: Array) -> tuple[Array, Array]:
 def summed(rays: Array, axes: Array) -> Array:
     """Return the sum of the lengths that make up each twist, (m, r), for bounds on rounding.
 
-    The twists themselves are shorter where axes nearly cancel.
-
-    The twists themselves are shorter where axes nearly cancel.
+    The twists themselves are shorter where axes nearly cancel each other.
     """
     return np.linalg.norm(np.abs(rays) @ np.abs(axes), axis=2)
 

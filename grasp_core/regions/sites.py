@@ -64,8 +64,6 @@ class Sites(NamedTuple):
         """Return the power that a unit normal force must keep per unit of twist, (k,).
 
         Rounding to the grid changes the power by less.
-
-        Rounding to the grid costs forces less than this.
         """
         aside = np.sqrt(np.einsum("kcj,kcj->kc", self.corners, self.corners)).max(axis=1)
         places = np.sqrt(np.einsum("kj,kj->k", self.points, self.points))
@@ -85,9 +83,6 @@ class Sites(NamedTuple):
 
 def stacked_corners(polygons: list[Array]) -> Array:
     """Put polygons (c, 2) into one array, with the last corners of shorter ones repeated.
-
-    Raises:
-        InputError: A polygon has no corners, so that nothing would be asked of its contact.
 
     Raises:
         InputError: A polygon has no corners, so that nothing would be asked of its contact.

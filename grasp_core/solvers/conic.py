@@ -65,9 +65,6 @@ def minimize(program: ConicProgram) -> ConicSolution:
 
     Raises:
         SolverError: Every answer failed the check, as it does where the program is infeasible.
-
-    Raises:
-        SolverError: Every answer failed our check; an infeasible program also ends so.
     """
     failure = SolverError("Clarabel was not called with any settings")
     for change in WAYS:
@@ -134,9 +131,6 @@ class _Columns:
 
     A sparse matrix of scipy has these attributes too, but it checks its data again, and importing
     it takes longer than planning on a small object.
-
-    A matrix of scipy has them too, but checks what is known to be in order, and takes longer to
-    import than a small object to plan on.
     """
 
     data: Array

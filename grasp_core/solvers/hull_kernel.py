@@ -106,9 +106,6 @@ def enclose(hull: Hull, points: Array) -> bool:
 
     With the points as columns over ones in the matrix A, row i of inv(A) is the affine function
     that is one at point i and zero at the others.
-
-    With A the points as columns over ones, row i of inv(A) is the affine function that is one at
-    point i and zero at the others.
     """
     n = D + 1
     A = np.zeros((n, 2 * n))

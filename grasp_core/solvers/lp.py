@@ -91,9 +91,6 @@ def maximize(program: LinearProgram) -> Optimum | Infeasible:
 
     Raises:
         SolverError: The solver's answer failed the check, or the program is unbounded.
-
-    Raises:
-        SolverError: The solver's answer failed our check, or the program is unbounded.
     """
     found = maximize_above(program, -math.inf)
     if isinstance(found, Below):
@@ -134,8 +131,6 @@ def _refuted_by_least_violation(program: LinearProgram, failure: SolverError) ->
 
     The program with the violation as a further variable always has an optimum; the violation is
     kept above -1 to bound it.
-
-    The violation, a further variable, is kept above -1 to bound it.
     """
     G, h = program.stacked()
     rows = len(program.b)

@@ -137,9 +137,6 @@ def proved_empty(rows: Rows, vertex: Vertex, against: int, farthest: float) -> b
 
     Where a_r = alpha_1 a_1 + .. with alpha <= 0, the excess of a_r.x over b_r is at least that of
     alpha_1 b_1 + .. .
-
-    Where a_r = alpha_1 a_1 + .. with alpha <= 0, its excess over b_r is at least that of
-    alpha_1 b_1 + .. .
     """
     gap, left = -rows.b[against], rows.At[:, against].copy()
     for j in range(len(left)):
@@ -253,8 +250,6 @@ def _leaving(y: Array, alpha: Array, basis: Indices, rows: Rows) -> int:
     """Return the place in the basis with the least y / alpha, -1 if no alpha is positive.
 
     Of equal quotients the one with the largest alpha is taken. Equalities stay in the basis.
-
-    Equalities stay in the basis.
     """
     count, least, found = len(rows.b), np.inf, -1
     for j in range(len(y)):

@@ -42,8 +42,6 @@ def least_distance(C: Array, D: Array, *, accuracy: float = EXACT) -> Array:
 
     A row of the answer does not depend on the other rows of D, except for rounding.
 
-    A row of the answer does not depend on the other rows of D, but for rounding.
-
     Args:
         C: Normals of all polyhedra, (m, v).
         D: Right-hand sides of each polyhedron, (n, m).

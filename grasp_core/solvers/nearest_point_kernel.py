@@ -64,12 +64,6 @@ def solve(C: Array, D: Array, X: Array, U: Array) -> None:
         D: Right-hand sides, (n, m).
         X: Filled with the points, (n, v); with zeros where none was found.
         U: Zeros, filled with the points' multipliers, (n, m).
-
-    Args:
-        C: Normals, (m, v), contiguous like all of these arrays.
-        D: Right-hand sides, (n, m).
-        X: Filled with the points, (n, v); with zeros where none was found.
-        U: Zeros, filled with the points' multipliers, (n, m).
     """
     m, v = C.shape
     norms = np.empty(m)
@@ -111,8 +105,6 @@ def _enter(C: Array, active: Active, count: int, excess: float, least: float, x:
     """Step until the entering row is active; return the number of active rows, -1 on failure.
 
     `least` is the length up to which a remainder counts as zero.
-
-    `least` is the length up to which a rest counts as zero.
     """
     entering, z = active.rows[count], active.z
     for _ in range(count + 1):
@@ -156,8 +148,6 @@ def _split(row: Array, active: Active, count: int) -> float:
     """Write a row as R[:, count] on Q plus a remainder z orthogonal to Q; return z.z.
 
     This is done twice, because once leaves rounding errors of the size of the row.
-
-    This is done twice, as once leaves rounding of the size of the row.
     """
     Q, R, z = active.Q, active.R, active.z
     for j in range(len(row)):

@@ -52,9 +52,6 @@ def _part(name: str) -> Any:
     The import must not look for a display, so the user's choice of a matplotlib backend is hidden
     from it. Matplotlib's warning about the folder of its font cache is hidden too, because
     matplotlib finds another folder by itself.
-
-    The import must not look for a display, so a user's choice of a backend is hidden from it. Its
-    warning about where it caches fonts is hidden too, because it finds another place by itself.
     """
     backend, logger = os.environ.pop("MPLBACKEND", None), logging.getLogger("matplotlib")
     level = logger.level

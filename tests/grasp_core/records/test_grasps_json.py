@@ -58,7 +58,7 @@ def test_the_file_has_the_fields_that_users_rely_on(text):
 
 
 CHANGES = {
-    "not JSON": (lambda _: "{", "not JSON, or not all of it"),
+    "not JSON": (lambda _: "{", "not complete JSON"),
     "schema from the future": (lambda d: d | {"schema": 2}, "got 2: a newer graspproof"),
     "unknown key": (lambda d: d | {"extra": 1}, "extra"),
     "missing key": (lambda d: {k: v for k, v in d.items() if k != "seed"}, "seed"),

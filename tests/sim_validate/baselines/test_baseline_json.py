@@ -49,7 +49,7 @@ def with_entry(**changed):
         ("", "not complete JSON"),
         ("[]", "a baseline must hold one JSON object, got a list"),
         ("{}", "is not a baseline"),
-        (spoiled(lambda r: r.update(schema=2)), "schema: .* by a newer graspproof"),
+        (spoiled(lambda r: r.update(schema=2)), "schema: .* a newer graspproof"),
         (spoiled(lambda r: r.pop("friction")), "friction: missing"),
         (spoiled(lambda r: r.update(friction="x")), "friction: expected a number, got"),
         (spoiled(lambda r: r.update(grasps_file=3)), "grasps_file: expected text, got 3"),

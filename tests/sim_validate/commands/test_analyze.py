@@ -290,11 +290,11 @@ ONE = TETRAHEDRON["contacts"][0]
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("", "not JSON"),
+        ("", "not complete JSON"),
         ("[1]", "a contacts file must hold one JSON object, got a list"),
         ('{"contacts": ' * 100_000, "are nested more than 64 deep"),
         (changed(["friction"], None), "friction: null is not allowed; give a value"),
-        ("{}", '"contacts" (one grasp) and "grasps" (several)'),
+        ("{}", '"contacts" (one grasp) or "grasps" (several)'),
         (TETRAHEDRON | {"grasps": [{"contacts": [ONE, ONE]}]}, '"contacts" (one grasp)'),
         ({"grasps": [], "friction": 1}, "grasps: expected at least 1"),
         (changed(["friction"], ...), 'contacts[0].friction: the key is missing; give it there'),
