@@ -1,4 +1,4 @@
-"""Upper bounds on the discs of concurrent grasps, with one common radius.
+"""Bounds the discs of concurrent grasps from above, by a program with one common radius.
 
 Solved: the program of `families.concurrent` for four equal discs, over (x0, y_1 .. y_4, r), for a
 focus before and behind all fingers; numbers in comments are those of its derivation. See

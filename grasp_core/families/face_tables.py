@@ -1,4 +1,4 @@
-"""Convex face pieces in one array per property, as kernels need them."""
+"""Puts convex face pieces into one array per property, for compiled code."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ from grasp_core.objects.face_pieces import FacePiece
 
 
 def face_table(pieces: Sequence[FacePiece | None]) -> FaceTable:
-    """A table with one row per piece; rows of faces without room stay zero."""
+    """Make a table with one row per piece; faces too narrow for a contact leave zeros."""
     count, most = len(pieces), max((len(piece.E) for piece in pieces if piece), default=0)
     table = FaceTable(
         normals=np.zeros((count, 3)),

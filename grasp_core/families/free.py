@@ -1,17 +1,18 @@
-"""Grasps of four convex faces without a type fixed in advance, or a proof that there is none.
+"""Finds grasps of any type on four convex faces, or a proof that there is none (free method).
 
 Solved: whether any four contacts, one on each of four convex faces, are in force closure at a
 given friction, at any friction and for any normals.
 
-Derivation. Put a contact at every corner of the four faces: the patch. A force at any point of
-a convex face is a convex combination of the same force at its corners, so
+Derivation. Put a contact at every corner of the four faces: the corner contacts. A force at any
+point of a convex face is a convex combination of the same force at its corners, so
 
-    four contacts on the faces in force closure  =>  the patch in force closure.         (1)
+    four contacts on the faces in force closure  =>  the corner contacts in force closure. (1)
 
-A separating twist of the patch is therefore a proof of absence; by convexity of the supports it
-separates every grasp on these faces.
+A separating twist of the corner contacts is therefore a proof of absence; by convexity of the
+supports it separates every grasp on these faces.
 
-If the patch is closed, take the smallest forces that show it and add them face by face:
+If the corner contacts are in closure, take the smallest forces that show it and add them face by
+face:
 
     F_i = sum of the forces at the corners of face i.                                    (2)
 
@@ -21,12 +22,13 @@ positions x_i = o_i + T_i y_i:
     maximise t  subject to  sum_i (o_i + T_i y_i) x F_i = 0,                             (3)
                             e.y_i + t <= b                   for all i, edges.           (4)
 
-Any solution inside the faces, unless all on one line, is in force closure. Among solutions nearly
-as far from the edges as these forces allow, the one nearest to the middles of the faces is taken.
-If there is none, the centres of pressure of the patch are tried as contacts (5), then patches of
-smaller random pieces of the faces, which give other forces (6). What is still open can be split
-(7): each face quadruple is cut through its longest face, parts are dropped with their proof of
-absence, until a grasp is found, nothing is left, or the budget is spent.
+Any solution inside the faces, unless all contacts are on one line, is in force closure. Among
+solutions nearly as far from the edges as these forces allow, the one nearest to the middles of the
+faces is taken. If there is none, the centres of pressure of the corner forces are tried as contacts
+(5), then the corners of smaller random pieces of the faces, which give other forces (6). What is
+still undecided can be divided (7): each face quadruple is cut through its longest face, and parts
+are dropped with their proof of absence, until a grasp is found, nothing is left, or the budget is
+spent.
 
 Nothing here depends on P3. The lines of force are of the most general type, as a rule a
 regulus, with u, slopes and pitch free; so this also answers the freedom that the paper leaves
@@ -66,33 +68,35 @@ from grasp_core.solvers.ties import graded
 from grasp_core.values import FINGERS
 
 RESTARTS = 12
-"""Default number of smaller random patches that are tried."""
+"""Default number of smaller random pieces on which the method is tried again."""
 LEAST_INSET = 1e-4
 """Least distance of a contact from the edges of its face, in object radii."""
 DEPTH_KEPT = 0.5
-"""Share of the patch's margin that its forces keep inside their cones."""
+"""Share of the margin of all corner contacts that their forces keep inside the cones."""
 ROUNDED = 1e-12
-"""Least weight of a corner in a centre of pressure: keeps the weights' sum above zero."""
+"""Least weight of a corner in a centre of pressure; it keeps the sum of the weights above zero."""
 INSET_KEPT = 0.9
-"""Share of the largest distance from the edges that contacts keep when they move to the middles."""
+"""Share of the largest distance from the edges that contacts keep while they move to the middles of
+faces."""
 SAME_PLANE = 1e-6
-"""Moments smaller than this, relative to the largest, are rounding: the forces lie in a plane."""
+"""Moment, relative to the largest, below which it is rounding and the forces lie in a plane."""
 LEAST_SPREAD = 1e-3
 """Least extent of the contacts across the line they are closest to, in object radii."""
 
 
 SAME_CORNERS = 1e-12
-"""How far contacts of a proof may be from the corners of its part: thousands of roundings."""
+"""Distance of a proof's contacts from the corners of its part that counts as rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Absence:
-    """Proof that no four contacts on four convex pieces are in force closure."""
+    """A proof that no four contacts on four convex pieces are in force closure."""
 
     pieces: tuple[FacePiece, ...]
     friction: float
     leaves: tuple[tuple[Path, ClosureCertificate], ...]
-    """Parts that together cover the pieces, each with a twist that separates its patch."""
+    """Parts that together cover the pieces, each with a twist that separates contacts at all its
+    corners."""
 
     def verify(self) -> bool:
         """Re-check every field in plain arithmetic.
@@ -129,11 +133,11 @@ class Absence:
 
 @dataclass(frozen=True, slots=True)
 class Undecided:
-    """The free method found neither a grasp nor a proof of absence within its budget."""
+    """The answer when the free method found neither a grasp nor a proof within its budget."""
 
     open_parts: int
     open_share: float
-    """Open share of all choices of contacts, where each cut counts for half."""
+    """Share of all choices of contacts that is undecided, where each cut counts for half."""
 
 
 def place_free(
@@ -150,15 +154,15 @@ def place_free(
         pieces: Four convex pieces, in finger order, in units where the object has size one.
         friction: Coulomb coefficient at every contact, positive.
         rng: Source of the random restarts.
-        cells: Most parts of the pieces to examine; with 1 nothing is split.
-        restarts: Number of smaller random patches to try before giving up or splitting.
+        cells: Largest number of parts of the pieces to examine; with 1 nothing is divided.
+        restarts: Number of smaller random pieces to try before giving up or dividing.
 
     Raises:
         InputError: The friction is not positive.
         SolverError: A program's answer failed its check.
     """
     if not friction > 0.0:
-        raise InputError(f"friction must be positive, got {friction}")
+        raise InputError(f"friction must be greater than 0, got {friction}")
     leaves: list[tuple[Path, ClosureCertificate]] = []
     waiting: list[tuple[float, Path]] = [(0.0, ())]
     examined = 0
@@ -194,7 +198,7 @@ def _share(waiting: Sequence[tuple[float, Path]]) -> float:
 def close_patch(
     pieces: Sequence[FacePiece], part: Corners, friction: float
 ) -> ClosureCertificate | None:
-    """Closure certificate of contacts at all corners of a part; None if too close to call."""
+    """Decide force closure of contacts at all corners of a part; None if too close to call."""
     try:
         return force_closure(*corner_contacts(pieces, part), friction)
     except UndecidedError:
@@ -248,9 +252,10 @@ def place_by_forces(pieces: Sequence[FacePiece], forces: Array) -> Placement | N
 def _nearest_to_middles(
     pieces: Sequence[FacePiece], start: Array, A_eq: Array, rows: Array, limits: Array
 ) -> Array:
-    """Balanced contacts with rows @ y <= limits that are nearest to the pieces' middles, (8,).
+    """Find the balanced contacts nearest to the pieces' middles, (8,).
 
-    They are unique, unlike the contacts farthest from the edges, so they turn with the object.
+    They satisfy rows @ y <= limits. They are unique, unlike the contacts farthest from the edges,
+    so they turn with the object.
     """
     _, sizes, right = np.linalg.svd(A_eq)
     # the null space of (3): moves along it keep the balance
@@ -264,7 +269,7 @@ def _nearest_to_middles(
 def _grasp(
     pieces: Sequence[FacePiece], part: Corners, patch: ClosureCertificate, friction: float
 ) -> Placement | None:
-    """Make a placement from the forces of a closed patch; None if no attempt holds."""
+    """Make a placement from the forces at a closed part's corners; None if no attempt holds."""
     if patch.forces is None:
         return None
     owner = np.repeat(np.arange(FINGERS), [len(corners) for corners in part])
@@ -294,9 +299,9 @@ def of_general_type(
 ) -> Placement | None:
     """Give a placement forces whose lines form a regulus, at the same contacts.
 
-    On symmetric faces the patch's forces may all meet, or lie in one plane. Adding internal
-    forces, half as large as the cones have room for, makes the lines skew. The result is None
-    where that room is too small to tell.
+    On symmetric faces the forces at the corners may all meet, or lie in one plane. Adding internal
+    forces, half as large as the cones allow, makes the lines skew. The result is None where the
+    cones allow too little to tell.
     """
     if classify_lines(found.positions, found.forces) == "regulus":
         return found
@@ -334,7 +339,7 @@ def _held_at(pieces: Sequence[FacePiece], positions: Array, friction: float) -> 
 
 
 def _on_one_line(positions: Array) -> bool:
-    """Whether contacts are so near one line that they hardly resist turning about it."""
+    """Return whether contacts are so near one line that they hardly resist turning about it."""
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
     return bool(spread[1] < LEAST_SPREAD)
 

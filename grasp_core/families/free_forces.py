@@ -1,4 +1,4 @@
-"""The smallest forces that balance at the corners of a patch.
+"""Finds the smallest forces that balance at the corners of four faces.
 
 Solved: forces f at contacts on the corners of faces, all at least some depth inside their friction
 cones, that balance, have normal parts that sum to one, and have the least sum of squares:
@@ -25,15 +25,15 @@ from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.nearest_point import least_distance
 
 SIDES = 8
-"""Number of facets of the pyramids."""
+"""Number of facets of the pyramids inscribed in friction cones."""
 DEPENDENT = 1e-6
-"""Singular values smaller than this, relative to the largest, are zero but for rounding."""
+"""Size of a singular value, relative to the largest, below which it counts as zero."""
 
 
 def smallest_forces(
     pieces: Sequence[FacePiece], points: Array, normals: Array, friction: float, depth: float
 ) -> Array | None:
-    """The smallest balanced forces at points of pieces, (k, 3), or None if there are none.
+    """Find the smallest balanced forces at points of pieces, (k, 3); None if there are none.
 
     Args:
         pieces: The piece of each point, k of them.

@@ -1,4 +1,4 @@
-"""Regulus grasps: two pairs of lines of force that pass each other at equal pitch.
+"""Constructs regulus grasps: two pairs of lines of force that pass each other at equal pitch.
 
 Solved: for four convex faces with a force cone each, grouped into the pairs (0, 1) and
 (2, 3), four contacts near the middle of their faces and forces in the cones whose lines lie
@@ -66,24 +66,26 @@ from grasp_core.solvers.ties import nearest_optimum
 from grasp_core.values import FINGERS, ForceCone
 
 SLOPES = (0.5, 0.2, 0.8)
-"""Shares of the interval (3) at which each slope's angle is tried."""
+"""Positions in the interval (3), as shares of it, at which the angle of each slope is tried."""
 LEAST_DEPTH = 0.02
-"""Least height of the passing points over their faces, in object radii."""
+"""Least height, over their faces, of the points where lines pass the focus line, in object radii.
+"""
 LEAST_INSET = 1e-3
 """Least distance of a contact from the edges of its face, in object radii."""
 LEAST_GAP = 0.01
 """Least distance l_i, along N_i, at which a line passes the focus line, in object radii."""
 SAME_OFFSET = 1e-9
-"""Offsets that differ by no more count as equal: the slopes tried first win."""
+"""Difference between offsets that counts as none; of equal slopes, those tried first win."""
 GIVEN_UP = 1e-9
-"""Offset given up in favour of the least variables: giving up less makes the contacts of two
-pairings differ from each other's."""
+"""Offset that is given up in favour of smaller variables: with less, the contacts of two pairings
+differ."""
 X0, K, P, X, Z, T = slice(0, 3), 3, 4, slice(5, 7), slice(7, 9), 9
-"""Places of the variables x0, k, p, x_i, z_i and t."""
+"""Indices of the variables x0, k, p, x_i, z_i and t."""
 VARIABLES = 10
 
 RESULTANTS = np.array([1.0, 1.0, -1.0, -1.0])
-"""Signs of the resultants of the fingers' pairs along u."""
+"""Sign of each finger's pair: +1 where the pair's resultant force is along u, -1 where it is
+against u."""
 KERNEL = "grasp_core.families.regulus_kernel"
 SIDES = (1.0, -1.0)
 """Signs of p: the side of the focus line on which the first finger's line passes it."""
@@ -97,7 +99,7 @@ CHOICES: tuple[Choice, ...] = tuple(
 def place_regulus(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone]
 ) -> Placement | NoPlacement:
-    """Place four contacts on the lines of one regulus, as near to the faces' centres as can be.
+    """Place four contacts on the lines of one regulus, near the centres of the faces.
 
     Args:
         pieces: Four convex pieces; the pairs are (0, 1) and (2, 3).
@@ -145,7 +147,7 @@ def regulus_bounds(
 def _best_choice(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone]
 ) -> tuple[float, tuple[Choice, ...]] | None:
-    """The best choice, if there is any, and its merit; None if the half-angles differ."""
+    """Find the best choices of slopes and side, with their merit; None if half-angles differ."""
     half_angle = cones[0].half_angle
     if any(cone.half_angle != half_angle for cone in cones):
         return None
@@ -177,7 +179,7 @@ def _best_of(
 
 
 def nearly_symmetric(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
-    """Whether both pairs of each quadruple leave their slopes an interval (3), (q,).
+    """Return whether both pairs of each quadruple leave their slopes an interval (3), (q,).
 
     Args:
         axes: Axes of the force cones in finger order, (q, 4, 3).
@@ -188,7 +190,7 @@ def nearly_symmetric(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
 
 
 def _slope_angles(axes: Array, half_angles: Array) -> tuple[Array, Array]:
-    """The ends of (3): least and largest angle of each pair's forces from its resultant [rad].
+    """Compute the ends of (3): least and largest angle of forces from their resultant [rad].
 
     Args:
         axes: Axes of the force cones in finger order, (..., 4, 3).
@@ -207,13 +209,13 @@ def _slope_angles(axes: Array, half_angles: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pair:
-    """Frame (u, v, N) of one pair, each (3,), and the angles (3) that its slope may have [rad]."""
+    """Frame (u, v, N) of a pair of fingers, each (3,), and the interval (3) of its slope."""
 
     u: Array
     v: Array
     N: Array
     resultant: float
-    """+1 where the pair pushes along u, -1 where it pushes against u."""
+    """+1 where the pair's resultant force is along u, -1 where it is against u."""
     least_angle: float
     largest_angle: float
 
@@ -242,7 +244,7 @@ def _pairs(cones: Sequence[ForceCone]) -> list[_Pair]:
 
 
 def _slope(pair: _Pair, share: float) -> float:
-    """The slope y / x at a share of its interval (3), with the sign of x."""
+    """Compute the slope y / x at a share of its interval (3), with the sign of x."""
     width = pair.largest_angle - pair.least_angle
     return pair.resultant * math.tan(pair.least_angle + share * width)
 
@@ -268,7 +270,7 @@ def _program(
     slopes: Sequence[float],
     side: float,
 ) -> LinearProgram:
-    """The least offset t for given slopes, with the lines on one side of the focus line."""
+    """Build the program of the least offset t for given slopes and side of the focus line."""
     offset = np.eye(VARIABLES)[T]
     gap = -side * np.eye(VARIABLES)[P]
     # (8), for both pairs: l_i is p times the slope of the other

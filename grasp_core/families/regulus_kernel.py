@@ -1,4 +1,4 @@
-"""Compiled search for the best slopes of a regulus: the programs of `regulus` for all slopes tried.
+"""Searches in compiled code for the best slopes of a regulus, by the programs of `regulus`.
 
 A program, over (x0, k, p, x_1, x_2, z_1, z_2, t), is first solved without its gap: if p stays
 beyond the gap anyway, that side was the better one. As the cones span (P3), x_i is on the side of
@@ -34,10 +34,10 @@ from grasp_core.solvers.lp_kernel import (
 )
 
 VARIABLES, K, P, X, Z, T = 10, 3, 4, 5, 7, 9
-"""Number and places of the variables."""
+"""Number of variables, and the indices of k, p, x_i, z_i and t among them."""
 ACCURACY, FARTHEST = 1e-11, 1e4
-"""How far multipliers may be from giving the objective, and the size |x|_1 of the variables up to
-which a proof of infeasibility has to hold."""
+"""Error up to which multipliers give the objective, and the size |x|_1 of the variables up to which
+a proof of infeasibility must hold."""
 NONE, PLUS, MINUS = -1, 0, 1
 """Codes of the side: no slopes are feasible, p > 0, p < 0."""
 
@@ -100,7 +100,7 @@ def regulus_bounds(
 def _best_side(
     rows: Rows, gap: float, tie: float, worth: float, vertex: Vertex
 ) -> tuple[float, int]:
-    """The better of the programs for p > gap and p < -gap: a bound on its value, and the side."""
+    """Solve the programs for p > gap and p < -gap; return the better bound and its side."""
     either = _bounded(rows, worth, vertex)
     p = vertex.x[P]  # anything where `either` is infinite: the sides decide then, or nothing does
     if either <= worth or p >= gap:
@@ -119,7 +119,7 @@ def _best_side(
 
 @loop()
 def _bounded(rows: Rows, worth: float, vertex: Vertex) -> float:
-    """Upper bound of a program: minus infinity if proved infeasible, infinity if undecided."""
+    """Bound a program from above: minus infinity if infeasible, infinity if undecided."""
     c = np.zeros(VARIABLES)
     c[T] = -1.0
     measure(rows)

@@ -1,4 +1,4 @@
-"""The min-weight programs of many grasps are solved one after the other (see `metrics`).
+"""Solves the min-weight programs of many grasps one after the other (see `metrics`).
 
 Solved: for each grasp, with its N wrenches w_j and their mean m, a best vertex y of
 

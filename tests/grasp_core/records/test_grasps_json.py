@@ -100,7 +100,7 @@ CHANGES = {
     ),
     "witness direction that is not its force's": (
         lambda d: _set(d, ["grasps", 0, "witness", "directions", 0], [1.0, 0.0, 0.0]),
-        "direction",
+        "witness line",
     ),
     "another family": (
         lambda d: _set(d, ["grasps", 0, "family"], "regulus"),
