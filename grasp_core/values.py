@@ -146,7 +146,7 @@ class Grasp:
     critical_friction: float
     """Smallest Coulomb coefficient above which the contacts are in force closure."""
     closure_margin: float
-    """Margin of the exact closure test at the planned friction (see `force_closure`)."""
+    """Proved margin of force closure at the planned friction (see `ClosureCertificate.margin`)."""
     ferrari_canny: tuple[float, float]
     """Proved lower and upper bound [N] of the `l1` quality at the planned friction, with torques
     about the centre of mass and divided by the object's radius."""

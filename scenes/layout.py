@@ -32,9 +32,10 @@ STIFFNESS = 5.0
 """Servo stiffness in largest normal forces per grasp size. Below 1 a force-controlled grasp is
 unstable; above 50 the servos work against the planned forces."""
 LEAST_SIZE = 0.01
-"""Smallest grasp size in object radii, for contacts that are nearly on one line."""
+"""Smallest grasp size that is used, in object radii, for contacts that are nearly on one line."""
 SQUEEZE = 0.6
-"""Largest normal force in the gentle grasp, relative to the largest that fingers can apply."""
+"""Largest normal force in the gentle grasp that begins a trial, relative to the largest that
+fingers can apply."""
 PAD_HALF_WIDTH = 0.2
 PAD_DEPTH = 0.1
 """Thickness of a pad, the box under a contact that its fingertip touches, in object radii;
@@ -95,7 +96,7 @@ class Layout:
     friction: float
     drive: FingerDrive
     squeeze: Array
-    """Forces of a gentle grasp, balanced where possible, in the contact frames, (k, 3) [N]."""
+    """Forces of a gentle grasp in the contact frames, balanced where possible, (k, 3) [N]."""
     approach: Array
     """Starting points of the fingers, relative to their contacts, (k, 3) [m]."""
 

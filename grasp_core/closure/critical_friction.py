@@ -99,7 +99,7 @@ def critical_friction_interval(
     positions: ArrayLike | Grasp,
     normals: ArrayLike | None = None,
 ) -> FrictionInterval:
-    """Find proved bounds of the critical friction, with the forces and the twist that prove them.
+    """Find proved bounds of the critical friction, with the forces and twist as proof.
 
     Args:
         positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
@@ -150,7 +150,7 @@ class _Quick:
 
 
 def _at_once(points: Array, normals: Array) -> _Quick:
-    """Search in compiled code for narrow intervals, and prove both of their ends."""
+    """Search for narrow intervals in compiled code, and prove both of their ends."""
     arms, _, _ = unit_size(points)
     units = np.array(normals)  # writable, like all that the search is compiled for
     forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))

@@ -23,7 +23,7 @@ FIRST_TRIAL = 0.5
 MOST_TRIALS = 30
 """Largest number of programs per set of contacts; seven are usual."""
 SMALLEST, LARGEST = 1e-6, 1e3
-"""Smallest and largest friction that is tried."""
+"""Smallest and largest friction at which a program is solved."""
 AT_REST = 1e-4
 """Share of the largest z_i below which a contact's z_i counts as zero, and the contact as at rest.
 """
@@ -129,7 +129,7 @@ def _set_up(arms: Array, normals: Array, axes: Array, rows: Array, mean: Array) 
 
 @loop("numpy")
 def _orthonormal(normal: Array, axes: Array) -> None:
-    """Fill in a unit normal and two tangents, (3, 3)."""
+    """Fill in a unit normal and two tangents as an orthonormal frame, (3, 3)."""
     far = 0
     for j in range(3):
         axes[0, j] = normal[j]

@@ -39,7 +39,7 @@ DEPENDENT = 1e-9
 SUPPORTED = 0.5
 """Border between pushes that count as zero and as one: a push that can be positive can be one."""
 LARGEST = 1e4
-"""Largest size of a variable of the programs, whose answers are of order one."""
+"""Largest size of a variable in the linear programs, whose answers are of order one."""
 POSITIVE = 1e-6
 """Optima below this value count as zero: a hundred times the residual of a linear program."""
 SHARE = 0.5
@@ -48,7 +48,7 @@ SHARE = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rounds:
-    """The balanced forces of each round, or the twist that ends the rounds."""
+    """Balanced forces of each round of the search, or the twist with which the rounds end."""
 
     forces: tuple[Array, ...]
     """Balanced forces of each round, (k, 3) each; empty unless every positive friction is

@@ -87,7 +87,7 @@ class ClosureCertificate:
                 object.__setattr__(self, name, kept)
 
     def verify(self) -> bool:
-        """Re-check every field in plain arithmetic, without any solver.
+        """Check every field again in plain arithmetic, without any solver.
 
         Returns:
             Whether the fields prove the verdict and the margin; False if they are no certificate.

@@ -26,7 +26,7 @@ from grasp_core.closure.wrenches import WRENCH, grasp_map, normal_and_tangential
 from grasp_core.errors import SolverError
 
 FRICTION_ACCURACY = 5e-8
-"""Relative width of the final interval of a critical friction."""
+"""Width of the final interval of a critical friction, relative to its upper end."""
 FIRST_TRIAL = 0.5
 PROOF_SHARES = (0.0, 1e-3, 0.03)
 """Frictions at which closure is tried, as shares of the way from the friction that the forces need
@@ -40,7 +40,7 @@ OVERSHOOT = 1.0
 and by `OVERSHOOT` times the error of Newton's method, which is its step's square over the friction.
 """
 HALVING = 6
-"""After this many trials the interval is halved once, whatever Newton's method says."""
+"""Number of trials after which the interval is halved once, whatever Newton's method suggests."""
 MOST_TRIALS = 80
 """Largest number of trials in one search: nine are usual, and some fifty where contacts are nearly
 degenerate."""
@@ -167,11 +167,11 @@ class Ends:
     """Friction at which neither side could be proved, probably the threshold; NaN if there is none.
     """
     spread: float = 0.0
-    """Distance from `center` at which proofs are tried."""
+    """Distance from `center` at which the next proofs are tried."""
 
     @classmethod
     def of(cls, points: Array, units: Array, *, strict: bool = True) -> "Ends":
-        """Begin with contacts about which nothing is proved yet."""
+        """Start with an interval about which nothing is proved yet."""
         return cls(points, units, unit_size(points)[0], strict)
 
     @property

@@ -32,12 +32,12 @@ from grasp_core.errors import InputError
 LineClass: TypeAlias = Literal["planar", "concurrent", "pencil", "regulus", "independent"]
 
 ON_CLASS = 1e-7
-"""Singular values and eigenvalues below this count as zero, for unit directions and points
-spread over a unit length: ten times what a linear program's answer may be off."""
+"""Size of singular values and eigenvalues below which they count as zero, for unit directions and
+points spread over a unit length: ten times the error of a linear program's answer."""
 ROUNDING = 1e-12
 """Distance, relative to coordinates, below which two points count as one."""
 REGULUS = 3
-"""Rank of the reciprocal form on the span of a regulus."""
+"""Rank of the reciprocal form on the span of four lines that lie on a regulus."""
 
 
 def plucker_vectors(points: Array, directions: Array) -> Array:

@@ -43,7 +43,7 @@ SMALLEST_GAP = 1e-11
 BALANCED = 1e-10
 """Largest accepted imbalance of the last point; 1e-15 is usual."""
 SHORTER = 0.99
-"""Share of the way to the border of the cones that a step may take."""
+"""Share of the distance to the border of the cones that a step may use."""
 
 
 @loop("numpy")
@@ -101,7 +101,7 @@ def _start(pair: Array, y: Array) -> None:
 
 @loop("numpy")
 def _values(mean: Array, pair: Array, y: Array) -> tuple[float, float, float]:
-    """Return the values of (1) and (2), and the sum of s_i.z_i."""
+    """Compute the values of the programs (1) and (2), and the sum of s_i.z_i."""
     primal = dual = gap = 0.0
     for i in range(pair.shape[1]):
         primal += pair[0, i, 0]
@@ -244,7 +244,7 @@ def _direct(V: Array, R: Array, missing: Array, wanted: Array, step: Array, turn
 
 @loop("numpy")
 def _solve_lower(R: Array, b: Array, x: Array) -> None:
-    """Solve R'x = b."""
+    """Solve R'x = b for x by forward substitution."""
     for w in range(WRENCH):
         x[w] = b[w]
         for v in range(w):
@@ -254,7 +254,7 @@ def _solve_lower(R: Array, b: Array, x: Array) -> None:
 
 @loop("numpy")
 def _solve_upper(R: Array, x: Array) -> None:
-    """Solve R x = b in place."""
+    """Solve R x = b for x in place by back substitution."""
     for w in range(WRENCH - 1, -1, -1):
         for v in range(w + 1, WRENCH):
             x[w] -= R[w, v] * x[v]

@@ -29,7 +29,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.closure.wrenches import WRENCH, grasp_map, normal_and_tangential
 
 Exact = list[Fraction]
-"""A vector of rational numbers."""
+"""A vector of rational numbers, without rounding."""
 
 INDEPENDENT = (1e-6, 1e-9)
 """Distances of a unit-size wrench from the span of others above which it is independent of them,

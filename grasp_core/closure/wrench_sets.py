@@ -78,11 +78,12 @@ def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
 class WrenchSet:
     """The set of wrenches that contacts can apply with bounded normal forces.
 
-    Contact forces are local here: (normal, tangent, tangent) of each contact in turn.
+    Contact forces are local here: components (normal, tangent, tangent) of each contact in turn.
     """
 
     G: Array
-    """Matrix from local contact forces to their wrench, torques over the torque scale, (6, 3k)."""
+    """Matrix from local contact forces to their wrench, with torques over the torque scale, (6,
+    3k)."""
     friction: Array
     """Coulomb coefficients, (k,)."""
     norm: Norm

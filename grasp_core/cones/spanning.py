@@ -115,12 +115,12 @@ def span_sines(units: Array) -> Array:
 
 
 def _dotted(one: Sequence[Array], two: Sequence[Array]) -> Array:
-    """Return dot products of columns, (q,)."""
+    """Compute dot products of vectors that are given by columns, (q,)."""
     return one[0] * two[0] + one[1] * two[1] + one[2] * two[2]
 
 
 def _crossed(one: Sequence[Array], two: Sequence[Array]) -> tuple[Array, Array, Array]:
-    """Return cross products of columns, three of (q,)."""
+    """Compute cross products of vectors that are given by columns, three of (q,)."""
     (x, y, z), (u, v, w) = one, two
     return y * w - z * v, z * u - x * w, x * v - y * u
 
@@ -185,7 +185,7 @@ def balancing_weights(vectors: Array) -> Array:
 
 
 def _signed_determinants(vectors: Array) -> Array:
-    """Return weights of a vanishing combination, by Cramer's rule, (..., 4)."""
+    """Compute the weights of a vanishing combination by Cramer's rule, (..., 4)."""
     minors = np.stack([vectors[..., rest, :] for rest in OTHERS], axis=-3)
     determinants: Array = np.asarray(np.linalg.det(minors), dtype=np.float64)
     return determinants * (1.0, -1.0, 1.0, -1.0)
@@ -249,7 +249,7 @@ class SpanningTable:
         return SpanningQuadruples(indices, np.arcsin(sines))
 
     def count(self, newest: int) -> int:
-        """Count the quadruples that end in a direction."""
+        """Count the spanning quadruples whose last direction is the given one."""
         self._extend(newest + 1)
         return int(self.kernel.quadruples(self.bits, newest, np.empty((0, 4), dtype=np.int64)))
 
@@ -269,7 +269,7 @@ class SpanningTable:
 
 
 def _sorted(parts: Sequence[Indices], count: int) -> Indices:
-    """Sort quadruples of `count` directions in lexicographic order, (q, 4)."""
+    """Sort quadruples of direction indices in lexicographic order, (q, 4)."""
     places = count ** np.arange(3, -1, -1)
     keys = np.sort(np.concatenate(parts) @ places)
     return keys[:, None] // places % count

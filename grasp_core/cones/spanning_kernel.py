@@ -26,7 +26,7 @@ def empty_table(count: int) -> NDArray[np.uint64]:
 
 @loop()
 def extend(table: NDArray[np.uint64], units: Array, start: int, end: int, least: float) -> None:
-    """Put the directions start .. end - 1 into the table.
+    """Enter the directions start .. end - 1 into the table.
 
     Args:
         table: Table that holds the directions before these; changed in place.

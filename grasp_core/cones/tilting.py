@@ -49,7 +49,7 @@ MOVES = 60
 FIRST_MOVE = 0.2
 """Length of the first random move, in friction angles."""
 GROWTH, DECAY = 1.3, 0.9
-"""Factors on the length of the moves after a success and after a failure."""
+"""Factors on the length of random moves, after a success and after a failure."""
 SLIGHT = 1e-6
 """Size below which improvements and directions decide nothing: vertices that are off by 1e-9 of an
 object turn the normals of its small faces by a hundred times that."""
@@ -183,7 +183,7 @@ def _bent(normals: Array, thetas: Array) -> Iterator[Array]:
 
 
 def half_angle(axes: Array, normals: Array, thetas: Array) -> Array:
-    """Return the largest psi that (1) allows, (q,) [rad]; negative where the axes do not span."""
+    """Return the largest psi that (1) allows, (q,) [rad]; negative where axes do not span."""
     reached = np.empty(len(axes))
     compiled(KERNEL).half_angles(*map(np.ascontiguousarray, (axes, normals, thetas)), reached)
     return reached

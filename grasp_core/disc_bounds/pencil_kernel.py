@@ -21,7 +21,7 @@ from grasp_core.geometry.vectors_kernel import angle_between, dotted, focus_dire
 from grasp_core.solvers.lp_kernel import Rows
 
 VARIABLES, K = 5, 3
-"""Number of variables, and the place of k, half the distance of the foci, among them."""
+"""Number of variables, and the index of k, half the distance of the foci, among them."""
 CELL_A, CELL_B = -1.0, 1.0
 """Sign of k u in the focus of the first two fingers, for the two orders of the foci."""
 

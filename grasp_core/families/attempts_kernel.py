@@ -63,7 +63,7 @@ def vertex_of(n: int) -> Vertex:
 
 @loop()
 def measure(rows: Rows) -> None:
-    """Fill in the lengths of the rows, by which the solver measures violations."""
+    """Compute the lengths of the rows, by which the solver measures violations."""
     rows.norms[:] = 0.0
     for i in range(len(rows.At)):
         for k in range(len(rows.norms)):

@@ -39,7 +39,7 @@ class Construction:
 
     family: Family
     orders: tuple[FingerOrder, ...]
-    """Finger orders that give different grasps of the same faces."""
+    """Orders of the fingers on the same faces that give different grasps."""
     place: Callable[[Sequence[FacePiece], Sequence[ForceCone], float], Placement | NoPlacement]
     """Function that places contacts, given pieces, force cones and the least merit that counts."""
     limits: slice | None

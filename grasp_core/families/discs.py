@@ -44,7 +44,7 @@ class LargestDiscs:
 def largest_discs(
     A: Array, b: Array, radii: slice, smallest: int, least: float
 ) -> LargestDiscs | NoPlacement:
-    """Solve both programs over the variables x with A x <= b.
+    """Find the largest four equal discs, then enlarge each, subject to rows A x <= b.
 
     Args:
         A: Rows over the variables, (rows, n); they keep the smallest radius below each of the four.

@@ -25,7 +25,7 @@ Path = tuple[int, ...]
 def random_parts(
     pieces: Sequence[FacePiece], rng: np.random.Generator, count: int
 ) -> Iterator[Corners]:
-    """Yield the pieces, each shrunk about one of its points at random."""
+    """Yield the four pieces, each shrunk about a random point of it."""
     for _ in range(count):
         parts: list[Array] = []
         for piece in pieces:

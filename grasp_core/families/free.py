@@ -99,7 +99,7 @@ class Absence:
     corners."""
 
     def verify(self) -> bool:
-        """Re-check every field in plain arithmetic.
+        """Check every field again in plain arithmetic.
 
         This checks that the pieces are convex polygons, and that the parts cover them and are all
         separated. Whoever has the object checks that the pieces are parts of its faces.
@@ -297,11 +297,11 @@ def _grasp(
 def of_general_type(
     pieces: Sequence[FacePiece], found: Placement, friction: float, rng: np.random.Generator
 ) -> Placement | None:
-    """Give a placement forces whose lines form a regulus, at the same contacts.
+    """Change the forces of a placement so that their lines form a regulus.
 
-    On symmetric faces the forces at the corners may all meet, or lie in one plane. Adding internal
-    forces, half as large as the cones allow, makes the lines skew. The result is None where the
-    cones allow too little to tell.
+    The contacts stay the same. On symmetric faces the forces at the corners may all meet, or lie in
+    one plane. Adding internal forces, half as large as the cones allow, makes the lines skew. The
+    result is None where the cones allow too little to tell.
     """
     if classify_lines(found.positions, found.forces) == "regulus":
         return found

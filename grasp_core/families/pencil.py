@@ -137,7 +137,7 @@ class _Discs:
     """Disc centres (1) as functions of the variables v: depths s v + s0, plane points Q v + q."""
 
     C: Array
-    """Maps from the variables to each finger's focus, (4, 3, VARIABLES)."""
+    """Maps from the variables to the focus of each finger, (4, 3, VARIABLES)."""
     s: Array
     """Linear part of the depths, (4, VARIABLES); `s0` is the constant part, (4,)."""
     s0: Array

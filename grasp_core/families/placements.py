@@ -27,7 +27,7 @@ class Placement:
     radii: Array
     """Radius of the independent disc around each contact, (4,); zeros where no disc is claimed."""
     merit: float
-    """The quantity that the construction maximised."""
+    """The quantity that the construction maximised, such as the smallest disc radius."""
     planned: Array | None = None
     """Forces for which the contacts were chosen, (4, 3); None if they are those of `forces`."""
 

@@ -90,7 +90,7 @@ KERNEL = "grasp_core.families.regulus_kernel"
 SIDES = (1.0, -1.0)
 """Signs of p: the side of the focus line on which the first finger's line passes it."""
 Choice: TypeAlias = tuple[int, int, int]
-"""Indices of the two pairs' slopes in `SLOPES`, and of the side in `SIDES`."""
+"""A choice to try: indices of the two pairs' slopes in `SLOPES`, and of the side in `SIDES`."""
 CHOICES: tuple[Choice, ...] = tuple(
     product(range(len(SLOPES)), range(len(SLOPES)), range(len(SIDES)))
 )
@@ -125,7 +125,7 @@ def place_regulus(
 def regulus_bounds(
     table: FaceTable, attempts: Attempts, enough: float = -SAME_OFFSET
 ) -> tuple[Array, Indices]:
-    """Bound the merit of reguli for many attempts in compiled code.
+    """Bound the merits of regulus grasps for many attempts, in compiled code.
 
     Args:
         table: The faces.

@@ -22,11 +22,11 @@ class PairFrames(NamedTuple):
     u: Array
     """Direction that lies in both pairs' planes, (3,)."""
     v: Array
-    """Directions in each pair's plane across u, (2, 3)."""
+    """Unit vectors in each pair's plane, across u, (2, 3)."""
     N: Array
     """Unit normals of the planes, (2, 3)."""
     tau: Array
-    """Slopes to try, (2, slopes)."""
+    """Slopes that are tried for each pair, (2, slopes)."""
     tight: Array
     """Rows (alpha, beta) of alpha x + beta z >= 0 that bound z / x from below and from above, for
     each slope, (2, slopes, 2, 2)."""

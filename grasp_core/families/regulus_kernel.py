@@ -43,17 +43,17 @@ NONE, PLUS, MINUS = -1, 0, 1
 
 
 class _Line(NamedTuple):
-    """The line through D along F, both as functions of the variables."""
+    """A line through the point D along F, both linear functions of the program's variables."""
 
     pair: int
     k: Array
-    """Change of D with k, (3,)."""
+    """Change of the point D with the variable k, (3,)."""
     p: Array
-    """Change of D with p, (3,)."""
+    """Change of the point D with the variable p, (3,)."""
     x: Array
-    """Change of F with x of the pair, (3,)."""
+    """Change of the direction F with the pair's variable x, (3,)."""
     z: Array
-    """Change of F with z of the pair, (3,)."""
+    """Change of the direction F with the pair's variable z, (3,)."""
 
 
 @loop()
@@ -64,7 +64,7 @@ def regulus_bounds(
     bounds: Array,
     chosen: Indices,
 ) -> None:
-    """Bound the merit, minus the largest offset t, over the slopes tried until one is enough.
+    """Bound the merit, minus the largest offset t, over slopes until one is good enough.
 
     Args:
         faces: The faces of the object.
@@ -205,7 +205,7 @@ def _line(frames: PairFrames, slopes: tuple[int, int], finger: int) -> _Line:
 
 @loop()
 def _add(line: _Line, d: Array, shares: tuple[float, float], rows: Rows, row: int) -> None:
-    """Fill in a row with passing d.D + force d.F, for `shares` = (passing, force)."""
+    """Fill in a row that adds shares of d.D and d.F, for `shares` = (passing, force)."""
     passing, force = shares
     for j in range(3):
         rows.At[j, row] = passing * d[j]

@@ -1,4 +1,4 @@
-"""Moves contacts on curved patches from the planes they were planned on to the true surface.
+"""Moves contacts on curved patches from the planes of the patches to the true surface.
 
 Solved: given a placement on the planes of patches, a placement with the same force cones on the
 triangles of the surface over the contacts, each within the region of its finger.
@@ -40,7 +40,7 @@ def on_true_surface(
     regions: Sequence[ContactRegion],
     place: OnFacets,
 ) -> tuple[tuple[FacePiece, ...], Placement] | None:
-    """Move a placement to the surface; None if no contacts there hold the same grasp.
+    """Move a placement to the true surface; None if no contacts there hold the same grasp.
 
     Args:
         shapes: Shapes of the four faces, in finger order.

@@ -42,7 +42,7 @@ class Balance:
     frames: Array
     """Columns (normal, tangent, tangent) of each contact, (k, 3, 3)."""
     G: Array
-    """Matrix from forces to their wrench, (6, 3k)."""
+    """Matrix from stacked local forces to their wrench, (6, 3k)."""
     inverse: Array
     """Pseudo-inverse of G, (3k, 6)."""
     null: Array

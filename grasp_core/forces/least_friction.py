@@ -30,7 +30,7 @@ does not push."""
 ROUNDING = 1e-9
 """Largest imbalance, and largest distance outside the limits, in units of the largest force."""
 FRICTIONLESS = 1e-6
-"""Coefficients below this are not lowered further."""
+"""Friction coefficient below which no lower one is searched for."""
 
 
 def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:

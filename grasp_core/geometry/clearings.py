@@ -86,7 +86,7 @@ def _nearest(point: Array, segments: Array) -> tuple[Array, Array]:
 
 
 def _ellipse(polygon: Array) -> tuple[Array, Array]:
-    """Return a polygon's centre and the map that makes its second moments those of a disc."""
+    """Return a polygon's centre, and the map that turns its second moments into a disc's."""
     _, centre = area_and_centroid([polygon])
     after = np.roll(polygon, -1, axis=0)
     corners = np.concatenate([polygon, 0.5 * (polygon + after)]) - centre

@@ -22,7 +22,7 @@ SAME_PART = 1e-3
 """Difference of two corners' heights that counts as none, as a share of the slack of straight
 corners."""
 SAME_CORNER = 1e-9
-"""Distance below which two corners are one, at unit size."""
+"""Distance below which two corners count as one, at unit size."""
 ON_LINE = 1e-12
 """Distance from a line, relative to coordinates, below which a corner is on it: a thousand rounding
 errors. Without it, a cut through a corner leaves a second corner beside it on some machines."""
@@ -223,7 +223,7 @@ def _edges(loop: list[int]) -> list[tuple[int, int]]:
 
 
 def _join(one: list[int], two: list[int], tail: int, head: int) -> list[int]:
-    """Walk `one` from head round to tail, then `two` from tail round to head."""
+    """Join two polygons along a common edge: walk `one` from head to tail, then `two` back."""
     start, other = one.index(head), two.index(tail)
     first = one[start:] + one[:start]
     second = two[other:] + two[:other]

@@ -39,7 +39,8 @@ FLATNESS_DIGITS = 9
 """Digits to which the cosines between normals and their averages are compared; equal ones are ties.
 """
 BORDER_GAP = 1e-9
-"""Distance of polygons from the borders of their groups, relative to the object's extent."""
+"""Distance that patches keep from the borders of their groups of triangles, relative to the
+object's extent."""
 
 
 def flat_patches(vertices: Array, triangles: Indices, limits: PatchLimits) -> tuple[Face, ...]:

@@ -50,12 +50,12 @@ class FacePiece:
     The frame is tied to the object: the pyramids inscribed in force cones turn with it.
     """
     corners: Array
-    """Corners in plane coordinates, (k, 2), counter-clockwise in the frame. The frame of a mirrored
-    piece is a mirror image."""
+    """Corners in plane coordinates, (k, 2), counter-clockwise in `frame`. For a mirrored piece the
+    frame is mirrored too."""
     E: Array
     """Unit outward edge normals, (k, 2)."""
     b: Array
-    """Limits of the edges: E y <= b inside, (k,)."""
+    """Distances of the edges from the origin of the plane coordinates: E y <= b inside, (k,)."""
     inradius: float
     """Radius of the largest disc in the piece."""
     spread: float = 0.0
@@ -130,7 +130,7 @@ def face_shapes(body: Polyhedron) -> tuple[FaceShape | None, ...]:
 
 
 def shape_of(pieces: Sequence[FacePiece]) -> FaceShape:
-    """Put convex pieces of one plane together as a shape, with their hull."""
+    """Combine convex pieces of one plane and their convex hull into a `FaceShape`."""
     first = pieces[0]
     if len(pieces) == 1:
         return FaceShape((first,), first)

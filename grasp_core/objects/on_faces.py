@@ -41,11 +41,13 @@ def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
             )
         if not _on_surface(body, body.faces[face], contact):
             raise InputError(
-                f"{where} does not lie on face {face} with that face's normal; plan on this object"
+                f"{where} does not lie on face {face} with its normal; use a grasp of this object"
             )
         plane = body.faces[face]
         if not any(within(contact.position, piece, plane.normal, slack) for piece in plane.pieces):
-            raise InputError(f"{where} lies outside the border of face {face}; plan on this object")
+            raise InputError(
+                f"{where} lies outside the border of face {face}; use a grasp of this object"
+            )
 
 
 def face_under(body: Polyhedron, contact: Contact) -> Face | None:

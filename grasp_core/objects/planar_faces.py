@@ -28,7 +28,7 @@ MAX_FACES = 200
 """Number of planar faces above which an object counts as curved: 200 faces have 65 million
 quadruples, some 6 million of which positively span."""
 SIDES = 2
-"""Number of triangles at an edge of a closed surface."""
+"""Number of triangles that meet at an edge of a closed surface."""
 
 Triangulate: TypeAlias = Callable[[list[Array]], Indices]
 """Function from the corners of an outer border and holes, in order, to counter-clockwise triangles.

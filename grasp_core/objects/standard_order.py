@@ -1,4 +1,4 @@
-"""Puts the faces and the handedness of an object into an order that does not depend on its file.
+"""Puts faces and handedness of an object into an order that does not depend on its file.
 
 Solved: an order of the faces, a first corner of each border and a handedness that depend on the
 shape alone, so that the planner sees the same object when it is turned or mirrored, or when its
@@ -52,7 +52,7 @@ class Standard:
 
 
 def standard(body: Polyhedron) -> Standard:
-    """Put an object into standard order and handedness."""
+    """Put an object into standard order and handedness, which depend on its shape alone."""
     images = (body, mirror_image(body))
     views = ((image, _frame(image, *flag)) for image in images for flag in _rarest_flags(image))
     first = min(((_looks(image, frame), image, frame) for image, frame in views), default=None,
@@ -90,7 +90,7 @@ def _mirrored(face: Face) -> Face:
 
 
 def _rarest_flags(body: Polyhedron) -> Iterator[tuple[int, int]]:
-    """Yield face and corner of each flag that is compared, in the order of the file."""
+    """Yield the flags (face, corner) that may define the standard order, in the file's order."""
     kinds = [_kind_of_face(body, face) for face in body.faces]
     rarest = _rarest([kind for kind in kinds if kind])
     flags = [

@@ -1,4 +1,4 @@
-"""Makes faces smaller before planning: two halves for two fingers, or a margin along the edges.
+"""Shrinks faces before planning: into two halves for two fingers, or by a margin along edges.
 
 For two fingers on one face, the face counts twice, as two halves with a gap between them. It is cut
 once, across its longest direction and in its middle. Grasps found on the halves hold for the face.

@@ -32,7 +32,7 @@ from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import graded, nearest_optimum, on_grid, surpassing
 
 SEARCH_GAP = 1e-3
-"""Gap of the quality's bounds during the climb."""
+"""Largest relative gap between the two bounds of the quality during the climb."""
 BAND = 0.2
 """Simplices up to this share farther from zero than the nearest one take part in a step."""
 MOST_ROWS = 100
@@ -42,7 +42,7 @@ the weights do not tell where the foot moves."""
 FLAT = 1e-9
 """Share of the largest singular value of a simplex below which a singular value counts as zero."""
 STEP_DIGITS = 6
-"""Digits after the point that a step is rounded to."""
+"""Digits after the point to which a step is rounded."""
 LAST_DIGIT = 10.0**-STEP_DIGITS
 """Distance inside the limits at which a step ends, in object radii: rounding may move the end by
 this much."""
@@ -50,7 +50,8 @@ FIRST_REACH, LEAST_REACH = 0.1, 1e-3
 """Size of the trust region at first, and the size at which the climb ends, in object radii."""
 MOST_STEPS = 40
 GOOD, GROWTH = 0.5, 1.5
-"""Share of the predicted gain above which the trust region grows, and by which factor."""
+"""Share of the predicted gain above which the trust region grows, and the factor by which it grows.
+"""
 POOR, SHRINKAGE = 0.2, 0.4
 """Share of the predicted gain below which the trust region shrinks, and the factor by which it
 shrinks."""
@@ -126,7 +127,7 @@ class ContactFaces:
         return on_grid(x[:n].reshape(y.shape), STEP_DIGITS), float(x[n])
 
     def nearest_planes(self, found: FerrariCanny, polytope: InnerPolytope) -> tuple[Array, Array]:
-        """Return distances (m,) and slopes (m, 2k), by (1), of the planes nearest to zero."""
+        """Return distances (m,) and, by (1), slopes (m, 2k) of the planes nearest to zero."""
         points = polytope.forces @ found.wrenches.G.T
         height = np.einsum("mcj,mj->mc", points[polytope.corners], polytope.normals)
         heights: Array = height.min(axis=1)

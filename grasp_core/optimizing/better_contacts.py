@@ -37,7 +37,7 @@ from grasp_core.solvers.ties import coarse, first_best, largest_first, on_grid, 
 from grasp_core.values import FINGERS, ForceCone, Grasp
 
 FINGER_RADIUS = 0.05
-"""Default radius, in object radii: half the radius of a fingertip in the scenes."""
+"""Default radius of a finger, in object radii: half the radius of a fingertip in the scenes."""
 RANDOM_STARTS = 3
 """Number of random contact sets, the best of `RANDOM_TRIALS`, from which the climb starts besides
 the grasp itself."""
@@ -131,7 +131,7 @@ def optimize_contacts(
 def _insets(
     body: Polyhedron, grasp: Grasp, pieces: Sequence[FacePiece], finger_radius: float | None
 ) -> list[float]:
-    """Return how far contacts stay from the edges of each piece, at unit size."""
+    """Return the distance that contacts keep from the edges of each piece, at unit size."""
     if finger_radius is not None:
         return [finger_radius / body.radius] * FINGERS
     depths = [
@@ -157,7 +157,7 @@ def pieces_under(body: Polyhedron, grasp: Grasp) -> tuple[FacePiece, ...]:
 
 
 def _deepest(pieces: Sequence[FacePiece], point: Array) -> FacePiece:
-    """Return the piece that a point is deepest in, or the first if it is on a common edge."""
+    """Return the piece in which a point is deepest; of equal ones, the first."""
     depths = [float((piece.b - piece.E @ _in_plane(piece, point)).min()) for piece in pieces]
     return pieces[first_best(depths, SAME_CORNER)]
 

@@ -66,7 +66,7 @@ class Leaf:
     path: Path
     """Divisions that lead from the whole pieces to this part."""
     direction: Array
-    """Unit twist in which the corners' support bounds the quality, (6,)."""
+    """Unit twist in which the support of all corner contacts bounds the quality, (6,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +81,7 @@ class QualityCeiling:
     leaves: tuple[Leaf, ...]
 
     def verify(self) -> bool:
-        """Re-check every field in plain arithmetic.
+        """Check every field again in plain arithmetic.
 
         The check is that the pieces are convex polygons, that the parts cover them, and that all
         are bounded, to within `ROUNDING`. Whether the pieces are those of an object's faces can
@@ -136,7 +136,7 @@ def quality_ceiling(
     finger_radius: ArrayLike | None = None,
     parts: int = 200,
 ) -> QualityCeiling:
-    """Bound the `l1` quality of all contacts on four faces.
+    """Find an upper bound on the `l1` quality of all contacts on four faces.
 
     Torques are taken about the centre of mass and divided by the object's radius, as in
     `optimize_contacts`.

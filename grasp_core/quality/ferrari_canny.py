@@ -41,7 +41,7 @@ from grasp_core.quality.inner_polytope import InnerPolytope
 from grasp_core.values import Grasp
 
 GAP = 1e-4
-"""Default of the largest (upper - lower) / upper."""
+"""Default of the largest relative gap (upper - lower) / upper between the bounds of a quality."""
 FINEST_GAP = 1e-7
 """Smallest gap that may be asked for: below it, rounding of the planes of tiny simplices costs more
 than they gain."""
@@ -67,7 +67,7 @@ class FerrariCanny:
     upper: float
     """Upper bound of the quality [N]."""
     wrenches: WrenchSet
-    """Set of wrenches that the quality is about."""
+    """The set of wrenches to whose largest inscribed ball the quality refers."""
     direction: Array
     """Unit twist, (6,), with torques over the torque scale, in which the support is at most
     `upper`."""
@@ -78,7 +78,7 @@ class FerrariCanny:
     the set; None otherwise."""
 
     def verify(self) -> bool:
-        """Re-check every field in plain arithmetic, without any solver.
+        """Check every field again in plain arithmetic, without any solver.
 
         The bounds hold for the set `wrenches`, which is checked to be that of some contacts, to
         within 1e-12 of its longest wrench.
@@ -151,7 +151,7 @@ def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
 
 
 def wrench_set_quality(wrenches: WrenchSet, gap: float = GAP) -> FerrariCanny:
-    """Bound the signed distance of zero from the boundary of a wrench set, with its proof."""
+    """Bound the signed distance of zero from the border of a wrench set, with proofs."""
     kernel = compiled(KERNEL)
     linf = wrenches.norm == "linf"
     cones = kernel.Cones(np.array(wrenches.G, order="C"), np.array(wrenches.friction), linf)

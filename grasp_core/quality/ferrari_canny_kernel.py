@@ -44,7 +44,7 @@ class Limits(NamedTuple):
     """The limits at which a polytope stops growing."""
 
     gap: float
-    """Largest (upper - lower) / upper that is enough."""
+    """Relative gap (upper - lower) / upper at which the polytope stops growing."""
     simplices: int
     points: int
     flat: float

@@ -32,7 +32,7 @@ BLOCK = 2**15
 TINY = 1e-300
 """Smallest length that is divided by: a normal may have length zero."""
 LARGEST_KEY = 2**62
-"""Largest integer that names a ridge, with one digit per corner."""
+"""Largest integer that may name a ridge, with one digit for each of its corners."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +40,7 @@ class InnerPolytope:
     """A polytope inside a wrench set whose planes bound the quality from below."""
 
     forces: Array
-    """Local contact forces whose wrenches are the points, (n, 3k)."""
+    """Local contact forces; their wrenches are the points of the polytope, (n, 3k)."""
     corners: Indices
     """Indices of the points of each simplex of the boundary, (m, 6)."""
     normals: Array

@@ -27,13 +27,13 @@ from grasp_core.values import Grasp
 FEWEST_EDGES = 3
 KERNEL = "grasp_core.quality.min_weight_kernel"
 RANK = 1e-9
-"""Singular values below this share of the largest count as zero."""
+"""Share of the largest singular value below which a singular value counts as zero."""
 UNREACHABLE = 1e-9
 """Least distance from zero at which the affine combinations of unit-size wrenches miss zero."""
 
 
 def pyramid_wrenches(wrenches: WrenchSet, edges: int) -> Array:
-    """Return wrenches of the edges of pyramids inscribed in the friction cones, (k edges, 6).
+    """Compute wrenches of pyramid edges inscribed in friction cones, (k edges, 6).
 
     Raises:
         InputError: There are fewer than three edges, or more than ten thousand.
@@ -46,7 +46,7 @@ def pyramid_wrenches(wrenches: WrenchSet, edges: int) -> Array:
 
 
 def _circle(edges: int) -> Array:
-    """Return the edges of a pyramid of friction one, (normal, tangent, tangent), (edges, 3).
+    """Compute the edges (normal, tangent, tangent) of a pyramid for friction one, (edges, 3).
 
     Raises:
         InputError: There are fewer than three edges, or more than ten thousand.

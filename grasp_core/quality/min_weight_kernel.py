@@ -19,7 +19,7 @@ WRENCH = 6
 
 @loop("numpy")
 def vertices(wrenches: Array, twists: Array, multipliers: Array, rows: Indices) -> None:
-    """Find a best vertex of each program.
+    """Find a best vertex of the min-weight program of each grasp.
 
     Args:
         wrenches: Wrenches of each grasp, (g, N, 6).

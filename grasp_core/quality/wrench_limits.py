@@ -50,7 +50,7 @@ LAST_DIGITS = 1e-12
 """
 MAX_STEPS = 30
 STARTS = 3
-"""How many of the weakest axis wrenches the search starts from."""
+"""Number of axis wrenches, the weakest ones, from which the search starts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +60,8 @@ class WrenchLimit:
     wrench: Array
     """External wrench (force, torque), (6,) [N, N m], torque about the stated centre."""
     limit: float
-    """Largest multiple of `wrench` that is resisted, since `forces` balance it; dimensionless."""
+    """Largest multiple of `wrench` that is resisted; `forces` prove it by balancing that multiple.
+    """
     upper: float
     """Multiple above which the wrench is not resisted: the support of `facet`, in plain arithmetic.
     """
@@ -68,7 +69,8 @@ class WrenchLimit:
     """Contact forces that resist the wrench at the limit, (k, 3) [N]: in their cones, with normal
     parts up to the largest, and balanced, all to within `HELD`."""
     facet: Array
-    """Twist y of the limiting facet, (6,), with y.wrench = -1, about the stated centre."""
+    """Twist y of the facet that limits the wrench, (6,), with y.wrench = -1, about the stated
+    centre."""
 
     def verify(
         self,
@@ -271,7 +273,7 @@ class WrenchBody:
         return bounded and abs(power + 1.0) <= ROUNDING * lengths
 
     def _about_middle(self, wrench: Array) -> Array:
-        """Return a wrench about the contacts' middle, at unit size."""
+        """Move a wrench's reference point to the contacts' mean, and scale it to unit size."""
         moved = np.append(wrench[:3], wrench[3:] - np.cross(self.middle, wrench[:3]))
         return moved / self.scale
 

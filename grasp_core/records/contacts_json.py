@@ -1,4 +1,4 @@
-"""Reads the text of a contacts file, or of a `grasps.json`, as checked contacts.
+"""Reads and checks the contacts in the text of a contacts file or of a `grasps.json`.
 
 A contacts file is JSON: `{"contacts": [...]}` for one grasp, or `{"grasps": [{"id": ...,
 "contacts": [...]}, ...]}`, where a contact is `{"position_m": [3], "normal": [3]}` and perhaps
@@ -28,7 +28,7 @@ MOST_GRASPS = 100_000
 LARGEST_LENGTH_M = 1e6
 """Largest length [m]: longer ones are mistakes, and their squares might overflow."""
 NEARLY_UNIT = 1e-3
-"""How far the length of a normal may be from 1: rounding of a file with three digits."""
+"""Largest error of a normal's length in a file: the rounding of three digits."""
 ROUNDING = 1e-15
 """Largest difference from 1 that rounding leaves in the length of a unit vector."""
 SAME_POINT = 1e-9

@@ -17,7 +17,7 @@ class _Record(BaseModel):
 
 
 class MeshRecord(_Record):
-    """The triangles of the object."""
+    """The triangles of the object's surface."""
 
     vertices_m: list[Triple]
     triangles: list[tuple[int, int, int]]
@@ -113,7 +113,7 @@ class FingerRecord(_Record):
 
 
 class GraspsRecord(_Record):
-    """A whole `grasps.json`."""
+    """The contents of a whole `grasps.json`."""
 
     schema_version: Literal[1] = Field(alias="schema")
     object: ObjectRecord

@@ -58,7 +58,7 @@ class CertifiedRegions:
     normals: Array
     """Unit normals of the faces, into the object, (4, 3)."""
     depths: Array
-    """Largest distance of the surface from each region's plane, (4,) [m]."""
+    """Largest distance of the true surface from each region's plane, (4,) [m]."""
     cover: TwistCover
     """Proof that all contacts in the regions are force-closed, with lengths relative to `scale`."""
     scale: float
@@ -80,7 +80,7 @@ class CertifiedRegions:
             raise InputError(f"depths must not be negative, got {float(self.depths.min()):.6g}")
 
     def verify(self) -> bool:
-        """Re-check every field in plain arithmetic.
+        """Check every field again in plain arithmetic.
 
         This checks that every choice of contacts in `regions`, on planes with `normals` and at most
         `depths` off them, is force-closed with `friction`; that the polygons are convex, in their

@@ -49,7 +49,7 @@ from grasp_core.solvers.ties import coarse, first_best, on_grid
 from grasp_core.values import ContactRegion, Grasp, four
 
 Balance: TypeAlias = Literal["radius", "area"]
-"""What regions are grown for: the smallest inscribed disc, or the total area."""
+"""What regions are made large for: the smallest inscribed disc, or the total area."""
 FEWEST = 64
 """Least number of cones that a caller may ask for: every search begins with the 64 orthants."""
 MOST_CONES = 1_000_000
@@ -75,7 +75,7 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     max_cones: int = CONES,
     cones: object = None,
 ) -> CertifiedRegions | None:
-    """Find regions around the contacts of a grasp, as large as a proof is found for.
+    """Find independent regions around the contacts of a grasp, as large as can be proved.
 
     Args:
         body: The object.

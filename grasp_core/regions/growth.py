@@ -30,7 +30,8 @@ SHARINGS = 2
 MARGIN = 4.0
 """Power that polygons leave over, as a multiple of the slack with which the proof is checked."""
 FIRST_STEP, LAST_STEP = 0.4, 0.03
-"""Steps by which polygons are moved outwards, relative to the radius of the discs."""
+"""First and last step by which edges of polygons are moved outwards, relative to the radius of the
+discs."""
 BEGINNINGS = (1.0, 0.6)
 """Radii of the discs from which large areas grow, relative to the largest proved ones."""
 GROWING = 4

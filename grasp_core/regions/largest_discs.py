@@ -21,7 +21,7 @@ from grasp_core.regions.sites import TINY, Sites, stacked_corners
 from grasp_core.solvers.ties import coarse
 
 FINENESS = 0.02
-"""Precision to which the radius is found, relative to it."""
+"""Relative precision to which the largest radius is found."""
 FIRST_RADIUS, LEAST_RADIUS = 0.05, 1e-6
 """Radii at which the search begins and at which it gives up, relative to the levers of the
 contacts."""
@@ -45,7 +45,7 @@ class Grounds:
     """The pieces that contacts may stand on, at unit size, with friction and the effort allowed."""
 
     pieces: tuple[FacePiece, ...]
-    """One piece per contact, about any common origin."""
+    """Convex piece of a face for each contact, with lengths about any common origin."""
     friction: Array
     """Coulomb coefficient of each contact, (k,)."""
     cones: int

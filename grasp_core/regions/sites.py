@@ -43,7 +43,7 @@ class Sites(NamedTuple):
     radii: Array
     """Radii of the discs by which the polygons are widened, (k,)."""
     depths: Array
-    """Largest distance of contacts from the planes, (k,)."""
+    """Largest distance of contacts from the planes of their polygons, (k,)."""
 
     def on_grid(self) -> "Sites":
         """Round the sites to a grid, so that a search does not depend on last digits.

@@ -37,11 +37,11 @@ class ConicProgram:
     """The data of one conic program, rows ordered as zero, non-negative, second-order."""
 
     q: Array
-    """Objective, (n,)."""
+    """Coefficients of the objective q.x, (n,)."""
     A: Array
-    """Matrix of the rows, (rows, n)."""
+    """Matrix of the constraints b - A x in K, (rows, n)."""
     b: Array
-    """Right-hand sides, (rows,)."""
+    """Right-hand sides of the constraints, (rows,)."""
     zeros: int
     """Number of rows of b - A x that must be zero."""
     nonnegatives: int
@@ -56,7 +56,7 @@ class ConicSolution:
 
     x: Array
     z: Array
-    """Dual variable, (rows,)."""
+    """Dual variable: one multiplier per row of the program, (rows,)."""
     value: float
 
 
@@ -113,7 +113,7 @@ def _check(program: ConicProgram, solution: ConicSolution, status: str) -> None:
 
 
 def _outside(program: ConicProgram, rows: Array, *, dual: bool) -> float:
-    """Return how far a vector lies outside K (or its dual, where the zero rows are free)."""
+    """Return how far a vector lies outside the cone K, or outside its dual cone."""
     start = program.zeros
     worst = 0.0 if dual else float(np.abs(rows[:start]).max(initial=0.0))
     worst = max(worst, -float(rows[start : start + program.nonnegatives].min(initial=0.0)))

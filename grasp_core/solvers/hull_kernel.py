@@ -25,7 +25,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
 
 D = 6
-"""Number of coordinates of a point."""
+"""Number of coordinates of each point of the hull."""
 DEAD = 1e300
 """Offset that marks a simplex as removed."""
 SINGULAR = 1e-13
@@ -45,7 +45,7 @@ class Hull(NamedTuple):
     neighbors: Indices
     """Neighbour of each simplex across the ridge opposite each corner, (room, 6)."""
     sums: Indices
-    """Sum of the corners' indices of each simplex, (room,)."""
+    """Sum of the point indices in `corners` of each simplex, (room,)."""
     heights: Array
     """Height, above each simplex, of the latest point that was compared with it, (room,)."""
     rounds: Indices
@@ -283,7 +283,7 @@ def _join(hull: Hull, seen: Indices, slack: float) -> bool:
 
 @loop()
 def _bury(hull: Hull, seen: Indices) -> None:
-    """Free the places of simplices that are removed."""
+    """Free the places of the removed simplices for new ones."""
     for f in seen:
         hull.offsets[f] = DEAD
         hull.free[hull.counts[1]] = f

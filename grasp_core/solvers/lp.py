@@ -41,7 +41,7 @@ class LinearProgram:
     """The data of one linear program; the equalities may be missing."""
 
     c: Array
-    """Objective, (n,)."""
+    """Coefficients of the objective c.x, (n,)."""
     A: Array
     """Matrix of the inequalities, (rows, n)."""
     b: Array
@@ -52,7 +52,7 @@ class LinearProgram:
     """Right-hand sides of the equalities, (equalities,)."""
 
     def stacked(self) -> tuple[Array, Array]:
-        """Return inequality rows, then equality rows, with their right-hand sides."""
+        """Return the rows of inequalities and then of equalities, with right-hand sides."""
         if self.A_eq is None or self.b_eq is None:
             return self.A, self.b
         return np.vstack([self.A, self.A_eq]), np.concatenate([self.b, self.b_eq])
@@ -81,7 +81,7 @@ class Below:
     """A proof, by multipliers as for an optimum, that no feasible value reaches the cutoff."""
 
     bound: float
-    """Largest value that the multipliers allow, b.y + b_eq.z."""
+    """Upper bound on all feasible values that the multipliers prove, b.y + b_eq.z."""
     multipliers: Array
     """Multipliers y, then z, (rows + equalities,); the first `rows` are non-negative."""
 

@@ -27,9 +27,9 @@ BOX = 1e3
 """Half the side of the box in which the search begins: data are of order one, and a program whose
 search ends at the box is left to another solver."""
 VIOLATED = 1e-10
-"""Distance from a row above which a point violates it."""
+"""Distance beyond a row's plane at which a point violates the row."""
 POSITIVE = 1e-9
-"""Least alpha_j that may become a pivot."""
+"""Least alpha_j that may serve as a pivot."""
 SAME_RATIO = 1e-12
 UNCHANGED = 1e-13
 """Decrease of c.x in one step below which the step counts as no progress."""
@@ -46,7 +46,7 @@ class Rows(NamedTuple):
     """The rows of a program; equalities come last, and their signs may be changed."""
 
     At: Array
-    """A transposed, (n, rows): the loops over all rows then run over neighbours in memory."""
+    """Transpose of the matrix A of rows, (n, rows): loops over rows then read adjacent memory."""
     b: Array
     """Right-hand sides, (rows,)."""
     norms: Array

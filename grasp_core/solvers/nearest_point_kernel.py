@@ -26,7 +26,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
 
 VIOLATED = 1e-13
-"""Distance from a row, relative to x or one, above which a point violates it."""
+"""Distance beyond a row's plane, relative to |x| or 1, at which a point violates the row."""
 DEPENDENT = 1e-9
 """Share of its length that a row must keep orthogonal to the active rows to be independent of them.
 """

@@ -101,12 +101,12 @@ def ranks(values: ArrayLike, share: float = SAME_SHARE) -> Indices:
 
 
 def smallest_first(values: ArrayLike) -> list[int]:
-    """List places of numbers in rising order, (n,); equal ones keep the order they come in."""
+    """List the indices of numbers in rising order, (n,); equal ones keep their order."""
     return [int(place) for place in np.argsort(ranks(values), kind="stable")]
 
 
 def largest_first(values: ArrayLike) -> list[int]:
-    """List places of numbers in falling order, (n,); equal ones keep the order they come in."""
+    """List the indices of numbers in falling order, (n,); equal ones keep their order."""
     return smallest_first(-np.asarray(values, dtype=np.float64))
 
 

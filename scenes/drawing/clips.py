@@ -31,7 +31,7 @@ ANGLES_DEG = (-50.0, 25.0)
 SIZE = (480, 360)
 """Width and height of the picture [pixels]."""
 RATE = 25.0
-"""Frames per second."""
+"""Frames per second of a clip."""
 NEARER = 0.9
 """Share of the fingertips' farthest reach that the picture must show: fingertips may come nearer to
 the picture's border than the object."""
@@ -39,9 +39,9 @@ RIGID = 7
 """Length of each row of joint positions in a scene with rigid fingertips, which holds only the pose
 of the object."""
 VISIBLE = 0.1
-"""Size of a motion that is easily seen, in grasp sizes."""
+"""Size, in grasp sizes, to which small motions are magnified so that they are easily seen."""
 MOST = 1000.0
-"""Largest factor by which motions are multiplied."""
+"""Largest factor by which motions are magnified."""
 PATIENCE_S = 300.0
 
 

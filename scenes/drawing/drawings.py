@@ -26,12 +26,13 @@ CONE_LENGTH = 0.42
 BEYOND = 0.2
 """Length by which a line is drawn past the points it connects, in object radii."""
 REACH = 0.95
-"""Distance from the object's centre up to which a regulus's surface is drawn, in object radii."""
+"""Radius around the object's centre within which the ruled surface of a regulus is drawn, in object
+radii."""
 FARTHEST = 4.0
 """Greatest length of a line of force, and greatest distance from the centre at which a focus still
 has its plane drawn, in object radii; the foci of built-in objects are within three."""
 SLACK_RAD = 1e-6
-"""Angle by which rounding may let a force cone stick out of its friction cone [rad]."""
+"""Angle by which rounding may make a force cone exceed its friction cone [rad]."""
 POLYGON = 3
 """Least number of corners of a region that can be filled with colour."""
 MOST_TRIANGLES = 2500
@@ -79,7 +80,7 @@ def _panes(body: Polyhedron) -> tuple[Array, ...]:
 
 
 def _coarse(body: Polyhedron) -> Array:
-    """Simplify a surface on a grid, without tearing it apart, (t, 3, 3) [m].
+    """Simplify a surface by joining vertices on a grid, without tearing it, (t, 3, 3) [m].
 
     Each vertex moves to the mean of the vertices in its cell. Triangles that then have no area are
     dropped.

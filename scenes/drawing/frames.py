@@ -25,7 +25,7 @@ INK, LETTERS = (30, 30, 40), 18
 
 
 def main(job: str, out: str) -> None:
-    """Draw one frame for every row of joint positions."""
+    """Draw one frame of a clip for every row of joint positions, and write the clip."""
     given = np.load(job, allow_pickle=False)
     model = _lit(str(given["xml"]))
     for finger, colour in enumerate(given["colours"]):

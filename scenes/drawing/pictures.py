@@ -52,7 +52,7 @@ def write_picture(
     *,
     view: View | None = None,
 ) -> Path:
-    """Draw a grasp as in the paper, and write the picture.
+    """Draw a grasp in the style of the paper, and write the picture to a file.
 
     Args:
         body: The object.
@@ -76,7 +76,7 @@ def grasp_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
     legend: bool = True,
 ) -> Any:  # fmt: skip
-    """Draw a grasp as in the paper, as a matplotlib figure.
+    """Draw a grasp in the style of the paper, as a matplotlib figure.
 
     Raises:
         InputError: The grasp does not lie on the body, or the friction is out of range.

@@ -20,7 +20,7 @@ SIDES = 20
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
-    """One thing to draw, in the object's frame."""
+    """One thing to draw: polygons, lines and points in the object's frame, with a role."""
 
     role: Role
     finger: int | None = None

@@ -44,7 +44,7 @@ class View:
 
     @classmethod
     def of_angles(cls, azimuth_deg: float, elevation_deg: float, body: Polyhedron) -> Self:
-        """Place a camera around an object, by its direction as seen from the object."""
+        """Place a camera by its azimuth and elevation [deg] as seen from the object."""
         number(azimuth_deg, "azimuth_deg")
         number(elevation_deg, "elevation_deg")
         axes = _axes(math.radians(azimuth_deg), math.radians(elevation_deg))
