@@ -136,7 +136,7 @@ def _depth(v: Array, i: int) -> float:
 
 @loop("numpy")
 def _scale(pair: Array, W: Array, middle: Array) -> bool:
-    """Fill in symmetric maps W_i of the cone K and their inverses.
+    """Fill in symmetric maps W_i of the cone K and their inverses, which scale s and z alike.
 
     They satisfy W_i z_i = inverse(W_i) s_i = middle_i.
 
@@ -172,7 +172,7 @@ def _scale(pair: Array, W: Array, middle: Array) -> bool:
 
 @loop("numpy")
 def _factor(columns: Array, W: Array, V: Array, R: Array) -> bool:
-    """Find reflections 1 - v v' that bring all A_i W_i, side by side, to the triangle R.
+    """Find reflections 1 - v v' that turn the columns A_i W_i into a triangular matrix R.
 
     Returns:
         False if the wrenches do not span all six dimensions.
@@ -221,7 +221,7 @@ def _dot(V: Array, v: int, X: Array, x: int) -> float:
 
 @loop("numpy")
 def _direct(V: Array, R: Array, missing: Array, wanted: Array, step: Array, turn: Array) -> None:
-    """Find the step whose scaled parts for s and z sum to `wanted`, with its part `turn` for y.
+    """Compute a Newton step: parts for s and z, which scaled sum to `wanted`, and one for y.
 
     The step also supplies the wrench that the forces lack to balance.
     """
@@ -270,7 +270,10 @@ def _towards_the_border(middle: Array, wanted: Array) -> None:
 
 @loop("numpy")
 def _towards_the_middle(middle: Array, ahead: Array, product: float, wanted: Array) -> None:
-    """Set the goal of a step: products equal to `product` e, corrected for the step ahead."""
+    """Set the goal of a Newton step: products of s and z become `product` times e.
+
+    The goal is corrected for the step ahead.
+    """
     s, z = ahead[0], ahead[1]
     for i in range(len(wanted)):
         m0, m1, m2 = middle[i, 0], middle[i, 1], middle[i, 2]

@@ -285,7 +285,7 @@ def _check_limits(normal_force: tuple[float, float]) -> None:
     # infinity stands for no upper limit; any other limit must be a force of a plausible size
     if not (SMALLEST <= limits[1] <= LARGEST or (limits[1] == math.inf and limits[0] <= LARGEST)):
         raise InputError(
-            f"normal_force: largest must be from {SMALLEST:g} to {LARGEST:g} N, or infinite, got "
+            f"normal_force: the largest must be {SMALLEST:g} to {LARGEST:g} N, or infinite, got "
             f"{shown(normal_force)}"
         )
 
