@@ -1,6 +1,6 @@
-"""Four-finger force-closure grasps of polyhedra: planning, and proofs either way.
+"""Plans four-finger force-closure grasps of polyhedra, and proves force closure or its absence.
 
-Names are imported on first use; the stub beside this file says where from.
+Each name is imported when it is first used; the stub file beside this one lists its module.
 """
 
 from grasp_core.lazy_names import names_in_stub

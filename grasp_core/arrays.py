@@ -1,4 +1,4 @@
-"""Arrays are checked once on the way in, and are read-only from then on."""
+"""Checks arrays once when they are passed in, and makes them read-only."""
 
 import math
 from typing import Any, TypeAlias
@@ -15,20 +15,21 @@ Indices: TypeAlias = NDArray[np.int64]
 """Integer array of indices, of any shape."""
 
 DIGITS = 9
-"""Digits kept by `to_digits`: a thousand times more than any result needs, a million times fewer
-than solvers' noise reaches."""
+"""Digits kept by `to_digits`: a thousand times finer than any result needs, a million times coarser
+than solvers' noise."""
 SHIFT = 0.5 * (math.sqrt(5.0) - 1.0)
-"""Offset of the grids on which numbers are rounded or compared, in cells: the golden section is the
-number worst approximated by fractions, so the numbers of regular objects are far from borders."""
+"""Offset, in cells, of the grids on which numbers are rounded or compared: the golden section is
+the number that fractions approximate worst, so the numbers of regular objects are far from the
+borders of cells."""
 ASIDE = 0.05
 """Shift of the decimal logarithm that keeps round numbers, such as the 1.0 of a unit vector, away
-from the sizes at which one digit more counts."""
+from the sizes at which one digit more is kept."""
 LARGEST_ENTRY = 1e50
 """Largest size of an array entry: the product of three such numbers has a finite square."""
 SMALLEST_SIZE = 1e-50
-"""Smallest length above zero: the square of a smaller one vanishes beside others, or is zero."""
+"""Smallest length above zero: the square of a smaller one would vanish."""
 REAL = "iuf"
-"""Numpy's kind letters of integers and floats, the only entries accepted."""
+"""Numpy's letters for kinds of integers and floats; no other entries are accepted."""
 UNIT_SLACK = 1e-9
 """How far the length of a unit vector may be from 1: the rounding of a file with ten digits."""
 
@@ -59,7 +60,7 @@ def frozen(
     largest = float(np.abs(array).max(initial=0.0))
     if largest > most:
         raise InputError(
-            f"{name} must be at most {most:g} in size, got {largest:.6g}; use other units"
+            f"{name} must not exceed {most:g} in size, got {largest:.6g}; use other units"
         )
     array.setflags(write=False)
     return array
@@ -74,7 +75,9 @@ def real_array(value: ArrayLike, name: str) -> Array:
     try:
         given: NDArray[Any] = np.asarray(value)
     except (TypeError, ValueError) as error:  # rows of different lengths
-        raise InputError(f"{name} must be an array of numbers: {error}") from error
+        raise InputError(
+            f"{name} must be an array of numbers; numpy refuses it: {error}"
+        ) from error
     if given.dtype.kind not in REAL:
         got = shown(value) if given.ndim == 0 else f"entries of type {given.dtype}"
         raise InputError(f"{name} must be an array of numbers, got {got}")
@@ -92,12 +95,12 @@ def frozen_units(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> 
     lengths = np.linalg.norm(array, axis=-1)
     if (np.abs(lengths - 1.0) > UNIT_SLACK).any():
         worst = float(lengths.flat[int(np.argmax(np.abs(lengths - 1.0)))])
-        raise InputError(f"{name} must have length 1, got {worst:.12g}; divide by its length first")
+        raise InputError(f"{name} must have length 1, got {worst:.12g}; divide it by its length")
     return array
 
 
 def frozen_each(value: ArrayLike, count: int, name: str) -> Array:
-    """Copy one number for all of `count` things, or one each, into a read-only array, (count,)."""
+    """Copy one number for all of `count` items, or one each, into a read-only array, (count,)."""
     given = real_array(value, name)
     return frozen(np.full(count, given) if given.ndim == 0 else given, (count,), name)
 
@@ -115,8 +118,8 @@ def frozen_indices(value: Any, shape: tuple[int | None, ...], name: str) -> Indi
 def to_digits(values: Array, size: float = 0.0) -> Array:
     """Round values to `DIGITS` digits of the largest of them, on a shifted grid.
 
-    The last bits of solvers' and factorisations' answers depend on where their numbers lie in
-    memory; what is simulated or written must not.
+    The last bits of the answers of solvers depend on where their numbers lie in memory; results
+    that are simulated or written to files must not.
 
     Args:
         values: Numbers in an array of any shape.

@@ -1,7 +1,7 @@
-"""Checks for single values on the way in: numbers, counts, words, switches, paths, our own values.
+"""Checks single values that users pass in: numbers, counts, words, switches, paths, objects.
 
-Arrays are checked in `arrays`. Nothing heavy is imported here, so that command-line flags can
-use the same bounds.
+Arrays are checked in `arrays`. Nothing that is slow to import is imported here, so that
+command-line flags can use the same bounds.
 """
 
 import math
@@ -15,20 +15,21 @@ from grasp_core.errors import InputError
 Value = TypeVar("Value")
 
 SMALLEST, LARGEST = 1e-9, 1e9
-"""Lengths, forces and similar quantities outside this range are mistakes, in SI units."""
+"""Smallest and largest length, force or similar quantity in SI units: others are mistakes."""
 LARGEST_FRICTION = 1e3
-"""Largest Coulomb coefficient: a larger critical one is reported as infinite, a larger input is
-refused; no material comes near it."""
+"""Largest Coulomb coefficient; no material comes near it. A larger critical friction is reported as
+infinite, and a larger input is refused."""
 MOST_COUNT = 10**9
 """Largest count accepted: anything larger would take longer than anybody waits."""
 MOST_SEED = 2**64 - 1
 MOST_EDGES = 10_000
-"""Most edges of a pyramid that replaces a friction cone: it equals the cone to seven digits."""
+"""Largest number of edges of a pyramid that replaces a friction cone: it equals the cone to seven
+digits."""
 MOST_RANDOM_WRENCHES, MOST_TRIALS = 10_000, 100_000
 HUGE = 10**100
 """Whole numbers above this are shown by their size: Python does not write the largest ones."""
 SHOWN = 60
-"""Most characters of a refused value that a message shows."""
+"""Largest number of characters of a refused value that a message shows."""
 
 
 def number(  # noqa: PLR0913 - the ways in which a range can end
@@ -176,7 +177,7 @@ def path_of(value: Any, name: str) -> Path:
     if not isinstance(value, str | Path):
         raise InputError(f"{name} must be a path, as text or pathlib.Path, got {shown(value)}")
     if not str(value) or "\0" in str(value):
-        raise InputError(f"{name} must name a file or folder, got {shown(value)}")
+        raise InputError(f"{name} must be the path of a file or folder, got {shown(value)}")
     return Path(value)
 
 
@@ -193,7 +194,9 @@ def several(value: Any, each: Callable[[Any], Value], name: str, kind: str) -> t
         InputError: The value is not a sequence, or `each` refuses an item.
     """
     if isinstance(value, str | bytes) or not isinstance(value, Iterable):
-        raise InputError(f"{name} must be several {kind}, as a tuple, got {shown(value)}")
+        raise InputError(
+            f"{name} must be a sequence of {kind}, such as a tuple, got {shown(value)}"
+        )
     return tuple(each(thing) for thing in cast("Iterable[Any]", value))
 
 

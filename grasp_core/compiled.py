@@ -1,4 +1,4 @@
-"""The door to numba: how inner loops are declared, compiled, kept and loaded.
+"""Declares, compiles, keeps and loads inner loops; only this module handles numba.
 
 A kernel, `NAME_kernel.py` beside the module `NAME.py`, is plain arithmetic on arrays of programs,
 directions or contacts. Kernels are loaded on first use, since numba takes half a second to import.

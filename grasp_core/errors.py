@@ -1,4 +1,4 @@
-"""The errors that the three packages raise on purpose, one class per cause."""
+"""Defines the errors that graspproof raises on purpose, one class per cause."""
 
 from enum import StrEnum
 
@@ -8,23 +8,23 @@ class GraspError(Exception):
 
 
 class InputError(GraspError):
-    """A value passed in breaks the contract; the message says which, and how to correct it."""
+    """Raised when a value passed in breaks the contract; the message says how to correct it."""
 
 
 class UndecidedError(GraspError):
-    """The question lies closer to its boundary than the arithmetic can tell."""
+    """Raised when a question is too close to its boundary for the arithmetic to decide."""
 
 
 class SolverError(GraspError):
-    """A solver's answer failed our own check of it, so there is no answer."""
+    """Raised when a solver's answer failed graspproof's own check, so there is no answer."""
 
 
 class NoForcesError(GraspError):
-    """No forces within the limits and the friction balance the wrench."""
+    """Raised when no forces within the limits and the friction balance the wrench."""
 
 
 class UnfaithfulError(GraspError):
-    """The simulator's settings do not reproduce statics, so nothing may be certified with them."""
+    """Raised when the simulator does not reproduce statics, so it may certify nothing."""
 
 
 class MeshRefusal(StrEnum):
@@ -50,7 +50,7 @@ class MeshRefusal(StrEnum):
 
 
 class MeshError(InputError):
-    """A mesh cannot be taken as a solid polyhedron.
+    """Raised when a mesh cannot be taken as a solid polyhedron.
 
     Attributes:
         reason: The stable code of the refusal.

@@ -1,4 +1,4 @@
-"""Checks of a certificate's fields that answer True or False, where `checked` and `arrays` raise.
+"""Checks fields of a certificate, and answers True or False where others would raise errors.
 
 A certificate may come from anywhere, so its `verify` answers False to a bad field, never an error.
 """

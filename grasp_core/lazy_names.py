@@ -1,4 +1,4 @@
-"""A package's names are imported on their first use, so that unused ones cost nothing.
+"""Imports the names of a package on their first use, so that unused ones cost no time.
 
 The stub beside a package's `__init__.py` lists the names, for type checkers and for this module.
 """

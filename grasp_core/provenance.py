@@ -1,4 +1,4 @@
-"""What produced a result: versions of every package, and how this processor rounds.
+"""Tells what produced a result: versions of every package, and how this processor rounds.
 
 Results of different processors, or of compiled and interpreted loops, differ in the last digits.
 """

@@ -1,4 +1,4 @@
-"""Values of many numbers are shown in one line: a name, and the figures that tell them apart."""
+"""Shows values of many numbers in one line: a name, and the figures that tell them apart."""
 
 from typing import cast
 

@@ -1,7 +1,7 @@
-"""The nouns of a grasp, all of them frozen: contacts, force cones, regions, witnesses and grasps.
+"""Defines the values of a grasp: contacts, force cones, regions, witnesses and grasps.
 
-Every vector is in the object's frame and in SI units. Normals are unit vectors that
-point into the object. Arrays are copied, checked and made read-only on construction.
+All of them are frozen. Every vector is in the object's frame and in SI units. Normals are unit
+vectors that point into the object. Arrays are copied, checked and made read-only on construction.
 """
 
 from collections.abc import Callable, Iterable
@@ -26,9 +26,10 @@ from grasp_core.errors import InputError
 from grasp_core.short_text import counted, summary, vector
 
 Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
-"""The class of a grasp's witness lines."""
+"""The family of a grasp, by how its four lines of force meet: concurrent, pencil or regulus among
+others."""
 Method: TypeAlias = Literal["concurrent", "pencil", "regulus", "free"]
-"""How grasps are searched: by one of the paper's three constructions, or free of any family."""
+"""How grasps are searched for: by one of the paper's three constructions, or free of any family."""
 RegionKind: TypeAlias = Literal["cone", "disc", "point", "certified"]
 FaceQuadruple: TypeAlias = tuple[int, int, int, int]
 """Indices of four faces, in finger order."""
@@ -43,7 +44,7 @@ RIGHT_ANGLE = np.pi / 2
 class ForceCone:
     """A circular cone of force directions inside a friction cone.
 
-    In the paper the normal is the axis and the friction angle the half-angle.
+    In the paper its axis is the contact normal and its half-angle the friction angle.
     """
 
     axis: Array
@@ -101,7 +102,7 @@ class ContactRegion:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Witness:
-    """Balanced forces, whose four lines show to which family a grasp belongs."""
+    """Balanced contact forces, whose four lines show to which family a grasp belongs."""
 
     points: Array
     """One point on each line, namely the contact, (4, 3) [m]."""
@@ -114,7 +115,7 @@ class Witness:
 
     @property
     def directions(self) -> Array:
-        """Unit vectors along the lines, (4, 3)."""
+        """Return unit vectors along the lines, (4, 3)."""
         return self.forces / np.linalg.norm(self.forces, axis=1, keepdims=True)
 
     def __repr__(self) -> str:
@@ -130,27 +131,30 @@ class Grasp:
     faces: FaceQuadruple
     contacts: tuple[Contact, Contact, Contact, Contact]
     focus_points: Array
-    """Points where witness lines meet, (k, 3) [m]: one for a concurrent grasp, one for each
-    pair of a pencil. For a regulus, the points between the two lines of each pair, or none."""
+    """Points where witness lines meet, (k, 3) [m]: one for a concurrent grasp, one for each pair of
+    a pencil. For a regulus, the points midway between the two lines of each pair; empty for other
+    grasps."""
     force_cones: tuple[ForceCone, ForceCone, ForceCone, ForceCone]
     """Force cones that the construction used; each lies inside its contact's friction cone."""
     regions: tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
     radius: float
-    """Radius of the smallest of the four independent discs [m]; 0.0 where none is claimed."""
+    """Radius of the smallest of four discs in which fingers may stand independently [m]; 0.0 where
+    no discs are claimed."""
     span_angle: float
-    """Largest half-angle at which the four normals positively span, theta* [rad]."""
+    """theta*, the largest half-angle [rad] below which cones around the four normals positively
+    span."""
     critical_friction: float
     """Smallest Coulomb coefficient above which the contacts are in force closure."""
     closure_margin: float
-    """Margin of the exact closure test at the planned friction (see `force_closure`)."""
+    """Proved margin of force closure at the planned friction (see `ClosureCertificate.margin`)."""
     ferrari_canny: tuple[float, float]
-    """Lower and upper bound, both proved, of the `l1` quality at the planned friction, with torques
-    about the centre of mass and over the object's radius [N]."""
+    """Proved lower and upper bound [N] of the `l1` quality at the planned friction, with torques
+    about the centre of mass and divided by the object's radius."""
     witness: Witness
     """Balanced forces whose four lines belong to the grasp's family."""
     approach_directions: Array | None = None
-    """Direction in which each finger moves in to its contact, on the free line that was found for
-    it, unit vectors, (4, 3); None if no line was asked for (`plan(finger=...)`)."""
+    """Unit vector along which each finger moves in to its contact on a free line, (4, 3); None if
+    no free lines were asked for (`plan(finger=...)`)."""
 
     def __post_init__(self) -> None:
         text(self.id, "id")
@@ -179,12 +183,12 @@ class Grasp:
 
     @property
     def positions(self) -> Array:
-        """Contact points in finger order, (4, 3) [m]."""
+        """Return the contact points in finger order, (4, 3) [m]."""
         return np.array([contact.position for contact in self.contacts])
 
     @property
     def normals(self) -> Array:
-        """Inward normals in finger order, (4, 3)."""
+        """Return the inward normals in finger order, (4, 3)."""
         return np.array([contact.normal for contact in self.contacts])
 
     def __repr__(self) -> str:
@@ -196,17 +200,17 @@ class Grasp:
 
 
 PER_FINGER = {"contacts": Contact, "force_cones": ForceCone, "regions": ContactRegion}
-"""Class of the values that a grasp has one of per finger, by field name."""
+"""Class of the values in each field of a grasp that has one value per finger, by field name."""
 
 
 def _one_per_finger(value: Any, each: Callable[[Any], object], name: str, kind: str) -> None:
     things = several(value, each, name, kind)
     if len(things) != FINGERS:
-        raise InputError(f"a grasp has {FINGERS} {name}, got {len(things)}")
+        raise InputError(f"a grasp needs {FINGERS} {name}, one per finger, got {len(things)}")
 
 
 def four(items: Iterable[Item]) -> tuple[Item, Item, Item, Item]:
-    """Return exactly four things, one per finger.
+    """Return exactly four items, one per finger.
 
     Raises:
         InputError: There are more or fewer than four.

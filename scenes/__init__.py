@@ -1,6 +1,6 @@
 """Turn grasps into MuJoCo scenes, and make the built-in example objects.
 
-Names are imported on first use; the stub beside this file says where from.
+Each name is imported when it is first used; the stub file beside this one lists its module.
 """
 
 from grasp_core.lazy_names import names_in_stub

@@ -1,9 +1,9 @@
-"""The built-in example objects, made from coordinates and booleans, sized for a hand.
+"""Makes the built-in example objects from coordinates, hulls and unions, at hand size.
 
-All are about a decimetre across, in metres, with their own frame near the middle. They range from
-the regular solids, where results are known in closed form, to parts that make planners stumble:
-boxes and prisms without spanning quadruples, an elongated bar without concurrent grasps, and
-non-convex parts with holes, notches and handles.
+All objects are about 0.1 m across, with the origin of their frame near the middle. They range from
+the regular solids, whose results are known in closed form, to parts that are hard to plan on: boxes
+and prisms without spanning quadruples, an elongated bar without concurrent grasps, and non-convex
+parts with holes, notches and handles.
 """
 
 import difflib
@@ -21,16 +21,15 @@ from grasp_core.objects.booleans import Solid, extrusion, hull
 from grasp_core.objects.polyhedron import Polyhedron
 
 DIGITS = 14
-"""Number of digits to which coordinates are rounded before solids are made of them. The last digit
-of a cosine depends on the processor, and where rounding decides, the order of faces depends on that
-digit."""
+"""Number of digits to which coordinates are rounded before solids are built. The last digit of a
+cosine depends on the processor, and the order of the faces could depend on that digit."""
 GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
 RANDOM_NAME = re.compile(r"random-(\d{1,3})-(\d{1,9})", re.ASCII)
 RANDOM_FACES = range(4, 201)
 
 
 def example_names() -> tuple[str, ...]:
-    """Names that `example_object` accepts; `random-FACES-SEED` stands for a family of objects."""
+    """List the names that `example_object` accepts; `random-FACES-SEED` is a pattern."""
     return (*OBJECTS, "random-FACES-SEED")
 
 
@@ -55,7 +54,7 @@ def example_object(name: str) -> Polyhedron:
         near = [] if len(key) > SHOWN else difflib.get_close_matches(key, example_names(), n=3)
         hint = f"did you mean {' or '.join(near)}?" if near else "see `graspproof objects`"
         if key.startswith("random"):
-            hint = f"write random-FACES-SEED with {RANDOM_FACES[0]} to {RANDOM_FACES[-1]} faces"
+            hint = f"write random-FACES-SEED, FACES from {RANDOM_FACES[0]} to {RANDOM_FACES[-1]}"
         raise InputError(f"there is no built-in object {shown(name)}; {hint}")
     return Polyhedron.from_mesh(solid.vertices, solid.triangles, name=key)
 
@@ -65,7 +64,7 @@ def _signs() -> Array:
 
 
 def _box(x: float, y: float, z: float) -> Solid:
-    """An axis-aligned box with these half-widths about the origin."""
+    """Make an axis-aligned box with these half-widths about the origin."""
     return hull(_signs() * (x, y, z))
 
 
@@ -97,7 +96,7 @@ def _icosahedron() -> Solid:
 
 
 def _wedge() -> Solid:
-    """A rough wedge of six irregular vertices: eight triangular faces, no symmetry."""
+    """Make a rough wedge of six irregular vertices: eight triangular faces, no symmetry."""
     return hull(
         0.01
         * np.array(
@@ -114,7 +113,7 @@ def _wedge() -> Solid:
 
 
 def _chamfered_box() -> Solid:
-    """A box of 12 x 10 x 8 cm with its eight corners cut off."""
+    """Make a box of 12 x 10 x 8 cm with its eight corners cut off."""
     widths, cut = np.array([0.06, 0.05, 0.04]), 0.02
     corners = _signs()[:, None, :] * (widths - cut * np.eye(3))[None]
     return hull(corners.reshape(-1, 3))
@@ -129,7 +128,7 @@ def _prism() -> Solid:
 
 
 def _double_wedge_bar() -> Solid:
-    """A bar that ends in two crossed wedges: pencil grasps, but no concurrent one."""
+    """Make a bar that ends in two crossed wedges: it has pencil grasps, no concurrent one."""
     length, unit = 3.0, 0.02
     ends = [[-length - 1.0, 0.0, s] for s in (-1, 1)] + [[length + 1.0, s, 0.0] for s in (-1, 1)]
     middle = _signs() * (length, 1.0, 1.0)
@@ -176,7 +175,7 @@ def _mug() -> Solid:
 
 
 def _random(faces: int, seed: int) -> Solid:
-    """Random planes tangent to a random ellipsoid, none of them redundant."""
+    """Make a solid of random planes tangent to a random ellipsoid, each of which bounds it."""
     rng = np.random.default_rng([faces, seed])
     stretch = rng.uniform(0.7, 1.3, 3)
     while True:
@@ -188,8 +187,8 @@ def _random(faces: int, seed: int) -> Solid:
 
 
 LEAST_POLAR_OFFSET = 0.25
-"""Least distance of a polar facet from the origin. A nearer one would put a corner more than four
-radii away; such slivers of objects are drawn again."""
+"""Least distance of a facet of the polar body from the origin. A nearer facet would put a corner of
+the object more than four radii away; such thin objects are drawn anew."""
 
 
 def _least_offset(solid: Solid) -> float:
@@ -198,12 +197,12 @@ def _least_offset(solid: Solid) -> float:
 
 
 def _facet_signs(solid: Solid) -> Array:
-    """The sign for each triangle, +1 where its outer side faces away from the origin."""
+    """Return +1 for each triangle whose outer side faces away from the origin, else -1."""
     return np.sign(np.linalg.det(solid.vertices[solid.triangles]))
 
 
 def _polar_corners(solid: Solid) -> Array:
-    """Corner of the polar body for each triangle: the point p with p.v = 1 at its vertices."""
+    """Compute the corner p of the polar body for each triangle: p.v = 1 at its vertices v."""
     a, b, c = (solid.vertices[solid.triangles[:, corner]] for corner in range(3))
     crosses = np.cross(b, c) + np.cross(c, a) + np.cross(a, b)
     determinants = (a * np.cross(b, c)).sum(axis=1)

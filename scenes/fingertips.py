@@ -1,10 +1,11 @@
-"""How fingertips are built and driven, and whether four of them find room at their contacts.
+"""Describes fingertips, and finds a radius at which they overlap nothing beside their contacts.
 
-A fingertip is a sphere that touches its face at the contact, so its centre is p - r n. Two of them
-overlap from the radius on at which their centres are 2 r apart, which is a quadratic equation. One
-meets the object elsewhere from the radius on at which a further surface point q is as near to its
-centre as p is: r = |q - p|^2 / (2 (p - q).n). The nearest q is found by shrinking: the point
-nearest to the centre of too large a sphere gives a smaller sphere, until no point is inside.
+A fingertip is a sphere that touches its face at the contact p, so with the inward normal n its
+centre is p - r n. Two fingertips overlap from the radius r at which their centres are 2 r apart,
+which is the root of a quadratic equation. A fingertip meets the object beside its contact from the
+radius at which another surface point q is as near to its centre as p is: r = |q - p|^2 / (2 (p -
+q).n). The q with the least radius is found by shrinking: the surface point nearest to the centre of
+too large a sphere gives a smaller sphere, until no surface point is inside.
 """
 
 import math
@@ -24,21 +25,22 @@ from grasp_core.values import Contact
 
 Drive: TypeAlias = Literal["servo", "rigid"]
 TIP_RADIUS = 0.1
-"""Fingertip radius that is used where it fits, in object radii."""
+"""Fingertip radius that is used wherever such fingertips overlap nothing, in object radii."""
 LEAST_TIP_RADIUS = 1e-3
 """Smallest fingertip radius that is tried, in object radii."""
 ROOM = 0.95
-"""Fingertip radius relative to the largest that fits, where the usual one does not."""
+"""Fingertip radius where `TIP_RADIUS` does not fit, relative to the largest that fits."""
 TOUCHING = 1e-6
-"""Largest overlap that is ignored, in fingertip radii."""
+"""Largest overlap that counts as mere touching, in fingertip radii."""
 MAX_SHRINKING = 100
 FACING = 1e-9
-"""Value of 4 - |m|^2 below which the difference is rounding, and the normals are opposite."""
+"""Value of 4 - |m|^2, with m the difference of two unit normals, below which the normals count as
+opposite."""
 
 
 @dataclass(frozen=True, slots=True)
 class FingerSettings:
-    """How fingertips are built and driven; what is None is chosen to suit the grasp.
+    """How fingertips are built and driven; a setting that is None is chosen to suit the grasp.
 
     Raises:
         InputError: A number is out of range (1e-9 to 1e9), or a choice is unknown.
@@ -47,18 +49,18 @@ class FingerSettings:
     max_normal_force_n: float = 10.0
     """Largest normal force of each finger [N]."""
     radius_m: float | None = None
-    """Radius of the fingertips [m]; if None, a tenth of the object's radius, or what fits."""
+    """Radius of the fingertips [m]; if None, a tenth of the object's radius, or less where that
+    would overlap something."""
     mass_kg: float | None = None
     stiffness_n_per_m: float | None = None
-    """Stiffness of the servos [N/m]."""
+    """Stiffness of the fingertips' servos [N/m]; None chooses it by the grasp size."""
     approach: tuple[float, float, float] | None = None
-    """Direction in which all fingers move in from their start. If None, each finger takes the
-    direction that was planned for it, or its normal."""
+    """Direction in which all fingers move towards the object. If None, each finger takes the
+    direction that was planned for it, or its contact normal."""
     drive: Drive = "servo"
-    """How fingertips are held: servos push them, rigid ones stay where they are put."""
+    """How fingertips are held: pushed by servos, or rigidly fixed in place."""
     indentation: float = 0.0
-    """Depth to which a fingertip is put into its face, in grasp sizes, if more than just
-    touching."""
+    """Depth of each fingertip in its face at the start, in grasp sizes; 0 means just touching."""
 
     def __post_init__(self) -> None:
         positive(self.max_normal_force_n, "max_normal_force_n")
@@ -68,13 +70,13 @@ class FingerSettings:
         if self.approach is not None:
             way = frozen(self.approach, (3,), "approach")
             if not SMALLEST <= float(np.linalg.norm(way)) <= LARGEST:
-                raise InputError(f"approach must be a direction, not zero, got {self.approach}")
+                raise InputError(f"approach must not be the zero vector, got {self.approach}")
         one_of(self.drive, get_args(Drive), "drive")
         number(self.indentation, "indentation", least=0.0, below=1.0)
 
 
 def fitting_radius(body: Polyhedron, positions: Array, normals: Array) -> float:
-    """Choose a fingertip radius at which nothing overlaps, if a large enough one exists [m].
+    """Choose a fingertip radius [m] at which nothing overlaps, if a large enough one exists.
 
     Args:
         body: The object.
@@ -90,7 +92,7 @@ def fitting_radius(body: Polyhedron, positions: Array, normals: Array) -> float:
 
 
 def clashes(body: Polyhedron, positions: Array, normals: Array, radius: float) -> tuple[str, ...]:
-    """List what fingertips of a radius overlap: each other, or the object beside their contact.
+    """List what fingertips of a radius overlap: each other, or the object beside their contacts.
 
     Args:
         body: The object.
@@ -115,10 +117,11 @@ def clashes(body: Polyhedron, positions: Array, normals: Array, radius: float) -
 
 
 def _largest_apart(positions: Array, normals: Array) -> float:
-    """Radius up to which no two fingertips overlap: |d - r m| = 2 r for the closest pair.
+    """Return the radius up to which no two fingertips overlap: |d - r m| = 2 r.
 
-    It is the positive root of (4 - m.m) r^2 + 2 (d.m) r = d.d. Two fingers that face each other
-    have none, and do not limit it.
+    Between two contacts d is the difference of the positions and m that of the normals. The radius
+    is the positive root of (4 - m.m) r^2 + 2 (d.m) r = d.d. Two fingers that face each other have
+    no such root, and do not limit the radius.
     """
     largest = math.inf
     for i, j in combinations(range(len(positions)), 2):
@@ -133,18 +136,21 @@ def _largest_apart(positions: Array, normals: Array) -> float:
 
 
 def _largest_clear(body: Polyhedron, positions: Array, normals: Array, start: float) -> Array:
-    """Radius up to which each fingertip meets nothing beside its contact, at most `start`, (k,)."""
+    """Return up to which radius each fingertip meets nothing beside its contact, (k,).
+
+    The radius is at most `start`.
+    """
     return np.array(
         [_clear_radius(body, *contact, start) for contact in zip(positions, normals, strict=True)]
     )
 
 
 def _clear_radius(body: Polyhedron, position: Array, normal: Array, start: float) -> float:
-    """Radius up to which one fingertip meets nothing beside its contact, at most `start`.
+    """Return up to which radius one fingertip meets nothing beside its contact.
 
-    Contacts may be a little below their own faces, because positions in files are rounded. The
-    surface of a curved patch does not count where it is touched: a finger is taken to touch its
-    plane.
+    The radius is at most `start`. Contacts may lie slightly below their faces, because positions in
+    files are rounded. The surface of a curved patch does not count near the contact, because a
+    fingertip is assumed to touch the plane of the patch.
     """
     slack, radius = ON_FACE * body.radius, start
     triangles = _triangles_near(body, position, normal, start)
@@ -159,7 +165,7 @@ def _clear_radius(body: Polyhedron, position: Array, normal: Array, start: float
 
 
 def _triangles_near(body: Polyhedron, position: Array, normal: Array, radius: float) -> Indices:
-    """Triangles that a fingertip of up to a radius may meet, (t, 3).
+    """Find the triangles that a fingertip of at most a given radius may meet, (t, 3).
 
     Spheres of smaller radius at the same contact lie inside the largest one.
     """

@@ -1,11 +1,12 @@
-"""Contacts on an object -> positions, masses and drives of a scene, as plain numbers.
+"""Computes positions, masses and drives of a scene from the contacts on an object.
 
-The world frame is the object's frame moved to its centre of mass: T_world_object is the translation
-by minus the centre of mass. Lengths and forces are the true ones. Masses are not: a quasi-static
-test asks whether forces balance, and similar grasps should behave alike, so all of the dynamics is
-scaled by the size of the grasp, which is the lever of the contacts about the axis they are closest
-to. Object and fingers get the mass that the largest normal force moves by that lever in a fixed
-time, centred between the contacts. The servos get the stiffness that keeps such a lever stable.
+The world frame is the object's frame moved to the centre of mass: T_world_object is the translation
+by minus the centre of mass. Lengths and forces are the true ones, but masses are not. A
+quasi-static test asks whether forces balance, and grasps that differ only in scale should behave
+alike, so the dynamics is scaled by the grasp size: the root mean square lever of the contacts about
+the axis that they are closest to. Object and fingers get the mass that the largest normal force
+moves by one grasp size in a fixed time, centred between the contacts. The servos get a stiffness at
+which such a lever is stable.
 """
 
 import math
@@ -29,29 +30,31 @@ RESPONSE_TIME_S = 0.07
 where the settings were measured."""
 STIFFNESS = 5.0
 """Servo stiffness in largest normal forces per grasp size. Below 1 a force-controlled grasp is
-unstable, above 50 the servo works against the planned forces."""
+unstable; above 50 the servos work against the planned forces."""
 LEAST_SIZE = 0.01
-"""Smallest grasp size in object radii, for contacts that are nearly on one line."""
+"""Smallest grasp size that is used, in object radii, for contacts that are nearly on one line."""
 SQUEEZE = 0.6
-"""Largest normal force in the gentle grasp, relative to the largest that fingers can apply."""
+"""Largest normal force in the gentle grasp that begins a trial, relative to the largest that
+fingers can apply."""
 PAD_HALF_WIDTH = 0.2
 PAD_DEPTH = 0.1
-"""Thickness of a pad, in object radii; `PAD_HALF_WIDTH` is in the same unit."""
+"""Thickness of a pad, the box under a contact that its fingertip touches, in object radii;
+`PAD_HALF_WIDTH` has the same unit."""
 FLAT = 1e-6
-"""Share of the largest moment of inertia that is added to all of them. Those of coplanar contacts
-are the limit of what a body can have, and rounding must not pass it."""
+"""Share of the largest moment of inertia that is added to all three. Coplanar contacts give moments
+at the very limit of what a body can have, and rounding must not pass that limit."""
 TOUCH = 1e-9
 """Least depth of fingertips in their faces at the start, in grasp sizes: a ten-thousandth of the
-finer thresholds. If they just touched, rounding would decide which of them press in the first step,
-and the blows of the others, a step later, tilt lightly held objects by up to 1e-4 in long steps."""
+finer thresholds. At depth zero, rounding would decide which fingertips press in the first step, and
+the impact of the others one step later can tilt lightly held objects by 1e-4."""
 RETREAT = 0.5
-"""Distance from which fingers approach, in grasp sizes; from much farther they would arrive too
-fast."""
+"""Distance from which fingers approach, in grasp sizes; from much farther away they would arrive
+too fast."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FingerDrive:
-    """How a fingertip is built and driven."""
+    """How one fingertip is built and driven."""
 
     radius_m: float
     mass_kg: float
@@ -59,26 +62,27 @@ class FingerDrive:
     damping_n_s_per_m: float
     max_normal_force_n: float
     rigid: bool
-    """Whether fingertips stay where they are put, whatever the numbers of the servos."""
+    """Whether fingertips are rigidly fixed in place; the numbers of the servos are then unused."""
     indentation_m: float
     """Depth of a fingertip in its face at the start [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
-    """Everything that stands in a scene, in the world frame."""
+    """Positions, masses and drives of everything in a scene, in the world frame."""
 
     name: str
     vertices: Array
     """Object mesh about its centre of mass, (n, 3) [m]."""
     triangles: Indices
-    """(t, 3)"""
+    """Vertex indices of the object's mesh, (t, 3)."""
     radius_m: float
     """Largest distance of the object's surface from its centre of mass [m]."""
     center: Array
-    """Mean of the contacts, where the simulated mass is, (3,) [m]."""
+    """Mean of the contacts, (3,) [m]; the simulated mass is centred there."""
     grasp_size_m: float
-    """Lever of the contacts about the axis through `center` that they are closest to [m]."""
+    """Root mean square lever of the contacts about the axis through `center` that they are closest
+    to [m]."""
     mass_kg: float
     inertia_kg_m2: Array
     """Inertia about `center`, along the world axes, (3, 3) [kg m^2]."""
@@ -87,23 +91,23 @@ class Layout:
     frames: Array
     """Columns (inward normal, tangent, tangent) of each contact, (k, 3, 3)."""
     borders: tuple[tuple[Array, ...], ...]
-    """Convex pieces of the face of each contact, (n, 3) each [m]; empty for a contact on no
+    """Convex pieces of each contact's face, (n, 3) each [m]; empty for a contact that lies on no
     face."""
     friction: float
     drive: FingerDrive
     squeeze: Array
-    """Forces of a gentle grasp, balanced where possible, in the contact frames, (k, 3) [N]."""
+    """Forces of a gentle grasp in the contact frames, balanced where possible, (k, 3) [N]."""
     approach: Array
     """Starting points of the fingers, relative to their contacts, (k, 3) [m]."""
 
     @property
     def squeeze_forces(self) -> Array:
-        """Forces of a gentle grasp along the world's axes, (k, 3) [N]."""
+        """Return the forces of a gentle grasp along the world's axes, (k, 3) [N]."""
         return np.einsum("kij,kj->ki", self.frames, self.squeeze)
 
     @property
     def tip_centers(self) -> Array:
-        """Centres of the fingertips at their contacts, (k, 3) [m]."""
+        """Return the centres of the fingertips at their contacts, (k, 3) [m]."""
         height = self.drive.radius_m - self.drive.indentation_m
         return self.contacts - height * self.frames[:, :, 0]
 
@@ -118,8 +122,8 @@ def arrange(
 
     Contacts are rounded to nine digits of the object's radius. Closing fingers strike and rebound,
     which turns differences in the last digits of a number, such as those between machines, into
-    visible motions. What follows from the rounded contacts is plain arithmetic, the same
-    everywhere.
+    visible motions. Everything after the rounding is plain arithmetic with the same result on every
+    machine.
 
     Args:
         body: The object.
@@ -191,7 +195,10 @@ def _drive(
 
 
 def _ways_in(grasp: Grasp | Sequence[Contact], normals: Array, fingers: FingerSettings) -> Array:
-    """Unit directions in which the fingers arrive, (k, 3): asked for, planned, or the normals."""
+    """Choose the unit direction in which each finger arrives, (k, 3).
+
+    It is the direction asked for, else the planned one, else the contact normal.
+    """
     if fingers.approach is None:
         planned = grasp.approach_directions if isinstance(grasp, Grasp) else None
         return normals if planned is None else planned
@@ -200,7 +207,7 @@ def _ways_in(grasp: Grasp | Sequence[Contact], normals: Array, fingers: FingerSe
 
 
 def grasp_size(positions: Array) -> float:
-    """Root mean square distance of contacts from the axis they are closest to [m].
+    """Compute the root mean square distance [m] of contacts from the axis they are closest to.
 
     Args:
         positions: Contact points, (k, 3) [m].
@@ -215,10 +222,11 @@ def _to_digits(value: float) -> float:
 
 
 def _inertia(mass: float, positions: Array, size: float) -> Array:
-    """A quarter of the inertia of the mass shared between the contacts, (3, 3) [kg m^2].
+    """Compute a quarter of the inertia of the mass shared between contacts, (3, 3) [kg m^2].
 
-    About the axis that the contacts are closest to, it is mass (size / 2)^2; about the others it
-    grows with their levers. An equal inertia about all axes would let long grasps spring loose.
+    About the axis that the contacts are closest to, it is mass (size / 2)^2; about the other axes
+    it grows with the contacts' levers. An equal inertia about all axes would let long grasps spring
+    loose.
     """
     arms = positions - positions.mean(axis=0)
     second = arms.T @ arms / len(arms)
@@ -230,10 +238,9 @@ def _inertia(mass: float, positions: Array, size: float) -> Array:
 
 
 def _pushes(positions: Array, normals: Array, friction: float) -> Array:
-    """Forces in the contact frames, (k, 3), that balance if the contacts are in force closure.
+    """Compute forces in the contact frames, (k, 3), that balance under force closure.
 
-    The largest normal part is one. Contacts that are not in force closure just push along their
-    normals.
+    The largest normal part is one. Contacts that are not in force closure push along their normals.
     """
     try:
         forces = force_closure(positions, normals, friction).forces

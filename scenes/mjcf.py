@@ -1,11 +1,10 @@
-"""Layout -> MJCF text: self-contained, with every setting and all digits of every number.
+"""Writes a layout as MJCF text that is self-contained: every setting, and every digit.
 
 This module writes the text itself. MuJoCo's own writer leaves out what equals a default (defaults
 change between releases) and rounds numbers. The object's mesh is only shown. Contact happens
 between each fingertip and its own pad: a box on the object whose top is flush with the face at the
-contact and which only this finger can touch, so that normals are exact on any object, convex or
-not. A convex object's own mesh can stand in for the pads, as a check that they are where its
-surface is.
+contact, and which only this fingertip can touch. So normals are exact on any object, convex or not.
+The mesh of a convex object can replace the pads, to check that the pads are flush with its surface.
 
 Fingers are spheres on three slides along (normal, tangent, tangent), each with a position servo:
 `ctrl = f / kp` makes it push with force f at its zero position, and the servo on the normal is
@@ -36,14 +35,14 @@ from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
 from scenes.physics import PhysicsSettings
 
 Surface = Literal["pads", "mesh"]
-"""What fingertips touch: one pad each, or the convex hull of the object's mesh."""
+"""What fingertips touch: one pad (a small box) each, or the convex hull of the object's mesh."""
 FEWEST_CONTACTS = 2
 AXES = ("normal", "tangent1", "tangent2")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A grasp as a MuJoCo model in text, with the numbers it was made from."""
+    """A grasp as the text of a MuJoCo model, with the settings and numbers it was made from."""
 
     xml: str
     layout: Layout
@@ -60,7 +59,7 @@ def build_scene(
     physics: PhysicsSettings | None = None,
     surface: Surface = "pads",
 ) -> Scene:
-    """Turn a grasp into a MuJoCo scene.
+    """Make a MuJoCo scene from an object and a grasp.
 
     Args:
         body: The object.
@@ -81,7 +80,9 @@ def build_scene(
         if value is not None:
             instance(value, kind, name)
     if surface == "mesh" and not is_convex(body):
-        raise InputError(f"{body.name} is not convex: fingertips would touch its hull; use pads")
+        raise InputError(
+            f"surface must be 'pads' where the object is not convex, as {body.name} is"
+        )
     contacts = grasp if isinstance(grasp, Grasp) else _listed(grasp)
     layout = arrange(body, contacts, friction, fingers)
     physics = physics or PhysicsSettings()
@@ -92,7 +93,7 @@ def _listed(contacts: Iterable[Contact]) -> tuple[Contact, ...]:
     each = partial(instance, kind=Contact, name="grasp", remedy="give a Grasp, or Contact values")
     listed = several(contacts, each, "grasp", "Contact values or a Grasp")
     if len(listed) < FEWEST_CONTACTS:
-        raise InputError(f"grasp must have {FEWEST_CONTACTS} contacts at least, got {len(listed)}")
+        raise InputError(f"grasp must have at least {FEWEST_CONTACTS} contacts, got {len(listed)}")
     return listed
 
 
@@ -107,7 +108,7 @@ def write_scene(scene: Scene, path: str | Path) -> Path:
 
 
 def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads") -> str:
-    """The MJCF text of a layout; equal layouts give equal texts."""
+    """Write the MJCF text of a layout; equal layouts give equal texts."""
     root = ElementTree.Element("mujoco", model=_plain(layout.name))
     _add(root, "compiler", {"angle": "radian", "autolimits": "false", "inertiafromgeom": "false"})
     option = _add(root, "option", physics.options())
@@ -226,9 +227,10 @@ def _servos(actuators: ElementTree.Element, layout: Layout, finger: int) -> None
 def _keyframes(root: ElementTree.Element, layout: Layout) -> None:
     """Add keyframes: positions of the fingers, and commands of their servos.
 
-    `pregrasp`: the fingers stay away from the object. `approach`: they start at the same place, but
-    squeeze gently, so that they come in. `grasp`: they touch and squeeze gently. `squeeze`: they
-    touch and squeeze in the same proportions, as hard as the largest push allows.
+    In `pregrasp` the fingers stay away from the object. In `approach` they start at the same place
+    but are commanded to squeeze gently, so that they move in. In `grasp` they touch and squeeze
+    gently. In `squeeze` they touch and squeeze in the same proportions, as hard as the largest
+    normal force allows.
     """
     fingers = len(layout.contacts)
     home = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], np.zeros(3 * fingers)])
@@ -247,10 +249,10 @@ def _keyframes(root: ElementTree.Element, layout: Layout) -> None:
 
 
 def quaternion(rotation: Array) -> Array:
-    """Unit quaternion (w, x, y, z) of a rotation matrix, (4,), with its largest part positive.
+    """Convert a rotation matrix to a unit quaternion (w, x, y, z), its largest part positive.
 
-    The rows below are 4 q_i q for each part q_i of the quaternion q; the row of the largest part
-    has the most digits.
+    The rows below are 4 q_i q for each component q_i of the quaternion q; the row of the largest
+    component has the most accurate digits.
     """
     (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
     rows = np.array(
@@ -273,12 +275,12 @@ def _add(
 
 
 def _text(value: object) -> str:
-    """Write a number in full precision, or a sequence with blanks between its numbers."""
+    """Write a number in full precision, or a sequence of them separated by blanks."""
     if isinstance(value, str):
         return value
     return " ".join(repr(number) for number in np.asarray(value).ravel().tolist())
 
 
 def _plain(name: str) -> str:
-    """A model name of printable characters only."""
+    """Replace the characters of a model's name that cannot be printed."""
     return "".join(c if c.isprintable() else "_" for c in name) or "object"

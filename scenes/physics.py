@@ -1,10 +1,10 @@
-"""Every MuJoCo setting that a scene is simulated with; all of them are written into the scene.
+"""Lists every MuJoCo setting that scenes are simulated with; scenes spell all of them out.
 
 The defaults were measured to reproduce Coulomb friction to about 0.1 %: elliptic cones (pyramids
-are up to 29 % too weak along their diagonals), the `discrete` integrator (hard contacts slip
-falsely under the others at ordinary tolerances), a high ratio of friction to normal impedance
-(resting contacts otherwise creep), hard and constant contact impedance, and a dense Jacobian (the
-sparse Newton solver of MuJoCo 4.0.0 has a bug).
+are up to 29 % too weak along their diagonals), the `discrete` integrator (under the others, hard
+contacts slip when they should hold), a high ratio of friction to normal impedance (resting contacts
+otherwise creep), hard and constant contact impedance, and a dense Jacobian (the sparse Newton
+solver of MuJoCo 4.0.0 has a bug).
 """
 
 from dataclasses import asdict, dataclass
@@ -23,16 +23,18 @@ class PhysicsSettings:
     """
 
     timestep: float = 0.002
-    """Length of a step, from 1e-5 to 0.005 [s]. With steps twice as long, objects let go 40 % above
-    their critical friction, and only some of the known cases show it."""
+    """Length of a step, from 1e-5 to 0.005 [s]. With steps twice as long, objects let go at
+    frictions 40 % above the critical friction, and few of the cases with known answers reveal it.
+    """
     integrator: str = "discrete"
     cone: str = "elliptic"
     solver: str = "Newton"
     jacobian: str = "dense"
     impratio: float = 1000.0
     tolerance: float = 1e-16
-    """Tolerance of the solver, absolute in squares of accelerations. These are a millionth as large
-    on an object a thousandth as large: 1e-12 slips falsely at a millimetre."""
+    """Tolerance of MuJoCo's solver, an absolute one on squared accelerations. An object a
+    thousandth as large has squared accelerations a millionth as large: with 1e-12, contacts of
+    millimetre-sized objects slip when they should hold."""
     iterations: int = 100
     ls_iterations: int = 50
     ls_tolerance: float = 0.01
@@ -44,7 +46,7 @@ class PhysicsSettings:
     sdf_initpoints: int = 40
     sleep_tolerance: float = 0.001
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """[m/s^2]"""
+    """Acceleration of gravity in the world frame [m/s^2]."""
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
     magnetic: tuple[float, float, float] = (0.0, 0.0, 0.0)
     density: float = 0.0
@@ -52,14 +54,14 @@ class PhysicsSettings:
     solref: tuple[float, float] = (0.004, 1.0)
     solimp: tuple[float, float, float, float, float] = (0.99, 0.99, 0.001, 0.5, 2.0)
     condim: int = 3
-    """Kind of contact; 3 is a hard fingertip, which transmits no torsion."""
+    """Contact dimension of MuJoCo; 3 is a hard fingertip, which transmits no torsional friction."""
     margin: float = 0.0
     gap: float = 0.0
     autoreset: bool = False
-    """Whether MuJoCo resets after a blow-up: it then silently returns to the start, which looks
-    perfectly stable."""
+    """Whether MuJoCo resets the state when the simulation diverges: the object then silently
+    returns to its start, which looks perfectly stable."""
     diagexact: bool = False
-    """Whether contact impedances use the exact inertia that each contact sees."""
+    """Whether contact impedances use the exact inertia at each contact."""
 
     def __post_init__(self) -> None:
         for name, words in WORDS.items():
@@ -76,18 +78,18 @@ class PhysicsSettings:
             raise InputError(f"condim must be one of {CONTACT_DIMENSIONS}, got {self.condim}")
 
     def options(self) -> dict[str, float | int | str | tuple[float, ...]]:
-        """Attributes of MJCF's `option` element."""
+        """Return the attributes of MJCF's `option` element."""
         elsewhere = (*CONTACT_SETTINGS, *CHOSEN_FLAGS)
         return {name: value for name, value in asdict(self).items() if name not in elsewhere}
 
     def flags(self) -> dict[str, str]:
-        """All flags of MJCF's `flag` element, so that no default matters."""
+        """Return all flags of MJCF's `flag` element, so that no default matters."""
         on = {*ENABLED_FLAGS, *(name for name in CHOSEN_FLAGS if getattr(self, name))}
         names = (*ENABLED_FLAGS, *CHOSEN_FLAGS, *UNUSED_FLAGS)
         return {name: "enable" if name in on else "disable" for name in names}
 
     def contact(self) -> dict[str, float | int | str | tuple[float, ...]]:
-        """Attributes of each geom that makes contact."""
+        """Return the attributes of each geom that makes contact."""
         return {
             "condim": self.condim,
             "solref": self.solref,
@@ -127,8 +129,8 @@ RANGES = {
     "margin": (0.0, 1.0),
     "gap": (0.0, 1.0),
 }
-"""Least and largest value of each number: shorter steps take hours, longer ones are fewer than a
-hold has phases."""
+"""Least and largest value of each number. Shorter time steps take hours; with longer ones the
+phases of a trial would be shorter than a step."""
 VECTORS = {
     "gravity": (3, 1e4),
     "wind": (3, 1e4),
@@ -147,4 +149,4 @@ ENABLED_FLAGS = (
 UNUSED_FLAGS = (
     "override", "energy", "fwdinv", "invdiscrete", "sleep", "ipc", "speculative",
 )  # fmt: skip
-"""Flags that are off by default and stay off; a sleeping body would hide drift."""
+"""Flags that MuJoCo leaves off and that stay off; a body put to sleep would hide drift."""

@@ -1,4 +1,4 @@
-"""Contacts are made into checked arrays, one set or many sets of equal size, and into a hash."""
+"""Turns contacts into checked arrays, one set or many sets of equal size, and into a hash."""
 
 import hashlib
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ from grasp_core.errors import InputError
 from grasp_core.values import FINGERS, Contact, Grasp
 
 FEWEST = 2
-"""Fewest contacts that can balance anything."""
+"""Least number of contacts that can balance anything."""
 
 
 def stacked(contacts: Iterable[Contact]) -> tuple[Array, Array]:
@@ -27,7 +27,7 @@ def stacked(contacts: Iterable[Contact]) -> tuple[Array, Array]:
 def contact_arrays(
     positions: ArrayLike | Grasp | Iterable[Grasp], normals: ArrayLike | None, *, many: bool = False
 ) -> tuple[Array, Array]:
-    """Return checked positions and inward normals of a set of contacts, or of many of equal size.
+    """Return checked positions and normals of one set of contacts, or of many sets.
 
     Args:
         positions: Contact points, (k, 3) [m], or a Grasp; for many sets (g, k, 3), or grasps.
@@ -41,21 +41,23 @@ def contact_arrays(
     given: Any = positions
     if isinstance(positions, Grasp) and not many:
         if normals is not None:
-            raise InputError(f"normals must be None where a Grasp is given, got {shown(normals)}")
+            raise InputError(
+                f"normals must be left out where a Grasp is given, got {shown(normals)}"
+            )
         return positions.positions, positions.normals
     if normals is None and many:
         return _of_grasps((given,) if isinstance(given, Grasp) else given)
     if normals is None:
-        raise InputError("normals are missing: pass positions and normals, or a Grasp")
+        raise InputError("normals are missing; pass positions and normals, or a Grasp")
     points = frozen(given, (None, None, 3) if many else (None, 3), "positions")
     if points.shape[-2] < FEWEST:
-        raise InputError(f"positions: at least two contacts are needed, got {points.shape[-2]}")
+        raise InputError(f"positions must hold at least two contacts, got {points.shape[-2]}")
     check_spread(np.ptp(points, axis=-2))
     return points, frozen_units(normals, points.shape, "normals")
 
 
 def _of_grasps(given: Any) -> tuple[Array, Array]:
-    check = partial(instance, kind=Grasp, name="positions", remedy="or give normals")
+    check = partial(instance, kind=Grasp, name="positions", remedy="or pass normals too")
     grasps = several(given, check, "positions", "Grasp values")
     shape = (len(grasps), FINGERS, 3)
     points = np.array([grasp.positions for grasp in grasps], dtype=np.float64).reshape(shape)
@@ -64,7 +66,7 @@ def _of_grasps(given: Any) -> tuple[Array, Array]:
 
 
 def check_spread(extents: Array, name: str = "positions") -> None:
-    """Refuse contacts so close together, but not in one place, that squares of lengths vanish.
+    """Refuse contacts that are apart by so little that squares of lengths vanish.
 
     Args:
         extents: Extent of each set of contacts along each axis, (..., 3) [m].

@@ -1,4 +1,4 @@
-"""Critical friction: the least coefficient above which contacts are in force closure.
+"""Finds the critical friction, the least coefficient above which contacts are in force closure.
 
 Solved: where the margin of the closure program changes sign as the common friction grows.
 
@@ -42,20 +42,21 @@ from grasp_core.values import Grasp
 
 KERNEL = "grasp_core.closure.critical_friction_kernel"
 NO_FORCE = 1e-100
-"""Least normal part that is divided by: a contact that does not push needs infinite friction."""
+"""Least normal force that is divided by: a contact that does not push would need infinite friction.
+"""
 SEARCHED = 0.95
-"""Share of the accuracy that the compiled search is asked for; the rest is left for rounding."""
+"""Share of the wanted accuracy that the compiled search uses; the rest is left for rounding."""
 
 
 def critical_friction(
     positions: ArrayLike | Grasp,
     normals: ArrayLike | None = None,
 ) -> float:
-    """Find the smallest common Coulomb coefficient that is proved enough for force closure.
+    """Find the least common Coulomb coefficient that is proved enough for force closure.
 
     It is the upper end of an interval whose lower end is proved to be too little (see
     `critical_friction_interval`). In tests on 20,000 sets of contacts, half of them on grids, the
-    two are at most 6e-8 apart, or that share of them where they are above 1.
+    interval is at most 6e-8 wide, or that share of its upper end where this is above 1.
 
     Args:
         positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
@@ -77,7 +78,9 @@ def critical_frictions(
     positions: ArrayLike | Iterable[Grasp],
     normals: ArrayLike | None = None,
 ) -> Array:
-    """Find the critical friction of each of many sets of contacts (see `critical_friction`).
+    """Find the critical friction of each of many sets of contacts.
+
+    `critical_friction` explains how it is found and proved.
 
     Args:
         positions: Contact points, (g, k, 3) [m], k >= 2; or grasps.
@@ -96,7 +99,7 @@ def critical_friction_interval(
     positions: ArrayLike | Grasp,
     normals: ArrayLike | None = None,
 ) -> FrictionInterval:
-    """Find proved bounds of the critical friction, with the forces and the twist that prove them.
+    """Find proved bounds of the critical friction, with the forces and twist as proof.
 
     Args:
         positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
@@ -134,10 +137,10 @@ def _upper_ends(points: Array, units: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Quick:
-    """Quick intervals for many sets of contacts, where the compiled search found narrow ones."""
+    """Narrow intervals of critical friction for many sets of contacts, found in compiled code."""
 
     found: NDArray[np.bool_]
-    """Whether an interval was found and proved, (g,)."""
+    """Whether a narrow interval was found and proved for each set, (g,)."""
     upper: Array
     """Upper ends of the intervals, (g,)."""
     forces: Array
@@ -147,7 +150,7 @@ class _Quick:
 
 
 def _at_once(points: Array, normals: Array) -> _Quick:
-    """Search in compiled code for narrow intervals, and prove both of their ends."""
+    """Search for narrow intervals in compiled code, and prove both of their ends."""
     arms, _, _ = unit_size(points)
     units = np.array(normals)  # writable, like all that the search is compiled for
     forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))
@@ -173,11 +176,11 @@ def _at_once(points: Array, normals: Array) -> _Quick:
 
 
 def _separate(twists: Array, arms: Array, normals: Array, friction: Array) -> NDArray[np.bool_]:
-    """Return which twists leave each contact at rest or departing as steeply as (2) asks.
+    """Return which twists leave each contact at rest, or departing as steeply as (2) asks.
 
-    A contact is allowed the rounding of its own speed only. A bound on the rounding of the whole
-    twist would not do: where the margin grows with the square of the friction, it lets pass twists
-    that do not separate.
+    Each contact may move by the rounding of its own speed only. A bound on the rounding of the
+    whole twist would accept twists that do not separate, where the margin grows with the square of
+    the friction.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         sizes = np.linalg.norm(twists, axis=1)[:, None]
@@ -189,7 +192,10 @@ def _separate(twists: Array, arms: Array, normals: Array, friction: Array) -> ND
 
 
 def _close_without_friction(arms: Array, normals: Array) -> bool:
-    """Return whether pushes along the normals balance; only the most even ones are tried."""
+    """Return whether pushes along the normals balance.
+
+    Only the most even pushes are tried.
+    """
     along_normals = np.hstack([normals, np.cross(arms, normals)])
     left, values, _ = np.linalg.svd(along_normals)
     # the projection of equal pushes onto those that balance

@@ -1,4 +1,4 @@
-"""The compiled search for critical frictions solves one margin program after the other.
+"""Searches in compiled code for critical frictions, by one margin program after the other.
 
 Solved: for each set of contacts, balanced forces that need little more than the critical friction,
 and a twist that separates at little less (see `critical_friction`).
@@ -21,19 +21,21 @@ from grasp_core.compiled import loop
 
 FIRST_TRIAL = 0.5
 MOST_TRIALS = 30
-"""Most programs per set of contacts; seven are usual."""
+"""Largest number of programs per set of contacts; seven are usual."""
 SMALLEST, LARGEST = 1e-6, 1e3
-"""Smallest and largest friction that is tried."""
+"""Smallest and largest friction at which a program is solved."""
 AT_REST = 1e-4
-"""A contact is put to rest if its z_i is at most this share of the largest one."""
+"""Share of the largest z_i below which a contact's z_i counts as zero, and the contact as at rest.
+"""
 SPANNED = 1e-6
-"""A row adds nothing to a basis if the sine of its angle to that span is below this."""
+"""Sine of the angle between a row and the span of a basis below which the row adds nothing."""
 ABOVE, BELOW = 0.75, 0.15
-"""Trials pass the root by these shares of the width asked for, to close in from both sides: above
-it by more, as the proof of closure is the harder one; and by the error of Newton's method, the
-square of its step over the friction."""
+"""Shares of the wanted width by which trials pass the root, to close in from both sides: more from
+above, where the proof of closure is harder. The error of Newton's method, the square of its step
+over the friction, is added."""
 EVEN = 1e-10
-"""An optimum this close to one shows nothing: ten times the gap that is left, for rounding."""
+"""Distance of an optimum from one that shows nothing: ten times the gap that is left, for rounding.
+"""
 
 
 @loop("numpy")
@@ -87,7 +89,7 @@ def search(
 def deepest(
     contacts: tuple[Array, Array, Array], share: float, forces: Array, twists: Array, values: Array
 ) -> None:
-    """Balance each of many sets of contacts as deep inside its cones as can be.
+    """Balance each of many sets of contacts with forces as deep inside their cones as possible.
 
     Args:
         contacts: Arms at unit size, (g, k, 3), normals, (g, k, 3), and frictions, (g,).
@@ -127,7 +129,7 @@ def _set_up(arms: Array, normals: Array, axes: Array, rows: Array, mean: Array) 
 
 @loop("numpy")
 def _orthonormal(normal: Array, axes: Array) -> None:
-    """Fill in a unit normal and two tangents, (3, 3)."""
+    """Fill in a unit normal and two tangents as an orthonormal frame, (3, 3)."""
     far = 0
     for j in range(3):
         axes[0, j] = normal[j]
@@ -150,7 +152,7 @@ def _at_friction(rows: Array, mean: Array, friction: float, columns: Array) -> N
 
 @loop("numpy")
 def _needed(pair: Array, primal: float, friction: float) -> float:
-    """Return the most friction that any of the forces needs; infinite if one of them pulls."""
+    """Return the largest friction that any of the forces needs; infinite if a force pulls."""
     share, needed = (1.0 - primal) / pair.shape[1], 0.0
     for i in range(pair.shape[1]):
         along = pair[0, i, 0] + share
@@ -172,7 +174,7 @@ def _in_space(pair: Array, primal: float, friction: float, axes: Array, forces: 
 
 @loop("numpy")
 def _separates(rows: Array, z: Array, span: Array, twist: Array) -> float:
-    """Return up to which friction a twist separates, once contacts nearly at rest are at rest."""
+    """Return the friction up to which a twist separates, with slow contacts put to rest."""
     still = 0.0
     for i in range(len(rows)):
         still = max(still, AT_REST * z[i, 0])
@@ -188,7 +190,7 @@ def _separates(rows: Array, z: Array, span: Array, twist: Array) -> float:
 
 @loop("numpy")
 def _least_ratio(rows: Array, z: Array, still: float, twist: Array) -> float:
-    """Return the least ratio of leaving to sliding over the contacts that are not at rest."""
+    """Return the least ratio of leaving to sliding speed over contacts that are not at rest."""
     least = LARGEST
     for i in range(len(rows)):
         if z[i, 0] > still:
@@ -203,7 +205,7 @@ def _least_ratio(rows: Array, z: Array, still: float, twist: Array) -> float:
 
 @loop("numpy")
 def _add(row: Array, span: Array, spanned: int) -> int:
-    """Add a row to an orthonormal basis, unless it is in its span already; return the new size."""
+    """Add a row to an orthonormal basis unless the basis spans it already; return the new size."""
     if spanned == WRENCH:
         return spanned
     fresh, before = span[spanned], math.sqrt(_dot(row, row))
@@ -245,11 +247,11 @@ def _dot(a: Array, b: Array) -> float:
 def _next(
     pair: Array, value: float, friction: float, lower: float, upper: float, width: float
 ) -> float:
-    """Return where 1 / V becomes one by Newton's method, passed a little to the wider side.
+    """Return the friction to try next: where Newton's method has 1 / V = 1, slightly passed.
 
-    Friction enters the program through the tangential columns of A_i only, and y is their
-    multiplier: the slope of V over the logarithm of the friction is the sum of s_i1 z_i1 and
-    s_i2 z_i2.
+    It is passed towards the wider side of the interval. Friction enters the program through the
+    tangential columns of A_i only, and y is their multiplier: the slope of V over the logarithm of
+    the friction is the sum of s_i1 z_i1 and s_i2 z_i2.
     """
     slope = 0.0
     for i in range(pair.shape[1]):

@@ -1,4 +1,4 @@
-"""Decides closure of contacts: seeks forces or a twist in several ways until one proves it.
+"""Decides force closure of contacts: tries several ways to find forces or a twist that prove it.
 
 The margin program is solved in compiled code, or else by the conic solver. `proofs` says what an
 answer proves. Margins of zero need a twist that lies on the cones, or one that leaves contacts at
@@ -35,27 +35,28 @@ from grasp_core.closure.wrenches import (
 from grasp_core.errors import SolverError
 
 DECIDED = 1e-9
-"""Margins closer to zero are left undecided unless a certificate settles them: a hundred
-times the tolerance asked of the solver."""
+"""Distance of a margin from zero below which it is left undecided unless a certificate settles it:
+a hundred times the tolerance that the solver is asked for."""
 PRECISE = 1e-10
-"""Gap that compiled code may leave, relative to the margin: below what the conic solver leaves."""
+"""Gap that compiled code may leave, relative to the margin: smaller than the gap that the conic
+solver leaves."""
 FAR = 1e3
-"""Margins farther from zero, in units of the friction, come from nearly parallel normals; compiled
-code is off by some per mille there, so the conic solver decides."""
+"""Distance of a margin from zero, in units of the friction, above which the conic solver decides:
+such margins come from nearly parallel normals, where compiled code has errors of some per mille."""
 INTERIOR = 1e-6
-"""Depth inside its cone, for forces whose normal parts sum to 1, from which a contact counts as
-carrying an interior force: far above what the solver leaves on a boundary."""
+"""Depth of a force inside its cone above which it counts as interior, if normal parts sum to 1: far
+more than the solver leaves on a boundary."""
 TOUCHING = 1e-9
-"""Supports of a unit twist above minus this count as zero: the tolerance of the solver."""
+"""Supports of a unit twist above minus this value count as zero: the tolerance of the solver."""
 NEWTON_STEPS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """The margin program's answer, and which verdict it proves."""
+    """The margin program's answer, and the verdict that it proves."""
 
     margin: float
-    """Optimum of the program as it was found, dimensionless; only `closed` is proved."""
+    """Optimum of the program as the solver found it, dimensionless; only `closed` is proved."""
     forces: Array
     """Balancing forces, (k, 3); they prove closure if `closed` is True."""
     twist: Array
@@ -65,7 +66,7 @@ class Answer:
 
 
 def decide(arms: Array, normals: Array, friction: Array) -> Answer:
-    """Decide closure of contacts at unit size: in compiled code, or else by the conic solver."""
+    """Decide force closure of contacts at unit size, in compiled code or by the conic solver."""
     answer = _decided_quickly(arms, normals, friction)
     return answer or _decided_by_programs(arms, normals, friction)
 
@@ -93,7 +94,7 @@ def _decided_by_programs(arms: Array, normals: Array, friction: Array) -> Answer
 
 
 def _decided_quickly(arms: Array, normals: Array, friction: Array) -> Answer | None:
-    """Return the answer of compiled code if it is proved; that code knows one positive friction."""
+    """Return compiled code's answer if it is proved; it needs one positive friction for all."""
     if not (friction[0] > 0.0 and (friction == friction[0]).all()):
         return None
     forces, twists, margins = deepest_forces(arms[None], normals[None], friction[:1], PRECISE)
@@ -111,7 +112,7 @@ def _decided_quickly(arms: Array, normals: Array, friction: Array) -> Answer | N
 
 
 def _apart(arms: Array, normals: Array, friction: Array) -> Answer:
-    """Refute closure by the twist towards the nearest wrench, or leave it undecided."""
+    """Refute closure by the twist towards the nearest wrench, or leave closure undecided."""
     wrenches = WrenchSet(in_frames(grasp_map(arms), contact_frames(normals)), friction, "l1")
     _, facing = nearest_wrench(wrenches)
     refuted = refutes_closure(facing, arms, normals, friction)
@@ -119,7 +120,7 @@ def _apart(arms: Array, normals: Array, friction: Array) -> Answer:
 
 
 def _touching_twist(twist: Array, arms: Array, normals: Array, friction: Array) -> Array:
-    """Change a twist so that supports that are nearly zero are zero to within rounding.
+    """Change a twist so that supports that are nearly zero are zero up to rounding.
 
     Where the margin is exactly zero, as with symmetric normals at just their critical friction, the
     solver's twist passes the cones by its own tolerance; Newton's method takes it onto them.
@@ -142,11 +143,12 @@ def _touching_twist(twist: Array, arms: Array, normals: Array, friction: Array) 
 def _twist_sparing_interior_forces(
     arms: Array, normals: Array, friction: Array, forces: Array
 ) -> Array | None:
-    """Find a separating twist for contacts some of which balance each other inside their cones.
+    """Find a separating twist where some contacts balance each other.
 
-    The margin is zero there however far the other contacts are from completing closure. A
-    separating twist must leave the balanced contacts at rest; within such twists the margin
-    program is asked again, for the other contacts only, until it is negative or none is left.
+    Their forces are inside their cones, so the margin is zero however far the other contacts are
+    from completing closure. A separating twist must leave the balanced contacts at rest; among such
+    twists the margin program is solved again, for the other contacts only, until its optimum is
+    negative or no contact is left.
     """
     rest = np.arange(len(arms))
     twists = np.eye(WRENCH)
@@ -174,7 +176,7 @@ def _twist_sparing_interior_forces(
 
 
 def _null_space(rows: Array, basis: Array) -> Array:
-    """Return a basis of the part of the span of `basis` (columns) that `rows` maps to zero."""
+    """Return a basis of the vectors in the span of `basis` (columns) that `rows` maps to 0."""
     if not rows.size:
         return basis
     _, values, right = np.linalg.svd(rows)

@@ -1,4 +1,4 @@
-"""Contacts at either end of the scale of friction: closed by any positive one, or closed by none.
+"""Decides whether contacts are in force closure at every positive friction, or at no friction.
 
 Solved: whether contacts are in force closure at every positive friction, and whether they are at
 no friction whatever. Both are questions of linear programs.
@@ -35,30 +35,30 @@ from grasp_core.errors import SolverError
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 
 DEPENDENT = 1e-9
-"""Singular values of unit-size wrenches below this count as zero."""
+"""Singular values of unit-size wrenches below this value count as zero."""
 SUPPORTED = 0.5
-"""Border between pushes of zero and of one: pushes that can be positive can be one."""
+"""Border between pushes that count as zero and as one: a push that can be positive can be one."""
 LARGEST = 1e4
-"""Largest size of a variable of the programs, whose answers are of order one."""
+"""Largest size of a variable in the linear programs, whose answers are of order one."""
 POSITIVE = 1e-6
-"""Optima below this count as zero: a hundred times the residual of a linear program."""
+"""Optima below this value count as zero: a hundred times the residual of a linear program."""
 SHARE = 0.5
-"""Share of what is left of a cone that the forces of the next round may take."""
+"""Share of the remaining depth in a cone that the forces of the next round may take."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rounds:
-    """The balanced forces of each round, or the twist that ends the rounds."""
+    """Balanced forces of each round of the search, or the twist with which the rounds end."""
 
     forces: tuple[Array, ...]
     """Balanced forces of each round, (k, 3) each; empty unless every positive friction is
     enough."""
     twist: Array | None
-    """Twist under which contacts depart along their normals or are at rest, (6,). None where forces
-    are given, or nothing was found."""
+    """Twist under which contacts depart along their normals or are at rest, (6,); None where
+    `forces` are given or nothing was found."""
 
     def at(self, friction: float, normals: Array) -> Array:
-        """Return balanced forces inside the cones of a friction, (k, 3), of pushes of order one."""
+        """Combine the rounds to balanced forces inside the cones of a friction, (k, 3)."""
         total = self.forces[0]
         for forces in self.forces[1:]:
             along, across = normal_and_tangential(total, normals)
@@ -70,7 +70,7 @@ class Rounds:
 
 
 def rounds(arms: Array, normals: Array) -> Rounds:
-    """Find out whether every positive friction is enough.
+    """Find out whether every positive friction is enough for force closure.
 
     Args:
         arms: Contacts at unit size, (k, 3).
@@ -99,7 +99,7 @@ def rounds(arms: Array, normals: Array) -> Rounds:
 
 
 def hopeless_twist(arms: Array, normals: Array) -> Array | None:
-    """Find the twist (6,) of (2), if there is one: it separates at every friction.
+    """Find a twist (6,) that separates at every friction, by (2); None if there is none.
 
     Args:
         arms: Contacts at unit size, (k, 3).
@@ -121,7 +121,9 @@ def hopeless_twist(arms: Array, normals: Array) -> Array | None:
 
 
 def pushing_forces(arms: Array, normals: Array) -> Array | None:
-    """Find balanced forces (k, 3) that push at every contact; some friction then allows them.
+    """Find balanced forces (k, 3) that push at every contact; None if there are none.
+
+    Some friction allows such forces.
 
     Args:
         arms: Contacts at unit size, (k, 3).
@@ -138,7 +140,7 @@ def pushing_forces(arms: Array, normals: Array) -> Array | None:
 
 
 def _most_pushes(rows: Array) -> Array | None:
-    """Find weights (n,) >= 0 with rows @ weights = 0, as many above zero as can be, or None."""
+    """Find weights (n,) >= 0 with rows @ weights = 0, as many of them positive as possible."""
     basis = _null_space(rows)
     k, n = basis.shape
     # shares from 0 to 1, each at most its weight: their sum counts the weights that can be positive
@@ -156,7 +158,7 @@ def _most_pushes(rows: Array) -> Array | None:
 
 
 def _departing(outside: Array, pushes: Array) -> Array | None:
-    """Find the twist, a combination of the columns of `outside`, that departs most evenly."""
+    """Find the combination of the columns of `outside` that departs most evenly, or None."""
     m, n = outside.shape[1], pushes.shape[1]
     steep = np.hstack([pushes.T @ outside, np.ones((n, 1))])
     box = np.hstack([np.vstack([np.eye(m), -np.eye(m)]), np.zeros((2 * m, 1))])
@@ -165,7 +167,7 @@ def _departing(outside: Array, pushes: Array) -> Array | None:
 
 
 def _best(c: Array, A: Array, b: Array) -> Array | None:
-    """Return where c.x is largest with A x <= b, if it is positive there, and not by rounding."""
+    """Return where c.x is largest subject to A x <= b; None if it is not clearly positive there."""
     if not A.shape[1]:
         return None
     try:

@@ -1,4 +1,4 @@
-"""Equilibrium and force closure with exact circular friction cones, proved either way.
+"""Decides equilibrium and force closure with exact circular friction cones, with a proof.
 
 Solved: whether contact forces f_i in the friction cones C_i can balance every wrench.
 
@@ -41,15 +41,15 @@ from grasp_core.fields import are_frictions, are_units, is_array, is_number
 from grasp_core.values import Grasp
 
 UNSAFE = 1e-6
-"""A margin larger than this does not itself explain why nothing can be proved."""
+"""Size of a margin above which the margin itself does not explain why nothing can be proved."""
 CAUTION = 1.01
-"""Factor on the rounding that `verify` allows for, in the margin that is reported: sums and
-singular values differ in their last digits from processor to processor."""
+"""Factor on the allowance for rounding in the reported margin, relative to that in `verify`: sums
+and singular values differ in their last digits from processor to processor."""
 SUMMED = 1e-9
-"""How far the normal parts of closing forces may be from summing to 1, and their wrench at unit
-size from zero."""
+"""Error that closing forces may have: in the sum of their normal parts, which is 1, and in their
+wrench at unit size, which is zero."""
 FAR_BELOW = -1e6
-"""A margin proved to be below this is reported as minus infinity: hardly any forces balance."""
+"""Margin below which minus infinity is reported: hardly any forces balance."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +87,7 @@ class ClosureCertificate:
                 object.__setattr__(self, name, kept)
 
     def verify(self) -> bool:
-        """Re-check every field in plain arithmetic, without any solver.
+        """Check every field again in plain arithmetic, without any solver.
 
         Returns:
             Whether the fields prove the verdict and the margin; False if they are no certificate.
@@ -102,7 +102,10 @@ class ClosureCertificate:
             )
 
     def separates(self) -> bool:
-        """Return whether the wrench separates, whatever the margin; fields are taken as sound."""
+        """Return whether the wrench separates, whatever the margin.
+
+        Shapes and types of the fields are not checked again.
+        """
         return self.forces is None and self.proved() <= 0.0
 
     def _are_contacts(self) -> bool:
@@ -114,7 +117,7 @@ class ClosureCertificate:
         return (spread == 0.0 or spread >= SMALLEST_SIZE) and are_frictions(self.friction, count)
 
     def proved(self, caution: float = 1.0) -> float:
-        """Compute the margin that the fields prove: a lower bound if closed, an upper one if not.
+        """Compute the margin that the fields prove: a lower bound if closed, else an upper one.
 
         Args:
             caution: Factor on the rounding that is allowed for.
@@ -193,7 +196,7 @@ def _why_undecided(margin: float) -> str:
             "friction or the contacts slightly"
         )
     return (
-        f"the closure margin is {margin:.2g}, but neither answer can be proved: contacts or "
+        f"neither force closure nor its opposite can be proved (margin {margin:.2g}): contacts or "
         "normals nearly coincide, or lie nearly on a line; move them apart or leave some out"
     )
 

@@ -1,4 +1,4 @@
-"""The interval that the critical friction of contacts is proved to lie in.
+"""Defines the interval in which the critical friction of contacts is proved to lie.
 
 Its upper end is proved by forces f_i that balance exactly and lie inside the cones there, its lower
 end by a twist whose velocities v_i leave each contact at rest or depart steeply enough:
@@ -22,20 +22,20 @@ from grasp_core.closure.wrenches import WRENCH
 from grasp_core.fields import are_units, is_array, is_number
 
 FRICTIONLESS = 1e-6
-"""Smallest friction at which closure is sought: the contacts of a file with six digits are not
-placed better than that."""
+"""Smallest friction at which closure is sought: files that keep six digits do not place contacts
+more precisely."""
 REPORTED_AS_ZERO = 2.0 * FRICTIONLESS
-"""Largest critical friction that is reported as zero: where it is zero in truth, a proof may need a
-trifle more than `FRICTIONLESS` on one machine and not on another."""
+"""Largest critical friction that is reported as zero: where the true value is zero, a proof may
+need slightly more than `FRICTIONLESS` on one machine and not on another."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrictionInterval:
-    """An interval of friction: contacts are open up to `lower`, and closed from `upper` on.
+    """Friction up to `lower`, at which contacts are open, and from `upper` on, closed.
 
-    The proof that the contacts are open holds for contacts moved by at most 1e-12 of their size,
-    where their wrenches are dependent but for rounding; the proof that they are closed holds for
-    the contacts as they are.
+    The proof that the contacts are open (not in force closure) allows each to move by 1e-12 of
+    their size, because wrenches may be dependent except for rounding; the proof that they are
+    closed holds for the contacts as they are.
     """
 
     lower: float
@@ -47,8 +47,8 @@ class FrictionInterval:
     normals: Array
     """Inward unit normals, (k, 3)."""
     forces: Array | None
-    """Forces that are balanced strictly inside cones of friction `upper`, once their imbalance,
-    which is rounding, is removed; (k, 3), in any unit of force. None where `upper` is infinite."""
+    """Forces that balance strictly inside cones of friction `upper`, once their imbalance, which is
+    rounding, is removed; (k, 3), in any unit of force. None where `upper` is infinite."""
     twist: Array | None
     """Velocity of the object at the first contact, and angular velocity, (6,) [m/s, rad/s], along
     which no force inside cones of friction `lower` has positive power. None where `lower` is 0."""
@@ -63,7 +63,7 @@ class FrictionInterval:
 
     @property
     def critical_friction(self) -> float:
-        """The upper end as functions and files report it: 0.0 up to `REPORTED_AS_ZERO`."""
+        """Return the upper end; values up to `REPORTED_AS_ZERO` become 0.0."""
         return 0.0 if self.upper <= REPORTED_AS_ZERO else self.upper
 
     def verify(self) -> bool:

@@ -1,4 +1,4 @@
-"""The critical friction of one set of contacts is searched program by program.
+"""Searches for the critical friction of one set of contacts, program by program.
 
 Solved: a narrow interval with proofs of both of its ends (see `friction_interval`).
 
@@ -26,40 +26,42 @@ from grasp_core.closure.wrenches import WRENCH, grasp_map, normal_and_tangential
 from grasp_core.errors import SolverError
 
 FRICTION_ACCURACY = 5e-8
-"""Relative width of the final interval of a critical friction."""
+"""Width of the final interval of a critical friction, relative to its upper end."""
 FIRST_TRIAL = 0.5
 PROOF_SHARES = (0.0, 1e-3, 0.03)
-"""Frictions at which closure is tried, as shares of the way from what forces need to the trial."""
+"""Frictions at which closure is tried, as shares of the way from the friction that the forces need
+to the trial friction."""
 GROWTH = ((0.1 * FRICTIONLESS, 3.0), (1e-3, 2.0), (math.inf, 10.0))
 """Pairs of a distance and a factor: up to that distance from an undecided friction, the next trial
-is that many times farther; fast where proofs are expected, and again where they are not."""
+is that factor farther away."""
 NUDGE = 0.4
 OVERSHOOT = 1.0
 """Trials pass the expected threshold, to close in from both sides: by `NUDGE` times the accuracy,
-and by `OVERSHOOT` times the error of Newton's method, the step's square over the friction."""
+and by `OVERSHOOT` times the error of Newton's method, which is its step's square over the friction.
+"""
 HALVING = 6
-"""After this many trials the interval is halved once, whatever Newton's method says."""
+"""Number of trials after which the interval is halved once, whatever Newton's method suggests."""
 MOST_TRIALS = 80
-"""Most trials of one search: nine are usual, and some fifty where contacts are nearly
+"""Largest number of trials in one search: nine are usual, and some fifty where contacts are nearly
 degenerate."""
 LITTLE = 1e-3
-"""Largest friction that is tried first where any friction seems enough."""
+"""Largest friction that is tried first where any positive friction seems enough."""
 RESTING = (NEARLY_AT_REST, 1e-7, 1e-5, 1e-3)
 """Speeds below which contacts are put to rest under a unit twist, tried in turn: a solver leaves
-the square root of its accuracy where two contacts carry nearly everything."""
+the square root of its accuracy where two contacts carry nearly all force."""
 EVENED = 3
-"""How often a program is solved again in units of the pushes that it found before."""
+"""Number of times that a program is solved again in units of the pushes that it found before."""
 FAINTEST = 1e-10
-"""Smallest push that gets a unit of its own, as a share of the largest."""
+"""Smallest push, as a share of the largest, that is used as a unit."""
 ADDED, SHAVED = 5e-9, 1e-10
-"""Allowance for rounding, relative: `ADDED` raises the friction that forces need, `SHAVED` lowers
-the one up to which a twist separates."""
+"""Relative allowances for rounding: `ADDED` raises the friction that forces need, `SHAVED` lowers
+the friction up to which a twist separates."""
 STALLED = 1e-3
-"""A unit twist that is shorter than this once contacts are at rest is only rounding."""
+"""Length below which a unit twist whose slow contacts were put to rest is only rounding."""
 
 
 def search_interval(points: Array, units: Array) -> FrictionInterval:
-    """Find the interval of the critical friction, as narrow as its accuracy or proofs allow.
+    """Find the interval of the critical friction, as narrow as accuracy or proofs allow.
 
     Args:
         points: Contact points, (k, 3) [m].
@@ -97,7 +99,7 @@ def _searched(ends: "Ends") -> "Ends":
 
 
 def _try_little(ends: "Ends") -> None:
-    """Look for closure at little friction, or else for a first lower end."""
+    """Look for a proof of closure at very small friction, or else for a first lower end."""
     little, friction = rounds(ends.arms, ends.units), FRICTIONLESS
     if little.twist is not None:
         ends.open(little.twist)
@@ -111,9 +113,9 @@ def _try_little(ends: "Ends") -> None:
 def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:
     """Solve the margin program again in units of the pushes of its own answer.
 
-    At a threshold, some contacts can push only as little as others can press or slide beside what
-    they carry. The depth of their forces is then below what a solver tells from zero. In units of
-    their own they are as deep as others.
+    Near a threshold, some contacts push much less than others. The depth of their forces in the
+    cones is then too small for a solver to tell from zero. In units of their own pushes, these
+    forces are as deep as others.
     """
     G, alike = grasp_map(ends.arms), np.full(len(ends.arms), friction)
     for _ in range(EVENED):
@@ -134,7 +136,7 @@ def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:
 
 
 def _asked(arms: Array, units: Array, friction: float) -> Answer:
-    """Ask for the margin program's answer; where it fails, zeros, which prove nothing."""
+    """Solve the margin program; where that fails, return zeros, which prove nothing."""
     try:
         return decide(arms, units, np.full(len(arms), friction))
     except SolverError:
@@ -152,35 +154,36 @@ class Ends:
     arms: Array
     """Arms of the contacts at unit size, (k, 3)."""
     strict: bool = True
-    """Whether each step is proved in rational arithmetic, or in floats, which rounding may undo."""
+    """Whether each step is proved in rational arithmetic; otherwise floats are used, whose proofs
+    rounding may invalidate."""
     lower: float = 0.0
     upper: float = math.inf
     forces: Array | None = None
     twist: Array | None = None
     share: float = 0.5
-    """Share of the upper end to try next while nothing is known from below."""
+    """Share of the upper end to try next while no lower end is known."""
     trials: int = 0
     center: float = math.nan
-    """Friction at which neither side could be proved, apparently the threshold; NaN if there is
-    none."""
+    """Friction at which neither side could be proved, probably the threshold; NaN if there is none.
+    """
     spread: float = 0.0
-    """Distance from `center` at which proofs are tried."""
+    """Distance from `center` at which the next proofs are tried."""
 
     @classmethod
     def of(cls, points: Array, units: Array, *, strict: bool = True) -> "Ends":
-        """Begin with contacts about which nothing is proved yet."""
+        """Start with an interval about which nothing is proved yet."""
         return cls(points, units, unit_size(points)[0], strict)
 
     @property
     def settled(self) -> bool:
-        """Whether the interval is as narrow as asked for, or as proofs allow."""
+        """Return whether the interval is as narrow as asked for, or as proofs allow."""
         narrow = self.upper - self.lower <= FRICTION_ACCURACY * self.lower
         around = self.upper <= self.center + self.spread and self.lower >= self.center - self.spread
         beyond = max(self.lower, self.spread) >= LARGEST_FRICTION
         return self.upper <= FRICTIONLESS or narrow or around or beyond
 
     def interval(self) -> FrictionInterval:
-        """Return what has been proved, with forces that balance as well as floats can."""
+        """Return the proved interval, with forces that balance as well as floats can."""
         forces, contacts = self.forces, (self.points, self.units)
         if forces is not None:
             exact = closing_forces(forces, *contacts, self.upper)
@@ -189,12 +192,12 @@ class Ends:
         return FrictionInterval(self.lower, self.upper, *contacts, forces, self.twist)
 
     def learn(self, friction: float, answer: Answer) -> None:
-        """Move both ends to what the program's answer at a friction proves."""
+        """Move both ends as far as the program's answer at a friction proves."""
         self.close(answer.forces, friction)
         self.open(answer.twist)
 
     def decided(self, friction: float) -> None:
-        """Look farther from a friction at which nothing was proved, or stop looking there."""
+        """Look farther away from a friction at which nothing was proved, or give up there."""
         undecided = self.lower < friction < self.upper
         if undecided and math.isnan(self.center):
             self.center, self.spread = friction, NUDGE * FRICTION_ACCURACY * friction
@@ -204,7 +207,7 @@ class Ends:
             self.center, self.spread = math.nan, 0.0  # the threshold turned out to be elsewhere
 
     def close(self, forces: Array, friction: float, *, exactly: bool = False) -> None:
-        """Lower the upper end to what forces need, or to the friction they were found at."""
+        """Lower the upper end to the friction that forces need, or at which they were found."""
         along, across = normal_and_tangential(forces, self.units)
         if not along.min() > 0.0:
             return
@@ -235,7 +238,7 @@ class Ends:
                 self._opened(still, friction)
 
     def open_at_all(self, twist: Array) -> bool:
-        """Return whether a twist separates at every friction; then the search is over."""
+        """Return whether a twist separates at every friction; then the search ends."""
         self._opened(twist, math.inf)
         return self.lower == math.inf
 
@@ -246,7 +249,7 @@ class Ends:
             self.lower, self.twist = friction, twist
 
     def next_trial(self, friction: float, margin: float, slope: float) -> float:
-        """Return the margin's root by Newton's method, passed a little to the wider side."""
+        """Return the root of the margin by Newton's method, moved slightly past it."""
         if not math.isnan(self.center):
             above = self.center + self.spread
             return above if self.upper > above else self.center - self.spread
@@ -264,7 +267,11 @@ class Ends:
 
 
 def _put_to_rest(twist: Array, arms: Array, normals: Array, slow: float) -> tuple[Array, float]:
-    """Put slow contacts to rest under a unit twist; also return up to where it may separate."""
+    """Put slow contacts to rest under a unit twist.
+
+    Returns:
+        The changed twist, and the friction up to which it may separate.
+    """
     rows = grasp_map(arms).T.reshape(-1, 3, WRENCH)
     slowest = np.linalg.norm(rows @ twist, axis=1) <= slow
     resting = rows[slowest].reshape(-1, WRENCH)
@@ -280,12 +287,12 @@ def _put_to_rest(twist: Array, arms: Array, normals: Array, slow: float) -> tupl
 
 
 def _between(lower: float, upper: float) -> float:
-    """Return the friction halfway between in cone angle, which treats small and large alike."""
+    """Return the friction in the middle between two, measured by the cones' half-angles."""
     return math.tan(0.5 * (math.atan(lower) + math.atan(min(upper, 4.0 * LARGEST_FRICTION))))
 
 
 def _slope(answer: Answer, arms: Array, normals: Array) -> float:
-    """Return by how much the margin over mu grows with the logarithm of mu."""
+    """Return the slope of the margin over mu with respect to the logarithm of mu."""
     velocities = answer.twist[:3] + np.cross(answer.twist[3:], arms)
     along = np.einsum("ki,ki->k", answer.forces, normals)
     slides = answer.forces - along[:, None] * normals

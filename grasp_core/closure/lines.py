@@ -1,4 +1,4 @@
-"""Four lines in space: whether they are linearly dependent, and in which way (P1).
+"""Classifies four lines in space: whether they are linearly dependent, and in which way (P1).
 
 Solved: the Grassmann class of four lines, from the two numbers that decide it.
 
@@ -32,12 +32,12 @@ from grasp_core.errors import InputError
 LineClass: TypeAlias = Literal["planar", "concurrent", "pencil", "regulus", "independent"]
 
 ON_CLASS = 1e-7
-"""Singular values and eigenvalues below this count as zero, for unit directions and points
-spread over a unit length: ten times what a linear program's answer may be off."""
+"""Size of singular values and eigenvalues below which they count as zero, for unit directions and
+points spread over a unit length: ten times the error of a linear program's answer."""
 ROUNDING = 1e-12
-"""Points closer than this, relative to their coordinates, are one point."""
+"""Distance, relative to coordinates, below which two points count as one."""
 REGULUS = 3
-"""Rank of the reciprocal form on the span of a regulus."""
+"""Rank of the reciprocal form on the span of four lines that lie on a regulus."""
 
 
 def plucker_vectors(points: Array, directions: Array) -> Array:
@@ -46,7 +46,7 @@ def plucker_vectors(points: Array, directions: Array) -> Array:
 
 
 def classify_lines(points: ArrayLike, directions: ArrayLike) -> LineClass:
-    """Name the smallest line variety of rank 3 that holds four lines.
+    """Classify the smallest line variety of rank 3 that holds four lines.
 
     Lines that lie in a plane are `planar` even if they also meet; parallel lines are
     `concurrent`. The spread of the points sets the length against which tolerances count.
@@ -63,7 +63,7 @@ def classify_lines(points: ArrayLike, directions: ArrayLike) -> LineClass:
     lengths = np.linalg.norm(d, axis=1, keepdims=True)
     if lengths.min() < SMALLEST_SIZE:
         raise InputError(
-            f"directions must not be zero: a line needs a direction of length {SMALLEST_SIZE:g} "
+            f"directions must not be zero: each must have a length of {SMALLEST_SIZE:g} "
             f"at least, got {float(lengths.min()):.6g}"
         )
     check_spread(np.ptp(x, axis=0), "points")

@@ -1,4 +1,4 @@
-"""The margin program of force closure at one friction is solved by an interior-point method.
+"""Solves the margin program of force closure at one friction by an interior-point method.
 
 Solved (see `force_closure`): how deep inside their friction cones k contacts can balance each
 other. In coordinates (normal, tangent, tangent) with tangential forces in units of the friction,
@@ -41,22 +41,23 @@ from grasp_core.solvers.cone_steps_kernel import (
 
 WRENCH = 6
 MOST_STEPS = 40
-"""Most Newton steps; ten are usual."""
+"""Largest number of Newton steps; ten are usual."""
 SHARE = 0.1
-"""Gap, as a share of the distance of V from one, that leaves no doubt on which side of one V is."""
+"""Gap, as a share of the distance of V from one, at which it is certain on which side of one V is.
+"""
 SMALLEST_GAP = 1e-11
-"""Gaps below this are rounding, in programs of order one."""
+"""Gap below which only rounding is left, in programs of order one."""
 BALANCED = 1e-10
-"""Largest imbalance of the last point; 1e-15 is usual."""
+"""Largest accepted imbalance of the last point; 1e-15 is usual."""
 SHORTER = 0.99
-"""Share of the way to the border of the cones that a step may take."""
+"""Share of the distance to the border of the cones that a step may use."""
 
 
 @loop("numpy")
 def least_cone_sum(
     columns: Array, mean: Array, share: float, pair: Array, y: Array
 ) -> tuple[float, float]:
-    """Solve (1) and (2), up to a gap.
+    """Solve the programs (1) and (2), up to a gap between their values.
 
     Args:
         columns: Columns of each A_i, as rows, (k, 3, 6).
@@ -107,7 +108,7 @@ def _start(pair: Array, y: Array) -> None:
 
 @loop("numpy")
 def _values(mean: Array, pair: Array, y: Array) -> tuple[float, float, float]:
-    """Return the values of (1) and (2), and the sum of s_i.z_i."""
+    """Compute the values of the programs (1) and (2), and the sum of s_i.z_i."""
     primal = dual = gap = 0.0
     for i in range(pair.shape[1]):
         primal += pair[0, i, 0]
@@ -120,7 +121,7 @@ def _values(mean: Array, pair: Array, y: Array) -> tuple[float, float, float]:
 
 @loop("numpy")
 def _missing(columns: Array, mean: Array, pair: Array, missing: Array) -> float:
-    """Fill in what the forces lack to balance; return its largest part."""
+    """Fill in the wrench that the forces lack to balance; return its largest component."""
     for w in range(WRENCH):
         missing[w] = -mean[w]
     for i in range(len(columns)):
@@ -135,7 +136,7 @@ def _missing(columns: Array, mean: Array, pair: Array, missing: Array) -> float:
 
 @loop("numpy")
 def _factor(columns: Array, W: Array, V: Array, R: Array) -> bool:
-    """Find reflections 1 - v v' that bring all A_i W_i, side by side, to the triangle R.
+    """Find reflections 1 - v v' that turn the columns A_i W_i into a triangular matrix R.
 
     Returns:
         False if the wrenches do not span all six dimensions.
@@ -167,7 +168,7 @@ def _factor(columns: Array, W: Array, V: Array, R: Array) -> bool:
 
 @loop("numpy")
 def _reflect(V: Array, v: int, X: Array, x: int) -> None:
-    """Reflect the x-th of some vectors by the v-th reflection."""
+    """Apply the v-th reflection to the x-th of some vectors."""
     share = _dot(V, v, X, x)
     for i in range(V.shape[1]):
         for j in range(3):
@@ -184,9 +185,9 @@ def _dot(V: Array, v: int, X: Array, x: int) -> float:
 
 @loop("numpy")
 def _direct(V: Array, R: Array, missing: Array, wanted: Array, step: Array, turn: Array) -> None:
-    """Find the step whose scaled parts for s and z sum to `wanted`, and its part `turn` for y.
+    """Compute a Newton step: parts for s and z, which scaled sum to `wanted`, and one for y.
 
-    The step also supplies what the forces lack to balance.
+    The step also supplies the wrench that the forces lack to balance.
     """
     for i in range(len(wanted)):
         for j in range(3):
@@ -207,7 +208,7 @@ def _direct(V: Array, R: Array, missing: Array, wanted: Array, step: Array, turn
 
 @loop("numpy")
 def _solve_lower(R: Array, b: Array, x: Array) -> None:
-    """Solve R'x = b."""
+    """Solve R'x = b for x by forward substitution."""
     for w in range(WRENCH):
         x[w] = b[w]
         for v in range(w):
@@ -217,7 +218,7 @@ def _solve_lower(R: Array, b: Array, x: Array) -> None:
 
 @loop("numpy")
 def _solve_upper(R: Array, x: Array) -> None:
-    """Solve R x = b in place."""
+    """Solve R x = b for x in place by back substitution."""
     for w in range(WRENCH - 1, -1, -1):
         for v in range(w + 1, WRENCH):
             x[w] -= R[w, v] * x[v]

@@ -1,4 +1,4 @@
-"""The margin program of force closure is solved here, in compiled code or by the conic solver.
+"""Solves the margin program of force closure, in compiled code or by the conic solver.
 
 `force_closure` derives the program, (1) to (3) there, and `margin_kernel` the compiled method. What
 a solution claims is proved by `proofs`.
@@ -15,19 +15,20 @@ from grasp_core.compiled import compiled
 from grasp_core.solvers.conic import ConicProgram, minimize
 
 KERNEL = "grasp_core.closure.critical_friction_kernel"
-"""Kernel of the search for critical friction, which solves the same program at many frictions."""
+"""Module with the compiled search for critical friction, which solves the same program at many
+frictions."""
 ROUNDING = 1e-12
-"""Slack of the plain-arithmetic checks, for data scaled to unit size: some thousand
-rounding errors."""
+"""Slack of checks in plain arithmetic, for data scaled to unit size: some thousand rounding errors.
+"""
 TINY = float(np.finfo(np.float64).tiny)
 COARSE = 0.1
-"""Gap, as in `margin_kernel`, that may be left where only the sign of a margin is asked for."""
+"""Gap, as in `margin_kernel`, that may be left where only the sign of a margin is needed."""
 
 
 def deepest_forces(
     arms: Array, normals: Array, friction: Array, share: float = COARSE
 ) -> tuple[Array, Array, Array]:
-    """Find balanced forces of many sets of contacts, as deep in the cones as can be, by the kernel.
+    """Balance many sets of contacts with forces as deep in the cones as possible.
 
     Args:
         arms: Contacts at unit size, (g, k, 3).
@@ -50,10 +51,11 @@ def deepest_forces(
 
 
 def margin_program(balance: Array, normals: Array, friction: Array) -> tuple[float, Array, Array]:
-    """Solve for the margin t, balancing forces (k, 3), and the dual twist in the rows of `balance`.
+    """Solve for the margin t, balancing forces (k, 3), and the twist of the dual program.
 
-    The unknowns of a contact are its normal force and its tangential force over mu, so that
-    small coefficients are solved as well as large ones; without friction only the former.
+    The twist has one entry for each row of `balance`. The unknowns of a contact are its normal
+    force and its tangential force over mu, so that small coefficients are solved as well as large
+    ones; without friction only the normal force is unknown.
 
     Args:
         balance: Matrix on the stacked forces whose product must vanish, (m, 3k).
@@ -91,13 +93,16 @@ def margin_program(balance: Array, normals: Array, friction: Array) -> tuple[flo
 
 
 def allowed(friction: Array) -> NDArray[np.bool_]:
-    """Return which local forces (normal, tangent, tangent) may be non-zero, (3k,)."""
+    """Return which components (normal, tangent, tangent) of forces may be non-zero, (3k,)."""
     sliding = friction > 0.0
     return np.column_stack([np.ones_like(sliding), sliding, sliding]).ravel()
 
 
 def _departing_twist(rows: Array, share: Array) -> Array | None:
-    """Find a twist with which every contact leaves along its normal: then no forces balance."""
+    """Find a twist with which every contact leaves along its normal.
+
+    Its existence proves that no forces balance.
+    """
     sizes = np.maximum(np.linalg.norm(rows, axis=0), TINY)
     scaled: Array = (rows / sizes).T
     twist = -np.asarray(np.linalg.lstsq(scaled, share / sizes, rcond=None)[0], dtype=np.float64)

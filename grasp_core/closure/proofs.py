@@ -1,4 +1,4 @@
-"""Proofs of force closure, and of its opposite, by forces and by twists.
+"""Proves force closure by contact forces, and its opposite by twists.
 
 Contacts are given at unit size: arms from their mean point, the longest of length one. The program
 and the supports s_i are those of `force_closure`. Let d_i be the depth mu_i n_i.f_i - |tangential
@@ -42,8 +42,8 @@ from grasp_core.closure.wrenches import (
 )
 
 GIANT = 1e100
-"""Largest number accepted from a compiled search, which may end with larger ones, or with NaN,
-where contacts are degenerate."""
+"""Largest number accepted from a compiled search, which may end with larger ones or NaN where
+contacts are degenerate."""
 RANK = 1e-9
 """Smallest singular value of the unit-size grasp map that counts as full rank."""
 
@@ -56,7 +56,10 @@ def supports(twist: Array, arms: Array, normals: Array, friction: Array) -> Arra
 
 
 def generators_of(arms: Array, normals: Array, friction: Array) -> Array:
-    """Return wrenches that span those of all contacts: three each, one each without friction."""
+    """Return wrenches that span those of all contacts.
+
+    There are three for each contact, or one without friction.
+    """
     G = grasp_map(arms)
     if (friction > 0.0).all():
         return G
@@ -66,7 +69,7 @@ def generators_of(arms: Array, normals: Array, friction: Array) -> Array:
 def refutes_closure(
     twist: Array, arms: Array, normals: Array, friction: Array
 ) -> NDArray[np.bool_]:
-    """Return whether no contact force within its cone works along a twist, (2).
+    """Return whether, by (2), no contact force in its cone has positive power on a twist.
 
     Args:
         twist: One twist per set of contacts, (..., 6).
@@ -87,7 +90,7 @@ def refutes_closure(
 def proves_closure(
     forces: Array, arms: Array, normals: Array, friction: Array
 ) -> NDArray[np.bool_]:
-    """Return whether forces lie so deep in the cones that correcting them is harmless, (1).
+    """Return whether forces, by (1), prove closure: they stay in the cones once balanced.
 
     Args:
         forces: Nearly balanced contact forces, (..., k, 3).
@@ -123,7 +126,7 @@ def proves_closure(
 def proved_margin(
     forces: Array, arms: Array, normals: Array, friction: Array, caution: float = 1.0
 ) -> float:
-    """Compute the margin (1) that forces prove: their depth, less what their correction may cost.
+    """Compute the margin (1) that forces prove: their depth, less the cost of balancing them.
 
     Args:
         forces: Nearly balanced contact forces, (k, 3).
@@ -184,7 +187,7 @@ def margin_ceiling(
 
 
 def without_giants(vectors: Array, axes: int) -> Array:
-    """Replace sets with huge numbers or NaN by zeros, which prove nothing.
+    """Replace sets that contain huge numbers or NaN by zeros, which prove nothing.
 
     Args:
         vectors: Twists, (..., 6), or forces, (..., k, 3).

@@ -1,4 +1,4 @@
-"""Proofs of force closure, and of its opposite, in rational arithmetic.
+"""Proves force closure, and its opposite, in rational arithmetic.
 
 Solved: whether numbers that a search found prove what they are meant to prove, for positions and
 normals exactly as they are given: a float is a rational number.
@@ -29,20 +29,20 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.closure.wrenches import WRENCH, grasp_map, normal_and_tangential
 
 Exact = list[Fraction]
-"""A vector of rational numbers."""
+"""A vector of rational numbers, without rounding."""
 
 INDEPENDENT = (1e-6, 1e-9)
-"""Distances of a unit-size wrench from the span of others at which it counts as independent of
-them, tried in turn; the last one is the rank that force closure asks for."""
+"""Distances of a unit-size wrench from the span of others above which it is independent of them,
+tried in turn; the last one defines the rank that force closure asks for."""
 NEARLY_AT_REST = 1e-9
-"""Speeds below this are meant to be zero, for twists of unit size."""
+"""Speed below which a contact is meant to be at rest, for twists of unit size."""
 SAME = Fraction(1, 10**12)
-"""Speed of a contact that cannot be put to rest exactly and yet counts as at rest, for twists of
-unit size: it would be at rest if it were moved by this share of the contacts' size."""
+"""Speed at which a contact that cannot be put to rest exactly still counts as at rest, for twists
+of unit size: moving it by this share of the contacts' size would put it to rest."""
 
 
 def closes(forces: Array, positions: Array, normals: Array, friction: float) -> bool:
-    """Return whether forces next to these balance exactly, strictly inside cones of full rank.
+    """Return whether nearby forces balance exactly, strictly inside cones of full rank.
 
     Args:
         forces: Contact forces that balance but for rounding, (k, 3).
@@ -56,7 +56,7 @@ def closes(forces: Array, positions: Array, normals: Array, friction: float) -> 
 def closing_forces(
     forces: Array, positions: Array, normals: Array, friction: float
 ) -> Array | None:
-    """Return the balanced forces that `closes` finds, rounded to floats; None if there are none.
+    """Return the exactly balanced forces that `closes` finds as floats; None if there are none.
 
     Args:
         forces: Contact forces that balance but for rounding, (k, 3).
@@ -84,7 +84,7 @@ def closing_forces(
 
 
 def separates(twist: Array, positions: Array, normals: Array, friction: float) -> bool:
-    """Return whether no force in the friction cones works along a twist next to this one.
+    """Return whether, for a nearby twist, no force in the friction cones has positive power.
 
     Args:
         twist: Velocity of the object at the first contact, and angular velocity, (6,) [m/s, rad/s].
@@ -115,7 +115,7 @@ def separates(twist: Array, positions: Array, normals: Array, friction: float) -
 
 
 def _arms(positions: Array) -> tuple[Array, float]:
-    """Return arms from the first contact in units of the longest one, (k, 3), and its length."""
+    """Return arms from the first contact over the longest arm, (k, 3), and that arm's length."""
     arms = positions - positions[0]
     size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
     return arms / size, size
@@ -141,14 +141,14 @@ def _columns(arms: Array, order: Indices) -> list[tuple[int, int]] | None:
 
 
 def _nearly_balanced(forces: Array, arms: Array, depths: Array) -> Array:
-    """Change forces so that they balance but for rounding, the deeper ones by more."""
+    """Change forces so that they balance up to rounding, deeper ones by more."""
     G, room = grasp_map(arms), np.repeat(depths, 3)
     change = np.linalg.lstsq(G * room, G @ forces.ravel(), rcond=INDEPENDENT[-1])[0]
     return forces - (room * np.asarray(change, dtype=np.float64)).reshape(forces.shape)
 
 
 def _independent(rows: Array, least: float) -> list[int]:
-    """Choose rows of (n, 6), none of them nearer than `least` to the span of those before it."""
+    """Choose rows of (n, 6) that are at least `least` away from the span of earlier ones."""
     left, found = rows.copy(), list[int]()
     for row in range(len(left)):
         length = float(np.linalg.norm(left[row]))
@@ -163,7 +163,7 @@ def _independent(rows: Array, least: float) -> list[int]:
 def _balanced(
     forces: list[Exact], arms: list[Exact], columns: list[tuple[int, int]]
 ) -> list[Exact] | None:
-    """Change components of forces, given as (contact, axis), so that the forces balance exactly."""
+    """Change some components of forces, listed as (contact, axis), until they balance exactly."""
     total = [Fraction(0)] * WRENCH
     for force, arm in zip(forces, arms, strict=True):
         wrench = [*force, *_cross(arm, force)]
@@ -179,7 +179,7 @@ def _balanced(
 
 
 def _at_rest(twist: Exact, arms: list[Exact], resting: list[tuple[int, int]]) -> Exact | None:
-    """Change a twist so that velocities of contacts along axes, (contact, axis), are zero."""
+    """Change a twist so that contacts' velocities along some axes, (contact, axis), are zero."""
     rows = [_wrench(axis, arms[contact]) for contact, axis in resting]
     speeds = [sum((a * b for a, b in zip(row, twist, strict=True)), Fraction(0)) for row in rows]
     changes = _solution(rows, speeds)
@@ -187,7 +187,7 @@ def _at_rest(twist: Exact, arms: list[Exact], resting: list[tuple[int, int]]) ->
 
 
 def _wrench(axis: int, arm: Exact) -> Exact:
-    """Return the wrench of a unit force; its product with a twist is the contact's speed there."""
+    """Return the wrench of a unit force; its product with a twist is a contact's speed."""
     force = [Fraction(int(axis == each)) for each in range(3)]
     return [*force, *_cross(arm, force)]
 
@@ -197,7 +197,10 @@ def _velocity(twist: Exact, arm: Exact) -> Exact:
 
 
 def _solution(rows: list[Exact], right: Exact) -> Exact | None:
-    """Solve rows @ x = right for six numbers by elimination; those it leaves free are zero."""
+    """Solve rows @ x = right for six numbers by elimination, or return None.
+
+    Numbers that the rows leave free are zero.
+    """
     table = [[*row, value] for row, value in zip(rows, right, strict=True)]
     pivots = list[int]()
     for i, row in enumerate(table):
@@ -223,7 +226,10 @@ def _inside(force: Exact, normal: Exact, slope: Fraction) -> bool:
 
 
 def _departs(velocity: Exact, normal: Exact, slope: Fraction | None) -> bool:
-    """Return whether (2) holds, for every friction if `slope` is None, or the speed is `SAME`."""
+    """Return whether (2) holds, or the speed is at most `SAME`.
+
+    With `slope` None, (2) must hold for every friction.
+    """
     if _dot(velocity, velocity) <= SAME**2:
         return True
     along, across = _squares(velocity, normal)
@@ -232,7 +238,7 @@ def _departs(velocity: Exact, normal: Exact, slope: Fraction | None) -> bool:
 
 
 def _squares(vector: Exact, normal: Exact) -> tuple[Fraction, Fraction]:
-    """Return squares of the parts along and across a normal, times the square of its length."""
+    """Return squares of a vector's parts along and across a normal, times the normal's square."""
     along = _dot(vector, normal) ** 2
     return along, _dot(vector, vector) * _dot(normal, normal) - along
 

@@ -1,4 +1,4 @@
-"""The wrenches that contacts can apply with bounded forces, by closed-form support points.
+"""Describes the wrenches that contacts can apply with bounded forces, in closed form.
 
 Ferrari & Canny bound the contact forces in two ways:
 
@@ -34,20 +34,22 @@ from grasp_core.solvers.ties import on_grid
 from grasp_core.values import Grasp
 
 Norm: TypeAlias = Literal["l1", "linf"]
-"""How contact forces are bounded: by their sum (`l1`) or one by one (`linf`)."""
+"""How contact forces are bounded: by the sum of normal forces (`l1`) or one by one (`linf`)."""
 
 NO_SLIDE = 1e-290
-"""A velocity along the surface that is smaller than this has no direction."""
+"""Speed along the surface below which the direction of sliding is undefined."""
 SAME_FRAME = 1e-9
-"""How far frames may be from orthonormal: normals are unit vectors to nine digits."""
+"""Error up to which frames count as orthonormal: normals are unit vectors to nine digits."""
 SAME_DIGITS = 10
-"""Digits after the point that searches are given: frames stay within `SAME_FRAME`."""
+"""Digits after the point to which frames are rounded for searches, so that they stay within
+`SAME_FRAME`."""
 LARGEST_RATIO = 1e6
-"""Largest ratio of torque scale and contacts' extent, either way: beyond it, rounding decides."""
+"""Largest ratio of torque scale and contacts' extent, and its inverse: beyond it, rounding decides.
+"""
 
 
 def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
-    """Compute levers of contacts (k, 3) about a centre, over the torque scale.
+    """Compute levers of contacts (k, 3) about a centre, divided by the torque scale.
 
     Raises:
         InputError: The scale or the centre is so far from those of the contacts that rounding
@@ -61,7 +63,7 @@ def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
     if not 1.0 / LARGEST_RATIO <= scale / extent <= LARGEST_RATIO:
         raise InputError(
             f"torque_scale must be within a factor {LARGEST_RATIO:g} of the extent of the "
-            f"positions, {extent:.3g}; got {torque_scale}"
+            f"positions, {extent:.3g} m, got {torque_scale}"
         )
     arms = (points - frozen(center, (3,), "center")) / scale
     if float(np.abs(arms).max()) > LARGEST_RATIO:
@@ -76,15 +78,16 @@ def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
 class WrenchSet:
     """The set of wrenches that contacts can apply with bounded normal forces.
 
-    Contact forces are local here: (normal, tangent, tangent) of each contact in turn.
+    Contact forces are local here: components (normal, tangent, tangent) of each contact in turn.
     """
 
     G: Array
-    """Matrix from local contact forces to their wrench, torques over the torque scale, (6, 3k)."""
+    """Matrix from local contact forces to their wrench, with torques over the torque scale, (6,
+    3k)."""
     friction: Array
     """Coulomb coefficients, (k,)."""
     norm: Norm
-    """How normal forces are bounded: their sum is one newton (`l1`) or each is at most that
+    """How normal forces are bounded: their sum is at most one newton (`l1`), or each of them is
     (`linf`)."""
 
     @classmethod
@@ -98,7 +101,7 @@ class WrenchSet:
         torque_scale: float,
         norm: Norm = "l1",
     ) -> Self:
-        """Make the set of contacts, (k, 3) each; torques are about `center`, over `torque_scale`.
+        """Make the wrench set of contacts; torques are about `center`, over `torque_scale`.
 
         Raises:
             InputError: Shapes, lengths or signs are wrong.
@@ -110,16 +113,17 @@ class WrenchSet:
         return cls(G, contact_frictions(friction, len(points)), norm)
 
     def on_grid(self) -> "WrenchSet":
-        """Return nearly the same set, on a grid, for searches that must not see last digits."""
+        """Round the set to a grid, so that searches do not depend on last digits."""
         return replace(
             self, G=on_grid(self.G, SAME_DIGITS), friction=on_grid(self.friction, SAME_DIGITS)
         )
 
     def sound(self) -> bool:
-        """Return whether this is the wrench set of some contacts, to within `SAME_FRAME`.
+        """Return whether this is the wrench set of some contacts, up to `SAME_FRAME`.
 
         The force rows of `G` must be an orthonormal frame for each contact, and the torque rows
-        those of the frame's vectors at one point: then torque rows times the frame's are skew.
+        those of the frame's vectors at one point: then the torque rows times the transposed frame
+        form a skew matrix.
         """
         k = len(self.friction) if is_array(self.friction, None) else 0
         known = is_a(self.norm, str) and self.norm in get_args(Norm)
@@ -140,12 +144,15 @@ class WrenchSet:
 
     @property
     def size(self) -> float:
-        """Length of the longest wrench of a unit normal force, to within a factor 1.5 [N]."""
+        """Return the length [N] of the longest wrench of a unit normal force, roughly.
+
+        It may be too long or too short by a factor 1.5.
+        """
         longest = np.linalg.norm(self.G, axis=0).max()
         return float(longest * np.sqrt(1.0 + self.friction.max() ** 2))
 
     def supports(self, directions: Array) -> Array:
-        """Compute the support (1) in several directions, (n, 6), without forces, (n,)."""
+        """Compute the support (1) in several directions (n, 6), without the forces, (n,)."""
         slopes = (directions @ self.G).reshape(len(directions), -1, 3)
         each = slopes[:, :, 0] + self.friction * np.hypot(slopes[:, :, 1], slopes[:, :, 2])
         return each.max(axis=1) if self.norm == "l1" else np.maximum(each, 0.0).sum(axis=1)
@@ -171,7 +178,7 @@ class WrenchSet:
         return float(each[pushing].sum()), forces.ravel()
 
     def edges(self) -> Array:
-        """Return local forces whose wrenches span what the set spans, (n, 3k)."""
+        """Return local forces whose wrenches span the same space as the set, (n, 3k)."""
         k = len(self.friction)
         frame = np.array([[1.0, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1]])
         forces = np.zeros((4 * k + 1, k, 3))
@@ -182,7 +189,7 @@ class WrenchSet:
         return rows if self.norm == "linf" else rows[:-1]
 
     def holds(self, forces: Array, slack: float) -> bool:
-        """Return whether local forces, (n, 3k), lie within cones and bounds, up to a slack."""
+        """Return whether local forces, (n, 3k), are within cones and bounds, up to a slack."""
         each = forces.reshape(len(forces), -1, 3)
         pushes, slides = each[:, :, 0], np.hypot(each[:, :, 1], each[:, :, 2])
         if self.norm == "l1":
@@ -194,9 +201,9 @@ class WrenchSet:
 
 
 def nearest_wrench(wrenches: WrenchSet) -> tuple[Array, Array]:
-    """Find the wrench nearest to zero that forces can apply whose normal parts sum to one.
+    """Find the wrench nearest to zero of forces whose normal parts sum to one.
 
-    A cone program that always has a solution finds it.
+    It is found by a cone program that always has a solution.
 
     Returns:
         Local forces of that wrench, (3k,), which show how near to balance the contacts come; and
@@ -221,7 +228,7 @@ def nearest_wrench(wrenches: WrenchSet) -> tuple[Array, Array]:
 
 
 def _into_cones(forces: Array, friction: Array) -> Array:
-    """Move forces into the cones and scale them so that their normal parts sum to one exactly."""
+    """Move forces into the cones and scale them so that normal parts sum to one exactly."""
     each = forces.reshape(-1, 3).copy()
     each[:, 0] = np.maximum(each[:, 0], 0.0)
     across, allowed = np.hypot(each[:, 1], each[:, 2]), friction * each[:, 0]

@@ -1,7 +1,7 @@
-"""Matrices from contact forces to wrenches, and the frames of contacts.
+"""Builds matrices from contact forces to wrenches, and the frames of contacts.
 
-A wrench is (force, torque), (6,), with the torque about a stated centre. A contact force is
-what the finger applies to the object, in the object's frame.
+A wrench is (force, torque), (6,), with the torque about a stated centre. A contact force is what
+the finger applies to the object, in the object's frame.
 """
 
 import numpy as np
@@ -10,11 +10,11 @@ from grasp_core.arrays import Array
 from grasp_core.geometry.polygons import plane_tangents
 
 WRENCH = 6
-"""Dimension of a wrench."""
+"""Number of components of a wrench."""
 
 
 def grasp_map(positions: Array, center: Array | None = None) -> Array:
-    """Build the matrix (..., 6, 3k) from stacked contact forces (3k,) to their wrench.
+    """Build the matrix that maps stacked contact forces (3k,) to their wrench, (..., 6, 3k).
 
     Args:
         positions: Contact points, (..., k, 3) [m].
@@ -31,7 +31,7 @@ def grasp_map(positions: Array, center: Array | None = None) -> Array:
 
 
 def in_frames(G: Array, frames: Array) -> Array:
-    """Turn a matrix on stacked forces (m, 3k) into one on their coordinates in (k, 3, 3) frames."""
+    """Rewrite a matrix on stacked forces (m, 3k) for coordinates in contact frames (k, 3, 3)."""
     m, k = len(G), len(frames)
     return np.einsum("mki,kij->mkj", G.reshape(m, k, 3), frames).reshape(m, 3 * k)
 
@@ -43,14 +43,14 @@ def cross_matrix(vector: Array) -> Array:
 
 
 def contact_frames(normals: Array) -> Array:
-    """Build orthonormal frames with the columns (normal, tangent, tangent), (..., 3, 3)."""
+    """Build orthonormal contact frames, columns (normal, tangent, tangent), (..., 3, 3)."""
     rows = normals.reshape(-1, 3).tolist()
     columns = [((x, y, z), *plane_tangents(x, y, z)) for x, y, z in rows]
     return np.array(columns).reshape(*normals.shape, 3).swapaxes(-1, -2)
 
 
 def normal_and_tangential(forces: Array, normals: Array) -> tuple[Array, Array]:
-    """Split (..., k, 3): normal components and lengths of the tangential parts, (..., k) each."""
+    """Split forces (..., k, 3) into normal components and tangential lengths."""
     along = np.einsum("...i,...i->...", forces, normals)
     across = forces - along[..., None] * normals
     return along, np.sqrt(np.einsum("...i,...i->...", across, across))

@@ -1,4 +1,4 @@
-"""Pyramids inscribed in circular cones, which stand for the cones in linear programs.
+"""Inscribes pyramids in circular cones, which replace the cones in linear programs.
 
 The edges of a pyramid with m sides lie on the cone, so the pyramid is inside: what is proved for it
 holds for the cone. Across the axis it is a regular polygon, whose sides are nearer to the middle
@@ -19,7 +19,7 @@ from grasp_core.arrays import Array, frozen
 from grasp_core.values import ForceCone
 
 PYRAMID_SIDES = 16
-"""Sides of pyramids, unless a program asks for more."""
+"""Number of sides of a pyramid, unless a program asks for more."""
 
 
 def inscribed_share(sides: int = PYRAMID_SIDES) -> float:
@@ -28,7 +28,7 @@ def inscribed_share(sides: int = PYRAMID_SIDES) -> float:
 
 
 def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES) -> Array:
-    """Inward unit normals g of a pyramid inscribed in a circular cone, (sides, 3).
+    """Compute inward unit normals g of a pyramid inscribed in a circular cone, (sides, 3).
 
     All v with g.v >= 0 for all g are inside the cone.
 
@@ -41,7 +41,7 @@ def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES)
 
 
 def pyramid_facets(axes: Array, half_angle: float, toward: Array, sides: int) -> Array:
-    """Inward unit normals of pyramids inscribed in equally wide cones, (..., sides, 3).
+    """Compute inward unit normals of pyramids in equally wide cones, (..., sides, 3).
 
     See `inscribed_facets` for what such a pyramid is.
 
@@ -60,6 +60,6 @@ def pyramid_facets(axes: Array, half_angle: float, toward: Array, sides: int) ->
 
 @cache
 def facet_turns(sides: int) -> Array:
-    """Cosines and sines of the directions in which a pyramid's facets lean, (sides, 2)."""
+    """Compute cosines and sines of the directions in which facets lean, (sides, 2)."""
     turns = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
     return frozen(np.column_stack([np.cos(turns), np.sin(turns)]), (sides, 2), "turns")

@@ -1,4 +1,4 @@
-"""When four cones of directions positively span space whatever directions they contribute (P3).
+"""Decides when four cones positively span space, whatever direction each contributes (P3).
 
 Solved: Definition 3 of the paper in closed form, and all face quadruples that satisfy it.
 
@@ -41,11 +41,12 @@ KERNEL = "grasp_core.cones.spanning_kernel"
 FEW = 30
 """Number of directions up to which trying all quadruples is faster than loading compiled code."""
 GUESS = 2
-"""Quadruples per pair of directions that there is room for before they are counted."""
+"""Number of quadruples per pair of directions for which memory is reserved before they are counted.
+"""
 OTHERS = ([1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2])
-"""Indices of the other three, for each of four."""
+"""Indices of the other three cones, for each of the four."""
 DEPENDENT = 1e-12
-"""Triples of unit vectors with a smaller determinant are coplanar: a few rounding errors."""
+"""Determinant below which three unit vectors count as coplanar: a few rounding errors."""
 
 
 def span_angle(normals: ArrayLike) -> float:
@@ -66,7 +67,7 @@ def span_angle(normals: ArrayLike) -> float:
 
 
 def count_spanning(normals: ArrayLike, least: float) -> int:
-    """Count the quadruples of unit vectors (n, 3) that span at an angle [rad], without a list."""
+    """Count the quadruples of unit vectors (n, 3) that span at an angle [rad]."""
     units = frozen_units(normals, (None, 3), "normals")
     if len(units) <= FEW:
         every = np.array(list(combinations(units, 4))).reshape(-1, 4, 3)
@@ -76,13 +77,13 @@ def count_spanning(normals: ArrayLike, least: float) -> int:
 
 
 def span_sines(units: Array) -> Array:
-    """Compute sines of theta* of many quadruples (q, 4, 3), (q,); negative where they do not span.
+    """Compute sin(theta*) of many quadruples (q, 4, 3), (q,); negative where they do not span.
 
-    The negative value is how far the worst weight of a vanishing combination is from positive.
+    The negative value tells how far the worst weight in a vanishing combination is from positive.
 
-    It is (2), from the cosines between the vectors: with (v x w).(w x u) = (v.w)(w.u) - u.v, the
-    largest |+-(v x w) +-(w x u) +-(u x v)| needs no cross products. A few arrays along all
-    quadruples make this ten times as fast as a formula for each.
+    The formula is (2), written with the cosines between the vectors: with (v x w).(w x u) =
+    (v.w)(w.u) - u.v, the largest |+-(v x w) +-(w x u) +-(u x v)| needs no cross products. A few
+    arrays along all quadruples make this ten times as fast as a formula for each.
     """
     one, two, three, four = np.ascontiguousarray(np.moveaxis(units, 0, -1))
     # weights of a vanishing combination: all of one sign where the four positively span
@@ -114,12 +115,12 @@ def span_sines(units: Array) -> Array:
 
 
 def _dotted(one: Sequence[Array], two: Sequence[Array]) -> Array:
-    """Return dot products of columns, (q,)."""
+    """Compute dot products of vectors that are given by columns, (q,)."""
     return one[0] * two[0] + one[1] * two[1] + one[2] * two[2]
 
 
 def _crossed(one: Sequence[Array], two: Sequence[Array]) -> tuple[Array, Array, Array]:
-    """Return cross products of columns, three of (q,)."""
+    """Compute cross products of vectors that are given by columns, three of (q,)."""
     (x, y, z), (u, v, w) = one, two
     return y * w - z * v, z * u - x * w, x * v - y * u
 
@@ -139,7 +140,9 @@ def cones_positively_span(axes: ArrayLike, half_angles: ArrayLike) -> bool:
     units = frozen_units(axes, (4, 3), "axes")
     angles = frozen(half_angles, (4,), "half_angles")
     if (angles < 0.0).any() or (angles >= np.pi / 2).any():
-        raise InputError(f"half_angles must be in [0, pi/2), got {angles.tolist()}")
+        raise InputError(
+            f"half_angles must be at least 0 and below pi/2 rad, got {angles.tolist()}"
+        )
     sines = np.sin(angles)
     if not positively_span(units):
         # positive spanning is what continuity in the derivation starts from
@@ -153,7 +156,7 @@ def cones_positively_span(axes: ArrayLike, half_angles: ArrayLike) -> bool:
 
 
 def angles_between(one: Array, other: Array) -> Array:
-    """Compute angles between vectors (..., 3), (...) [rad], as exact for small ones as for others.
+    """Compute angles [rad] between vectors (..., 3), accurate for small ones too, (...).
 
     The inverse cosine would give up half of the digits of a small angle.
     """
@@ -163,7 +166,10 @@ def angles_between(one: Array, other: Array) -> Array:
 
 
 def positively_span(vectors: Array) -> bool:
-    """Return whether four vectors, (4, 3), span R^3 and some positive combination vanishes."""
+    """Return whether four vectors, (4, 3), positively span R^3.
+
+    They do if they span R^3 and some combination with positive weights vanishes.
+    """
     signed = _signed_determinants(vectors)
     return bool(signed.min() > DEPENDENT or signed.max() < -DEPENDENT)
 
@@ -179,14 +185,16 @@ def balancing_weights(vectors: Array) -> Array:
 
 
 def _signed_determinants(vectors: Array) -> Array:
-    """Return weights of a vanishing combination, by Cramer's rule, (..., 4)."""
+    """Compute the weights of a vanishing combination by Cramer's rule, (..., 4)."""
     minors = np.stack([vectors[..., rest, :] for rest in OTHERS], axis=-3)
     determinants: Array = np.asarray(np.linalg.det(minors), dtype=np.float64)
     return determinants * (1.0, -1.0, 1.0, -1.0)
 
 
 def triple_sine(one: Array, two: Array, three: Array) -> Array:
-    """Compute the sine of the half-angle at which three cones first touch one plane, signed by det.
+    """Compute the sine of the half-angle at which three cones first touch one plane.
+
+    It has the sign of the axes' determinant.
 
     Args:
         one: Unit vectors, (..., 3).
@@ -215,7 +223,7 @@ class SpanningQuadruples:
 
 
 def spanning_quadruples(normals: Array, least_angle: float) -> SpanningQuadruples:
-    """List all quadruples of directions whose span angle exceeds `least_angle`.
+    """List all quadruples of directions that positively span at a larger angle than given.
 
     Args:
         normals: Unit vectors, (n, 3).
@@ -225,7 +233,7 @@ def spanning_quadruples(normals: Array, least_angle: float) -> SpanningQuadruple
 
 
 class SpanningTable:
-    """The quadruples of directions that span, listed by the last of their directions."""
+    """Spanning quadruples of directions, listed by the last of their directions."""
 
     def __init__(self, normals: Array, least_angle: float) -> None:
         self.units, self.least = np.ascontiguousarray(normals), math.sin(least_angle)
@@ -241,7 +249,7 @@ class SpanningTable:
         return SpanningQuadruples(indices, np.arcsin(sines))
 
     def count(self, newest: int) -> int:
-        """Count the quadruples that end in a direction."""
+        """Count the spanning quadruples whose last direction is the given one."""
         self._extend(newest + 1)
         return int(self.kernel.quadruples(self.bits, newest, np.empty((0, 4), dtype=np.int64)))
 
@@ -261,7 +269,7 @@ class SpanningTable:
 
 
 def _sorted(parts: Sequence[Indices], count: int) -> Indices:
-    """Sort quadruples of `count` directions in lexicographic order, (q, 4)."""
+    """Sort quadruples of direction indices in lexicographic order, (q, 4)."""
     places = count ** np.arange(3, -1, -1)
     keys = np.sort(np.concatenate(parts) @ places)
     return keys[:, None] // places % count

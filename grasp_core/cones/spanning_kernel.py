@@ -1,4 +1,4 @@
-"""Quadruples of directions that positively span at some least angle, by bit sets of triples.
+"""Finds quadruples of directions that positively span at some angle, by bit sets of triples.
 
 With s(i, j, k) the signed sine of the angle at which three cones first touch one plane (see
 `spanning`), four directions i, j, k < l span at an angle if the three others go around
@@ -16,7 +16,7 @@ from grasp_core.compiled import loop
 
 WORD = 64
 DEPENDENT = 1e-12
-"""Triples of unit vectors with a smaller determinant are coplanar."""
+"""Determinant below which three unit vectors count as coplanar."""
 
 
 def empty_table(count: int) -> NDArray[np.uint64]:
@@ -26,7 +26,7 @@ def empty_table(count: int) -> NDArray[np.uint64]:
 
 @loop()
 def extend(table: NDArray[np.uint64], units: Array, start: int, end: int, least: float) -> None:
-    """Put the directions start .. end - 1 into the table.
+    """Enter the directions start .. end - 1 into the table.
 
     Args:
         table: Table that holds the directions before these; changed in place.
@@ -53,7 +53,7 @@ def extend(table: NDArray[np.uint64], units: Array, start: int, end: int, least:
 
 @loop()
 def quadruples(table: NDArray[np.uint64], newest: int, found: Indices) -> int:
-    """List the quadruples of one direction and three before it.
+    """List the spanning quadruples of one direction and three earlier ones.
 
     Args:
         table: Table that holds all of these directions.
@@ -76,7 +76,7 @@ def quadruples(table: NDArray[np.uint64], newest: int, found: Indices) -> int:
 
 @loop()
 def least_sines(units: Array, found: Indices, sines: Array) -> None:
-    """Fill in sines of the angles below which quadruples of directions span, (q,)."""
+    """Fill in sin(theta*) of quadruples of directions, (q,)."""
     for row in range(len(found)):
         a, b = units[found[row, 0]], units[found[row, 1]]
         c, d = units[found[row, 2]], units[found[row, 3]]
@@ -92,7 +92,7 @@ def _completed(
     found: Indices,
     count: int,
 ) -> int:
-    """List quadruples of a pair, the newest direction and one between; return the new count."""
+    """List quadruples of a pair, the newest direction and one between; return their count."""
     tail, head = pair
     larger = max(tail, head)
     for word in range(larger // WORD, (newest + WORD - 1) // WORD):
@@ -128,7 +128,7 @@ def _place(bit: np.uint64) -> int:
 
 @loop()
 def _mark(table: NDArray[np.uint64], i: int, j: int, k: int) -> None:
-    """Mark that (i, j, k) turns this way, and with it (j, k, i) and (k, i, j)."""
+    """Mark the triple (i, j, k) as positive, and with it (j, k, i) and (k, i, j)."""
     one = np.uint64(1)
     table[i, j, k // WORD] |= one << np.uint64(k % WORD)
     table[j, k, i // WORD] |= one << np.uint64(i % WORD)
@@ -137,7 +137,7 @@ def _mark(table: NDArray[np.uint64], i: int, j: int, k: int) -> None:
 
 @loop()
 def _sine(u: Array, v: Array, w: Array) -> float:
-    """Return the size of `triple_sine` of `spanning`."""
+    """Return the absolute value of `triple_sine` of `spanning`."""
     x, y, z = _crossed(v, w)
     determinant = abs(x * u[0] + y * u[1] + z * u[2])
     if determinant <= DEPENDENT:

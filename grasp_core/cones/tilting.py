@@ -1,4 +1,4 @@
-"""Force cones that positively span although the faces' normals do not.
+"""Tilts force cones so that they positively span although the faces' normals do not.
 
 Solved: for four normals n_i with friction cones of half-angles theta_i, axes a_i and one half-angle
 psi, as large as a search finds, such that the cones around a_i lie inside the friction cones and
@@ -41,42 +41,44 @@ from grasp_core.values import FINGERS
 
 KERNEL = "grasp_core.cones.tilting_kernel"
 CAPS = (0.3, 0.5, 0.7, 0.9)
-"""How far axes may lean while they are balanced, in friction angles."""
+"""Angles up to which axes may lean while they are balanced, in friction angles."""
 TOWARD = (0.5, 0.9)
-"""How far axes may lean to meet in a point, in friction angles."""
+"""Angles up to which axes may lean to meet in a point, in friction angles."""
 SWEEPS = 8
 MOVES = 60
 FIRST_MOVE = 0.2
 """Length of the first random move, in friction angles."""
 GROWTH, DECAY = 1.3, 0.9
-"""Factors on the length of the moves after a success and after a failure."""
+"""Factors on the length of random moves, after a success and after a failure."""
 SLIGHT = 1e-6
-"""Improvements and directions below this decide nothing: vertices that are off by 1e-9 of an
+"""Size below which improvements and directions decide nothing: vertices that are off by 1e-9 of an
 object turn the normals of its small faces by a hundred times that."""
 PACE = (FIRST_MOVE, GROWTH, DECAY, SLIGHT)
 BESIDE = 0.1
-"""Sine of the angle from which on one axis counts as beside another."""
+"""Sine of the angle between two axes above which one can serve to find a direction across the
+other."""
 FLAT = 0.5
-"""Normals lie nearly in a plane if their spread across it is below this share of the next one."""
+"""Spread of normals across a plane, as a share of their next larger spread, below which they nearly
+lie in the plane."""
 SIDES = [tuple(s * np.array(p)) for s in (1, -1)
          for p in ((1, 1, -1, -1), (1, -1, 1, -1), (1, -1, -1, 1))]  # fmt: skip
 """Signs that put two fingers on either side of a plane."""
 CHUNK = 20_000
-"""Quadruples that are searched at once: some tens of megabytes."""
+"""Number of quadruples that are searched at once, which needs some tens of megabytes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TiltedCones:
-    """The four force cones of each of q quadruples."""
+    """Force cones of q quadruples, four for each."""
 
     axes: Array
     """Unit vectors along the cones' middles, (q, 4, 3)."""
     half_angles: Array
-    """Half-angle psi, the same for all four, (q,) [rad]; not positive where none was found."""
+    """Half-angle psi that the four cones share, (q,) [rad]; not positive where none was found."""
 
 
 def tilted_cones(normals: Array, thetas: Array) -> TiltedCones:
-    """Search force cones with wide half-angles for many quadruples.
+    """Search for wide force cones that positively span, for many quadruples.
 
     Args:
         normals: Unit vectors, (q, 4, 3).
@@ -91,7 +93,7 @@ def tilted_cones(normals: Array, thetas: Array) -> TiltedCones:
 
 
 def widest_half_angles(normals: Array, thetas: Array, sines: Array) -> Array:
-    """Bound the half-angles psi of all force cones by (2), however these are tilted, (q,) [rad].
+    """Bound the half-angles psi of all force cones by (2), however tilted, (q,) [rad].
 
     Where the normals span, the smallest over m of max angle(n_i, m) - 90 deg is theta*. Else it is
     negative, and taken where m is in the middle of two normals, or as far from three.
@@ -110,7 +112,7 @@ def widest_half_angles(normals: Array, thetas: Array, sines: Array) -> Array:
 
 
 def widened(directions: Array, normals: Array, thetas: Array) -> TiltedCones:
-    """Search force cones whose axes are near given directions inside the friction cones.
+    """Search for force cones with axes near given directions inside the friction cones.
 
     Args:
         directions: Directions to start from, such as those of balanced forces, (q, 4, 3).
@@ -122,7 +124,7 @@ def widened(directions: Array, normals: Array, thetas: Array) -> TiltedCones:
 
 
 def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> TiltedCones:
-    """Search force cones whose axes lean towards common points, as far as spanning lets them.
+    """Search for force cones whose axes lean towards common points as far as possible.
 
     Args:
         points: One point for each quadruple, (q, 3).
@@ -164,7 +166,7 @@ def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
 
 
 def _bent(normals: Array, thetas: Array) -> Iterator[Array]:
-    """Yield axes that leave a plane in which the normals nearly lie, two to either side of it."""
+    """Yield axes bent out of a plane in which the normals nearly lie, two to either side."""
     _, _, directions = np.linalg.svd(normals)
     across = directions[:, 2]
     turns = np.cross(normals[:, :1], normals[:, 1:])
@@ -181,23 +183,23 @@ def _bent(normals: Array, thetas: Array) -> Iterator[Array]:
 
 
 def half_angle(axes: Array, normals: Array, thetas: Array) -> Array:
-    """Return the largest psi that (1) allows, (q,) [rad]; negative where the axes do not span."""
+    """Return the largest psi that (1) allows, (q,) [rad]; negative where axes do not span."""
     reached = np.empty(len(axes))
     compiled(KERNEL).half_angles(*map(np.ascontiguousarray, (axes, normals, thetas)), reached)
     return reached
 
 
 def _balanced(normals: Array, caps: Array) -> Array:
-    """Point unit vectors, within caps around the normals, each against the sum of the others."""
+    """Point each unit vector against the sum of the others, within caps around normals."""
     axes = np.array(normals, order="C")
     compiled(KERNEL).balance(axes, axes.copy(), np.ascontiguousarray(caps), SWEEPS, SLIGHT)
     return axes
 
 
 def _into_cap(vectors: Array, centers: Array, angles: Array) -> Array:
-    """Return unit vectors along vectors (q, 3), or the nearest within angles (q,) of unit centers.
+    """Return the unit vectors nearest to vectors (q, 3) within angles (q,) of unit centres.
 
-    A vector without a direction across its center gives the center.
+    A vector with no component across its centre gives the centre.
     """
     along = np.einsum("qi,qi->q", vectors, centers)
     across = vectors - along[:, None] * centers
@@ -221,7 +223,7 @@ def _improved(axes: Array, normals: Array, thetas: Array) -> tuple[Array, Array]
 
 
 def _aside(axes: Array) -> tuple[Array, Array]:
-    """Return two directions across each axis, (q, 4, 3), the first also across one beside it."""
+    """Return two directions across each axis, (q, 4, 3); the first is across a second axis too."""
     first = np.zeros_like(axes)
     for ahead in range(FINGERS - 1, 0, -1):
         cross = np.cross(axes, np.roll(axes, -ahead, axis=1))

@@ -1,4 +1,4 @@
-"""Force cones are tilted until they span, for many quadruples (see `tilting`)."""
+"""Tilts force cones until they positively span, in compiled code (see `tilting`)."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ FINGERS = 4
 DEPENDENT = 1e-12
 """Determinant below which three axes are coplanar, as in `grasp_core.cones.spanning`."""
 SLIGHT = 1e-6
-"""Size below which nothing is decided, as in `grasp_core.cones.tilting`."""
+"""Size below which a difference decides nothing, as in `grasp_core.cones.tilting`."""
 
 
 @loop()
@@ -40,7 +40,7 @@ def lowest_heights(normals: Array, lowest: Array) -> None:
 
 @loop()
 def _height(normals: Array, middle: Array, side: float) -> float:
-    """Return the largest -n_i.m, for m along a vector or against it; infinite without direction."""
+    """Return the largest -n_i.m for m along or against a vector; infinite for a zero vector."""
     length, least = np.sqrt(dotted(middle, middle)), np.inf
     if length <= SLIGHT:
         return np.inf
@@ -88,7 +88,7 @@ def improve(
     moves: Array,
     pace: Array,
 ) -> None:
-    """Move all axes of each quadruple at once, as long as that widens the cones.
+    """Move all four axes of each quadruple at random, and keep moves that widen the cones.
 
     Args:
         cones: Axes, changed in place, (q, 4, 3); half-angles, filled in, (q,) [rad].
@@ -126,7 +126,7 @@ def improve(
 
 @loop()
 def _half_angle(axes: Array, normals: Array, thetas: Array, floor: float) -> float:
-    """Return the largest psi; where that is no larger than a floor, anything up to the floor."""
+    """Return the largest psi, or any value up to `floor` if psi is not above it."""
     sine, least = _span_sine(axes), np.inf
     span = np.arcsin(min(sine, 1.0)) if sine > 0.0 else sine
     if span <= floor:
@@ -141,7 +141,7 @@ def _half_angle(axes: Array, normals: Array, thetas: Array, floor: float) -> flo
 
 @loop()
 def _span_sine(axes: Array) -> float:
-    """Compute `span_sines` of `grasp_core.cones.spanning` for one quadruple."""
+    """Compute the same as `span_sines` of `grasp_core.cones.spanning`, for one quadruple."""
     ab, ac, ad = _cosine(axes, 0, 1), _cosine(axes, 0, 2), _cosine(axes, 0, 3)
     bc, bd, cd = _cosine(axes, 1, 2), _cosine(axes, 1, 3), _cosine(axes, 2, 3)
     a, b = _determinant(axes, 1, 2, 3), -_determinant(axes, 0, 2, 3)
@@ -173,7 +173,7 @@ def _determinant(axes: Array, i: int, j: int, k: int) -> float:
 
 @loop()
 def _sine(determinant: float, g: float, h: float, k: float) -> float:
-    """Return the sine at which three cones first touch one plane, from cosines between axes."""
+    """Return the sine at which three cones first touch one plane, from the axes' cosines."""
     a, b, c = h * k - g, g * k - h, g * h - k
     most = max(max(a + b + c, a - b - c), max(b - a - c, c - a - b))
     return abs(determinant) / np.sqrt(3.0 - g * g - h * h - k * k + 2.0 * most)
@@ -183,7 +183,7 @@ def _sine(determinant: float, g: float, h: float, k: float) -> float:
 def _into_cap(
     vector: Array, center: Array, cosine: float, sine: float, slight: float, unit: Array
 ) -> None:
-    """Fill in the unit vector along a vector, or the nearest one in a cap around a center."""
+    """Fill in the unit vector nearest to a vector in a cap around a centre."""
     along, square = dotted(vector, center), 0.0
     for d in range(3):
         square += (vector[d] - along * center[d]) ** 2

@@ -1,4 +1,4 @@
-"""Upper bounds on the discs of concurrent grasps, with one common radius.
+"""Bounds the discs of concurrent grasps from above, by a program with one common radius.
 
 Solved: the program of `families.concurrent` for four equal discs, over (x0, y_1 .. y_4, r), for a
 focus before and behind all fingers; numbers in comments are those of its derivation. See
@@ -65,7 +65,7 @@ def _aim_rows(
     rows: Rows,
     row: int,
 ) -> int:
-    """Fill in rows (1): the focus x0 stays in the cones of a disc, over (x0 (3), y (4 x 2), r)."""
+    """Fill in rows (1), which keep the focus x0 in the cones of every point of a disc."""
     (a, finger), (turns, side) = place, facets
     sine, cosine = facet_sines(attempts.half_angles[a], len(turns))
     # (4): a focus behind the finger turns the facets round
@@ -93,7 +93,7 @@ def _aim_rows(
 
 @loop()
 def _inside_rows(faces: FaceTable, face: int, finger: int, rows: Rows, row: int) -> int:
-    """Fill in rows (2): a disc stays inside its face."""
+    """Fill in rows (2), which keep a disc inside its face."""
     y, r = 3 + 2 * finger, VARIABLES - 1
     for e in range(faces.edges[face]):
         rows.At[y, row], rows.At[y + 1, row] = faces.E[face, e, 0], faces.E[face, e, 1]

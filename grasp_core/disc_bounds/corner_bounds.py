@@ -1,4 +1,4 @@
-"""Upper bounds on discs from the faces' corners alone, at next to no cost.
+"""Bounds discs from above by the corners of the faces alone, which costs almost no time.
 
 Reach. With positive weights w of sum w_i a_i = 0 for the axes, and contacts c_i on the faces,
 sum w_i a_i.(x0 - c_i) = -sum w_i a_i.c_i wherever the focus x0 is. So the weighted mean of the
@@ -45,11 +45,14 @@ from grasp_core.values import FINGERS
 
 KERNEL = "grasp_core.disc_bounds.corner_bounds_kernel"
 PARALLEL = 1e-6
-"""Axes with 1 - a_i.a_j below this are so nearly parallel that they bound no width."""
+"""Value of 1 - a_i.a_j below which two axes are so nearly parallel that they bound no width."""
 
 
 def corners_of(body: Polyhedron) -> Corners:
-    """Corners of each face about the centre of mass over the radius, the first corner repeated."""
+    """Return the corners of each face at object size one, the first corner repeated.
+
+    Lengths are divided by the object's radius and counted from its centre of mass.
+    """
     corners = [
         (np.vstack([face.polygon, *face.holes]) - body.center_of_mass) / body.radius
         for face in body.faces
@@ -63,7 +66,7 @@ def corners_of(body: Polyhedron) -> Corners:
 def disc_limits(
     corners: Corners, normals: Array, faces: Indices, axes: Array, half_angles: Array
 ) -> Array:
-    """Upper bounds on the discs of many quadruples, (q, 4).
+    """Bound the discs of many quadruples from above, (q, 4).
 
     Args:
         corners: Corners of all faces.
@@ -85,7 +88,7 @@ def disc_limits(
 
 
 def angle_limits(extent: float, widths: Array, half_angles: Array) -> Array:
-    """Upper bounds on discs where only the cones' widths are known, not their axes, (q, 4).
+    """Bound the discs from above where only the cones' half-angles are known, (q, 4).
 
     Args:
         extent: Largest distance of a corner from the centre of mass, which no reach exceeds.
@@ -98,7 +101,7 @@ def angle_limits(extent: float, widths: Array, half_angles: Array) -> Array:
 
 
 def distances(corners: Corners) -> Array:
-    """Upper bounds on the distance between a point of one face and one of another, (f, f)."""
+    """Bound the distance between points of two faces from above, (f, f)."""
     middles = corners.points.mean(axis=1)
     radii = np.linalg.norm(corners.points - middles[:, None], axis=-1).max(axis=1)
     between = np.linalg.norm(middles[:, None] - middles, axis=-1)
@@ -107,10 +110,10 @@ def distances(corners: Corners) -> Array:
 
 
 def widths_apart(faces: Indices, apart: Array, halves: Array, leaning: Array) -> Array:
-    """Upper bounds on s_i + s_j for axes that lean from the normals, (q, 4, 4).
+    """Bound s_i + s_j from above for axes that lean from the normals, (q, 4, 4).
 
     The vector d of (2) has the length 2 / |a_i - a_j|, and the angle between the axes differs from
-    the angle between the normals by at most what both lean.
+    the angle between the normals by at most the sum of both leans.
 
     Args:
         faces: Faces of each quadruple, (q, 4).

@@ -1,4 +1,4 @@
-"""Upper bounds on discs from the faces' corners, compiled for many quadruples.
+"""Bounds discs from above by the corners of the faces, in compiled code.
 
 Numbers in comments are those of the derivation in `disc_bounds.corner_bounds`.
 """
@@ -13,7 +13,8 @@ from grasp_core.geometry.vectors_kernel import balancing_weights, cross, dotted
 FINGERS = 4
 PAIRINGS = ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2))
 PARALLEL = 1e-6
-"""Axes with 1 - a_i.a_j, or with a cross product, below this are nearly parallel: no bound."""
+"""Size of 1 - a_i.a_j, or of a cross product, below which axes are nearly parallel and give no
+bound."""
 
 
 @loop()
@@ -25,7 +26,7 @@ def fill(
     half_angles: Array,
     limits: Array,
 ) -> None:
-    """Bound the discs of quadruples (see `disc_limits`).
+    """Bound the discs of many quadruples from above (see `disc_limits`).
 
     Args:
         corners: Corners of all faces.
@@ -57,7 +58,7 @@ def fill(
 
 @loop()
 def reaches(corners: Corners, faces: Indices, axes: Array) -> tuple[float, float]:
-    """The bound (1) on the mean distance of a focus before, and behind, its contacts."""
+    """Compute the bounds (1) on the mean distance of a focus before and behind its contacts."""
     weights, before, behind = np.empty(FINGERS), 0.0, 0.0
     balancing_weights(axes, weights)
     for i in range(FINGERS):
@@ -68,7 +69,7 @@ def reaches(corners: Corners, faces: Indices, axes: Array) -> tuple[float, float
 
 @loop()
 def _width(corners: Corners, faces: Indices, axes: Array, pair: tuple[int, int]) -> float:
-    """The bound (2) on s_i + s_j."""
+    """Compute the bound (2) on s_i + s_j."""
     (i, j), apart = pair, np.empty(3)
     for d in range(3):
         apart[d] = axes[i, d] - axes[j, d]
@@ -87,7 +88,7 @@ def _across(
     places: tuple[int, int, int, int],
     half: float,
 ) -> float:
-    """The bound on r by (3) and (4), with N across the axes of the first two fingers."""
+    """Compute the bound on r by (3) and (4), with N across the axes of the first two fingers."""
     N, limit, pair = np.empty(3), np.inf, FINGERS // 2
     cross(axes[places[0]], axes[places[1]], N)
     length = np.sqrt(dotted(N, N))
@@ -117,13 +118,13 @@ def _across(
 
 @loop()
 def _lean(normal: Array, N: Array) -> float:
-    """|T'N|: how far a disc of radius one reaches along N."""
+    """Compute |T'N|: how far a disc of radius one reaches along N."""
     return np.sqrt(max(1.0 - dotted(normal, N) ** 2, 0.0))
 
 
 @loop()
 def _extent(corners: Corners, face: int, direction: Array) -> tuple[float, float]:
-    """Least and largest height of a face's corners along a direction."""
+    """Find the least and largest height of a face's corners along a direction."""
     low, high = np.inf, -np.inf
     for k in range(corners.counts[face]):
         height = 0.0

@@ -1,4 +1,4 @@
-"""Upper bounds on the discs of pencil grasps, with one common radius.
+"""Bounds the discs of pencil grasps from above, by programs with one common radius.
 
 Solved: the program of `families.pencil` for four equal discs, in both cells; numbers in comments
 are those of its derivation. The ball about each focus is no larger than needed, R = r + the largest
@@ -21,16 +21,16 @@ from grasp_core.geometry.vectors_kernel import angle_between, dotted, focus_dire
 from grasp_core.solvers.lp_kernel import Rows
 
 VARIABLES, K = 5, 3
-"""Number of variables, and the place of k, half the distance of the foci, among them."""
+"""Number of variables, and the index of k, half the distance of the foci, among them."""
 CELL_A, CELL_B = -1.0, 1.0
-"""Sign of k u in the focus of the first two fingers."""
+"""Sign of k u in the focus of the first two fingers, for the two orders of the foci."""
 
 
 @loop()
 def pencil_bounds(
     faces: FaceTable, attempts: Attempts, least_gap: float, least: float, bounds: Array
 ) -> None:
-    """Bound the discs of pencil grasps in both cells.
+    """Bound the discs of pencil grasps from above, for both orders of the foci.
 
     Args:
         faces: The faces of the object.
@@ -61,7 +61,7 @@ def pencil_bounds(
 def _depth_along(
     faces: FaceTable, attempts: Attempts, place: tuple[int, int], cell: float, u: Array
 ) -> tuple[Array, float, float]:
-    """The depth s of a finger by (1): its slopes in (x0, k), its constant, the sign of k u."""
+    """Express the depth s of a finger by (1): slopes in (x0, k), constant, sign of k u."""
     a, finger = place
     face, s = attempts.faces[a, finger], np.empty(K + 1)
     n, o = faces.normals[face], faces.origins[face]
@@ -136,7 +136,7 @@ def _near_row(
     rows: Rows,
     row: int,
 ) -> int:
-    """Fill in the row (5): a focus of cell B does not pass the other crossing."""
+    """Fill in the row (5): a focus of cell B does not pass the other pair's crossing point."""
     (a, finger, u), (s, s0, sign) = setting, depth
     face = attempts.faces[a, finger]
     toward = sign * dotted(attempts.axes[a, finger], u)

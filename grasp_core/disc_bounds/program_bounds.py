@@ -1,4 +1,4 @@
-"""Upper bounds on the disc radius of many attempts, from small programs in compiled code.
+"""Bounds the disc radii of many attempts from above, by small programs in compiled code.
 
 An attempt is four faces in the order of the fingers, with a force cone each. Where a construction
 has discs, the bound is the value of the first program of `largest_discs`, which maximises the
@@ -34,9 +34,9 @@ class AttemptBounds:
     shapes: Shapes
 
     def of(self, construction: Construction, attempts: Attempts, least: float) -> Array:
-        """Upper bounds on the smallest radius, (a,) [object radii]; infinite where none is proved.
+        """Bound the smallest radius from above, (a,) [object radii]; infinite if not proved.
 
-        For reguli they are infinite or, where no slopes are feasible, minus infinity.
+        For reguli the bounds are infinite or, where no slopes are feasible, minus infinity.
 
         Args:
             construction: The construction of a family.
@@ -70,5 +70,5 @@ class AttemptBounds:
 
     @cached_property
     def _table(self) -> FaceTable:
-        """The hulls of all faces as one table."""
+        """Put the hulls of all faces into one table."""
         return face_table([shape.hull if shape else None for shape in self.shapes])

@@ -1,4 +1,4 @@
-"""Shared parts of the disc programs in compiled code: rows, cone facets and checked bounds.
+"""Shares rows, cone facets and checked bounds between the disc programs in compiled code.
 
 The programs of `concurrent` and `pencil` grow four discs and maximise the smallest radius. Its
 optimum alone is found with all four radii equal, since rows only get tighter as a radius grows.
@@ -15,13 +15,13 @@ from grasp_core.solvers.lp_kernel import LOST, Rows, Vertex, proved_bound, solve
 
 FINGERS = 4
 ACCURACY = 1e-12
-"""How far multipliers may be from giving the objective: even if a focus is a thousand object radii
-away, this is worth less than the accuracy of a program's answer."""
+"""Error up to which multipliers give the objective: even if a focus is a thousand object radii
+away, the bound changes by less than the accuracy of a program's answer."""
 
 
 @loop()
 def edges_of(faces: FaceTable, attempts: Attempts, a: int) -> int:
-    """Number of edges of the four faces of an attempt."""
+    """Count the edges of the four faces of an attempt."""
     count = 0
     for finger in range(FINGERS):
         count += int(faces.edges[attempts.faces[a, finger]])
@@ -30,14 +30,14 @@ def edges_of(faces: FaceTable, attempts: Attempts, a: int) -> int:
 
 @loop()
 def facet_sines(half_angle: float, sides: int) -> tuple[float, float]:
-    """Sine and cosine of the half-angle of the cone that an inscribed pyramid's facets touch."""
+    """Compute sine and cosine of the half-angle of the cone that touches a pyramid's facets."""
     tangent = np.tan(half_angle) * np.cos(np.pi / sides)
     return tangent / np.hypot(1.0, tangent), 1.0 / np.hypot(1.0, tangent)
 
 
 @loop()
 def room_for(room: Array, n: int, count: int) -> Rows:
-    """Empty rows of a program of n variables, in memory that is reused."""
+    """Make empty rows for a program of n variables, in memory that is reused."""
     At = room[: n * count].reshape(n, count)
     At[:] = 0.0
     b, norms = room[n * count : (n + 1) * count], room[(n + 1) * count : (n + 2) * count]
@@ -46,7 +46,7 @@ def room_for(room: Array, n: int, count: int) -> Rows:
 
 @loop()
 def bounded(rows: Rows, least: float) -> float:
-    """An upper bound on the radius; where it is above `least`, the tightest one."""
+    """Compute an upper bound on the radius; above `least` it is the tightest one."""
     c, vertex = np.zeros(len(rows.At)), vertex_of(len(rows.At))
     c[-1] = 1.0
     measure(rows)
@@ -57,13 +57,13 @@ def bounded(rows: Rows, least: float) -> float:
 
 @loop()
 def vertex_of(n: int) -> Vertex:
-    """Room for one vertex of a program with n variables."""
+    """Make an empty vertex of a program with n variables."""
     return Vertex(np.empty(n, dtype=np.int64), np.empty(n), np.empty(n))
 
 
 @loop()
 def measure(rows: Rows) -> None:
-    """Fill in the lengths of the rows, by which the solver measures violations."""
+    """Compute the lengths of the rows, by which the solver measures violations."""
     rows.norms[:] = 0.0
     for i in range(len(rows.At)):
         for k in range(len(rows.norms)):

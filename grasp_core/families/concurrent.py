@@ -1,4 +1,4 @@
-"""Concurrent grasps: four lines of force that meet in one focus point.
+"""Constructs concurrent grasps: four lines of force that meet in one focus point.
 
 Solved: for four convex faces and a force cone at each, the focus point x0 and four discs of
 the largest common radius r, one inside each face, such that x0 lies in the force cone of
@@ -58,7 +58,7 @@ from grasp_core.solvers.ties import surpassing
 from grasp_core.values import FINGERS, ForceCone, four
 
 RADII, SMALLEST = slice(11, 15), 15
-"""Places of the four radii and of their lower bound r among the 16 variables."""
+"""Indices of the four radii and of their lower bound r among the 16 variables."""
 
 
 Sides: TypeAlias = tuple[float, float, float, float]
@@ -72,7 +72,7 @@ MIXED_SIDES: tuple[Sides, ...] = tuple(
 def place_concurrent(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone], *, least: float
 ) -> Placement | NoPlacement:
-    """Place a focus point and four discs of the largest common radius, on the better side.
+    """Place a focus before or behind all fingers, and the largest four equal discs.
 
     Args:
         pieces: Four convex pieces, in finger order, in units where the object has size one.
@@ -90,9 +90,9 @@ def place_concurrent(
 def place_on_mixed_sides(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone], *, least: float
 ) -> Placement | NoPlacement:
-    """Place a focus before some fingers and behind the others, with discs as `place_concurrent`.
+    """Place a focus before some fingers and behind the others, with four discs.
 
-    Fourteen patterns of sides are tried, each for discs larger than the ones before. This is for
+    Fourteen patterns of sides are tried, each for discs larger than those found before. This is for
     faces on which nothing else was found; on convex objects it hardly ever finds anything.
     """
     return _best(pieces, cones, ((sides, math.inf) for sides in MIXED_SIDES), least)
@@ -104,7 +104,10 @@ def _best(
     patterns: Iterable[tuple[Sides, float]],
     least: float,
 ) -> Placement | NoPlacement:
-    """The largest discs over patterns of sides, each given with an upper bound on its discs."""
+    """Place the largest discs over several patterns of sides.
+
+    Each pattern comes with an upper bound on its discs.
+    """
     best: Placement | None = None
     bound = -math.inf
     for sides, limit in patterns:
@@ -121,7 +124,7 @@ def _best(
 
 
 def _reaches(pieces: Sequence[FacePiece], cones: Sequence[ForceCone]) -> tuple[float, float]:
-    """Upper bounds on the weighted mean of s_i in (5), the focus before and behind all fingers."""
+    """Bound the weighted mean of s_i in (5), for a focus before and behind all fingers."""
     heights = [
         cone.axis @ (piece.origin[:, None] + piece.frame @ piece.corners.T)
         for piece, cone in zip(pieces, cones, strict=True)
@@ -160,10 +163,10 @@ def place_on_sides(
 
 
 def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array, contact: Array) -> Array:
-    """Corners of the part of a piece from which a line in the force cone meets the focus, (k, 3).
+    """Cut a piece to where a line in the force cone meets the focus, (k, 3).
 
-    This is the inverted cone of section 3.1 on the contact's side of the focus, inscribed by the
-    same pyramid as in the program.
+    The result is the inverted cone of section 3.1 on the contact's side of the focus, inscribed by
+    the same pyramid as in the program.
     """
     side = 1.0 if float(cone.axis @ (focus - contact)) > 0.0 else -1.0
     G = side * inscribed_facets(cone, piece.frame[:, 0])
@@ -174,9 +177,9 @@ def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array, contact: Arr
 
 
 def concurrent_radius_bounds(reaches: Array, _: Array, half_angles: Array) -> Array:
-    """Upper bounds on the discs of quadruples, (..., 1), by (5).
+    """Bound the discs of quadruples from above by (5), (..., 1).
 
-    The least s_i is at most the weighted mean.
+    The least s_i is at most the weighted mean of all s_i.
 
     Args:
         reaches: Upper bounds on the weighted mean of s_i, any shape [object radii].
@@ -189,7 +192,7 @@ def concurrent_radius_bounds(reaches: Array, _: Array, half_angles: Array) -> Ar
 def _rows(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone], sides: Sides
 ) -> tuple[Array, Array]:
-    """Rows A x <= b over x = (x0 (3), y (4 x 2), radii r_i (4), r), (rows, 16) and (rows,)."""
+    """Build rows A x <= b over x = (x0 (3), y (4 x 2), radii r_i (4), r)."""
     rows: list[Array] = []
     limits: list[Array] = []
     for i, (piece, cone, side) in enumerate(zip(pieces, cones, sides, strict=True)):

@@ -1,4 +1,4 @@
-"""The paper's three constructions behind one interface, which the planner uses for all of them."""
+"""Gives the paper's three constructions one interface, which the planner uses."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -29,32 +29,31 @@ PAIRINGS: tuple[FingerOrder, ...] = ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2))
 """The three ways to group four faces into the pairs (first, second) and (third, fourth)."""
 LEAST_RADIUS = 1e-3
 """Least radius, relative to the object's, of a disc that counts as a region to stand in; foci of a
-pencil closer than this count as one point."""
+pencil that are closer than this count as one point."""
 DISC_CORNERS = 64
-"""Number of points of a disc's border that are listed."""
+"""Number of points that are listed on the border of a disc."""
 
 
 @dataclass(frozen=True, slots=True)
 class Construction:
-    """The construction of one family, with what the planner needs to know about it."""
+    """The construction of one family, with the functions that the planner needs for it."""
 
     family: Family
     orders: tuple[FingerOrder, ...]
-    """Finger orders that give different grasps of the same faces."""
+    """Orders of the fingers on the same faces that give different grasps."""
     place: Callable[[Sequence[FacePiece], Sequence[ForceCone], float], Placement | NoPlacement]
-    """Places contacts, given pieces, force cones and the least merit that counts."""
+    """Function that places contacts, given pieces, force cones and the least merit that counts."""
     limits: slice | None
-    """The `disc_limits` of a quadruple that belong to the finger orders; None where no disc is
-    claimed."""
+    """Columns of `disc_limits` that belong to the finger orders; None where no disc is claimed."""
     admits: Callable[[Array, Array], NDArray[np.bool_]]
-    """Whether quadruples are worth a program, (q,), from their normals in finger order, (q, 4, 3),
-    and half-angles, (q,) [rad]: False only where no program can be feasible."""
+    """Function that returns for which quadruples a program may be feasible, (q,), from normals in
+    finger order, (q, 4, 3), and half-angles, (q,) [rad]."""
     region: Region
-    """Makes the region of one finger, in the pieces' units."""
+    """Function that makes the region of one finger, in the pieces' units."""
 
     @property
     def least(self) -> float:
-        """The merit that a placement must exceed to count."""
+        """Return the merit that a placement must exceed to count."""
         return LEAST_RADIUS if self.limits else -math.inf
 
 
@@ -79,7 +78,7 @@ def _disc_region(piece: FacePiece, _: ForceCone, placed: Placement, finger: int)
 def regions_of(
     region: Region, pieces: Sequence[FacePiece], cones: Sequence[ForceCone], placed: Placement
 ) -> tuple[ContactRegion, ...]:
-    """The regions of all fingers, in the pieces' units."""
+    """Make the regions of all fingers, in the pieces' units."""
     return tuple(
         region(piece, cone, placed, finger)
         for finger, (piece, cone) in enumerate(zip(pieces, cones, strict=True))
@@ -87,7 +86,7 @@ def regions_of(
 
 
 def point_region(_: FacePiece, __: ForceCone, placed: Placement, finger: int) -> ContactRegion:
-    """A region of one point, the contact itself."""
+    """Make a region of one point, the contact itself."""
     return ContactRegion("point", placed.positions[finger][None], 0.0)
 
 
@@ -99,7 +98,7 @@ MIXED = Construction(
     _always_admitted,
     _cone_region,
 )
-"""Concurrent grasps with the focus before some fingers and behind the others."""
+"""Construction of concurrent grasps with the focus before some fingers and behind the others."""
 
 CONSTRUCTIONS: dict[Family, Construction] = {
     "concurrent": Construction(

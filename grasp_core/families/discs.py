@@ -1,4 +1,4 @@
-"""Four discs of the largest common radius, each of them then as large as it can be.
+"""Finds four discs of the largest common radius, and then enlarges each as far as possible.
 
 The first program maximises the smallest radius. That radius may be negative, so the program is
 always feasible and the sign of its optimum, with the multipliers that prove it, decides. The
@@ -26,8 +26,8 @@ from grasp_core.solvers.lp import (
 from grasp_core.solvers.ties import nearest_optimum
 
 KEPT = 1e-6
-"""Share of the smallest radius that the second program may give up. With less, its optima would be
-slivers, in which rounding moves the nearest point a thousand times as far."""
+"""Share of the smallest radius that the second program may give up. With less, its optima would
+form slivers, in which rounding moves the nearest point a thousand times as far."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,15 +35,16 @@ class LargestDiscs:
     """The variables of the disc program, and the radius that it maximised."""
 
     x: Array
-    """Variables, (n,); their radii are reduced by what a program's answer may be off."""
+    """Variables, (n,); the radii among them are reduced by the error of a program's answer."""
     merit: float
-    """Optimum of the smallest radius: the same on every machine but for the last digits."""
+    """Largest value of the smallest radius: the same on every machine except for the last digits.
+    """
 
 
 def largest_discs(
     A: Array, b: Array, radii: slice, smallest: int, least: float
 ) -> LargestDiscs | NoPlacement:
-    """Solve both programs over the variables x with A x <= b.
+    """Find the largest four equal discs, then enlarge each, subject to rows A x <= b.
 
     Args:
         A: Rows over the variables, (rows, n); they keep the smallest radius below each of the four.
@@ -62,7 +63,9 @@ def largest_discs(
     common = np.eye(n)[smallest]
     first = maximize_above(LinearProgram(common, A, b), least)
     if isinstance(first, Infeasible):
-        raise SolverError("a program that is feasible for small enough radii was called infeasible")
+        raise SolverError(
+            "the solver called a disc program infeasible, though small discs always fit"
+        )
     if isinstance(first, Below):
         return NoPlacement(first.bound)
     if first.value < least:

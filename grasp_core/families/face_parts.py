@@ -1,4 +1,4 @@
-"""Parts of four convex pieces: repeated halves, randomly shrunk pieces, and contacts at corners."""
+"""Divides four convex pieces into halves, shrinks them at random, and puts contacts at corners."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -12,19 +12,20 @@ from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.ties import first_best
 
 SMALLER = 0.5
-"""Size of random parts relative to the piece."""
+"""Size of randomly shrunk pieces, relative to the piece."""
 DEEPEST = 1000
-"""Most cuts in a row: more leave parts smaller than floating-point numbers can tell apart."""
+"""Largest number of cuts in a row: more leave parts smaller than floating-point numbers can tell
+apart."""
 Corners = tuple[Array, ...]
 """Corners of a convex part of each piece, each (k, 2) in the plane coordinates of its piece."""
 Path = tuple[int, ...]
-"""The half, 0 or 1, that was taken at each cut."""
+"""The half, 0 or 1, that was kept at each cut."""
 
 
 def random_parts(
     pieces: Sequence[FacePiece], rng: np.random.Generator, count: int
 ) -> Iterator[Corners]:
-    """Yield the pieces, each shrunk about one of its points at random."""
+    """Yield the four pieces, each shrunk about a random point of it."""
     for _ in range(count):
         parts: list[Array] = []
         for piece in pieces:
@@ -34,14 +35,14 @@ def random_parts(
 
 
 def corner_contacts(pieces: Sequence[FacePiece], part: Corners) -> tuple[Array, Array]:
-    """Positions and normals of contacts at all corners of a part, each (k, 3)."""
+    """Put contacts at all corners of a part; return positions and normals, each (k, 3)."""
     points = [p.origin + corners @ p.frame.T for p, corners in zip(pieces, part, strict=True)]
     normals = [np.tile(p.normal, (len(c), 1)) for p, c in zip(pieces, part, strict=True)]
     return np.vstack(points), np.vstack(normals)
 
 
 def part_at(pieces: Sequence[FacePiece], path: Path) -> Corners:
-    """The part reached by cutting the polygon with the longest diagonal at each step of a path."""
+    """Return the part reached by a path, which cuts the polygon with the longest diagonal."""
     part = [piece.corners for piece in pieces]
     for half in path:
         spans = [_longest(corners) for corners in part]
@@ -51,12 +52,12 @@ def part_at(pieces: Sequence[FacePiece], path: Path) -> Corners:
 
 
 def is_path(value: Any) -> bool:
-    """Whether a value is a path: a tuple of halves, not too long."""
+    """Return whether a value is a path: a tuple of halves that is not too long."""
     return is_tuple_of(value, int) and len(value) <= DEEPEST and set(value) <= {0, 1}
 
 
 def cover_everything(paths: Sequence[Path]) -> bool:
-    """Whether parts, none of them within another, together make up the whole."""
+    """Return whether parts, none of them inside another, together make up the whole."""
     halves = all(half in {0, 1} for path in paths for half in path)
     apart = not any(
         two[: len(one)] == one
@@ -71,7 +72,7 @@ def cover_everything(paths: Sequence[Path]) -> bool:
 
 
 def _longest(corners: Array) -> tuple[float, Array]:
-    """Length and unit direction of the longest line between two corners."""
+    """Return length and unit direction of the longest line between two corners."""
     between = (corners[:, None] - corners[None]).reshape(-1, 2)
     lengths = np.linalg.norm(between, axis=1)
     far = first_best(lengths)

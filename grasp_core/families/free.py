@@ -1,15 +1,15 @@
-"""Grasps of four convex faces without a type fixed in advance, or a proof that there is none.
+"""Finds grasps of any type on four convex faces, or a proof that there is none (free method).
 
 Solved: whether any four contacts, one on each of four convex faces, are in force closure at a
 given friction, at any friction and for any normals.
 
-Derivation. Put a contact at every corner of the four faces: the patch. A force at any point of
-a convex face is a convex combination of the same force at its corners, so
+Derivation. Put a contact at every corner of the four faces: the corner contacts. A force at any
+point of a convex face is a convex combination of the same force at its corners, so
 
-    four contacts on the faces in force closure  =>  the patch in force closure.         (1)
+    four contacts on the faces in force closure  =>  the corner contacts in force closure. (1)
 
-A separating twist of the patch is therefore a proof of absence; by convexity of the supports it
-separates every grasp on these faces.
+A separating twist of the corner contacts is therefore a proof of absence; by convexity of the
+supports it separates every grasp on these faces.
 
 If the patch is closed, its forces, added up face by face, say where four contacts balance
 (`free_contacts`). If no contacts are found in this way, patches of smaller random pieces of the
@@ -52,20 +52,21 @@ from grasp_core.values import FINGERS
 RESTARTS = 12
 """Default number of smaller random patches that are tried."""
 SAME_CORNERS = 1e-12
-"""How far contacts of a proof may be from the corners of its part: thousands of roundings."""
+"""Distance of a proof's contacts from the corners of its part that counts as rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Absence:
-    """Proof that no four contacts on four convex pieces are in force closure."""
+    """A proof that no four contacts on four convex pieces are in force closure."""
 
     pieces: tuple[FacePiece, ...]
     friction: float
     leaves: tuple[tuple[Path, ClosureCertificate], ...]
-    """Parts that together cover the pieces, each with a twist that separates its patch."""
+    """Parts that together cover the pieces, each with a twist that separates contacts at all its
+    corners."""
 
     def verify(self) -> bool:
-        """Re-check every field in plain arithmetic.
+        """Check every field again in plain arithmetic.
 
         This checks that the pieces are convex polygons, and that the parts cover them and are all
         separated. Whoever has the object checks that the pieces are parts of its faces.
@@ -99,11 +100,11 @@ class Absence:
 
 @dataclass(frozen=True, slots=True)
 class Undecided:
-    """The free method found neither a grasp nor a proof of absence within its budget."""
+    """The answer when the free method found neither a grasp nor a proof within its budget."""
 
     open_parts: int
     open_share: float
-    """Open share of all choices of contacts, where each cut counts for half."""
+    """Share of all choices of contacts that is undecided, where each cut counts for half."""
 
 
 def place_free(
@@ -120,15 +121,15 @@ def place_free(
         pieces: Four convex pieces, in finger order, in units where the object has size one.
         friction: Coulomb coefficient at every contact, positive.
         rng: Source of the random restarts.
-        cells: Most parts of the pieces to examine; with 1 nothing is split.
-        restarts: Number of smaller random patches to try before giving up or splitting.
+        cells: Largest number of parts of the pieces to examine; with 1 nothing is divided.
+        restarts: Number of smaller random pieces to try before giving up or dividing.
 
     Raises:
         InputError: The friction is not positive.
         SolverError: A program's answer failed its check.
     """
     if not friction > 0.0:
-        raise InputError(f"friction must be positive, got {friction}")
+        raise InputError(f"friction must be greater than 0, got {friction}")
     leaves: list[tuple[Path, ClosureCertificate]] = []
     waiting: list[tuple[float, Path]] = [(0.0, ())]
     examined = 0
@@ -164,7 +165,7 @@ def _share(waiting: Sequence[tuple[float, Path]]) -> float:
 def close_patch(
     pieces: Sequence[FacePiece], part: Corners, friction: float
 ) -> ClosureCertificate | None:
-    """Closure certificate of contacts at all corners of a part; None if too close to call."""
+    """Decide force closure of contacts at all corners of a part; None if too close to call."""
     try:
         return force_closure(*corner_contacts(pieces, part), friction)
     except UndecidedError:

@@ -1,4 +1,4 @@
-"""The inputs of kernels as plain arrays; numba is not needed to fill them."""
+"""Holds the inputs of compiled code as plain arrays; filling them does not need numba."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from grasp_core.objects.face_pieces import FacePiece
 
 
 class FaceTable(NamedTuple):
-    """Convex faces at unit size, in the letters of `FacePiece`."""
+    """Convex faces at unit size, with the letters of `FacePiece`."""
 
     normals: Array
     """Inward unit normals, (f, 3)."""
@@ -19,52 +19,54 @@ class FaceTable(NamedTuple):
     frames: Array
     """Frames of the plane coordinates, (f, 3, 2)."""
     E: Array
-    """Rows of E y <= b inside the faces, (f, e, 2); a face fills as many rows as it has edges."""
+    """Unit outward edge normals, rows of E y <= b inside the faces, (f, e, 2); a face with fewer
+    edges leaves rows unused."""
     b: Array
-    """Limits of these rows, (f, e)."""
+    """Limits of the rows E y <= b, (f, e)."""
     edges: Indices
     """Number of edges of each face, (f,)."""
     corners: Array
-    """Corners in space, (f, e, 3); a face fills as many rows as it has edges."""
+    """Corners in space, (f, e, 3); a face with fewer corners leaves rows unused."""
     depths: Array
     """Largest distance of the surface from each plane, (f,)."""
 
 
 class Attempts(NamedTuple):
-    """Attempts: four faces in finger order with a force cone each."""
+    """Many attempts, each with four faces in finger order and a force cone for each face."""
 
     faces: Indices
     """Indices of the faces, (a, 4)."""
     axes: Array
     """Unit cone axes, (a, 4, 3)."""
     half_angles: Array
-    """Half-angle of the four cones, (a,) [rad]."""
+    """Half-angle that the four cones of an attempt share, (a,) [rad]."""
 
 
 class Corners(NamedTuple):
-    """Corners of faces, padded to the largest number of corners."""
+    """Corners of faces, in arrays as long as the largest number of corners."""
 
     points: Array
-    """Corners in space, (f, c, 3); a face fills as many rows as it has corners."""
+    """Corners in space, (f, c, 3); a face with fewer corners leaves rows unused."""
     counts: Indices
     """Number of corners of each face, (f,)."""
 
 
 class RegulusTerms(NamedTuple):
-    """Settings of `families.regulus`: which slopes are tried, and what counts as a regulus."""
+    """Settings of `families.regulus`: slopes to try, and which lines count as a regulus."""
 
     turns: Array
     """Cosines and sines of the directions in which a pyramid's facets lean, (m, 2)."""
     shares: Array
-    """Shares of each slope's interval of angles at which it is tried, (s,)."""
+    """Positions, as shares of each slope's interval of angles, at which slopes are tried, (s,)."""
     depth: float
-    """Least height of the passing points over their faces, in object radii."""
+    """Least height, over their faces, of the points where lines pass the focus line, in object
+    radii."""
     inset: float
     """Least distance of a contact from the edges of its face, in object radii."""
     gap: float
     """Least distance at which a line passes the focus line, in object radii."""
     tie: float
-    """Merits that differ by no more count as equal: the slopes tried first win."""
+    """Difference of merit that counts as none; of equal slopes, those tried first win."""
     enough: float
     """Merit above which no better slopes are sought."""
 

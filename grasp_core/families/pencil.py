@@ -1,4 +1,4 @@
-"""Pencil grasps: two pairs of lines of force, each meeting in a focus on a common line.
+"""Constructs pencil grasps: two pairs of lines of force, each with a focus on a common line.
 
 Solved: for four convex faces with a force cone each, grouped into the pairs (0, 1) and
 (2, 3), two focus points c_1, c_2 and discs of the largest common radius r, one inside each
@@ -68,9 +68,9 @@ from grasp_core.values import FINGERS, FaceQuadruple, ForceCone
 
 Cell: TypeAlias = tuple[float, float]
 CELL_A, CELL_B = (-1.0, 1.0), (1.0, -1.0)
-"""Signs of k u in c_1 and c_2, by (4) and (5)."""
+"""Signs of k u in c_1 and c_2 for the two orders of the foci, by (4) and (5)."""
 X0, K, BALL, RADII, SMALLEST = slice(0, 3), 3, 4, slice(5, 9), 9
-"""Places of the variables: x0, k, R, the radii r_ij and their lower bound r."""
+"""Indices of the variables: x0, k, R, the radii r_ij and their lower bound r."""
 VARIABLES = 10
 
 
@@ -82,7 +82,7 @@ def place_pencil(
     least_gap: float,
     cells: Sequence[Cell] = (CELL_A, CELL_B),
 ) -> Placement | NoPlacement:
-    """Place two foci and four discs of the largest common radius, in the better cell.
+    """Place two foci and the largest four equal discs, for the better order of the foci.
 
     Args:
         pieces: Four convex pieces; the pencils are (0, 1) and (2, 3).
@@ -109,15 +109,15 @@ def place_pencil(
 def pencil_radius_bounds(
     reaches: Array, widths: Array, half_angles: Array, orders: Sequence[FaceQuadruple]
 ) -> Array:
-    """Upper bounds on the discs of quadruples, in several orders of the fingers, (..., orders).
+    """Bound the discs of quadruples from above, for several finger orders, (..., orders).
 
     With kappa >= cos(psi), (2) and (3) leave r <= s tan(psi / 2) for each finger, and so for the
     mean of any fingers. Two fingers of a pair share a focus, hence the mean of their s is at most
-    half of their width.
+    half of the bound on s_i + s_j.
 
-    With positive weights of sum lam a = 0, (1) gives
-    sum lam_ij s_ij = -sum lam_ij a_ij.q_ij - (c_2 - c_1).w. In cell A the last term only lowers it.
-    In cell B it is 2 k |w|, at most half of the left side, which can therefore double.
+    With positive weights of sum lam a = 0, (1) gives sum lam_ij s_ij = -sum lam_ij a_ij.q_ij - (c_2
+    - c_1).w. In cell A the last term only lowers it. In cell B it is 2 k |w|, at most half of the
+    left side, which can therefore double.
 
     Args:
         reaches: Upper bounds on the mean distance of a focus along the axes, any shape.
@@ -137,7 +137,7 @@ class _Discs:
     """Disc centres (1) as functions of the variables v: depths s v + s0, plane points Q v + q."""
 
     C: Array
-    """Maps from the variables to each finger's focus, (4, 3, VARIABLES)."""
+    """Maps from the variables to the focus of each finger, (4, 3, VARIABLES)."""
     s: Array
     """Linear part of the depths, (4, VARIABLES); `s0` is the constant part, (4,)."""
     s0: Array
@@ -147,7 +147,7 @@ class _Discs:
     """Constant part of the centres, (4, 2)."""
 
     def in_cell(self, cell: Cell) -> "_Discs":
-        """The discs in another cell, given those of cell A: in cell B the sign of k changes."""
+        """Return the discs in another cell, given those of cell A; in cell B k changes its sign."""
         turn = np.ones(VARIABLES)
         turn[K] = cell[0] * CELL_A[0]
         return _Discs(self.C * turn, self.s * turn, self.s0, self.Q * turn, self.q)
@@ -181,7 +181,7 @@ def _place_in_cell(  # noqa: PLR0913, PLR0917 - a program's data
 
 
 def _discs(pieces: Sequence[FacePiece], cones: Sequence[ForceCone], u: Array) -> _Discs:
-    """Disc centres and depths for cell A, as linear functions of the variables."""
+    """Express disc centres and depths for cell A as linear functions of the variables."""
     n = np.array([piece.normal for piece in pieces])
     o = np.array([piece.origin for piece in pieces])
     T = np.array([piece.frame for piece in pieces])
@@ -200,7 +200,7 @@ def _discs(pieces: Sequence[FacePiece], cones: Sequence[ForceCone], u: Array) ->
 def _rows(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone], discs: _Discs, least_gap: float
 ) -> tuple[Array, Array]:
-    """The rows of both cells: the gap, three rows per finger, then the edges of the faces."""
+    """Build the rows of both cells: the gap, three rows per finger, the edges of the faces."""
     depths = np.array([piece.depth for piece in pieces])
     sines = np.sin([cone.half_angle for cone in cones])
     fingers = np.arange(FINGERS)
@@ -227,7 +227,7 @@ def _rows(
 def _near_rows(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone], discs: _Discs, u: Array
 ) -> tuple[Array, Array]:
-    """The rows of (5) that keep the foci of cell B near each other, one row per finger."""
+    """Build the rows (5) that keep the foci of cell B near each other, one row per finger."""
     # u_1 = u and u_2 = -u
     toward = np.repeat(CELL_A, 2) * -np.array([float(cone.axis @ u) for cone in cones])
     across = np.array([abs(float(piece.normal @ u)) for piece in pieces])
@@ -240,6 +240,6 @@ def _near_rows(
 
 
 def _kappa(piece: FacePiece, cone: ForceCone) -> float:
-    """Largest extent of a disc of radius one towards the facets of a cone: kappa in (2)."""
+    """Compute kappa in (2): how far a disc of radius one reaches towards a cone's facets."""
     lean = float(angles_between(piece.normal, cone.axis))
     return 1.0 if lean >= cone.half_angle else math.cos(cone.half_angle - lean)

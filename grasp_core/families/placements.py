@@ -1,4 +1,4 @@
-"""The result of a construction: contacts with the forces that witness them, or a bound.
+"""Holds the result of a construction: contacts with the forces that prove them, or a bound.
 
 Lengths are in the pieces' units, where the object has size one.
 """
@@ -22,39 +22,40 @@ class Placement:
     forces: Array
     """Balanced forces along the witness lines, normal parts summing to one, (4, 3)."""
     foci: Array
-    """Points where witness lines meet, (k, 3): one for a concurrent grasp, two for a pencil; for a
+    """Points where lines of force meet, (k, 3): one for a concurrent grasp, two for a pencil; for a
     regulus the points midway between the two lines of each pair, or none."""
     radii: Array
-    """Radius of the independent disc around each contact, (4,); zeros where none is claimed."""
+    """Radius of the independent disc around each contact, (4,); zeros where no disc is claimed."""
     merit: float
-    """The quantity that the construction maximised."""
+    """The quantity that the construction maximised, such as the smallest disc radius."""
     planned: Array | None = None
-    """Forces for which the contacts were chosen, if they differ from the witness's, (4, 3)."""
+    """Forces for which the contacts were chosen, (4, 3); None if they are those of `forces`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NoPlacement:
-    """The construction offers nothing on these pieces.
+    """The answer of a construction that finds no contacts on these pieces.
 
-    `bound` is the largest merit that its programs' multipliers allow; minus infinity where only a
-    sample of slopes was tried.
+    `bound` is the largest merit that its programs' multipliers allow; minus infinity where only
+    some slopes were tried.
     """
 
     bound: float
 
 
 def balanced_forces(pieces: Sequence[FacePiece], directions: Array) -> Array:
-    """Forces along four positively spanning directions that balance as vectors, (4, 3)."""
+    """Scale four positively spanning directions to forces whose sum is zero, (4, 3)."""
     forces = balancing_weights(directions)[:, None] * directions
     normals = np.array([piece.normal for piece in pieces])
     return forces / float(np.einsum("ki,ki->", forces, normals))
 
 
 def focus_direction(axes: Array) -> Array:
-    """Direction u of the line between the foci of pairs (0, 1) and (2, 3), (..., 3).
+    """Compute the direction u of the line through both foci of a pencil, (..., 3).
 
-    It lies in the planes of both pairs, and the first pair pushes along it: with positive
-    weights lam of sum lam a = 0, u points along w = lam_0 a_0 + lam_1 a_1 = -lam_2 a_2 - lam_3 a_3.
+    The first focus belongs to fingers 0 and 1, the second to fingers 2 and 3. The direction lies in
+    the planes of both pairs, and the first pair pushes along it: with positive weights lam of sum
+    lam a = 0, u points along w = lam_0 a_0 + lam_1 a_1 = -lam_2 a_2 - lam_3 a_3.
 
     Args:
         axes: Axes of four force cones that positively span, in finger order, (..., 4, 3).

@@ -35,7 +35,7 @@ from grasp_core.values import FINGERS, ForceCone
 SLOPES = (0.5, 0.2, 0.8)
 """Shares of the interval (3) of `regulus_program` at which each slope's angle is tried."""
 SAME_OFFSET = 1e-9
-"""Offsets that differ by no more count as equal: the slopes tried first win."""
+"""Difference between offsets that counts as none; of equal slopes, those tried first win."""
 GIVEN_UP = 1e-9
 """Offset given up in favour of the least variables: giving up less makes the contacts of two
 pairings differ from each other's."""
@@ -43,7 +43,7 @@ KERNEL = "grasp_core.families.regulus_kernel"
 SIDES = (1.0, -1.0)
 """Signs of p: the side of the focus line on which the first finger's line passes it."""
 Choice: TypeAlias = tuple[int, int, int]
-"""Indices of the two pairs' slopes in `SLOPES`, and of the side in `SIDES`."""
+"""A choice to try: indices of the two pairs' slopes in `SLOPES`, and of the side in `SIDES`."""
 CHOICES: tuple[Choice, ...] = tuple(
     product(range(len(SLOPES)), range(len(SLOPES)), range(len(SIDES)))
 )
@@ -52,7 +52,7 @@ CHOICES: tuple[Choice, ...] = tuple(
 def place_regulus(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone]
 ) -> Placement | NoPlacement:
-    """Place four contacts on the lines of one regulus, as near to the faces' centres as can be.
+    """Place four contacts on the lines of one regulus, near the centres of the faces.
 
     Args:
         pieces: Four convex pieces; the pairs are (0, 1) and (2, 3).
@@ -78,7 +78,7 @@ def place_regulus(
 def regulus_bounds(
     table: FaceTable, attempts: Attempts, enough: float = -SAME_OFFSET
 ) -> tuple[Array, Indices]:
-    """Bound the merit of reguli for many attempts in compiled code.
+    """Bound the merits of regulus grasps for many attempts, in compiled code.
 
     Args:
         table: The faces.
@@ -100,7 +100,7 @@ def regulus_bounds(
 def _best_choice(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone]
 ) -> tuple[float, tuple[Choice, ...]] | None:
-    """The best choice, if there is any, and its merit; None if the half-angles differ."""
+    """Find the best choices of slopes and side, with their merit; None if half-angles differ."""
     half_angle = cones[0].half_angle
     if any(cone.half_angle != half_angle for cone in cones):
         return None

@@ -12,30 +12,31 @@ from grasp_core.families.kernel_tables import Attempts, FaceTable, RegulusTerms
 from grasp_core.geometry.vectors_kernel import across, angle_between, cross, dotted, focus_direction
 
 FLAT = 1e-12
-"""Facets whose part along N is no larger do not bound z / x: they allow all of it or nothing."""
+"""Size of a facet's component along N below which the facet does not bound z / x: it allows every
+value or none."""
 
 
 class PairFrames(NamedTuple):
-    """Frames of both pairs of an attempt, and what their slopes may be."""
+    """Frames of both pairs of an attempt, with the slopes to try."""
 
     u: Array
-    """Direction along both planes, (3,)."""
+    """Direction that lies in both pairs' planes, (3,)."""
     v: Array
-    """Directions in each pair's plane across u, (2, 3)."""
+    """Unit vectors in each pair's plane, across u, (2, 3)."""
     N: Array
     """Unit normals of the planes, (2, 3)."""
     tau: Array
-    """Slopes to try, (2, slopes)."""
+    """Slopes that are tried for each pair, (2, slopes)."""
     tight: Array
     """Rows (alpha, beta) of alpha x + beta z >= 0 that bound z / x from below and from above, for
     each slope, (2, slopes, 2, 2)."""
     usable: NDArray[np.bool_]
-    """Whether these rows leave anything between them, (2, slopes)."""
+    """Whether the two rows in `tight` leave any z / x between them, (2, slopes)."""
 
 
 @loop()
 def pair_frames(faces: FaceTable, attempts: Attempts, a: int, terms: RegulusTerms) -> PairFrames:
-    """Frames of one attempt; slopes of pairs that are too far from symmetric are not usable."""
+    """Compute the frames of one attempt; slopes of too asymmetric pairs are not usable."""
     axes, slopes = attempts.axes[a], len(terms.shares)
     u, normal = focus_direction(axes), np.empty(3)
     frames = PairFrames(
@@ -73,7 +74,7 @@ def pair_frames(faces: FaceTable, attempts: Attempts, a: int, terms: RegulusTerm
 def _facets(
     faces: FaceTable, attempts: Attempts, place: tuple[int, int], frames: PairFrames, turns: Array
 ) -> Array:
-    """Normals of the facets of a pair's pyramids, as components along u, v, N, (2, facets, 3)."""
+    """Compute normals of the facets of a pair's pyramids along u, v, N, (2, facets, 3)."""
     a, pair = place
     found = np.empty((2, len(turns), 3))
     sine, cosine = facet_sines(attempts.half_angles[a], len(turns))

@@ -1,4 +1,4 @@
-"""Compiled search for the best slopes of a regulus: the programs of `regulus` for all slopes tried.
+"""Searches in compiled code for the best slopes of a regulus, by the programs of `regulus`.
 
 A program, over (x0, k, p, x_1, x_2, z_1, z_2, t), is first solved without its gap: if p stays
 beyond the gap anyway, that side was the better one. As the cones span (P3), x_i is on the side of
@@ -34,26 +34,26 @@ from grasp_core.solvers.lp_kernel import (
 )
 
 VARIABLES, K, P, X, Z, T = 10, 3, 4, 5, 7, 9
-"""Number and places of the variables."""
+"""Number of variables, and the indices of k, p, x_i, z_i and t among them."""
 ACCURACY, FARTHEST = 1e-11, 1e4
-"""How far multipliers may be from giving the objective, and the size |x|_1 of the variables up to
-which a proof of infeasibility has to hold."""
+"""Error up to which multipliers give the objective, and the size |x|_1 of the variables up to which
+a proof of infeasibility must hold."""
 NONE, PLUS, MINUS = -1, 0, 1
 """Codes of the side: no slopes are feasible, p > 0, p < 0."""
 
 
 class _Line(NamedTuple):
-    """The line through D along F, both as functions of the variables."""
+    """A line through the point D along F, both linear functions of the program's variables."""
 
     pair: int
     k: Array
-    """Change of D with k, (3,)."""
+    """Change of the point D with the variable k, (3,)."""
     p: Array
-    """Change of D with p, (3,)."""
+    """Change of the point D with the variable p, (3,)."""
     x: Array
-    """Change of F with x of the pair, (3,)."""
+    """Change of the direction F with the pair's variable x, (3,)."""
     z: Array
-    """Change of F with z of the pair, (3,)."""
+    """Change of the direction F with the pair's variable z, (3,)."""
 
 
 @loop()
@@ -64,7 +64,7 @@ def regulus_bounds(
     bounds: Array,
     chosen: Indices,
 ) -> None:
-    """Bound the merit, minus the largest offset t, over the slopes tried until one is enough.
+    """Bound the merit, minus the largest offset t, over slopes until one is good enough.
 
     Args:
         faces: The faces of the object.
@@ -100,7 +100,7 @@ def regulus_bounds(
 def _best_side(
     rows: Rows, gap: float, tie: float, worth: float, vertex: Vertex
 ) -> tuple[float, int]:
-    """The better of the programs for p > gap and p < -gap: a bound on its value, and the side."""
+    """Solve the programs for p > gap and p < -gap; return the better bound and its side."""
     either = _bounded(rows, worth, vertex)
     p = vertex.x[P]  # anything where `either` is infinite: the sides decide then, or nothing does
     if either <= worth or p >= gap:
@@ -119,7 +119,7 @@ def _best_side(
 
 @loop()
 def _bounded(rows: Rows, worth: float, vertex: Vertex) -> float:
-    """Upper bound of a program: minus infinity if proved infeasible, infinity if undecided."""
+    """Bound a program from above: minus infinity if infeasible, infinity if undecided."""
     c = np.zeros(VARIABLES)
     c[T] = -1.0
     measure(rows)
@@ -205,7 +205,7 @@ def _line(frames: PairFrames, slopes: tuple[int, int], finger: int) -> _Line:
 
 @loop()
 def _add(line: _Line, d: Array, shares: tuple[float, float], rows: Rows, row: int) -> None:
-    """Fill in a row with passing d.D + force d.F, for `shares` = (passing, force)."""
+    """Fill in a row that adds shares of d.D and d.F, for `shares` = (passing, force)."""
     passing, force = shares
     for j in range(3):
         rows.At[j, row] = passing * d[j]

@@ -1,4 +1,4 @@
-"""Moves contacts on curved patches from the planes they were planned on to the true surface.
+"""Moves contacts on curved patches from the planes of the patches to the true surface.
 
 Solved: given a placement on the planes of patches, a placement with the same force cones on the
 triangles of the surface over the contacts, each within the region of its finger.
@@ -22,10 +22,12 @@ from grasp_core.solvers.ties import graded
 from grasp_core.values import ContactRegion, ForceCone
 
 LEAST_FACET = 1e-5
-"""Least radius of a disc on part of a triangle (object size one); smaller parts are left out."""
+"""Least radius of the largest disc in a part of a triangle (object size one); smaller parts are
+left out."""
 ON_EDGE = 1e-12
-"""A line that passes an edge no farther out meets both triangles beside it, and the first one with
-room counts: lengths and volumes of an object of size one, a thousand rounding errors."""
+"""Distance outside an edge, in lengths and volumes of an object of size one, at which a line still
+meets both triangles beside the edge: a thousand rounding errors. The first of them that is large
+enough counts."""
 
 OnFacets = Callable[[tuple[FacePiece, ...]], Placement | None]
 
@@ -38,7 +40,7 @@ def on_true_surface(
     regions: Sequence[ContactRegion],
     place: OnFacets,
 ) -> tuple[tuple[FacePiece, ...], Placement] | None:
-    """Move a placement to the surface; None if no contacts there hold the same grasp.
+    """Move a placement to the true surface; None if no contacts there hold the same grasp.
 
     Args:
         shapes: Shapes of the four faces, in finger order.
@@ -76,7 +78,7 @@ def _aimed(
     planned: Placement,
     directions: Array,
 ) -> Placement | None:
-    """Contacts over or under the planned ones, aimed at the planned focus; None if that fails."""
+    """Aim from contacts above or below the planned ones at the planned focus; None on failure."""
     if len(planned.foci) != 1:
         return None
     heights = [
@@ -104,7 +106,7 @@ def _holds(facet: FacePiece, point: Array) -> bool:
 def _facet(
     shape: FaceShape, piece: FacePiece, at: Array, along: Array, region: ContactRegion
 ) -> FacePiece | None:
-    """Part of a surface triangle on the line through a point, as far as it is over a region."""
+    """Cut the surface triangle on the line through a point to a region, or return None."""
     if shape.facets is None:
         return piece
     parts = (_part(piece, triangle, region) for triangle in _hit(shape.facets, at, along))
@@ -112,7 +114,7 @@ def _facet(
 
 
 def _part(piece: FacePiece, triangle: Array, region: ContactRegion) -> FacePiece | None:
-    """The part of a triangle that is over a region, or None if there is no room on it."""
+    """Return the part of a triangle that is over a region; None if it is too small."""
     cross = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
     facet = piece_of(piece.face, cross / np.linalg.norm(cross), triangle)
     claimed = (region.polygon - piece.origin) @ piece.frame
@@ -127,7 +129,7 @@ def _part(piece: FacePiece, triangle: Array, region: ContactRegion) -> FacePiece
 
 
 def _hit(triangles: Array, point: Array, along: Array) -> Array:
-    """The triangles that a line meets, the nearest to the given point first, (k, 3, 3)."""
+    """Return the triangles that a line meets, those nearest to a given point first, (k, 3, 3)."""
     edges = np.roll(triangles, -1, axis=1) - triangles
     sides = np.cross(edges, point - triangles) @ along
     normals = np.cross(edges[:, 0], edges[:, 1])

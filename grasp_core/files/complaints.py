@@ -1,4 +1,4 @@
-"""What pydantic finds wrong with a file becomes a sentence: field, expected value, value found."""
+"""Turns what pydantic finds wrong with a file into a sentence: field, expected, found value."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar, get_args
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 Record = TypeVar("Record")
 BOUNDS = {"too_short": ("at least", "min_length"), "too_long": ("at most", "max_length")}
-"""Wording and limit of errors about the number of items, by their type."""
+"""Wording and key of the limit in errors about the number of items, by type of error."""
 UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 OURS = {
     "float_type": "a number", "int_type": "a whole number", "int_from_float": "a whole number",
@@ -21,13 +21,13 @@ OURS = {
     "greater_than": "more than {gt}", "greater_than_equal": "at least {ge}",
     "less_than": "less than {lt}", "less_than_equal": "at most {le}",
 }  # fmt: skip
-"""Words for kinds and ranges of values, as people say them who write JSON or TOML."""
+"""Words for kinds and ranges of values that people who write JSON or TOML use."""
 
 
 def record_of(
     kind: type[Record], text: str, wanted: str, *, schema: int | None = None, nulls: bool = True
 ) -> Record:
-    """Read a checked record from the text of a JSON file.
+    """Read the text of a JSON file as a record whose fields are checked.
 
     Args:
         kind: Class of the record with its fields: a model, or a typed dictionary.
@@ -49,7 +49,7 @@ def record_of(
 
 
 def complaint(error: "ValidationError", kind: Any, inside: Sequence[str] = ()) -> str:
-    """Describe the first thing that is wrong.
+    """Describe the first thing that is wrong with a record.
 
     Args:
         error: The error that pydantic raised.
@@ -60,7 +60,7 @@ def complaint(error: "ValidationError", kind: Any, inside: Sequence[str] = ()) -
     loc, fault, came = first["loc"], first["type"], first["input"]
     where = place([*inside, *loc])
     if fault in UNKNOWN:
-        return f"{where}: unknown key; expected are {', '.join(_fields_at(kind, loc[:-1]))}"
+        return f"{where}: unknown key; known keys are {', '.join(_fields_at(kind, loc[:-1]))}"
     if fault == "missing":
         return f"{where}: missing"
     limits: Mapping[str, Any] = first.get("ctx", {})
@@ -74,7 +74,7 @@ def complaint(error: "ValidationError", kind: Any, inside: Sequence[str] = ()) -
 
 
 def _expected(said: str) -> str:
-    """Return what was expected, from a message of pydantic."""
+    """Return what was expected, as pydantic's own message says it."""
     for beginning, ours in (("Input should be ", ""), ("String should ", "text to ")):
         if said.startswith(beginning):
             return ours + said.removeprefix(beginning)
@@ -96,7 +96,7 @@ def _fields(kind: Any) -> dict[str, Any]:
 
 
 def _record_in(annotation: Any) -> Any:
-    """Return the record that a type holds, as an item or as a value that may be null."""
+    """Return the class of records that a type holds, as an item or as a value that may be null."""
     if hasattr(annotation, "__pydantic_fields__"):
         return annotation
     inner = (_record_in(part) for part in get_args(annotation))

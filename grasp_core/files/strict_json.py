@@ -1,8 +1,8 @@
-"""The text of a JSON file becomes one object of plain values that all our readers may rely on.
+"""Turns the text of a JSON file into one object of plain values that all readers can rely on.
 
-Cases that JSON leaves open are refused: a key twice in an object, numbers that are too large or
-NaN, endless nesting, text that no encoding has. Another kind of our own files is refused by its
-name.
+Cases that JSON leaves open are refused: a key twice in one object, numbers that are too large or
+not finite, very deep nesting, and characters that cannot be encoded. A file of another kind that
+graspproof writes is refused by its name.
 """
 
 import json
@@ -14,12 +14,12 @@ from typing import Any, cast
 from grasp_core.errors import InputError
 
 DEEPEST = 64
-"""Most objects and lists inside each other; ours are less than ten deep."""
+"""Largest number of objects and lists inside each other; files of graspproof have less than ten."""
 LARGEST_WHOLE = 2**64 - 1
-"""Largest whole number: larger ones are no seeds, counts or indices, and arrays cannot hold
-them."""
+"""Largest whole number: larger ones are no seeds, counts or indices, and arrays cannot hold them.
+"""
 LONGEST_ECHO = 40
-"""Most characters of a wrong value, or of a key, that a message repeats."""
+"""Largest number of characters of a wrong value, or of a key, that a message repeats."""
 KINDS: Mapping[str, Collection[str]] = {
     "baseline": {"grasps_file"},
     "verdicts.json": {"verdicts"},
@@ -29,9 +29,10 @@ KINDS: Mapping[str, Collection[str]] = {
     "wrench file": {"wrenches"},
     "contacts file": {"contacts"},
 }
-"""Our JSON files, and for each the keys that tell it from the files listed after it."""
+"""The JSON files of graspproof, and for each the keys that tell it from the files listed after it.
+"""
 BESIDE = ("verdicts.json", "regions.json")
-"""Files that are kept in the folder of the grasps.json that they are about."""
+"""Files that are kept in the same folder as the grasps.json that they belong to."""
 
 
 def object_of(
@@ -50,7 +51,7 @@ def object_of(
     """
     found = value_of(text, nulls=nulls)
     if not isinstance(found, dict):
-        raise InputError(f"expected an object, as a {wanted} is, got {shown(found)}")
+        raise InputError(f"a {wanted} must hold one JSON object, got {shown(found)}")
     record = cast("dict[str, Any]", found)
     check_kind(record, wanted)
     if schema is not None:
@@ -72,16 +73,18 @@ def value_of(text: str, *, nulls: bool = True) -> Any:
         where = f"line {error.lineno}, column {error.colno}"
         said = error.msg if error.msg.isprintable() else "unexpected text"
         raise InputError(
-            f"not JSON, or not all of it ({said}: {where}); write the file again"
+            f"the text is not complete JSON ({said}: {where}); write the file again"
         ) from error
     except ValueError as error:  # Python reads no whole number of more than 4300 digits
-        raise InputError("a whole number has thousands of digits; shorten it") from error
+        raise InputError(
+            "a whole number in the file has thousands of digits; shorten it"
+        ) from error
     check_values(found, nulls=nulls)
     return found
 
 
 def check_values(document: object, *, nulls: bool = True) -> None:
-    """Refuse plain values that no file of ours may hold, whatever its format.
+    """Refuse plain values that no file of graspproof may hold, whatever its format.
 
     Raises:
         InputError: A number is not finite or too large, a text has no encoding, a value is null
@@ -94,12 +97,12 @@ def check_values(document: object, *, nulls: bool = True) -> None:
 
 
 class _FaultError(Exception):
-    """What is wrong with a value; the keys that lead to it are collected on the way out."""
+    """Raised when a value is wrong; the keys that lead to the value are added on the way out."""
 
     def __init__(self, fault: str) -> None:
         super().__init__(fault)
         self.trail: list[object] = []
-        """Keys from the value outwards; the last is that of the list around the document."""
+        """Keys that lead to the value, innermost first; the last is the document's own, 0."""
 
 
 def _check(holder: Any, nulls: bool, deeper: int) -> None:
@@ -118,7 +121,7 @@ def _check(holder: Any, nulls: bool, deeper: int) -> None:
 
 
 def check_kind(found: Mapping[str, Any], wanted: str) -> None:
-    """Refuse another kind of our files than the one that was asked for.
+    """Refuse a JSON file of graspproof that is of another kind than the one asked for.
 
     Raises:
         InputError: The file is of another kind; the message says which.
@@ -128,7 +131,7 @@ def check_kind(found: Mapping[str, Any], wanted: str) -> None:
     for kind, keys in KINDS.items():
         if kind != wanted and set(keys) <= found.keys():
             beside = " beside it" if wanted == "grasps.json" and kind in BESIDE else ""
-            raise InputError(f"this is a {kind}; give the {wanted}{beside}")
+            raise InputError(f"this is a {kind}, not a {wanted}; give the {wanted}{beside}")
 
 
 def check_schema(found: Mapping[str, Any], schema: int) -> None:
@@ -139,22 +142,22 @@ def check_schema(found: Mapping[str, Any], schema: int) -> None:
     """
     came = found.get("schema")
     if came is None:
-        raise InputError(f"schema: missing; expected {schema}")
+        raise InputError(f"schema: the key is missing; expected {schema}")
     if isinstance(came, bool) or not isinstance(came, int) or came < 1:
         raise InputError(f"schema: expected {schema}, got {shown(came)}")
     if came > schema:
         raise InputError(
-            f"schema: expected {schema}, got {shown(came)}: written by a newer graspproof; "
+            f"schema: expected {schema}, got {shown(came)}: a newer graspproof wrote the file; "
             "upgrade this one"
         )
     if came < schema:
         raise InputError(
-            f"schema: expected {schema}, got {came}: written by an older graspproof; write it again"
+            f"schema: expected {schema}, got {came} of an older graspproof; write the file again"
         )
 
 
 def place(parts: Sequence[object]) -> str:
-    """Write where a value is in a document, as in messages: `grasps[0].contacts[2].normal`."""
+    """Write where a value is in a document, for messages: `grasps[0].contacts[2].normal`."""
     said = "".join(
         f"[{part}]" if isinstance(part, int) else f".{_key(str(part))}" for part in parts
     )
@@ -162,7 +165,7 @@ def place(parts: Sequence[object]) -> str:
 
 
 def shown(value: object) -> str:
-    """Write a value that was found for a message: short, and in characters that can be printed."""
+    """Write a wrong value for a message: short, and in characters that can be printed."""
     if isinstance(value, dict):
         return "an object"
     if isinstance(value, list | tuple):
@@ -194,7 +197,7 @@ def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _all_plain(holder: Any) -> bool:
-    """Return whether a list holds finite floats only, as most lists do."""
+    """Return whether a list holds only finite floats, as most lists do."""
     if not isinstance(holder, list):
         return False
     values = cast("list[Any]", holder)
@@ -207,21 +210,21 @@ def _items(holder: Any) -> Iterable[tuple[Any, Any]]:
     record = cast("dict[str, Any]", holder)
     if not "".join(record).isascii():
         for key in filter(_has_no_encoding, record):
-            raise InputError(f"{_key(key)}: half of a letter (a lone surrogate) in a key")
+            raise InputError(f"{_key(key)}: the key holds half a character (a lone surrogate)")
     return record.items()
 
 
 def _fault(value: object, *, nulls: bool) -> str | None:
-    """Return what is wrong with a value that holds no others; None if nothing is."""
+    """Return what is wrong with a value that contains no other values; None if nothing is."""
     if isinstance(value, float):
         return None if math.isfinite(value) else f"expected a finite number, got {value}"
     if isinstance(value, int):
-        return None if abs(value) <= LARGEST_WHOLE else f"{shown(value)} is too large"
+        return None if abs(value) <= LARGEST_WHOLE else f"{shown(value)} is larger than 2^64 - 1"
     if isinstance(value, str):
         wrong = not value.isascii() and _has_no_encoding(value)
-        return "half of a letter (a lone surrogate) in the text" if wrong else None
+        return "the text holds half a character (a lone surrogate)" if wrong else None
     if value is None:
-        return None if nulls else "null; give a value, or leave the key out"
+        return None if nulls else "null is not allowed; give a value, or leave the key out"
     return f"expected a number or text, got {value}; put it in quotes"  # a day or time of TOML
 
 
@@ -234,4 +237,4 @@ def _has_no_encoding(text: str) -> bool:
 
 
 def _too_deep() -> str:
-    return f"objects and lists are more than {DEEPEST} deep inside each other"
+    return f"objects and lists are nested more than {DEEPEST} deep; flatten the file"

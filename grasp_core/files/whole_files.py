@@ -1,6 +1,6 @@
-"""Regular files are read up to a bound, and files are written whole or not at all.
+"""Reads regular files up to a size limit, and writes files completely or not at all.
 
-A new file is complete before it is renamed into place.
+A new file is written under another name, and is renamed when it is complete.
 """
 
 import os
@@ -11,13 +11,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 UNFINISHED = ".unfinished-"
-"""Part of the name of files that are being written, or were when their writer was killed."""
+"""Part of the name of a file that is still being written, or whose writing process was killed."""
 SHOWN = 40
-"""Most characters of a file's name in that of its unfinished one, which must not get too long."""
+"""Largest number of characters that the name of an unfinished file repeats of the final name."""
 
 
 def write_parts(path: Path, parts: Iterable[bytes]) -> Path:
-    """Write a file; folders are made as needed.
+    """Write a file from parts of bytes; missing folders are made.
 
     Raises:
         OSError: The file cannot be written; the error names the file.
@@ -31,7 +31,7 @@ def write_parts(path: Path, parts: Iterable[bytes]) -> Path:
 
 @contextmanager
 def replacing(path: Path) -> Generator[Path]:
-    """Yield another path with the same suffix to write to; afterwards it replaces the file.
+    """Yield another path with the same suffix to write to; afterwards that file replaces `path`.
 
     Raises:
         OSError: The file cannot be written; the error names the file, not the other path.
@@ -48,7 +48,7 @@ def replacing(path: Path) -> Generator[Path]:
 
 @contextmanager
 def _beside(path: Path) -> Generator[Path]:
-    """Yield an empty file in the same folder, which is removed afterwards."""
+    """Yield the path of an empty file in the same folder; the file is removed afterwards."""
     prefix = f".{path.name[:SHOWN]}{UNFINISHED}"
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=path.suffix)
     try:
@@ -59,13 +59,18 @@ def _beside(path: Path) -> Generator[Path]:
 
 
 def remove_unfinished(folder: Path) -> None:
-    """Remove the files that killed writers left in a folder where nobody is writing."""
+    """Remove the files that killed processes left unfinished in a folder.
+
+    Nothing else may be writing to the folder meanwhile.
+    """
     for path in folder.glob(f".*{UNFINISHED}*"):
         path.unlink(missing_ok=True)
 
 
 def bounded_bytes(path: Path, most: int) -> bytes:
-    """Read the bytes of a file, or its first `most + 1` if it has more; pipes never block.
+    """Read the bytes of a file, or its first `most + 1` bytes if it is longer.
+
+    Named pipes are refused, so reading never blocks.
 
     Raises:
         OSError: The file cannot be read, or is a folder, a pipe or a device.
@@ -75,10 +80,12 @@ def bounded_bytes(path: Path, most: int) -> bytes:
             path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
         )
     except ValueError as error:
-        raise OSError(None, f"no name of a file ({error})", str(path)) from error
+        raise OSError(None, f"the path is not a valid file name ({error})", str(path)) from error
     try:
         if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise OSError(None, "a folder, a pipe or a device", str(path))
+            raise OSError(
+                None, "the path is a folder, a pipe or a device; give a regular file", str(path)
+            )
         with os.fdopen(handle, "rb", closefd=False) as stream:
             return stream.read(most + 1)
     finally:

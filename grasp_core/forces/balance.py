@@ -1,4 +1,4 @@
-"""All contact forces that balance external wrenches: the smallest ones plus a null space.
+"""Finds all contact forces that balance external wrenches: smallest forces plus a null space.
 
 With the map G from forces to their wrench and the external wrenches w_i, the forces
 
@@ -29,10 +29,10 @@ RESIDUAL = 1e-6
 hundred times the accuracy asked of ProxQP."""
 
 CLEARLY = 1.01
-"""Factor by which a wrench must exceed all forces, so that rounding and `RESIDUAL` do not
-matter."""
+"""Factor by which a wrench must exceed all forces to be refused, so that rounding does not matter.
+"""
 NO_FORCE = 1e-100
-"""Least normal force that is divided by, where a contact may have no force."""
+"""Smallest normal force that is divided by: a contact may have no force."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +42,7 @@ class Balance:
     frames: Array
     """Columns (normal, tangent, tangent) of each contact, (k, 3, 3)."""
     G: Array
-    """Matrix from forces to their wrench, (6, 3k)."""
+    """Matrix from stacked local forces to their wrench, (6, 3k)."""
     inverse: Array
     """Pseudo-inverse of G, (3k, 6)."""
     null: Array
@@ -50,7 +50,7 @@ class Balance:
     scales: Array
     """Unit of force for each wrench, (n,) [N]."""
     W: Array
-    """External wrenches, (n, 6), in these units and in units of the longest arm."""
+    """External wrenches, (n, 6), in units of `scales` and of the longest arm."""
     F0: Array
     """Balancing forces of least norm, which may break limits and leave cones, (n, 3k)."""
     least: Array
@@ -63,15 +63,15 @@ class Balance:
         cls, arms: Array, normals: Array, wrenches: Array, normal_force: tuple[float, float], *,
         by_load: bool,
     ) -> "Balance":  # fmt: skip
-        """Scale contacts and wrenches, (n, 6) [N, N m], whose torques are about the arms' origin.
+        """Scale contacts and external wrenches to unit size.
 
         Args:
-            arms: Contact points from the centre of torques, (k, 3) [m].
+            arms: Contact points relative to the centre of torques, (k, 3) [m].
             normals: Inward unit normals, (k, 3).
             wrenches: External (force, torque), (n, 6) [N, N m].
             normal_force: Least and largest normal force of each contact [N].
-            by_load: Whether the unit of force is the load, so that a small one counts, or the
-                largest normal force.
+            by_load: Whether the unit of force is the load, so that small loads are solved as
+                exactly as large ones; otherwise it is the largest normal force.
         """
         least, largest = normal_force
         size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
@@ -90,7 +90,7 @@ class Balance:
         return cls(frames, G, inverse, null, scales, W, -W @ inverse.T, *limits)
 
     def one(self, i: int) -> "Balance":
-        """Return the balance of the i-th wrench alone, to the last bit what `of` makes of it."""
+        """Return the balance of the i-th wrench alone, the same bits as if made from it alone."""
         W = self.W[[i]]
         return replace(
             self, scales=self.scales[[i]], W=W, F0=-W @ self.inverse.T,
@@ -98,7 +98,7 @@ class Balance:
         )  # fmt: skip
 
     def beyond(self, friction: Array) -> NDArray[np.bool_]:
-        """Return which wrenches exceed all forces within limits and cones together, (n,).
+        """Return which wrenches exceed all forces within limits and cones, (n,).
 
         No arm is longer than one, so this bounds forces and torques alike. Wrenches far beyond that
         would keep solvers busy for seconds.
@@ -112,7 +112,7 @@ class Balance:
         return sizes > most * self.largest
 
     def pyramids(self, friction: Array) -> Array:
-        """Return rows R with R @ f <= 0 inside pyramids in the friction cones, (16 k, 3 k).
+        """Return rows R with R @ f <= 0 in pyramids inside the friction cones, (16 k, 3 k).
 
         Args:
             friction: Coulomb coefficient of each contact, (k,).
@@ -124,7 +124,7 @@ class Balance:
         return rows.reshape(count * PYRAMID_SIDES, 3 * count)
 
     def polyhedra(self, rows: Array) -> tuple[Array, Array]:
-        """Return C and D with (2) for f = F0[i] + null @ z exactly where C @ z <= D[i]."""
+        """Rewrite (2) for f = F0[i] + null @ z as inequalities C @ z <= D[i]."""
         along, normal_parts = self.null[0::3], self.F0[:, 0::3]
         # (2) with the forces (1) put in: what multiplies z goes left, the rest right
         C, D = [rows @ self.null, -along], [-self.F0 @ rows.T, normal_parts - self.least[:, None]]
@@ -134,7 +134,7 @@ class Balance:
         return np.vstack(C), np.hstack(D)
 
     def checked(self, F: Array, residual: float = RESIDUAL) -> Array:
-        """Make forces (n, 3k) balance to rounding; NaN where they then break a limit."""
+        """Make forces (n, 3k) balance up to rounding; NaN where they then break a limit."""
         # the least change that balances f is the pseudo-inverse of what is left
         exact = F - (F @ self.G.T + self.W) @ self.inverse.T
         along = exact[:, 0::3]
@@ -145,7 +145,7 @@ class Balance:
         return exact
 
     def into_cones(self, F: Array, friction: float) -> Array:
-        """Move forces (n, 3k) a little so that they meet limits and friction cones exactly."""
+        """Move forces (n, 3k) slightly so that they meet limits and friction cones exactly."""
         # normal parts are brought into the limits first, since they say how far slides may reach
         along = np.clip(F[:, 0::3], self.least[:, None], self.largest[:, None])
         across = np.hypot(F[:, 1::3], F[:, 2::3])
@@ -161,7 +161,7 @@ class Balance:
 
 
 def needed_friction(F: Array, friction: Array) -> Array:
-    """Return the largest share of its friction that a contact with a tangential force needs, (n,).
+    """Return the largest share of its friction that any contact needs, (n,).
 
     Args:
         F: Local forces, (n, 3k).

@@ -1,4 +1,4 @@
-"""Balanced contact forces of least norm in the exact circular friction cones.
+"""Finds balanced contact forces of least norm in the exact circular friction cones.
 
 Solved: for one wrench w, with the map G from forces to their wrench,
 
@@ -19,11 +19,11 @@ from grasp_core.forces.balance import RESIDUAL, Balance, needed_friction
 from grasp_core.solvers.conic import ConicProgram, minimize
 
 KEPT_BACK = 1e-7
-"""Share of the friction that is not used, to cover what the solver leaves."""
+"""Share of the friction that is not used, to cover the errors of the solver."""
 
 
 def least_norm_in_cones(balance: Balance, friction: Array) -> Array | None:
-    """Find local forces (3k,) that balance the first wrench in the cones; None if none are found.
+    """Find local forces (3k,) in the cones that balance the first wrench, or None.
 
     Args:
         balance: The wrench and the limits.

@@ -70,7 +70,7 @@ def contact_forces(  # noqa: PLR0913 - the contract's arguments
     if missing.size:
         which = "this wrench" if single else f"wrench {missing[0]}, counting from 0"
         raise NoForcesError(
-            f"no forces found with friction {_text(mu)} and normal forces in "
+            f"no forces were found with friction {_text(mu)} and normal forces in "
             f"{normal_force} N that balance {which}; {_remedy(normal_force)}"
         )
     forces = balance.in_space(F)
@@ -81,9 +81,9 @@ def least_friction_forces(
     positions: Array, normals: Array, friction: float, wrench: Array, *,
     normal_force: tuple[float, float], center: Array,
 ) -> tuple[Array, float] | None:  # fmt: skip
-    """Find balancing forces (k, 3) of least friction, with that coefficient, whatever it is.
+    """Find balancing forces (k, 3) of least friction, with that coefficient.
 
-    `friction` is where the search starts; forces are found above it if they must be.
+    The search starts at `friction`, but the forces may need more than that.
 
     Returns:
         The forces [N] and the coefficient; None when the limits on the normal forces leave no
@@ -108,7 +108,9 @@ def closest_forces(
     balance = _balance(positions, normals, load, normal_force, center)
     f = least_imbalance(balance, friction)
     if f is None:
-        raise SolverError("no forces in the cones were found, though a pure push is one")
+        raise SolverError(
+            "the solver found no forces in the friction cones, though pure pushes are some"
+        )
     return balance.in_space(balance.into_cones(f[None], friction))[0]
 
 
@@ -136,13 +138,13 @@ def _check_limits(normal_force: tuple[float, float]) -> None:
     # infinity stands for no upper limit; any other limit must be a force of a plausible size
     if not (SMALLEST <= limits[1] <= LARGEST or (limits[1] == math.inf and limits[0] <= LARGEST)):
         raise InputError(
-            f"normal_force: largest must be from {SMALLEST:g} to {LARGEST:g} N, or infinite, got "
+            f"normal_force: the largest must be {SMALLEST:g} to {LARGEST:g} N, or infinite, got "
             f"{shown(normal_force)}"
         )
 
 
 def _rows(wrench: ArrayLike) -> tuple[Array, bool]:
-    """Return wrenches as rows, and whether a single one was given that was not a row."""
+    """Return wrenches as rows, and whether the caller gave a single one that was not a row."""
     try:
         single = np.ndim(wrench) != 2  # noqa: PLR2004 - rows and columns
     except ValueError:  # ragged, which `frozen` explains
@@ -151,17 +153,20 @@ def _rows(wrench: ArrayLike) -> tuple[Array, bool]:
     sizes: Array = np.abs(loads).max(axis=1, initial=0.0)
     if ((sizes > 0.0) & (sizes < SMALLEST_SIZE)).any():
         raise InputError(
-            f"wrench: the largest part must be 0 or from {SMALLEST_SIZE:g} on, got "
+            f"wrench: the largest component must be 0 or at least {SMALLEST_SIZE:g}, got "
             f"{float(sizes[sizes > 0.0].min()):.3g}"
         )
     return loads, single
 
 
 def _remedy(normal_force: tuple[float, float]) -> str:
-    """Return what may help: without limits, a load that has forces has them at any size."""
+    """Return advice for a wrench that no forces balance.
+
+    Without limits on the forces, the size of the load does not matter.
+    """
     if math.isfinite(normal_force[1]):
         return "lower the load or raise the limits"
-    return "use more friction or place the contacts otherwise"
+    return "use more friction or move the contacts"
 
 
 def _text(friction: Array) -> str:

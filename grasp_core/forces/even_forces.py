@@ -1,4 +1,4 @@
-"""Balanced contact forces in which the finger that pushes least pushes as much as it can.
+"""Finds balanced contact forces in which the finger that pushes least pushes as much as possible.
 
 Solved, with the pushes f_n = n.f and the tangential parts f_t of the contact forces f:
 
@@ -20,13 +20,14 @@ from grasp_core.errors import NoForcesError, SolverError
 from grasp_core.solvers.conic import ConicProgram, minimize
 
 NO_PUSH = 1e-9
-"""A least push below this share of the largest is none: a hundred times what the solver leaves."""
+"""Share of the largest push below which a push counts as none: a hundred times the solver's error.
+"""
 IMBALANCE = 1e-9
-"""Largest imbalance of the answer, in largest pushes, for contacts of unit size."""
+"""Largest imbalance of the answer, in units of the largest push, for contacts of unit size."""
 
 
 def even_forces(positions: ArrayLike, normals: ArrayLike, friction: ArrayLike) -> Array:
-    """Find balanced forces whose least push is as large as it can be, the largest push being 1 N.
+    """Find balanced forces whose least push is largest, when the largest push is 1 N.
 
     Args:
         positions: Contact points, (k, 3) [m].
@@ -56,11 +57,13 @@ def even_forces(positions: ArrayLike, normals: ArrayLike, friction: ArrayLike) -
     along = x[0::3]
     if not along.min() > NO_PUSH:
         raise NoForcesError(
-            f"no balanced forces were found with which every finger pushes, with friction {mu}; "
+            f"no balanced forces in which every finger pushes were found at friction {mu}; "
             "more friction may allow them"
         )
     forces = np.einsum("kij,kj->ki", frames, x.reshape(k, 3)) / along.max()
     imbalance = float(np.abs(grasp_map(arms) @ forces.ravel()).max())
     if not imbalance <= IMBALANCE:
-        raise SolverError(f"forces are out of balance by {imbalance:.3g} of the largest push")
+        raise SolverError(
+            f"the solver's forces miss balance by {imbalance:.3g} of the largest push"
+        )
     return forces

@@ -1,4 +1,4 @@
-"""Balanced contact forces that need the least friction, with exact circular cones.
+"""Finds balanced contact forces that need the least friction, in exact circular cones.
 
 Solved: the least mu such that forces with |tangential part| <= mu normal part balance a wrench
 within limits on the normal parts. With mu the coefficient that the current forces need,
@@ -22,18 +22,19 @@ from grasp_core.forces.balance import NO_FORCE, Balance
 from grasp_core.solvers.conic import ConicProgram, minimize
 
 IMPROVEMENT = 1e-4
-"""The iteration ends when the coefficient falls by less than this share: some 1e-4 from the
-least."""
+"""Share by which the coefficient must fall in a round for the iteration to go on; it ends some 1e-4
+above the least."""
 MAX_ROUNDS = 12
-"""Most programs: the excess falls by half or more in each, and faster unless a finger idles."""
+"""Largest number of programs: the excess falls by half or more in each, and faster unless a finger
+does not push."""
 ROUNDING = 1e-9
-"""Largest imbalance, and distance outside the limits, in units of the largest force."""
+"""Largest imbalance, and largest distance outside the limits, in units of the largest force."""
 FRICTIONLESS = 1e-6
-"""Coefficients below this are not lowered further."""
+"""Friction coefficient below which no lower one is searched for."""
 
 
 def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:
-    """Find forces that balance the first wrench as the given ones do and need the least friction.
+    """Find forces that balance the first wrench and need the least friction.
 
     Args:
         balance: The wrench and the limits.
@@ -65,7 +66,7 @@ def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:
 
 
 def _needed_friction(forces: Array, weights: Array) -> float:
-    """Return the largest ratio of tangential to weighted normal part, over positive weights."""
+    """Return the largest ratio of tangential to weighted normal force."""
     along, across = forces[0::3], np.hypot(forces[1::3], forces[2::3])
     ratios = across / np.maximum(weights * along, NO_FORCE)
     return float(ratios[weights > 0.0].max())

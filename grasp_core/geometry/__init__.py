@@ -1,5 +1,5 @@
 """Where are points nearest to each other, inside, or connected?
 
 Plane polygons, triangles and points come in. Polygons, distances, nearest points and connected
-components go out; no grasp is known here.
+components go out; nothing here knows about grasps.
 """

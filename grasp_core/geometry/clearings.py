@@ -1,9 +1,9 @@
-"""Large convex polygons that no segment of a plane enters: clearings between obstacles.
+"""Grows large convex polygons in a plane between segments that must stay outside.
 
-Each segment is kept out by a half-plane through its point nearest to the middle of the polygon,
-square to the line between the two: as a segment is convex, all of it is beyond. Nearness is
-measured by an ellipse around the clearing, so that long clearings grow long; the largest polygon of
-a few rounds is kept.
+A segment is kept out by the half-plane through the segment's point nearest to the middle of the
+polygon, perpendicular to the line that connects the two: as a segment is convex, all of it is
+beyond. Distance is measured by an ellipse fitted to the polygon, so that long polygons grow long;
+the largest polygon of a few rounds is kept.
 
 The idea is that of IRIS (Deits & Tedrake, "Computing large convex regions of obstacle-free space
 through semidefinite programming", 2015), with the ellipse of the polygon's second moments.
@@ -17,11 +17,11 @@ from grasp_core.solvers.ties import first_best, surpassing
 
 ROUNDS = 5
 CANDIDATES = 400
-"""Most points that are tried as the middle."""
+"""Largest number of points that are tried as the middle of a polygon."""
 
 
 def clearest_point(points: Array, segments: Array) -> tuple[Array, float]:
-    """Find the point farthest from all segments, (2,), and how far that is.
+    """Find the point farthest from all segments, (2,), and its distance from them.
 
     Args:
         points: Candidates, (n, 2); if there are many, only some are tried.
@@ -34,7 +34,9 @@ def clearest_point(points: Array, segments: Array) -> tuple[Array, float]:
 
 
 def clearing(start: Array, segments: Array, gap: float) -> Array | None:
-    """Find a convex polygon around a point that no segment enters, (k, 2), counter-clockwise.
+    """Find a convex polygon around a point that no segment enters, (k, 2).
+
+    The polygon is counter-clockwise; None if there is no room for one.
 
     Args:
         start: Point inside the polygon, (2,).
@@ -55,7 +57,7 @@ def clearing(start: Array, segments: Array, gap: float) -> Array | None:
 
 
 def _cut(box: Array, middle: Array, segments: Array, stretch: Array, gap: float) -> Array:
-    """Cut off half-planes from the box for the segments, nearest first."""
+    """Cut a polygon by one half-plane for each segment, the nearest segment first."""
     left = (segments - middle) @ stretch.T
     polygon = box
     while len(left):
@@ -84,7 +86,7 @@ def _nearest(point: Array, segments: Array) -> tuple[Array, Array]:
 
 
 def _ellipse(polygon: Array) -> tuple[Array, Array]:
-    """Return a polygon's centre and the map that makes its second moments those of a disc."""
+    """Return a polygon's centre, and the map that turns its second moments into a disc's."""
     _, centre = area_and_centroid([polygon])
     after = np.roll(polygon, -1, axis=0)
     corners = np.concatenate([polygon, 0.5 * (polygon + after)]) - centre

@@ -1,7 +1,7 @@
-"""Points that are close to each other, and the sets that links join into one piece.
+"""Links points that are close to each other, and finds the sets that links connect.
 
-Scipy joins links into pieces; its graphs take 20 ms to import. Its search tree takes another 60 ms,
-so close points are found by numpy, and by the tree only where they crowd.
+Scipy finds connected sets; importing its graphs takes 20 ms. Importing its search tree takes
+another 60 ms, so numpy finds close points, and the tree is used only where points are dense.
 """
 
 import importlib
@@ -13,19 +13,19 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
 
 GENERAL = np.array([0.41421, 0.56714, 0.69315])
-"""Direction of the line of shadows, square to no face that anyone builds, where shadows would
-crowd; shorter than one, so that shadows are closer than points."""
+"""Direction of the line on which points are projected, perpendicular to no face that parts usually
+have. It is shorter than one, so that projections are closer together than points."""
 CROWDED = 64
-"""Most neighbours of a shadow that are compared with it one by one."""
+"""Largest number of neighbours on the line that are compared with a point one by one."""
 MOST_LINKS = 100
-"""Most links per point."""
+"""Largest number of links per point."""
 
 
 def close_pairs(points: Array, reach: float) -> Indices:
     """List links between points within a distance of each other, as pairs of indices, (k, 2).
 
-    Close points have close shadows on a line, so only neighbours there are compared. Equal points
-    are linked in a row, and compared with others only once.
+    Close points have close projections on a line, so only neighbours there are compared. Equal
+    points are linked in a row, and only one of them is compared with other points.
 
     Args:
         points: Points, (n, 3), in any unit of length.
@@ -64,11 +64,11 @@ def _pairs_of_tree(points: Array, reach: float) -> Indices:
 
 
 def components(count: int, links: Indices) -> Indices:
-    """Return for each thing the least index among those it is connected with, (count,).
+    """Return for each item the least index among the items connected with it, (count,).
 
     Args:
-        count: Number of things.
-        links: Pairs of indices of linked things, (k, 2).
+        count: Number of items.
+        links: Pairs of indices of linked items, (k, 2).
     """
     sparse: Any = importlib.import_module("scipy.sparse")
     csgraph: Any = importlib.import_module("scipy.sparse.csgraph")

@@ -1,6 +1,6 @@
-"""Convex polygons of certificates, checked in plain arithmetic: shape, width, and discs in them.
+"""Checks convex polygons of certificates in plain arithmetic: shape, width, and discs in them.
 
-Coordinates are in the polygon's plane and at about unit size.
+Coordinates are in the polygon's plane, with the polygon at about unit size.
 """
 
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from grasp_core.geometry.polygons import clip, edge_rows, plane_frame, signed_ar
 
 FEWEST_CORNERS, MOST_CORNERS = 3, 5000
 WIDTH, FINE = 1e-6, 1e-9
-"""How far a radius may be from that of the largest disc: relative to it, and in unit size."""
+"""Largest error of a claimed radius of the largest disc: relative to it, and at unit size."""
 LEFT_OUT = 2e-3
-"""Share of a polygon's area that it may lack of a disc: half of it is given up to save corners,
-the rest is for `SIDES`."""
+"""Share of a polygon's area by which it may fail to cover its disc: half of it is given up to have
+fewer corners, the rest is for `SIDES`."""
 SIDES = 64
-"""Sides of the polygon around a disc, whose area is larger by 8e-4 of it."""
+"""Number of sides of the polygon around a disc; its area exceeds the disc's by a share of 8e-4."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,15 +32,18 @@ class FlatPolygon:
     """Offsets of the edges, (k,): a point y is inside where E y <= b."""
 
     def holds(self, points: Array, slack: float) -> bool:
-        """Return whether points (n, 2) are inside, or outside by a slack at most."""
+        """Return whether points (n, 2) are inside, or outside by at most a slack."""
         return bool((points @ self.E.T <= self.b + slack).all())
 
 
 def flat_polygon(arms: Array, normal: Array, slack: float) -> FlatPolygon | None:
-    """Make a convex polygon, wound about its normal, of points (k, 3) in the plane through zero.
+    """Make a convex polygon from points (k, 3) in the plane through zero, or None.
+
+    The polygon is counter-clockwise about its normal.
 
     Returns:
-        None if the points are off the plane, or not corners of a convex polygon in order.
+        The polygon; None if the points are off the plane, or not corners of a convex polygon in
+        order.
     """
     if float(np.abs(arms @ normal).max()) > slack:
         return None
@@ -48,9 +51,9 @@ def flat_polygon(arms: Array, normal: Array, slack: float) -> FlatPolygon | None
 
 
 def convex_polygon(corners: Array, slack: float) -> FlatPolygon | None:
-    """Make a convex polygon of corners (k, 2); None if they are not its corners in order.
+    """Make a convex polygon from corners (k, 2); None if they are not its corners in order.
 
-    Corners that coincide with the one before, as cutting leaves them, count once.
+    A corner that coincides with the corner before it, as cutting leaves them, counts once.
     """
     corners = tidy(corners)
     if len(corners) < FEWEST_CORNERS:
@@ -62,7 +65,7 @@ def convex_polygon(corners: Array, slack: float) -> FlatPolygon | None:
 
 
 def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:
-    """Return whether moving all edges inwards by the radius makes the polygon just vanish."""
+    """Return whether a polygon shrinks to nothing when its edges move in by the radius."""
     inner, outer = (
         clip(polygon.corners, polygon.E, polygon.b - radius - sign * (WIDTH * radius + FINE))
         for sign in (-1.0, 1.0)
@@ -71,7 +74,10 @@ def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:
 
 
 def holds_disc(polygon: FlatPolygon, border: FlatPolygon, center: Array, radius: float) -> bool:
-    """Return whether a polygon covers a disc within a border, up to `LEFT_OUT` of its own area."""
+    """Return whether a polygon covers a disc within a border, but for a share `LEFT_OUT`.
+
+    The share refers to the polygon's own area.
+    """
     turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
     rows = np.column_stack([np.cos(turns), np.sin(turns)])
     disc = clip(border.corners, rows, rows @ center + radius)

@@ -1,16 +1,17 @@
-"""Nearest points of triangles, with no tolerance: tiny and thin ones are measured like the rest.
+"""Finds the nearest points of triangles without tolerances, however small or thin they are.
 
-Solved: for a point p and a triangle a, b, c, its point q nearest to p.
+Solved: for a point p and a triangle a, b, c, the point q of the triangle nearest to p.
 
-Method. q is the foot of p on the triangle's plane if that is inside, else on one of the edges. With
-n = (b - a) x (c - a) the foot is a + v (b - a) + w (c - a), v = n.((p - a) x (c - a)) / n.n and
-w = n.((b - a) x (p - a)) / n.n; it is inside if v, w >= 0 and v + w <= 1. Of these four candidates
-the nearest is taken. As each is on the triangle, rounding can make q too far from p, never too
-near: by some 1e-16 lengths of the triangle, divided by the ratio of its height to its length, and
-no more than its height, so by 1e-8 lengths for the worst of slivers.
+Method. q is the foot of p on the triangle's plane if that is inside, else it is on one of the
+edges. With n = (b - a) x (c - a) the foot is a + v (b - a) + w (c - a), v = n.((p - a) x (c - a)) /
+n.n and w = n.((b - a) x (p - a)) / n.n; it is inside if v, w >= 0 and v + w <= 1. Of these four
+candidates the nearest is taken. As each candidate is on the triangle, rounding can make q too far
+from p, never too near. The error is some 1e-16 lengths of the triangle, divided by the ratio of its
+height to its length, but no more than its height: at worst 1e-8 lengths, for very thin triangles.
 
-Source: Ericson, "Real-Time Collision Detection", 2005, section 5.1.5, without its cascade of signs:
-those are products of four lengths, which no one threshold suits.
+Source: Ericson, "Real-Time Collision Detection", 2005, section 5.1.5. The signs tested there are
+products of four lengths, which no single threshold suits, so the nearest candidate is taken
+instead.
 """
 
 import numpy as np
@@ -59,7 +60,7 @@ def _on_edges(corners: Array, point: Array) -> list[Array]:
 
 
 def _foot(corners: Array, point: Array) -> Array:
-    """Return the foot of a point on each triangle if it is inside, else a corner, (t, 3)."""
+    """Return the foot of a point on each triangle if that is inside, else a corner, (t, 3)."""
     tails = corners[:, 0]
     one, other, away = corners[:, 1] - tails, corners[:, 2] - tails, point - tails
     normals = np.cross(one, other)
@@ -77,5 +78,8 @@ def _dots(a: Array, b: Array) -> Array:
 
 
 def _divided(a: Array, b: Array) -> Array:
-    """Divide; zero where a triangle or edge has no size, as its corners are candidates anyway."""
+    """Divide arrays, with zero where the divisor is zero.
+
+    The divisor is zero for a triangle or an edge without size, whose corners are candidates anyway.
+    """
     return np.divide(a, b, out=np.zeros_like(a), where=b > 0.0)

@@ -1,4 +1,4 @@
-"""The surface of a triangle mesh, and whether a point with a normal lies on it."""
+"""Decides whether a point with a normal lies on the surface of a triangle mesh."""
 
 import math
 from typing import Any
@@ -9,12 +9,12 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.geometry.nearest_points import nearest_on_triangles
 
 LEAN = math.cos(3e-3)
-"""Cosine of the largest angle between a normal and a triangle's that still agree: planar faces are
-as flat as `FlatnessLimits` say, and six digits round."""
+"""Cosine of the largest angle at which a normal and a triangle's normal agree: planar faces are
+flat to within `FlatnessLimits`, and files keep six digits."""
 
 
 class Surface:
-    """The surface of a closed triangle mesh, wound outwards."""
+    """The surface of a closed triangle mesh whose triangles face outwards."""
 
     def __init__(self, vertices: Array, triangles: Indices) -> None:
         self._corners: Any = vertices[triangles]
@@ -25,11 +25,11 @@ class Surface:
         self._inward = -outward / np.where(lengths > 0.0, lengths, 1.0)
 
     def holds(self, point: Array, normal: Array | None, slack: float) -> bool:
-        """Return whether a point is on the surface, on a triangle with the normal if one is given.
+        """Return whether a point is on a triangle whose normal agrees with the given one.
 
         Args:
             point: The point, (3,) [m].
-            normal: Unit vector into the solid, (3,); None if any will do.
+            normal: Unit vector into the solid, (3,); None accepts every triangle.
             slack: How far the point may be from a triangle [m].
         """
         near = np.linalg.norm(nearest_on_triangles(self._corners, point) - point, axis=1) <= slack

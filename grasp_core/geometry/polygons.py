@@ -1,4 +1,4 @@
-"""Polygons in a plane: frames, edges, clipping, and convex pieces of a polygon with holes.
+"""Handles polygons in a plane: frames, edges, clipping, and convex pieces of a polygon with holes.
 
 A polygon is a (k, 2) array of corners, counter-clockwise unless it is a hole. A convex
 polygon is also the set {y : E y <= b}, with the rows of E unit outward edge normals.
@@ -13,20 +13,21 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.solvers.ties import first_best
 
 MERGE_ORDERS = 16
-"""How many orders of removing diagonals are tried."""
+"""Number of orders in which removing diagonals is tried."""
 CONVEX_SLACK = 1e-9
-"""How far a corner may turn inwards and still count as straight, relative to the two edge
-lengths' product: well above the rounding of coordinates, well below a visible notch."""
+"""How far a corner may turn inwards and still count as straight, relative to the product of its two
+edges' lengths: well above the rounding of coordinates, well below a visible notch."""
 
 SAME_PART = 1e-3
-"""Share of the slack of straight corners within which heights are equal."""
+"""Difference of two corners' heights that counts as none, as a share of the slack of straight
+corners."""
 SAME_CORNER = 1e-9
-"""Distance below which two corners are one, at unit size."""
+"""Distance below which two corners count as one, at unit size."""
 ON_LINE = 1e-12
 """Distance from a line, relative to coordinates, below which a corner is on it: a thousand rounding
-errors. Else a cut through a corner leaves a second corner beside it on some machines."""
+errors. Without it, a cut through a corner leaves a second corner beside it on some machines."""
 TRIMMED = 1e-3
-"""Share of a polygon's area that may be given up to have fewer corners."""
+"""Share of a polygon's area that is given up to have fewer corners."""
 
 Row: TypeAlias = tuple[float, float, float]
 
@@ -55,7 +56,7 @@ def plane_tangents(x: float, y: float, z: float) -> tuple[Row, Row]:
 
 
 def signed_area(polygon: Array) -> float:
-    """Return the area of a polygon, positive when counter-clockwise."""
+    """Return the area of a polygon, positive if its corners are counter-clockwise."""
     x, y = polygon.T
     return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
@@ -80,7 +81,7 @@ def edge_rows(polygon: Array) -> tuple[Array, Array]:
 
 
 def clip(polygon: Array, rows: Array, limits: Array) -> Array:
-    """Cut a convex polygon down to where rows @ y <= limits; (0, 2) when nothing is left."""
+    """Cut a convex polygon to rows @ y <= limits; the result is (0, 2) if nothing is left."""
     for row, limit in zip(rows, limits, strict=True):
         height = polygon @ row - limit
         height[np.abs(height) <= ON_LINE * np.abs(polygon).max(initial=0.0)] = 0.0
@@ -97,12 +98,12 @@ def clip(polygon: Array, rows: Array, limits: Array) -> Array:
 
 
 def tidy(polygon: Array) -> Array:
-    """Remove corners that coincide with the one before from a polygon (k, 2) at unit size."""
+    """Remove corners from a polygon (k, 2) at unit size that coincide with the corner before."""
     return polygon[np.linalg.norm(polygon - np.roll(polygon, 1, axis=0), axis=1) > SAME_CORNER]
 
 
 def with_fewer_corners(polygon: Array) -> Array:
-    """Drop corners of a convex polygon (k, 2) that hold hardly any area; the rest is inside it."""
+    """Drop corners that add little area to a convex polygon (k, 2); the result is inside it."""
     left = TRIMMED * signed_area(polygon)
     while len(polygon) > 3:  # noqa: PLR2004 - a triangle has no corner to spare
         before, after = (
@@ -132,7 +133,7 @@ def nearest_point(polygon: Array, point: Array) -> Array:
 def convex_hull(points: Array) -> Array:
     """Return the corners of the convex hull of points (n, 2), counter-clockwise, (k, 2).
 
-    They begin with the corner that comes first among the points, however the figure is turned.
+    The first corner is the one that comes first among the points, however the figure is turned.
     """
     ordered = points[np.lexsort(points.T[::-1])]
 
@@ -183,9 +184,9 @@ def is_convex(polygon: Array) -> bool:
 def merge_into_convex_pieces(points: Array, triangles: Indices) -> list[Array]:
     """Join the triangles of a polygon into few convex pieces.
 
-    Diagonals are removed one by one as long as the two pieces beside them form a convex
-    piece; the result has at most four times the least possible number of pieces. The order
-    matters, so a few are tried and the one with the fewest pieces is kept.
+    Diagonals are removed one by one as long as the two pieces beside a diagonal form a convex
+    piece; the result has at most four times the least possible number of pieces. The order matters,
+    so a few orders are tried and the result with the fewest pieces is kept.
 
     Args:
         points: Corners, (n, 2).
@@ -222,7 +223,7 @@ def _edges(loop: list[int]) -> list[tuple[int, int]]:
 
 
 def _join(one: list[int], two: list[int], tail: int, head: int) -> list[int]:
-    """Walk `one` from head round to tail, then `two` from tail round to head."""
+    """Join two polygons along a common edge: walk `one` from head to tail, then `two` back."""
     start, other = one.index(head), two.index(tail)
     first = one[start:] + one[:start]
     second = two[other:] + two[:other]

@@ -1,4 +1,4 @@
-"""Products of vectors in space, compiled for other kernels."""
+"""Computes products of vectors in space, compiled for other kernels."""
 
 import numpy as np
 
@@ -22,7 +22,7 @@ def cross(u: Array, v: Array, crossed: Array) -> None:
 
 @loop()
 def angle_between(u: Array, v: Array) -> float:
-    """Return the angle between two vectors [rad], as exact for nearly equal ones as for others."""
+    """Return the angle between two vectors [rad], accurate for nearly equal ones too."""
     crossed = np.empty(3)
     cross(u, v, crossed)
     return np.arctan2(np.sqrt(dotted(crossed, crossed)), dotted(u, v))
@@ -30,7 +30,7 @@ def angle_between(u: Array, v: Array) -> float:
 
 @loop()
 def balancing_weights(axes: Array, weights: Array) -> None:
-    """Fill in weights of sum w_i a_i = 0, (4,), like those of `grasp_core.cones.spanning`."""
+    """Fill in weights with sum w_i a_i = 0, (4,), like those of `grasp_core.cones.spanning`."""
     front, back, total = np.empty(3), np.empty(3), 0.0
     cross(axes[2], axes[3], back)
     cross(axes[0], axes[1], front)
@@ -46,7 +46,7 @@ def balancing_weights(axes: Array, weights: Array) -> None:
 
 @loop()
 def focus_direction(axes: Array) -> Array:
-    """Compute the same as `focus_direction` of `grasp_core.families.placements`."""
+    """Compute what `focus_direction` of `grasp_core.families.placements` computes."""
     weights, u = np.empty(4), np.empty(3)
     balancing_weights(axes, weights)
     for j in range(3):
@@ -59,7 +59,7 @@ def focus_direction(axes: Array) -> Array:
 
 @loop()
 def across(axis: Array, T: Array) -> tuple[Array, Array]:
-    """Return two unit vectors across an axis, the first leaning as the first of a face's frame."""
+    """Return two unit vectors across an axis; the first leans like the first column of T."""
     first, second, along = np.empty(3), np.empty(3), 0.0
     for j in range(3):
         along += T[j, 0] * axis[j]

@@ -31,7 +31,8 @@ FLOAT_TYPE = 5126
 TRIANGLES, STRIP = 4, 5
 MOST_NODES = 10_000
 MOST_VALUES = 4_000_000
-"""Most JSON values allowed: each of them takes up to a quarter of a kilobyte of memory."""
+"""Largest number of JSON values allowed: each of them takes up to a quarter of a kilobyte of
+memory."""
 PLAIN_EXTENSIONS = ("KHR_materials", "KHR_texture", "KHR_lights", "EXT_texture", "KHR_xmp")
 """Prefixes of glTF extensions that change only the appearance; files with others are refused."""
 Tree = dict[str, Any]
@@ -197,7 +198,7 @@ def _floats(node: Tree, name: str, count: int) -> Array:
 
 
 def _rotation(quaternion: Array) -> Array:
-    """The rotation matrix, (3, 3), of a quaternion (x, y, z, w), whose length does not matter."""
+    """Convert a quaternion (x, y, z, w) of any length to a rotation matrix, (3, 3)."""
     size = float(np.linalg.norm(quaternion))
     if not 0.5 < size < 2.0:  # noqa: PLR2004 - rounding does not get there
         broken("a node", f"its rotation is a quaternion of length {size:.3g}, expected 1")

@@ -1,4 +1,4 @@
-"""The limits on a mesh file's bytes, triangles, planar faces and bodies.
+"""Limits a mesh file's bytes, triangles, planar faces and bodies.
 
 Nothing heavy is imported here, so that command-line flags can show the same values.
 """
@@ -15,9 +15,9 @@ class MeshLimits:
     max_bytes: int = 64 * 2**20
     max_triangles: int = 200_000
     max_faces: int = 5_000
-    """Most planar faces of the object."""
+    """Largest number of planar faces of the object."""
     max_parts: int = 64
-    """Most connected parts of the surface: separate bodies and inner cavities."""
+    """Largest number of connected parts of the surface: separate bodies and inner cavities."""
 
     def __post_init__(self) -> None:
         for name in ("max_bytes", "max_triangles", "max_faces", "max_parts"):

@@ -16,7 +16,7 @@ from grasp_core.mesh_files.words import numbers, plain_text, whole, worded_lines
 
 LARGEST_CORNER = 2**32
 LARGEST_ROW = 2**30
-"""Most bytes of one row of a table that numpy can describe."""
+"""Largest number of bytes in one row of a table that numpy can describe."""
 CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
 Lines = Iterator[tuple[int, list[bytes]]]
 Cells = dict[str, Sequence[float]]

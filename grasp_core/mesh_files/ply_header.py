@@ -51,12 +51,12 @@ class Element:
 
     @property
     def kept(self) -> tuple[str, ...]:
-        """The names of the properties that describe the surface."""
+        """Return the names of the properties that describe the surface."""
         return {"vertex": POINT, "face": LISTS}.get(self.name, ())
 
     @property
     def lists(self) -> bool:
-        """Whether any property is a list, so that rows may differ in length."""
+        """Return whether any property is a list, so that rows may differ in length."""
         return any(each.count_kind is not None for each in self.properties)
 
 

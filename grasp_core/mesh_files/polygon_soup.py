@@ -28,7 +28,7 @@ class Polygons:
     """Collects the polygons of a file as triangles, at 24 bytes each."""
 
     most: int
-    """Most triangles allowed."""
+    """Largest number of triangles allowed."""
     first: int = 0
     """The number of the file's first vertex, 0 or 1, for messages."""
     triangles: "array[int]" = field(default_factory=_no_triangles)

@@ -20,7 +20,7 @@ OTHER_FILES = {
     b"\x28\xb5\x2f\xfd": "a zstd archive", b"<?xml": "an XML file", b"<!DOCTYPE": "an HTML file",
     b"%PDF": "a PDF file", b"\x89PNG": "a picture", b"DRACO": "a Draco file",
 }  # fmt: skip
-"""The first bytes of files that are not meshes, with a name for the message."""
+"""First bytes of files that are not meshes, each with a name of the format for messages."""
 MAGIC = {"ply": b"ply", "glb": b"glTF"}
 
 

@@ -5,7 +5,7 @@ from typing import NoReturn
 from grasp_core.errors import MeshError, MeshRefusal
 
 LONGEST = 60
-"""Most characters of a file that a message quotes."""
+"""Largest number of characters of a file that a message quotes."""
 
 
 def shown(value: object) -> str:

@@ -1,4 +1,4 @@
-"""Hulls, extrusions and booleans of triangle meshes. Only this module imports manifold3d."""
+"""Makes hulls, extrusions, unions and differences of meshes; only this module uses manifold3d."""
 
 import importlib
 from collections.abc import Sequence
@@ -14,9 +14,10 @@ from grasp_core.geometry.polygons import signed_area
 from grasp_core.solvers.ties import graded, largest_first
 
 GRID_DIGITS = 9
-"""Digits of the grid, relative to the figure, on which corners are put before triangulation."""
+"""Digits to which corners are rounded before triangulation, for figures of size one."""
 GRID = 4e-8
-"""Extra inset of figures of size one: the kernel rounds coordinates to 1e-8."""
+"""Extra distance by which figures of size one are shrunk, because manifold3d rounds coordinates to
+1e-8."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,26 +30,26 @@ class Solid:
     """Vertex indices, (t, 3)."""
 
     def __add__(self, other: "Solid") -> "Solid":
-        """The union of two solids."""
+        """Return the union of two solids."""
         return _solid(_manifold(self) + _manifold(other))
 
     def __sub__(self, other: "Solid") -> "Solid":
-        """The part of this solid that is outside of the other."""
+        """Return the part of this solid that is outside of the other."""
         return _solid(_manifold(self) - _manifold(other))
 
     @property
     def volume(self) -> float:
-        """Enclosed volume [m^3]; negative when the mesh is inside out."""
+        """Return the enclosed volume [m^3]; it is negative when the mesh is inside out."""
         corners = self.vertices[self.triangles] - self.vertices.mean(axis=0)
         return float(np.linalg.det(corners).sum()) / 6.0
 
     def moved(self, offset: ArrayLike) -> "Solid":
-        """This solid moved by an offset, (3,) [m]."""
+        """Return this solid moved by an offset, (3,) [m]."""
         return Solid(self.vertices + np.asarray(offset, dtype=np.float64), self.triangles)
 
 
 def hull(points: ArrayLike) -> Solid:
-    """Convex hull of points, (n, 3) [m]."""
+    """Make the convex hull of points, (n, 3) [m]."""
     return _solid(_kernel().Manifold.hull_points(np.asarray(points, dtype=np.float64)))
 
 
@@ -61,10 +62,10 @@ def extrusion(outline: ArrayLike, height: float, holes: Sequence[ArrayLike] = ()
 
 
 def triangulate(loops: Sequence[Array]) -> Indices:
-    """Triangulate an outer border with holes; indices count all corners in order, (t, 3).
+    """Triangulate a plane figure with holes; indices count all corners in order, (t, 3).
 
-    Corners are put on a grid first, where corners of regular figures are exactly on one line or
-    circle, so that rounding does not choose between triangulations.
+    Corners are first rounded to a grid, on which corners of regular figures are exactly on one line
+    or circle, so that rounding does not choose between triangulations.
     """
     size = float(np.ptp(np.vstack(loops), axis=0).max())
     on_grid = [graded(loop / size, GRID_DIGITS) for loop in loops]
@@ -72,9 +73,10 @@ def triangulate(loops: Sequence[Array]) -> Indices:
 
 
 def inset_figure(loops: Sequence[Array], margin: float) -> list[list[Array]]:
-    """The parts of a plane figure that are at least a margin away from its border.
+    """Cut off everything nearer than a margin to the border of a plane figure.
 
-    At corners that turn inwards somewhat more is cut off, so that what is left has few corners.
+    At corners that turn inwards a little more is cut off, so that the remaining parts have few
+    corners.
 
     Args:
         loops: Outer border and holes, each (k, 2).
@@ -92,17 +94,17 @@ def inset_figure(loops: Sequence[Array], margin: float) -> list[list[Array]]:
 
 
 def _outer_first(loops: Sequence[Array]) -> list[Array]:
-    """The largest loop first, then the others in their order."""
+    """Put the largest loop first, and keep the order of the others."""
     return [loops[place] for place in largest_first([signed_area(loop) for loop in loops])]
 
 
 def intersection_volume(one: Solid, two: Solid) -> float:
-    """Volume that two solids share [m^3]."""
+    """Compute the volume that two solids share [m^3]."""
     return float((_manifold(one) ^ _manifold(two)).volume())
 
 
 def union_volume(solids: Sequence[Solid]) -> float:
-    """Volume of the union of solids [m^3]."""
+    """Compute the volume of the union of solids [m^3]."""
     kernel = _kernel()
     parts = [_manifold(solid) for solid in solids]
     return float(kernel.Manifold.batch_boolean(parts, kernel.OpType.Add).volume())
@@ -119,7 +121,7 @@ def _manifold(solid: Solid) -> Any:
     )
     body = kernel.Manifold(mesh)
     if body.status() != kernel.Error.NoError:
-        raise InputError(f"expected a closed, orientable mesh, got {body.status().name}; repair it")
+        raise InputError(f"the mesh is not closed and orientable ({body.status().name}); repair it")
     return body
 
 

@@ -1,10 +1,10 @@
-"""Checks triangles and builds the parts of a polyhedron, or refuses them with a reason.
+"""Checks a triangle mesh and finds its faces, or refuses it with a reason.
 
-The order of the checks: the file, its numbers, one consistent side, that it is closed with two
-triangles per edge, its volume, and that no two of its parts overlap. Close vertices are welded, and
-a closed inside-out mesh is turned. A surface that is taken as patches need not be closed: if it is
-faulty, its largest part is used, wound as it is. The notes say what was done. Nothing else is
-repaired.
+The checks come in this order: the numbers of the file, one consistent orientation, closure with two
+triangles per edge, the volume, and that no two parts of the mesh overlap. Close vertices are
+welded, and a closed inside-out mesh is turned. A surface on which nearly flat patches replace the
+faces need not be closed: if it is faulty, its largest part is used, with the orientation it has.
+The notes say what was changed. Nothing else is repaired.
 """
 
 import hashlib
@@ -34,16 +34,18 @@ from grasp_core.objects.solid_checks import (
 from grasp_core.values import FINGERS
 
 SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0
-"""Half a millimetre to twenty metres: for any other extent the unit is almost surely wrong."""
+"""Smallest and largest extent of an object [m]: beyond them, the unit of the file is almost surely
+wrong."""
 SURROUNDINGS = 1e-6
-"""Largest distance of a centre of mass from the object's bounds, relative to the extent."""
+"""Largest distance of a given centre of mass from the object's bounding box, relative to the
+extent."""
 DEFAULT_FLATNESS = FlatnessLimits()
 DEFAULT_LIMITS = MeshLimits()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Parts:
-    """The parts that a polyhedron is made of."""
+    """The parts of a polyhedron: mesh, faces, mass properties and notes."""
 
     vertices: Array
     """Welded vertices, (n, 3) [m]."""
@@ -52,11 +54,11 @@ class Parts:
     faces: tuple[Face, ...]
     mass: MassProperties
     content_sha256: str
-    """Hash of the canonical mesh."""
+    """Hash of the mesh with vertices and triangles in sorted order."""
     patches: PatchLimits | None
-    """Limits of flatness of the patches; None where faces are exact."""
+    """Limits of flatness for patches that replace faces; None where faces are exactly planar."""
     notes: tuple[str, ...]
-    """Notes on what was mended, for people to read."""
+    """Notes, for people to read, on what was changed in the mesh."""
 
 
 def build(  # noqa: PLR0913, PLR0917 - as `load_polyhedron`
@@ -68,7 +70,7 @@ def build(  # noqa: PLR0913, PLR0917 - as `load_polyhedron`
     center_of_mass: ArrayLike | None,
     limits: MeshLimits,
 ) -> Parts:
-    """Check a triangle mesh and find its faces; for arguments see `load_polyhedron`.
+    """Check a triangle mesh and find its faces; `load_polyhedron` explains the arguments.
 
     Raises:
         InputError: The centre of mass is not a point.
@@ -82,8 +84,8 @@ def build(  # noqa: PLR0913, PLR0917 - as `load_polyhedron`
     groups = _planar_groups(points, corners, flatness, faces)
     if len(groups or ()) > limits.max_faces:
         message = (
-            f"{len(groups or ())} planar faces are over the limit of {limits.max_faces}; simplify "
-            "it, or take patches (--faces patches)"
+            f"{len(groups or ())} planar faces exceed the limit of {limits.max_faces}; simplify "
+            "the mesh, or plan on nearly flat patches (--faces patches)"
         )
         raise MeshError(MeshRefusal.TOO_MANY, message)
     flat = (patches or PatchLimits()) if groups is None else None
@@ -104,10 +106,10 @@ def build(  # noqa: PLR0913, PLR0917 - as `load_polyhedron`
 
 
 def check_choices(faces: FaceKind, patches: PatchLimits | None, flatness: FlatnessLimits) -> None:
-    """Refuse choices of the wrong kind.
+    """Refuse values of `faces`, `patches` or `flatness` that are of the wrong kind.
 
     Raises:
-        InputError: A choice is of the wrong kind.
+        InputError: A value is of the wrong kind.
     """
     one_of(faces, get_args(FaceKind), "faces")
     if patches is not None:
@@ -116,7 +118,7 @@ def check_choices(faces: FaceKind, patches: PatchLimits | None, flatness: Flatne
 
 
 def _given_center(points: Array, center_of_mass: ArrayLike | None) -> Array | None:
-    """Check a stated centre of mass, (3,) [m]; None if none is stated."""
+    """Check the centre of mass that a user gave, (3,) [m]; None if none was given."""
     if center_of_mass is None:
         return None
     center = frozen(center_of_mass, (3,), "center_of_mass")
@@ -124,7 +126,7 @@ def _given_center(points: Array, center_of_mass: ArrayLike | None) -> Array | No
     slack = SURROUNDINGS * float((high - low).max())
     if (center < low - slack).any() or (center > high + slack).any():
         raise InputError(
-            f"center_of_mass {center.tolist()} is outside the object, which is from {low.tolist()} "
+            f"center_of_mass {center.tolist()} must be inside the object, from {low.tolist()} "
             f"to {high.tolist()} m"
         )
     return center
@@ -133,7 +135,7 @@ def _given_center(points: Array, center_of_mass: ArrayLike | None) -> Array | No
 def _planar_groups(
     points: Array, corners: Indices, flatness: FlatnessLimits, faces: FaceKind
 ) -> list[Indices] | None:
-    """Triangles grouped into planar faces; None where patches are to be used instead."""
+    """Group triangles into planar faces; None where patches are used instead."""
     if faces == "patches":
         return None
     groups = coplanar_groups(points, corners, flatness)
@@ -143,7 +145,7 @@ def _planar_groups(
 def _sound_surface(
     points: Array, corners: Indices, fault: MeshError | None, most: int
 ) -> tuple[Array, Indices, list[str]]:
-    """The surface wound outwards; if it is faulty, its largest part, wound as it is."""
+    """Orient a surface outwards or, if it is faulty, return its largest part as it is."""
     if fault:
         return largest_part(points, corners)
     corners, flipped = oriented(points, corners, most)
@@ -154,28 +156,28 @@ def _sound_surface(
 def _patched(
     points: Array, corners: Indices, limits: PatchLimits, fault: MeshError | None
 ) -> tuple[tuple[Face, ...], list[str]]:
-    """The patches of a surface, and notes about them."""
+    """Find the patches of a surface, and write notes about them."""
     patches = flat_patches(points, corners, limits)
     if len(patches) < FINGERS:
         raise MeshError(
             MeshRefusal.NOT_FLAT,
-            f"{len(patches)} patches are within {limits.spread_deg:g} deg and {limits.depth:g} "
-            "of the extent from flat, but four fingers need four; allow more "
-            "(--patch-spread-deg, --patch-depth), or refine the mesh",
+            f"only {len(patches)} patches are within {limits.spread_deg:g} deg and "
+            f"{limits.depth:g} of the extent from flat, but four fingers need four patches; "
+            "allow more (--patch-spread-deg, --patch-depth), or refine the mesh",
         )
     lean = max((face.spread for face in patches), default=0.0)
     off = max((face.depth for face in patches), default=0.0)
     notes = [
-        f"a curved surface: planned on {len(patches)} patches, whose surface leans from their "
-        f"planes by up to {math.degrees(lean):.3g} deg and is up to {1e3 * off:.3g} mm off"
+        f"the surface is curved; its {len(patches)} patches stand for faces, and lean from their "
+        f"planes by up to {math.degrees(lean):.3g} deg and are up to {1e3 * off:.3g} mm off them"
     ]
     if fault and fault.reason is MeshRefusal.OPEN:
         notes.append(
-            f"not a closed surface ({fault}); only its patches are used, and the centre of mass is "
-            "that of the convex hull unless it is given"
+            f"the surface is not closed ({fault}); only its patches are used, and the centre of "
+            "mass is that of the convex hull unless it is given"
         )
     elif fault:
-        notes.append(f"not a proper surface ({fault}); only its patches are used")
+        notes.append(f"the surface is faulty ({fault}); only its patches are used")
     return patches, notes
 
 
@@ -184,20 +186,23 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tup
     real_array(triangles, "triangles")  # before numpy makes an array of anything
     corners = np.array(triangles)
     if points.ndim != 2 or corners.ndim != 2 or points.shape[1:] != (3,) or not corners.size:  # noqa: PLR2004
-        message = f"need vertices (n, 3) and triangles (t, 3), got {points.shape}, {corners.shape}"
+        got = f"{points.shape} and {corners.shape}"
+        message = f"vertices must be (n, 3) and triangles (t, 3), got {got}"
         raise MeshError(MeshRefusal.EMPTY, message)
     if corners.shape[1] != 3 or corners.dtype.kind not in "iu":  # noqa: PLR2004
         message = f"triangles must be whole numbers (t, 3), got {corners.dtype} {corners.shape}"
         raise MeshError(MeshRefusal.INDEX, message)
     if len(corners) > most:
-        message = f"{len(corners)} triangles are over the limit of {most}; simplify it"
+        message = f"the mesh has {len(corners)} triangles, expected at most {most}; simplify it"
         raise MeshError(MeshRefusal.TOO_MANY, message)
     if not np.isfinite(points).all():
         bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
-        raise MeshError(MeshRefusal.NON_FINITE, f"vertex {bad} is {points[bad]}, not finite")
+        raise MeshError(
+            MeshRefusal.NON_FINITE, f"vertex {bad} must have finite coordinates, got {points[bad]}"
+        )
     if corners.min() < 0 or corners.max() >= len(points):
         wrong = corners.min() if corners.min() < 0 else corners.max()
-        message = f"a triangle names vertex {wrong}, but there are 0..{len(points) - 1}"
+        message = f"a triangle names vertex {wrong}; the last vertex is {len(points) - 1}"
         raise MeshError(MeshRefusal.INDEX, message)
     with np.errstate(over="ignore"):
         extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
@@ -214,7 +219,7 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tup
 
 
 def content_hash(points: Array, corners: Indices) -> str:
-    """SHA-256 of the mesh with vertices and triangles in sorted order."""
+    """Hash a mesh with SHA-256, vertices and triangles in sorted order."""
     order = np.lexsort(points.T[::-1])
     place = np.empty_like(order)
     place[order] = np.arange(len(order))

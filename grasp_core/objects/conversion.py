@@ -1,4 +1,4 @@
-"""Polyhedra from meshes of trimesh, and back; the door to trimesh."""
+"""Converts meshes of the library trimesh to polyhedra and back."""
 
 import importlib
 from typing import Any
@@ -12,7 +12,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 def from_trimesh(
     mesh: Any, *, name: str = "object", faces: FaceKind = "auto", patches: PatchLimits | None = None
 ) -> Polyhedron:
-    """Build a polyhedron from a `trimesh.Trimesh`, with the checks of a mesh file.
+    """Build a polyhedron from a `trimesh.Trimesh`, with the same checks as for a mesh file.
 
     Args:
         mesh: Any value with `vertices`, (n, 3) [m], and triangles `faces`, (t, 3).
@@ -26,14 +26,14 @@ def from_trimesh(
     """
     if not (hasattr(mesh, "vertices") and hasattr(mesh, "faces")):
         raise InputError(
-            f"mesh must be a trimesh.Trimesh, got {type(mesh).__name__}; of a trimesh.Scene, "
-            "give scene.to_mesh()"
+            f"mesh must be a trimesh.Trimesh, got {type(mesh).__name__}; for a trimesh.Scene, "
+            "pass scene.to_mesh()"
         )
     return Polyhedron.from_mesh(mesh.vertices, mesh.faces, name=name, faces=faces, patches=patches)
 
 
 def to_trimesh(body: Polyhedron) -> Any:
-    """Return the surface of a polyhedron as a `trimesh.Trimesh` of the same triangles.
+    """Return the surface of a polyhedron as a `trimesh.Trimesh` with the same triangles.
 
     Raises:
         InputError: The value is not a polyhedron.

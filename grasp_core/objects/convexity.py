@@ -1,4 +1,4 @@
-"""Whether a surface is the surface of its convex hull, so that the hull can stand in for it.
+"""Decides whether a surface is that of its convex hull, so that the hull can replace it.
 
 A point of the hull is at most d from its border iff it is at most d below the plane of some facet.
 If that holds for the centroid of a triangle, each corner is at most 3 d below the same plane, as no
@@ -12,14 +12,14 @@ from grasp_core.arrays import Array
 from grasp_core.objects.polyhedron import Polyhedron
 
 FLUSH = 1e-6
-"""Largest depth of a triangle's centroid below the hull's border, in object radii: coordinates in
-single precision are off by a tenth of this."""
+"""Largest depth of a triangle's centroid below the surface of the convex hull, in object radii: ten
+times the error of coordinates in single precision."""
 BLOCK = 256
-"""Number of triangles compared with all facets at a time: a few megabytes."""
+"""Number of triangles compared with all facets at a time, which needs a few megabytes."""
 
 
 def is_convex(body: Polyhedron) -> bool:
-    """Whether the triangles of a body lie on the border of their convex hull."""
+    """Return whether all triangles of an object lie on the surface of their convex hull."""
     spatial: Any = importlib.import_module("scipy.spatial")
     points = (body.vertices - body.center_of_mass) / body.radius
     facets: Array = spatial.ConvexHull(points).equations

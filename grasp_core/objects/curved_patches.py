@@ -1,4 +1,4 @@
-"""Finds nearly flat parts of curved and scanned surfaces, and measures how far each is from flat.
+"""Finds nearly flat patches of curved and scanned surfaces, and measures how far each is from flat.
 
 Solved: planes and convex polygons in them such that over each point of a polygon, along the plane's
 normal, there is exactly one point of a connected group of triangles, at most `depth` from the
@@ -31,17 +31,20 @@ from grasp_core.objects.planar_faces import triangle_neighbours
 from grasp_core.solvers.ties import first_best, graded, largest_first, ranks
 
 SMOOTHING = 10
-"""Rounds in which normals are averaged with those of neighbours, to find where it is flat."""
+"""Number of times that normals are averaged with those of neighbours, to find where a surface is
+flat."""
 FITS = 3
-"""Number of times that a group is grown and its plane is fitted again."""
+"""Number of times that a group of triangles is grown and its plane is fitted again."""
 FLATNESS_DIGITS = 9
-"""Cosines between normals and their averages that are equal to this many digits are ties."""
+"""Digits to which the cosines between normals and their averages are compared; equal ones are ties.
+"""
 BORDER_GAP = 1e-9
-"""Distance of polygons from the borders of their groups, relative to the object's extent."""
+"""Distance that patches keep from the borders of their groups of triangles, relative to the
+object's extent."""
 
 
 def flat_patches(vertices: Array, triangles: Indices, limits: PatchLimits) -> tuple[Face, ...]:
-    """The largest nearly flat parts of a surface, with the largest discs first.
+    """Find the largest nearly flat patches of a surface, those with the largest discs first.
 
     Args:
         vertices: Vertices, (n, 3) [m].
@@ -64,9 +67,10 @@ def flat_patches(vertices: Array, triangles: Indices, limits: PatchLimits) -> tu
 
 
 def _largest_apart(found: list[tuple[float, Face]], most: int, extent: float) -> tuple[Face, ...]:
-    """The patches with the largest discs; among equal ones, each next as far from all as can be.
+    """Keep the patches with the largest discs, and of equal ones those far from each other.
 
-    A ring has dozens of equal patches, and the first ones of its list are all on one side.
+    A ring has dozens of equal patches, and without this rule the first ones would all be on one
+    side.
 
     Args:
         found: Radius of the largest disc of each patch [m], and the patch.
@@ -87,7 +91,7 @@ def _largest_apart(found: list[tuple[float, Face]], most: int, extent: float) ->
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Surface:
-    """A triangle mesh with what the growth of groups needs."""
+    """A triangle mesh with the areas, normals and neighbours by which groups of triangles grow."""
 
     corners: Array
     """Corners of the triangles, (t, 3, 3) [m]."""
@@ -96,7 +100,7 @@ class _Surface:
     areas: Array
     """Areas, (t,) [m^2]."""
     across: Indices
-    """The triangle across each edge (k, k+1), -1 at borders, (t, 3)."""
+    """The triangle across each edge (k, k+1), (t, 3); -1 where the edge is a border."""
     extent: float
     """Largest extent of the object [m]."""
 
@@ -112,7 +116,7 @@ class _Surface:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Group:
-    """Connected triangles, the outward normal of the plane they grew along, their area [m^2]."""
+    """Connected triangles, with the outward normal of their plane and their area [m^2]."""
 
     triangles: Indices
     outward: Array
@@ -120,7 +124,7 @@ class _Group:
 
 
 def _groups(surface: _Surface, spread: float, depth: float) -> list[_Group]:
-    """Disjoint groups of triangles, the largest first."""
+    """Divide the triangles into disjoint nearly flat groups, the largest first."""
     smooth = _smoothed(surface)
     flatness: Array = np.einsum("ti,ti->t", smooth, surface.normals)
     flat_first = np.argsort(-graded(flatness, FLATNESS_DIGITS), kind="stable")
@@ -155,7 +159,7 @@ def _grown(
     depth: float,
     free: NDArray[np.bool_],
 ) -> Indices:
-    """Free triangles near a plane that are reached from the seed across edges, (g,)."""
+    """Return the free triangles near a plane that connect to the seed across edges, (g,)."""
     normal, origin = plane
     seen = ~free
     seen[seed] = True
@@ -172,7 +176,7 @@ def _grown(
 
 
 def _smoothed(surface: _Surface) -> Array:
-    """Normals averaged over neighbourhoods, weighted by area, (t, 3)."""
+    """Average normals over neighbouring triangles, weighted by area, (t, 3)."""
     weighted = surface.normals * surface.areas[:, None]
     inner = surface.across >= 0
     for _ in range(SMOOTHING):
@@ -184,7 +188,7 @@ def _smoothed(surface: _Surface) -> Array:
 
 
 def _patch(surface: _Surface, group: Indices, normal: Array) -> tuple[float, Face] | None:
-    """The convex polygon that a group covers once, with the radius of its largest disc [m]."""
+    """Fit a convex polygon that a group covers once; also return its largest disc's radius [m]."""
     frame = plane_frame(normal)
     origin = surface.corners[group].mean(axis=(0, 1))
     flat = (surface.corners[group] - origin) @ frame
@@ -221,7 +225,7 @@ def _patch(surface: _Surface, group: Indices, normal: Array) -> tuple[float, Fac
 
 
 def _sheets(flat: Array, point: Array) -> int:
-    """Number of triangles (t, 3, 2) that cover a point."""
+    """Count the triangles (t, 3, 2) that cover a point."""
     tails, heads = flat, np.roll(flat, -1, axis=1)
     along, away = heads - tails, point - tails
     turns = along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0]

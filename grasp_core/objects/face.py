@@ -1,4 +1,4 @@
-"""The face of a polyhedron, and the limits of flatness for patches that count as faces."""
+"""Defines the face of a polyhedron, and the limits of flatness for patches that replace faces."""
 
 from dataclasses import dataclass, field
 from functools import partial
@@ -12,7 +12,7 @@ from grasp_core.short_text import counted, summary
 from grasp_core.values import FINGERS, RIGHT_ANGLE
 
 FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
-"""Kinds of faces: flat parts, nearly flat patches, or whichever suits the surface."""
+"""Which faces to use: exactly planar ones, nearly flat patches, or whichever suits the surface."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -32,9 +32,9 @@ class Face:
     pieces: tuple[Array, ...]
     """Convex polygons that tile the face, each (k, 3) [m], wound as `polygon`."""
     spread: float = 0.0
-    """Largest angle that the surface over a curved patch leans from the plane [rad]."""
+    """Largest angle between the surface and the plane of a curved patch [rad]."""
     depth: float = 0.0
-    """Largest distance of the surface over a curved patch from the plane [m]."""
+    """Largest distance of the surface from the plane of a curved patch [m]."""
     facets: Indices = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     """Indices of the triangles over a curved patch, (f,); empty for an exact face."""
 
@@ -58,14 +58,15 @@ class Face:
 
 @dataclass(frozen=True, slots=True)
 class PatchLimits:
-    """Limits of flatness for patches, and their number.
+    """How flat a patch of a curved surface must be, and how many patches are kept.
 
     Raises:
         InputError: A limit is out of range.
     """
 
     spread_deg: float = 10.0
-    """Largest angle between the surface and the patch's plane [deg]; friction loses it."""
+    """Largest angle between the surface and the patch's plane [deg]; the friction angle available
+    to the planner shrinks by it."""
     depth: float = 0.01
     """Largest distance of the surface from the plane, relative to the object's largest extent."""
     most: int = 20

@@ -1,6 +1,6 @@
-"""Convex pieces of an object's faces, moved and scaled so that the object has size one.
+"""Splits an object's faces into convex pieces, moved and scaled so that the object has size one.
 
-All programs work on these pieces, so their tolerances mean the same for every object.
+All linear programs work on these pieces, so their tolerances mean the same for every object.
 """
 
 from collections.abc import Sequence
@@ -24,49 +24,49 @@ from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import graded
 
 THINNEST = 1e-6
-"""Least radius of a disc (object size one) in a piece that can hold a contact."""
+"""Least radius of the largest disc in a piece that can hold a contact (object size one)."""
 SOUND = 1e-9
-"""Largest disagreement between the fields of a piece (object size one)."""
+"""Largest disagreement between fields of one piece that counts as rounding (object size one)."""
 
 SAME_PLACE = 6
-"""Distances equal to this many digits (object size one) are ties, broken by the pieces' order."""
+"""Digits to which distances are compared (object size one); the order of the pieces breaks ties."""
 LARGEST_INSET = 0.5
-"""Largest distance that is kept from edges, in radii of the piece's largest disc."""
+"""Largest distance that a contact keeps from edges, in radii of the piece's largest disc."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FacePiece:
-    """One convex piece of a face: the points origin + frame @ y with E y <= b."""
+    """One convex piece of a face: the points origin + frame @ y for all y with E y <= b."""
 
     face: int
-    """Index of its face in the polyhedron."""
+    """Index in the polyhedron of the face that the piece belongs to."""
     normal: Array
     """Unit vector into the object, (3,)."""
     origin: Array
-    """A point of the plane, (3,)."""
+    """The point of the plane whose plane coordinates are zero, (3,)."""
     frame: Array
     """Orthonormal columns spanning the plane, the first along an edge, (3, 2).
 
     The frame is tied to the object: the pyramids inscribed in force cones turn with it.
     """
     corners: Array
-    """Corners in plane coordinates, (k, 2), counter-clockwise in the frame. The frame of a mirrored
-    piece is a mirror image."""
+    """Corners in plane coordinates, (k, 2), counter-clockwise in `frame`. For a mirrored piece the
+    frame is mirrored too."""
     E: Array
     """Unit outward edge normals, (k, 2)."""
     b: Array
-    """Limits of the edges: E y <= b inside, (k,)."""
+    """Distances of the edges from the origin of the plane coordinates: E y <= b inside, (k,)."""
     inradius: float
     """Radius of the largest disc in the piece."""
     spread: float = 0.0
-    """Largest angle that the true surface leans from the plane [rad]."""
+    """Largest angle between the true surface and the plane [rad]."""
     depth: float = 0.0
     """Largest distance of the true surface from the plane."""
 
     def sound(self) -> bool:
-        """Whether the fields describe one convex polygon, at about unit size.
+        """Return whether the fields describe one convex polygon, at about unit size.
 
-        `face`, `spread` and `depth` are not checked: they refer to the object.
+        `face`, `spread` and `depth` are not checked, because they refer to the object.
         """
         with np.errstate(all="ignore"):
             count = len(self.corners) if is_array(self.corners, None, 2) else 0
@@ -85,7 +85,7 @@ class FacePiece:
             return bool(np.abs(axes.T @ axes - np.eye(3)).max() <= SOUND) and self._is_polygon()
 
     def _is_polygon(self) -> bool:
-        """Whether `corners` are the corners of {y : E y <= b}, and `inradius` is its inradius."""
+        """Return whether `corners` and `inradius` fit the polygon {y : E y <= b}."""
         polygon = convex_polygon(self.corners, SOUND)
         if polygon is None:
             return False
@@ -95,27 +95,28 @@ class FacePiece:
         return within and has_inscribed_radius(polygon, self.inradius)
 
     def point(self, y: Array) -> Array:
-        """The point in space, (3,), with plane coordinates `y`, (2,)."""
+        """Return the point in space, (3,), with plane coordinates `y`, (2,)."""
         return self.origin + self.frame @ y
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FaceShape:
-    """One face as convex pieces with room for a contact, and as their convex hull."""
+    """One face as convex pieces that are large enough for a contact, and as their hull."""
 
     pieces: tuple[FacePiece, ...]
     hull: FacePiece
     """Convex hull of the pieces: what is impossible on it is impossible on every piece."""
     facets: Array | None = None
-    """Corners of the triangles over a curved patch, wound as the piece, (f, 3, 3), if curved."""
+    """Corners of the triangles over a curved patch, wound as the piece, (f, 3, 3); None for an
+    exactly planar face."""
 
 
 Shapes: TypeAlias = Sequence[FaceShape | None]
-"""The faces of an object as the programs use them; None for faces without room."""
+"""The shape of each face of an object; None for faces too narrow for a contact."""
 
 
 def face_shapes(body: Polyhedron) -> tuple[FaceShape | None, ...]:
-    """The faces of an object as the programs use them; None for faces without room."""
+    """Make the shape of each face of an object; None for faces too narrow for a contact."""
     by_face: list[list[FacePiece]] = [[] for _ in body.faces]
     for piece in unit_pieces(body):
         by_face[piece.face].append(piece)
@@ -129,7 +130,7 @@ def face_shapes(body: Polyhedron) -> tuple[FaceShape | None, ...]:
 
 
 def shape_of(pieces: Sequence[FacePiece]) -> FaceShape:
-    """Put convex pieces of one plane together as a shape, with their hull."""
+    """Combine convex pieces of one plane and their convex hull into a `FaceShape`."""
     first = pieces[0]
     if len(pieces) == 1:
         return FaceShape((first,), first)
@@ -144,7 +145,7 @@ def shape_of(pieces: Sequence[FacePiece]) -> FaceShape:
 def choices_near(
     shapes: Sequence[FaceShape], positions: Array, most: int
 ) -> list[tuple[FacePiece, ...]]:
-    """Choices of one piece per face, the nearest to given points of the planes first.
+    """List choices of one piece per face, those nearest to given points of the planes first.
 
     Args:
         shapes: Shapes of k faces.
@@ -160,18 +161,18 @@ def choices_near(
 
 
 def _nearest_first(pieces: Sequence[FacePiece], at: Array) -> list[FacePiece]:
-    """Order pieces of a face, the nearest to a point of its plane first."""
+    """Order pieces of a face by their distance from a point of its plane."""
     apart = [graded(_outside(piece, at), SAME_PLACE) for piece in pieces]
     return [pieces[place] for place in sorted(range(len(pieces)), key=apart.__getitem__)]
 
 
 def _outside(piece: FacePiece, point: Array) -> float:
-    """Distance of a point of the plane beyond the farthest edge line of a piece."""
+    """Return how far a point of the plane is beyond the farthest edge line of a piece."""
     return float((piece.E @ (piece.frame.T @ (point - piece.origin)) - piece.b).max())
 
 
 def inset_piece(piece: FacePiece, inset: float) -> FacePiece:
-    """The part of a piece that keeps clear of its edges.
+    """Cut off the part of a piece that is too near its edges.
 
     Args:
         piece: Any convex piece.
@@ -184,7 +185,10 @@ def inset_piece(piece: FacePiece, inset: float) -> FacePiece:
 
 
 def unit_pieces(body: Polyhedron) -> tuple[FacePiece, ...]:
-    """All convex pieces with room for a contact, about the centre of mass over the radius."""
+    """List all convex pieces large enough for a contact, at object size one.
+
+    Lengths are divided by the object's radius and counted from its centre of mass.
+    """
     pieces = [
         replace(
             piece_of(index, face.normal, (polygon - body.center_of_mass) / body.radius),
@@ -198,7 +202,7 @@ def unit_pieces(body: Polyhedron) -> tuple[FacePiece, ...]:
 
 
 def piece_of(face: int, normal: Array, polygon: Array) -> FacePiece:
-    """Describe a convex polygon as a piece.
+    """Make the `FacePiece` of a convex polygon.
 
     Args:
         face: Index of its face.
@@ -224,17 +228,20 @@ def piece_of(face: int, normal: Array, polygon: Array) -> FacePiece:
 
 
 def inscribed_disc_radius(polygon: Array, piece: FacePiece) -> float:
-    """Radius of the largest disc in a convex polygon (k, 3) that lies on a piece."""
+    """Compute the radius of the largest disc in a convex polygon (k, 3) on a piece."""
     return inscribed_radius(*edge_rows((polygon - piece.origin) @ piece.frame))
 
 
 def inscribed_disc_radius_of(polygon: Array, normal: Array) -> float:
-    """Radius of the largest disc in a convex polygon (k, 3), counter-clockwise about a normal."""
+    """Compute the radius of the largest disc in a convex polygon (k, 3).
+
+    Its corners are counter-clockwise about the normal.
+    """
     return inscribed_radius(*edge_rows((polygon - polygon[0]) @ plane_frame(normal)))
 
 
 def inscribed_radius(E: Array, b: Array) -> float:
-    """Radius of the largest disc in {y : E y <= b}."""
+    """Compute the radius of the largest disc in {y : E y <= b}."""
     rows = np.column_stack([E, np.ones(len(E))])
     best = maximize(LinearProgram(np.array([0.0, 0.0, 1.0]), rows, b))
     return best.value if isinstance(best, Optimum) else 0.0

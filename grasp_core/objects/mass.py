@@ -1,11 +1,12 @@
-"""Volume, centre of mass and inertia of a solid of uniform density, from its surface.
+"""Computes volume, centre of mass and inertia of a solid of uniform density from its surface.
 
-By the divergence theorem volume and centre are integrals over the surface, of x n_x and of
-x_i^2 n_i / 2. On a triangle with corners a, b, c they are polynomials in the corners. Second
-moments are summed over the tetrahedra between the centre and the triangles.
+By the divergence theorem volume and centre are integrals over the surface, of x n_x and of x_i^2
+n_i / 2. On a triangle with corners a, b, c they are polynomials in the corners. Second moments are
+summed over the tetrahedra between the centre and the triangles.
 
-Trimesh has the same integrals and judges these in tests. It is not used here because it takes
-180 ms to import, a fourth of what a small object takes to plan on in a fresh process.
+Trimesh computes the same integrals, and tests compare the two. This module does not use trimesh,
+because importing it takes 180 ms, a fourth of the time in which a fresh process plans on a small
+object.
 
 Source: Eberly, "Polyhedral mass properties (revisited)", 2002.
 """
@@ -35,7 +36,7 @@ class MassProperties:
 
 
 def mass_properties(solid: Solid, center: Array | None = None) -> MassProperties:
-    """Mass properties of a solid of uniform density.
+    """Compute the mass properties of a solid of uniform density.
 
     Args:
         solid: A closed surface.
@@ -52,7 +53,7 @@ def mass_properties(solid: Solid, center: Array | None = None) -> MassProperties
 
 
 def _inertia(a: Array, b: Array, c: Array) -> Array:
-    """Inertia about the origin, (3, 3), of the tetrahedra between it and triangles."""
+    """Sum the inertias of tetrahedra between triangles and the origin, (3, 3)."""
     sizes = np.einsum("ti,ti->t", a, np.cross(b, c))[:, None]
     moments = sum(part.T @ (sizes * part) for part in (a, b, c, a + b + c)) / 120.0
     return np.trace(moments) * np.eye(3) - moments

@@ -10,7 +10,8 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 
 ON_FACE = 1e-6
-"""Largest distance of a contact from its face, in object radii: six digits in a file keep it."""
+"""Largest distance of a contact from its face, in object radii: files that keep six digits stay
+within it."""
 
 
 def check_body(body: Polyhedron) -> None:
@@ -30,21 +31,27 @@ def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
             its surface or outside its border.
     """
     check_body(body)
-    instance(grasp, Grasp, "grasp", "gc.plan finds them")
+    instance(grasp, Grasp, "grasp", "gc.plan makes grasps")
     slack = ON_FACE * body.radius
     for finger, (face, contact) in enumerate(zip(grasp.faces, grasp.contacts, strict=True)):
         where = f"grasp {grasp.id}: contact {finger}"
         if not 0 <= face < len(body.faces):
-            raise InputError(f"{where} names face {face}; there are 0..{len(body.faces) - 1}")
+            raise InputError(
+                f"{where} names face {face}, but faces are numbered 0 to {len(body.faces) - 1}"
+            )
         if not _on_surface(body, body.faces[face], contact):
-            raise InputError(f"{where} does not lie on face {face} with that face's normal")
+            raise InputError(
+                f"{where} does not lie on face {face} with its normal; use a grasp of this object"
+            )
         plane = body.faces[face]
         if not any(within(contact.position, piece, plane.normal, slack) for piece in plane.pieces):
-            raise InputError(f"{where} lies outside the border of face {face}")
+            raise InputError(
+                f"{where} lies outside the border of face {face}; use a grasp of this object"
+            )
 
 
 def face_under(body: Polyhedron, contact: Contact) -> Face | None:
-    """The face on which a contact lies with the surface's normal; None if there is none."""
+    """Find the face on which a contact lies with the surface's normal; None if there is none."""
     slack = ON_FACE * body.radius
     for face in body.faces:
         if _on_surface(body, face, contact) and any(
@@ -55,7 +62,7 @@ def face_under(body: Polyhedron, contact: Contact) -> Face | None:
 
 
 def _on_surface(body: Polyhedron, face: Face, contact: Contact) -> bool:
-    """Whether a contact is in the plane of a face, or on a triangle of a curved patch."""
+    """Return whether a contact is in the plane of a face, or on a triangle of a curved patch."""
     slack = ON_FACE * body.radius
     if not len(face.facets):
         off = abs(float(face.normal @ (contact.position - face.centroid)))
@@ -72,7 +79,7 @@ def _on_surface(body: Polyhedron, face: Face, contact: Contact) -> bool:
 
 
 def within(point: Array, polygon: Array, normal: Array, slack: float) -> bool:
-    """Whether a point in the plane of a convex polygon is inside it, or outside by at most `slack`.
+    """Return whether a point is inside a convex polygon, or outside by at most `slack`.
 
     Args:
         point: A point in the plane, (3,) [m].

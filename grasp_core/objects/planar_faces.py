@@ -25,13 +25,14 @@ from grasp_core.objects.face import Face
 from grasp_core.solvers.ties import largest_first
 
 MAX_FACES = 200
-"""Objects with more faces count as curved: 200 faces have 65 million quadruples, some 6 million of
-which span."""
+"""Number of planar faces above which an object counts as curved: 200 faces have 65 million
+quadruples, some 6 million of which positively span."""
 SIDES = 2
-"""Number of triangles at an edge of a closed surface."""
+"""Number of triangles that meet at an edge of a closed surface."""
 
 Triangulate: TypeAlias = Callable[[list[Array]], Indices]
-"""Maps the corners of an outer border and holes, in order, to counter-clockwise triangles."""
+"""Function from the corners of an outer border and holes, in order, to counter-clockwise triangles.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,11 +40,12 @@ class FlatnessLimits:
     """Limits within which triangles count as one planar face."""
 
     angle: float = 1e-3
-    """Largest angle between normals [rad]; about a thousand times the normal error of a
-    millimetre-high triangle in single precision, and far below any friction angle of interest."""
+    """Largest angle between normals [rad]: about a thousand times the error of the normal of a
+    triangle one millimetre high in single precision, and far below any friction angle of interest.
+    """
     distance: float = 1e-6
-    """Largest distance from the plane, relative to the object's largest extent; some ten
-    single-precision steps."""
+    """Largest distance from the plane, relative to the object's largest extent: some ten times the
+    rounding of single precision."""
 
     def __post_init__(self) -> None:
         number(self.angle, "angle", least=0.0, most=1.0)
@@ -57,19 +59,18 @@ def planar_faces(
     limits: FlatnessLimits,
     triangulate: Triangulate,
 ) -> tuple[Face, ...]:
-    """The planar faces of a closed, outward-wound mesh, one for each coplanar group."""
+    """Outline one planar face for each group of coplanar triangles of a closed, outward mesh."""
     slack = limits.distance * float(np.ptp(vertices, axis=0).max())
     return tuple(_face(vertices, triangles[group], slack, triangulate) for group in groups)
 
 
 def coplanar_groups(vertices: Array, triangles: Indices, limits: FlatnessLimits) -> list[Indices]:
-    """Edge-connected groups of triangles that lie in one plane within the limits, each (g,).
+    """Group triangles that lie in one plane within the limits and connect across edges, (g,) each.
 
     Groups are in the order of their first triangle, and do not depend on the winding.
 
-    The largest triangles seed first: their planes are the least affected by rounding. A
-    triangle thinner than the distance limit has no meaningful normal, so only its
-    distance counts.
+    Groups grow from the largest triangles first, whose planes are the least affected by rounding. A
+    triangle thinner than the distance limit has no meaningful normal, so only its distance counts.
     """
     corners = vertices[triangles]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -103,7 +104,10 @@ def _off(points: Array, origin: Array, normal: Array) -> float:
 
 
 def triangle_neighbours(triangles: Indices) -> Indices:
-    """The triangle across each edge (k, k+1) of each triangle, (t, 3); -1 unless exactly one."""
+    """Find the triangle across each edge (k, k+1) of each triangle, (t, 3).
+
+    An entry is -1 unless the edge has exactly one other triangle.
+    """
     tail, head = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     edges = np.sort(np.column_stack([tail, head]), axis=1)
     _, place, uses = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
@@ -146,7 +150,7 @@ def _face(vertices: Array, triangles: Indices, slack: float, triangulate: Triang
 
 
 def convex_pieces(loops: list[Array], triangulate: Triangulate, slack: float) -> list[Array]:
-    """Convex polygons that tile a plane figure, (k, 2) each.
+    """Split a plane figure into convex polygons, (k, 2) each.
 
     Args:
         loops: Outer border, counter-clockwise, and holes, clockwise, each (k, 2).
@@ -160,7 +164,7 @@ def convex_pieces(loops: list[Array], triangulate: Triangulate, slack: float) ->
 
 
 def border_loops(triangles: Indices) -> list[list[int]]:
-    """Vertex loops around a group of triangles, wound as the triangles are.
+    """Walk along the borders of a group of triangles; return loops of vertices wound like them.
 
     Where the border touches itself in one vertex, the walk turns through the group's own
     triangles, and is then cut there, so that each loop passes a vertex once.

@@ -1,4 +1,4 @@
-"""The polyhedron: a solid bounded by planar faces, from a mesh file or from triangles."""
+"""Defines the polyhedron, a solid bounded by planar faces, made from a mesh file or triangles."""
 
 import hashlib
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Polyhedron:
-    """A solid bounded by planar faces, with the mass properties of uniform density 1."""
+    """A solid bounded by planar faces, with the mass properties of uniform density 1 kg/m^3."""
 
     name: str
     vertices: Array
@@ -39,13 +39,14 @@ class Polyhedron:
     inertia: Array
     """Inertia about the centre of mass at density 1 kg/m^3, (3, 3) [kg m^2]."""
     content_sha256: str
-    """Hash of the canonical mesh: the same for any file name, vertex or triangle order."""
+    """Hash of the sorted mesh: the same for any file name, vertex order or triangle order."""
     source_sha256: str
     """Hash of the file's bytes; equal to `content_sha256` when there was no file."""
     patches: PatchLimits | None = None
-    """Limits of flatness of a curved or scanned surface's patches; None where faces are exact."""
+    """Limits of flatness for the patches of a curved surface; None where faces are exactly planar.
+    """
     notes: tuple[str, ...] = ()
-    """Notes on what was mended when the mesh was read, for people to read."""
+    """Notes, for people to read, on what was changed when the mesh was read."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", frozen(self.vertices, (None, 3), "vertices"))
@@ -58,7 +59,9 @@ class Polyhedron:
             text(getattr(self, name), name)
         number(self.volume, "volume", above=0.0, most=LARGEST)
         if triangles.max(initial=0) >= max(len(self.vertices), 1):
-            raise InputError(f"triangles must name vertices from 0 to {len(self.vertices) - 1}")
+            raise InputError(
+                f"triangles must hold vertex numbers from 0 to {len(self.vertices) - 1}"
+            )
         several(self.faces, partial(instance, kind=Face, name="faces"), "faces", "Face values")
         several(self.notes, partial(text, name="notes"), "notes", "texts")
         if self.patches is not None:
@@ -75,7 +78,7 @@ class Polyhedron:
         patches: PatchLimits | None = None,
         center_of_mass: ArrayLike | None = None,
     ) -> Self:
-        """Build from a triangle mesh, with the checks and refusals of a mesh file.
+        """Build a polyhedron from a triangle mesh, with the same checks as for a mesh file.
 
         Args:
             vertices: Vertices, (n, 3) [m].
@@ -95,12 +98,12 @@ class Polyhedron:
 
     @property
     def radius(self) -> float:
-        """Largest distance of a vertex from the centre of mass [m]."""
+        """Return the largest distance of a vertex from the centre of mass [m]."""
         return float(np.linalg.norm(self.vertices - self.center_of_mass, axis=1).max())
 
     @property
     def normals(self) -> Array:
-        """Unit normals of the faces, into the object, (faces, 3)."""
+        """Return the unit normals of the faces, into the object, (faces, 3)."""
         return np.array([face.normal for face in self.faces]).reshape(-1, 3)
 
     def __repr__(self) -> str:
@@ -123,7 +126,7 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
     center_of_mass: ArrayLike | None = None,
     limits: MeshLimits = DEFAULT_LIMITS,
 ) -> Polyhedron:
-    """Read a solid from a mesh file.
+    """Read a solid from a mesh file and find its faces.
 
     Args:
         path: An OBJ, STL, PLY, OFF or GLB file.

@@ -1,4 +1,4 @@
-"""Checks that triangles bound one solid: welding, closure, winding, and overlap of parts."""
+"""Checks that triangles bound one solid: closed, consistently wound, without overlapping parts."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ from grasp_core.objects.booleans import Solid, intersection_volume, union_volume
 from grasp_core.objects.planar_faces import SIDES, triangle_neighbours
 
 WELD = 1e-8
-"""Vertices closer than this, relative to the extent, are joined: single precision in a file
-keeps 6e-8, and equal numbers in a file are equal to the last bit."""
+"""Distance below which vertices are joined, relative to the extent: single precision in a file
+keeps 6e-8, and vertices that were equal before are equal to the last bit."""
 THINNEST = 1e-9
 """Least volume of a solid, relative to the cube of the extent."""
 OVERLAP = 1e-6
-"""Shared volume of two parts, relative to the whole, that counts as overlap; parts that
-only touch share what rounding leaves."""
+"""Volume shared by two parts, relative to the whole, above which they overlap; parts that only
+touch share what rounding leaves."""
 
 
 def welded(points: Array, corners: Indices) -> tuple[Array, Indices, int]:
@@ -43,10 +43,11 @@ def _links(points: Array, reach: float) -> Indices:
 
 
 def surface_fault(corners: Indices) -> MeshError | None:
-    """Why triangles are not a closed, one-sided surface without junctions; None if they are.
+    """Return the fault by which triangles do not bound a solid, or None if they do.
 
-    Each undirected edge must belong to two triangles that run along it both ways. Contradictory
-    sides are reported first, since a surface with any other fault may have sound parts.
+    They bound a solid if each edge belongs to two triangles that run along it in opposite
+    directions. Inconsistent orientation is reported first, since a surface with any other fault may
+    have usable parts.
     """
     tail, head = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
     edges, where, uses = np.unique(
@@ -57,29 +58,29 @@ def surface_fault(corners: Indices) -> MeshError | None:
     same_side = int(((uses == SIDES) & (forward != 1)).sum())
     if same_side:
         message = (
-            f"{same_side} edges have both triangles on the same side; wind all "
+            f"{same_side} edges have triangles of opposite orientation; wind all "
             "triangles counter-clockwise seen from outside"
         )
         return MeshError(MeshRefusal.WINDING, message)
     if (uses == 1).any():
         message = (
             f"{int((uses == 1).sum())} edges belong to one triangle only; close the surface, or "
-            "take its sound parts (--faces patches)"
+            "use its sound parts (--faces patches)"
         )
         return MeshError(MeshRefusal.OPEN, message)
     if (uses != SIDES).any():
         message = (
             f"edge {edges[uses != SIDES][0].tolist()} belongs to {uses[uses != SIDES][0]} triangles"
-            ", expected two; separate what meets there, or take its sound parts (--faces patches)"
+            ", expected two; separate the parts there, or use sound parts (--faces patches)"
         )
         return MeshError(MeshRefusal.NON_MANIFOLD, message)
     return None
 
 
 def largest_part(points: Array, corners: Indices) -> tuple[Array, Indices, list[str]]:
-    """The largest connected part of a faulty surface, wound as it is, and notes about it.
+    """Return the largest connected part of a faulty surface, as it is, and notes about it.
 
-    Only its winding tells the outside of an open surface, so it is never turned.
+    The orientation of an open surface cannot be checked, so the part is never turned.
     """
     parts = _labels(points, corners)
     crosses = np.cross(
@@ -89,7 +90,9 @@ def largest_part(points: Array, corners: Indices) -> tuple[Array, Indices, list[
     largest, notes = int(areas.argmax()), list[str]()
     if (areas > 0.0).sum() > 1:
         share = 100.0 * float(areas[largest] / areas.sum())
-        notes.append(f"{len(areas)} separate parts; only the largest is used, {share:.3g} % of all")
+        notes.append(
+            f"the surface has {len(areas)} parts; the largest, {share:.3g} % of it, is used alone"
+        )
     kept = corners[parts == largest]
     if Solid(points, kept).volume < 0.0:
         notes.append("the surface may be inside out: it seems to enclose a negative volume")
@@ -98,21 +101,19 @@ def largest_part(points: Array, corners: Indices) -> tuple[Array, Indices, list[
 
 
 def check_volume(solid: Solid) -> None:
-    """Refuse a solid that is flat.
+    """Refuse a solid that encloses almost no volume.
 
     Raises:
         MeshError: The volume is next to nothing.
     """
     extent = float(np.ptp(solid.vertices, axis=0).max())
     if abs(solid.volume) < THINNEST * extent**3:
-        message = (
-            f"the volume is {solid.volume:.3g} m^3, expected more; close the mesh around a solid"
-        )
+        message = f"the mesh encloses only {solid.volume:.3g} m^3; close it around a solid"
         raise MeshError(MeshRefusal.ZERO_VOLUME, message)
 
 
 def oriented(points: Array, corners: Indices, most: int) -> tuple[Indices, bool]:
-    """The triangles wound counter-clockwise seen from outside, and whether they were turned.
+    """Orient triangles counter-clockwise seen from outside, and return whether they were turned.
 
     Args:
         points: Vertices, (n, 3) [m].
@@ -131,12 +132,12 @@ def oriented(points: Array, corners: Indices, most: int) -> tuple[Indices, bool]
     cavities = [Solid(part.vertices, part.triangles[:, ::-1]) for part in parts if part.volume <= 0]
     slack = OVERLAP * abs(total)
     if len(bodies) > 1 and sum(body.volume for body in bodies) - union_volume(bodies) > slack:
-        message = f"{len(bodies)} solids overlap; unite them into one surface first"
+        message = (
+            f"the mesh holds {len(bodies)} solids that overlap; unite them into one surface first"
+        )
         raise MeshError(MeshRefusal.OVERLAP, message)
     if len(bodies) > 1:
-        message = (
-            f"{len(bodies)} separate solids; a grasp holds one solid, so give each its own file"
-        )
+        message = f"the mesh holds {len(bodies)} separate solids; give each its own file"
         raise MeshError(MeshRefusal.SEPARATE, message)
     for cavity in cavities:
         inside = sum(intersection_volume(body, cavity) for body in bodies)
@@ -147,7 +148,9 @@ def oriented(points: Array, corners: Indices, most: int) -> tuple[Indices, bool]
 
 
 def _parts(points: Array, corners: Indices, most: int) -> list[Solid]:
-    """The edge-connected parts of a closed mesh; parts that meet only in a point are separate.
+    """Split a closed mesh into parts that connect across edges.
+
+    Parts that meet only in a point are separate.
 
     Raises:
         MeshError: There are too many parts.
@@ -157,7 +160,9 @@ def _parts(points: Array, corners: Indices, most: int) -> list[Solid]:
     _, label = np.unique(components(len(corners), links), return_inverse=True)
     parts = list[Solid]()
     if label.max() >= most:
-        message = f"{label.max() + 1} separate parts are over the limit of {most}; give one solid"
+        message = (
+            f"the mesh has {label.max() + 1} parts, more than the limit of {most}; give one solid"
+        )
         raise MeshError(MeshRefusal.SEPARATE, message)
     for part in range(int(label.max()) + 1):
         used, local = np.unique(corners[label == part], return_inverse=True)
@@ -166,7 +171,7 @@ def _parts(points: Array, corners: Indices, most: int) -> list[Solid]:
 
 
 def _labels(points: Array, corners: Indices) -> Indices:
-    """The number of each triangle's part, (t,), where parts share no vertex."""
+    """Number the part that each triangle belongs to, (t,), for parts that share no vertex."""
     sides = np.column_stack([corners.ravel(), np.roll(corners, 1, axis=1).ravel()])
     label = components(len(points), sides)
     _, part = np.unique(label[corners[:, 0]], return_inverse=True)

@@ -1,4 +1,4 @@
-"""Puts the faces and the handedness of an object into an order that does not depend on its file.
+"""Puts faces and handedness of an object into an order that does not depend on its file.
 
 Solved: an order of the faces, a first corner of each border and a handedness that depend on the
 shape alone, so that the planner sees the same object when it is turned or mirrored, or when its
@@ -30,28 +30,29 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import graded
 
 FLIP = np.array([1.0, 1.0, -1.0])
-"""Signs of the coordinates in the mirror image: changing the sign of z is exact."""
+"""Signs of the coordinates in the mirror image: only z changes its sign, which is exact."""
 CELL_DIGITS = 6
-"""Lengths (object size one) and cosines that are equal to this many digits are the same."""
+"""Digits to which lengths (object size one) and cosines are compared."""
 SHORTEST = 1e-3
-"""Least distance of a corner that gives a direction from its face's centre, in object radii."""
+"""Least distance of a corner from its face's centre at which their connecting line gives a
+direction, in object radii."""
 
 Cells: TypeAlias = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Standard:
-    """An object as it is planned, and how it relates to the object as given."""
+    """An object in standard order, and the numbers that its faces have on the given object."""
 
     body: Polyhedron
-    """The object with its faces in standard order, perhaps mirrored."""
+    """The object with its faces in standard order; it may be the mirror image."""
     faces: tuple[int, ...]
     """For each face of `body`, its number on the object as given."""
     mirrored: bool
 
 
 def standard(body: Polyhedron) -> Standard:
-    """Put an object into standard order and handedness."""
+    """Put an object into standard order and handedness, which depend on its shape alone."""
     images = (body, mirror_image(body))
     views = ((image, _frame(image, *flag)) for image in images for flag in _rarest_flags(image))
     first = min(((_looks(image, frame), image, frame) for image, frame in views), default=None,
@@ -66,7 +67,7 @@ def standard(body: Polyhedron) -> Standard:
 
 
 def mirror_image(body: Polyhedron) -> Polyhedron:
-    """The mirror image of an object; its faces keep their numbers."""
+    """Make the mirror image of an object; its faces keep their numbers."""
     return replace(
         body,
         vertices=body.vertices * FLIP,
@@ -89,7 +90,7 @@ def _mirrored(face: Face) -> Face:
 
 
 def _rarest_flags(body: Polyhedron) -> Iterator[tuple[int, int]]:
-    """Yield face and corner of each flag that is compared, in the order of the file."""
+    """Yield the flags (face, corner) that may define the standard order, in the file's order."""
     kinds = [_kind_of_face(body, face) for face in body.faces]
     rarest = _rarest([kind for kind in kinds if kind])
     flags = [
@@ -104,7 +105,7 @@ def _rarest_flags(body: Polyhedron) -> Iterator[tuple[int, int]]:
 
 
 def _rarest(kinds: Sequence[Cells]) -> Cells:
-    """The kind that occurs least often; among equally rare ones, the first in order."""
+    """Return the kind that occurs least often; of equally rare kinds, the first in order."""
     return min(((count, kind) for kind, count in Counter(kinds).items()), default=(0, ()))[1]
 
 
@@ -115,7 +116,10 @@ def _kind_of_face(body: Polyhedron, face: Face) -> Cells:
 
 
 def _kind_of_corner(body: Polyhedron, face: int, corner: int) -> Cells:
-    """Distances of a corner from the centres of face and object; empty if it gives no direction."""
+    """Describe a corner by its distances from the centres of face and object.
+
+    The result is empty if the corner gives no direction.
+    """
     at = body.faces[face].polygon[corner]
     middles = body.faces[face].centroid, body.center_of_mass
     lengths = [float(np.linalg.norm(at - middle)) / body.radius for middle in middles]
@@ -127,7 +131,7 @@ def _graded(numbers: Sequence[float]) -> Cells:
 
 
 def _frame(body: Polyhedron, face: int, corner: int) -> Array:
-    """Orthonormal columns towards the corner, across, and along the normal, (3, 3)."""
+    """Build orthonormal columns towards the corner, across it, and along the normal, (3, 3)."""
     toward = body.faces[face].polygon[corner] - body.faces[face].centroid
     normal = body.faces[face].normal
     toward = toward - normal * float(normal @ toward)
@@ -137,13 +141,13 @@ def _frame(body: Polyhedron, face: int, corner: int) -> Array:
 
 
 def _looks(body: Polyhedron, frame: Array) -> tuple[Cells, ...]:
-    """The rows of `_cells` for all faces in a frame, in lexicographic order."""
+    """Sort the rows of `_cells` for all faces in a frame in lexicographic order."""
     cells = _cells(body, frame)
     return tuple(map(tuple, cells[np.lexsort(cells.T[::-1])].tolist()))
 
 
 def _cells(body: Polyhedron, frame: Array) -> Array:
-    """Area, centre and normal of each face in a frame, rounded to cells, (f, 7)."""
+    """Describe each face in a frame by its area, centre and normal, rounded to cells, (f, 7)."""
     areas = np.array([face.area for face in body.faces]) / body.radius**2
     centers = np.array([face.centroid for face in body.faces]) - body.center_of_mass
     seen = [areas[:, None], centers @ frame / body.radius, body.normals @ frame]
@@ -151,7 +155,7 @@ def _cells(body: Polyhedron, frame: Array) -> Array:
 
 
 def _relisted(face: Face, body: Polyhedron, frame: Array, slack: float) -> Face:
-    """List a face anew: borders from their first corner in a frame on, and new convex pieces."""
+    """Make a face anew: borders begin at their first corner in a frame, and pieces are new."""
     polygon, *holes = (_begun(loop, body, frame) for loop in (face.polygon, *face.holes))
     holes = sorted(holes, key=lambda hole: tuple(_corner_cells(hole[:1], body, frame)[0]))
     if len(face.pieces) == 1 and not holes:
@@ -165,7 +169,7 @@ def _relisted(face: Face, body: Polyhedron, frame: Array, slack: float) -> Face:
 
 
 def _begun(loop: Array, body: Polyhedron, frame: Array) -> Array:
-    """Roll a closed border so that it begins with its first corner in a frame, (k, 3)."""
+    """Rotate a closed border so that it begins with its first corner in a frame, (k, 3)."""
     cells = _corner_cells(loop, body, frame)
     return np.roll(loop, -int(np.lexsort(cells.T[::-1])[0]), axis=0)
 

@@ -1,4 +1,4 @@
-"""Makes faces smaller before planning: two halves for two fingers, or a margin along the edges.
+"""Shrinks faces before planning: into two halves for two fingers, or by a margin along edges.
 
 For two fingers on one face, the face counts twice, as two halves with a gap between them. It is cut
 once, across its longest direction and in its middle. Grasps found on the halves hold for the face.
@@ -19,12 +19,12 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import FINGERS
 
 SAME_LENGTH = 1.0 - 1e-6
-"""Share of the largest length from which directions count as equally long: the first of them is
+"""Share of the largest length from which two lengths count as equal. The first of equal ones is
 taken, so that rounding decides nothing."""
 
 
 def with_halves(body: Polyhedron, apart: float) -> tuple[Polyhedron, tuple[int, ...]]:
-    """Add two half faces to an object for each face that is long enough.
+    """Add two half faces to an object for each face that is long enough for two contacts.
 
     Args:
         body: The object.
@@ -42,7 +42,7 @@ def with_halves(body: Polyhedron, apart: float) -> tuple[Polyhedron, tuple[int, 
 
 
 def shared_quadruples(owners: Sequence[int]) -> Indices:
-    """Quadruples with both halves of one face, or of two faces, ascending, (q, 4).
+    """List face quadruples with both halves of one face, or of two faces, (q, 4).
 
     Args:
         owners: The owners that `with_halves` returned.
@@ -88,18 +88,18 @@ def _halves(face: Face, apart: float) -> list[Face]:
 
 
 def _longest(border: Array) -> Array:
-    """Unit vector between the two corners that are farthest apart, (2,)."""
+    """Return the unit vector between the two corners that are farthest apart, (2,)."""
     gaps = np.linalg.norm(border[:, None] - border[None], axis=2)
     i, j = np.argwhere(gaps >= SAME_LENGTH * gaps.max())[0]
     return (border[j] - border[i]) / gaps[i, j]
 
 
 def clear_of_edges(body: Polyhedron, margin: float) -> Polyhedron:
-    """The object with faces on which contacts keep a distance from all edges and holes.
+    """Shrink an object's faces so that contacts keep a distance from all edges and holes.
 
     Args:
         body: The object.
-        margin: The distance [m]; faces without room keep no pieces.
+        margin: The distance [m]; a face too narrow for it keeps no pieces.
     """
     return replace(body, faces=tuple(_without_margin(face, margin) for face in body.faces))
 

@@ -1,4 +1,4 @@
-"""Contacts climb towards larger Ferrari-Canny quality on four convex faces.
+"""Moves contacts on four convex faces uphill towards larger Ferrari-Canny quality.
 
 Solved, locally: maximise over positions x_i on the faces the radius of the largest ball of wrenches
 that contact forces with normal parts of sum one resist.
@@ -32,32 +32,36 @@ from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import graded, nearest_optimum, on_grid, surpassing
 
 SEARCH_GAP = 1e-3
-"""Gap of the quality's bounds during the climb."""
+"""Largest relative gap between the two bounds of the quality during the climb."""
 BAND = 0.2
-"""Simplices up to this share farther than the nearest one take part in a step."""
+"""Simplices up to this share farther from zero than the nearest one take part in a step."""
 MOST_ROWS = 100
 STEEPEST = 20.0
-"""Largest weight of a corner in the foot on a simplex: flatter ones do not say where it moves."""
+"""Largest weight of a corner in the foot of the perpendicular on a simplex: on flatter simplices
+the weights do not tell where the foot moves."""
 FLAT = 1e-9
-"""Singular values of simplices below this share of the largest count as zero."""
+"""Share of the largest singular value of a simplex below which a singular value counts as zero."""
 STEP_DIGITS = 6
-"""Digits after the point that a step is rounded to."""
+"""Digits after the point to which a step is rounded."""
 LAST_DIGIT = 10.0**-STEP_DIGITS
-"""How far inside the limits a step ends, in object radii, which is how far rounding may move it."""
+"""Distance inside the limits at which a step ends, in object radii: rounding may move the end by
+this much."""
 FIRST_REACH, LEAST_REACH = 0.1, 1e-3
-"""Trust region at first and at the end, in object radii."""
+"""Size of the trust region at first, and the size at which the climb ends, in object radii."""
 MOST_STEPS = 40
 GOOD, GROWTH = 0.5, 1.5
-"""Share of the predicted gain above which the trust region grows, and by which factor."""
+"""Share of the predicted gain above which the trust region grows, and the factor by which it grows.
+"""
 POOR, SHRINKAGE = 0.2, 0.4
-"""Share of the predicted gain below which the trust region shrinks, and to which share."""
+"""Share of the predicted gain below which the trust region shrinks, and the factor by which it
+shrinks."""
 WORTHWHILE = 1e-6
-"""Predicted relative gain at which the climb ends."""
+"""Predicted relative gain below which the climb ends."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactFaces:
-    """Four convex pieces of faces, with the limits that contacts keep on each."""
+    """Four convex pieces of faces, with the distances that contacts keep from the edges of each."""
 
     pieces: tuple[FacePiece, ...]
     limits: tuple[Array, ...]
@@ -67,7 +71,7 @@ class ContactFaces:
 
     @property
     def frames(self) -> Array:
-        """Contact frames of the pieces, (k, 3, 3)."""
+        """Return the contact frames of the pieces, (k, 3, 3)."""
         return contact_frames(np.array([piece.normal for piece in self.pieces]))
 
     def positions(self, y: Array) -> Array:
@@ -75,17 +79,17 @@ class ContactFaces:
         return np.array([piece.point(at) for piece, at in zip(self.pieces, y, strict=True)])
 
     def quality(self, y: Array, gap: float = SEARCH_GAP) -> FerrariCanny:
-        """Compute the `l1` quality of contacts, torques in units of the object's size.
+        """Compute the `l1` quality of contacts, with torques in units of the object's size.
 
-        Its wrenches are on a grid: a polytope that grows where it is weakest has many equal planes
-        to choose from.
+        Wrenches are rounded to a grid, because a polytope that grows where it is weakest often has
+        to choose between several equally near planes.
         """
         G = in_frames(grasp_map(self.positions(y)), self.frames)
         wrenches = WrenchSet(G, np.full(len(y), self.friction), "l1")
         return wrench_set_quality(wrenches.on_grid(), gap)
 
     def climbed(self, y: Array) -> tuple[Array, FerrariCanny]:
-        """Climb from given contacts to those of a local optimum, (k, 2), and their quality."""
+        """Move contacts uphill to a local optimum, (k, 2); return them with their quality."""
         found, reach = self.quality(y), FIRST_REACH
         for _ in range(MOST_STEPS):
             if found.polytope is None or reach < LEAST_REACH:
@@ -103,7 +107,7 @@ class ContactFaces:
     def _step(
         self, y: Array, found: FerrariCanny, polytope: InnerPolytope, reach: float
     ) -> tuple[Array, float]:
-        """Find the best move within the trust region, and what it should gain."""
+        """Find the best move within the trust region, and the gain that it predicts."""
         distances, slopes = self.nearest_planes(found, polytope)
         n = y.size
         rows = [np.hstack([-slopes, np.ones((len(slopes), 1))])]
@@ -123,7 +127,7 @@ class ContactFaces:
         return on_grid(x[:n].reshape(y.shape), STEP_DIGITS), float(x[n])
 
     def nearest_planes(self, found: FerrariCanny, polytope: InnerPolytope) -> tuple[Array, Array]:
-        """Return distances (m,) and slopes (m, 2k), by (1), of the planes nearest to zero."""
+        """Return distances (m,) and, by (1), slopes (m, 2k) of the planes nearest to zero."""
         points = polytope.forces @ found.wrenches.G.T
         height = np.einsum("mcj,mj->mc", points[polytope.corners], polytope.normals)
         heights: Array = height.min(axis=1)

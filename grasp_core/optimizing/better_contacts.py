@@ -1,15 +1,16 @@
-"""A grasp is moved on its four faces to where its Ferrari-Canny quality is larger.
+"""Moves a grasp's contacts on its four faces to where the Ferrari-Canny quality is larger.
 
 Each contact stays on the convex piece of a face that it is on.
 
-The climb of `ascent` has many local optima, so it starts from the grasp's own contacts and
-from random ones. The best end is certified like any grasp, and replaces the given one only if it is
-proved to be better: if its lower bound is above the given one's upper bound.
+The climb of `ascent` has many local optima, so it starts from the grasp's own contacts and from
+random ones. The best result is certified like any grasp, and replaces the given grasp only if it is
+proved to be better: its lower bound must exceed the given grasp's upper bound.
 
 Moved contacts keep a finger's radius from the edges of their faces, or half the radius of the
-largest disc in the face where that is less. Where no radius is asked for, they may also come as
-near to an edge as the given contact on that face is. With a radius, a grasp nearer to an edge
-starts from where it comes clear of it, and stays as it is if no contacts that are clear are better.
+largest disc in the face where that is less. Where the caller gives no radius, they may also come as
+near to an edge as the given contact on that face is. With a radius, a contact that is nearer to an
+edge is first moved away from it; the grasp stays as it is if no contacts at this distance are
+better.
 """
 
 import math
@@ -36,14 +37,16 @@ from grasp_core.solvers.ties import coarse, first_best, largest_first, on_grid, 
 from grasp_core.values import FINGERS, ForceCone, Grasp
 
 FINGER_RADIUS = 0.05
-"""Default radius, in object radii: half the radius of a fingertip in the scenes."""
+"""Default radius of a finger, in object radii: half the radius of a fingertip in the scenes."""
 RANDOM_STARTS = 3
-"""Random contacts that are followed besides the grasp itself: the best of `RANDOM_TRIALS`."""
+"""Number of random contact sets, the best of `RANDOM_TRIALS`, from which the climb starts besides
+the grasp itself."""
 RANDOM_TRIALS = 24
 START_DIGITS = 8
-"""Digits after the point of the contacts where the climb of the grasp begins, at unit size."""
+"""Digits after the point to which the grasp's contacts are rounded before the climb, at unit size.
+"""
 ROUGH = 2e-2
-"""Gap of the quality's bounds while starting points are compared."""
+"""Largest gap between the bounds of a quality while starting points are compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,11 +58,12 @@ class Improvement:
     before: FerrariCanny
     after: FerrariCanny
     clearances: tuple[float, ...]
-    """Distance that each contact had to keep from the edges of its face, if moved, (4,) [m]."""
+    """Distance [m] that each contact had to keep from the edges of its face, (4,); 0 if not moved.
+    """
 
     @property
     def gain(self) -> float:
-        """Factor by which the quality has grown: the ratio of lower bounds."""
+        """Return the factor by which the quality has grown: the ratio of its lower bounds."""
         return self.after.lower / self.before.lower
 
 
@@ -102,7 +106,7 @@ def optimize_contacts(
     before = _quality(body, grasp, friction)
     if before.lower <= 0.0:
         raise InputError(
-            f"grasp {grasp.id} is not in force closure at friction {friction}; "
+            f"grasp {grasp.id} must be in force closure at friction {friction}; "
             "raise the friction or give another grasp"
         )
     pieces = pieces_under(body, grasp)
@@ -127,7 +131,7 @@ def optimize_contacts(
 def _insets(
     body: Polyhedron, grasp: Grasp, pieces: Sequence[FacePiece], finger_radius: float | None
 ) -> list[float]:
-    """Return how far contacts stay from the edges of each piece, at unit size."""
+    """Return the distance that contacts keep from the edges of each piece, at unit size."""
     if finger_radius is not None:
         return [finger_radius / body.radius] * FINGERS
     depths = [
@@ -153,7 +157,7 @@ def pieces_under(body: Polyhedron, grasp: Grasp) -> tuple[FacePiece, ...]:
 
 
 def _deepest(pieces: Sequence[FacePiece], point: Array) -> FacePiece:
-    """Return the piece that a point is deepest in, or the first if it is on a common edge."""
+    """Return the piece in which a point is deepest; of equal ones, the first."""
     depths = [float((piece.b - piece.E @ _in_plane(piece, point)).min()) for piece in pieces]
     return pieces[first_best(depths, SAME_CORNER)]
 
@@ -167,7 +171,7 @@ def _in_plane(piece: FacePiece, point: Array) -> Array:
 
 
 def _clear_of_edges(room: FacePiece, point: Array) -> Array:
-    """Move a point in the plane of a face towards the middle of its room until inside, (2,)."""
+    """Move a point towards the middle of a polygon until it is inside, (2,)."""
     y, middle = on_grid(_in_plane(room, point), START_DIGITS), room.corners.mean(axis=0)
     beyond = room.E @ y - room.b
     inward = room.E @ (y - middle)
@@ -178,7 +182,7 @@ def _clear_of_edges(room: FacePiece, point: Array) -> Array:
 def _random_starts(
     faces: ContactFaces, rooms: Sequence[FacePiece], rng: np.random.Generator
 ) -> Iterator[Array]:
-    """Return the best of some random contacts that are in closure, (4, 2) each."""
+    """Yield the best of some random contact sets in force closure, (4, 2) each."""
     trials = [
         np.array([rng.dirichlet(np.ones(len(room.corners))) @ room.corners for room in rooms])
         for _ in range(RANDOM_TRIALS)
@@ -191,7 +195,10 @@ def _random_starts(
 def _certified(
     body: Polyhedron, grasp: Grasp, faces: ContactFaces, y: Array, rng: np.random.Generator
 ) -> Grasp | None:
-    """Return the grasp at these contacts if closure and a general witness confirm it, else None."""
+    """Return the grasp at these contacts if it can be certified, else None.
+
+    It is certified if force closure is proved and a witness of general type is found.
+    """
     positions = faces.positions(y)
     normals = np.array([piece.normal for piece in faces.pieces])
     try:

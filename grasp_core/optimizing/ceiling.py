@@ -1,4 +1,4 @@
-"""An upper bound of the Ferrari-Canny quality over all contacts on four faces.
+"""Bounds from above the Ferrari-Canny quality of all contacts on four faces.
 
 Solved: how much better than a known grasp any other on the same faces can be.
 
@@ -47,38 +47,41 @@ from grasp_core.solvers.ties import first_best, graded
 from grasp_core.values import FINGERS, FaceQuadruple
 
 PART_GAP = 0.02
-"""Gap of the quality of corner contacts: finer bounds do not help while parts are large."""
+"""Largest gap between the bounds of the quality of corner contacts: smaller gaps do not help while
+parts are large."""
 MOST_PARTS = 1_000_000
 ENOUGH = 0.01
-"""Parts whose bound is within this share of the known quality are not cut any more."""
+"""Share by which the bound of a part may exceed the known quality so that the part is not divided
+any more."""
 ROUNDING = 1e-9
-"""How far a part's bound may exceed the ceiling, relative to it or to one newton."""
+"""How far the bound of a part may exceed the ceiling, relative to it or to one newton."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leaf:
-    """A part of the faces, with a direction in which no contacts on it are strong."""
+    """A part of the faces that is not divided, with the direction that bounds its quality."""
 
     choice: int
-    """Index of a combination of convex pieces, one per face."""
+    """Index of a combination of convex pieces, one piece per face."""
     path: Path
-    """Cuts that lead from the whole pieces to this part."""
+    """Divisions that lead from the whole pieces to this part."""
     direction: Array
-    """Unit twist in which the corners' support bounds the quality, (6,)."""
+    """Unit twist in which the support of all corner contacts bounds the quality, (6,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class QualityCeiling:
-    """A bound `upper` that no contacts on the faces, clear of the edges, exceed in quality."""
+    """A proved bound `upper` on the quality of all contacts on four faces, clear of the edges."""
 
     upper: float
     choices: tuple[tuple[FacePiece, ...], ...]
-    """Convex pieces without their margins, at unit size, one per face in each combination."""
+    """Combinations of convex pieces, one piece per face, without the margins along edges, at unit
+    size."""
     friction: float
     leaves: tuple[Leaf, ...]
 
     def verify(self) -> bool:
-        """Re-check every field in plain arithmetic.
+        """Check every field again in plain arithmetic.
 
         The check is that the pieces are convex polygons, that the parts cover them, and that all
         are bounded, to within `ROUNDING`. Whether the pieces are those of an object's faces can
@@ -133,7 +136,7 @@ def quality_ceiling(
     finger_radius: ArrayLike | None = None,
     parts: int = 200,
 ) -> QualityCeiling:
-    """Bound the `l1` quality of all contacts on four faces.
+    """Find an upper bound on the `l1` quality of all contacts on four faces.
 
     Torques are taken about the centre of mass and divided by the object's radius, as in
     `optimize_contacts`.
@@ -166,7 +169,7 @@ def quality_ceiling(
     choices = _choices(body, faces, radii / body.radius)
     if parts < len(choices):
         raise InputError(
-            f"parts must be at least {len(choices)}, one per choice of pieces, got {parts}"
+            f"parts must be at least {len(choices)}, one per combination of pieces, got {parts}"
         )
     directions: list[Array] = []
     waiting: list[tuple[float, int, Path, float, Array]] = []
@@ -193,12 +196,12 @@ def _choices(
     each = partial(whole, name="faces", most=len(body.faces) - 1)
     given = several(faces, each, "faces", "indices")
     if len(given) != FINGERS:
-        raise InputError(f"faces must be {FINGERS} indices of faces, got {len(given)}")
+        raise InputError(f"faces must be {FINGERS} face numbers, got {len(given)}")
     pieces = unit_pieces(body)
     by_face = [[piece for piece in pieces if piece.face == face] for face in faces]
     if not all(by_face):
         raise InputError(
-            f"one of the faces {tuple(faces)} is too narrow for a contact; choose other faces"
+            f"faces {tuple(faces)}: one of them is too narrow for a contact; choose others"
         )
     # edges between the pieces of a face are no borders: contacts may lie on them
     rooms = [
@@ -212,7 +215,7 @@ def _bounded(
     choice: Sequence[FacePiece], path: Path, friction: float, directions: list[Array],
     target: float,
 ) -> tuple[float, Array]:  # fmt: skip
-    """Bound a part, with the direction of the bound; a new direction joins those to try."""
+    """Bound a part from above, and return the direction; a new direction joins the list."""
     corners = _corner_wrenches(choice, path, friction)
     best, bounds = None, np.empty(0)
     if directions:

@@ -1,4 +1,4 @@
-"""Ferrari-Canny quality with exact circular cones: proved lower and upper bounds.
+"""Bounds the Ferrari-Canny quality from both sides, with exact circular friction cones.
 
 Solved: Q, the radius of the largest ball around the zero wrench inside the set W of wrenches
 that bounded contact forces can apply (see `wrench_sets`); if zero lies outside W, minus its
@@ -41,16 +41,18 @@ from grasp_core.quality.inner_polytope import InnerPolytope
 from grasp_core.values import Grasp
 
 GAP = 1e-4
-"""Default of the largest (upper - lower) / upper."""
+"""Default of the largest relative gap (upper - lower) / upper between the bounds of a quality."""
 FINEST_GAP = 1e-7
-"""Smallest gap: below it, rounding of the planes of tiny simplices costs more than they gain."""
+"""Smallest gap that may be asked for: below it, rounding of the planes of tiny simplices costs more
+than they gain."""
 MOST_SIMPLICES, MOST_POINTS = 60_000, 4096
-"""Simplices and corners at which the polytope stops growing; its bounds hold all the same, farther
-apart."""
+"""Number of simplices, and of corners, at which the polytope stops growing; its bounds are valid
+nevertheless, but farther apart."""
 FLAT = 1e-9
-"""Points closer than this to a common plane, relative to their extent, span nothing more."""
+"""Distance from a common plane, relative to the extent, below which points count as lying in it."""
 ABOVE = 1e-12
-"""Height from which on a point sees a simplex, relative to the extent: some thousand roundings."""
+"""Height above a simplex, relative to the extent, from which a point sees the simplex: some
+thousand rounding errors."""
 ROUNDING = 1e-12
 """Slack of the plain-arithmetic checks, relative to the longest wrench."""
 KERNEL = "grasp_core.quality.ferrari_canny_kernel"
@@ -58,24 +60,25 @@ KERNEL = "grasp_core.quality.ferrari_canny_kernel"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FerrariCanny:
-    """Bounds of a quality with the direction and the polytope, or forces, that prove them."""
+    """Bounds of a quality, with the direction and the polytope, or forces, that prove them."""
 
     lower: float
     """Lower bound of the quality [N]."""
     upper: float
     """Upper bound of the quality [N]."""
     wrenches: WrenchSet
-    """Set of wrenches that the quality is about."""
+    """The set of wrenches to whose largest inscribed ball the quality refers."""
     direction: Array
-    """Unit twist, (6,), torque scale applied, in which the support is at most `upper`."""
+    """Unit twist, (6,), with torques over the torque scale, in which the support is at most
+    `upper`."""
     polytope: InnerPolytope | None
-    """Polytope that proves `lower` if zero is inside the set; None otherwise."""
+    """Polytope that proves `lower` if the zero wrench is inside the set; None otherwise."""
     forces: Array | None
-    """Local forces, (3k,), whose wrench is no longer than -`lower`, if zero is not inside; else
-    None."""
+    """Local forces, (3k,), whose wrench is no longer than -`lower`, if the zero wrench is outside
+    the set; None otherwise."""
 
     def verify(self) -> bool:
-        """Re-check every field in plain arithmetic, without any solver.
+        """Check every field again in plain arithmetic, without any solver.
 
         The bounds hold for the set `wrenches`, which is checked to be that of some contacts, to
         within 1e-12 of its longest wrench.
@@ -148,7 +151,7 @@ def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
 
 
 def wrench_set_quality(wrenches: WrenchSet, gap: float = GAP) -> FerrariCanny:
-    """Bound the signed distance of zero from the boundary of a wrench set, with its proof."""
+    """Bound the signed distance of zero from the border of a wrench set, with proofs."""
     kernel = compiled(KERNEL)
     linf = wrenches.norm == "linf"
     cones = kernel.Cones(np.array(wrenches.G, order="C"), np.array(wrenches.friction), linf)
@@ -166,7 +169,7 @@ def wrench_set_quality(wrenches: WrenchSet, gap: float = GAP) -> FerrariCanny:
 
 
 def _outside(wrenches: WrenchSet, direction: Array | None) -> FerrariCanny:
-    """Find bounds where zero is not inside the set, or no polytope could show that it is."""
+    """Bound the quality where zero is outside the set, or no polytope shows that it is inside."""
     unit = replace(wrenches, norm="l1")
     forces, facing = nearest_wrench(unit)
     wrench = unit.G @ forces

@@ -1,4 +1,4 @@
-"""A polytope grows inside a set of wrenches until its nearest plane touches the set.
+"""Grows a polytope inside a set of wrenches until its nearest plane touches the set's border.
 
 Solved: the method of `ferrari_canny`, from the first simplex to the last, for one set. The answer
 gives the forces at the points, the points that bound each simplex, and the normals; `ferrari_canny`
@@ -23,34 +23,35 @@ from grasp_core.solvers.hull_kernel import (
 )
 
 ROOM = 2048
-"""Simplices that fit at first; the room at least doubles whenever it does not suffice."""
+"""Number of simplices that fit at first; the room is doubled whenever it does not suffice."""
 GROWN, OUTSIDE, FLAT, LOST = 0, 1, 2, 3
 """How growing ends: with a polytope around zero, with zero outside, with all points in a plane, or
-with a hull that fell apart."""
+with a hull that rounding has broken."""
 
 
 class Cones(NamedTuple):
-    """The cones of contact forces, whose wrenches make up the set."""
+    """The friction cones of the contacts, whose wrenches make up the set."""
 
     G: Array
     """Matrix from local contact forces to their wrench, (6, 3k), contiguous."""
     friction: Array
     """Coulomb coefficients, (k,)."""
     linf: bool
-    """Whether each normal force is bounded, not their sum."""
+    """Whether each normal force is bounded; otherwise their sum is."""
 
 
 class Limits(NamedTuple):
     """The limits at which a polytope stops growing."""
 
     gap: float
-    """Largest (upper - lower) / upper that is enough."""
+    """Relative gap (upper - lower) / upper at which the polytope stops growing."""
     simplices: int
     points: int
     flat: float
-    """Points closer than this to a common plane, relative to their extent, span nothing more."""
+    """Distance from a common plane, relative to the extent, below which points count as lying in
+    it."""
     above: float
-    """Height from which on a point sees a simplex, relative to the extent."""
+    """Height above a simplex, relative to the extent, from which a point sees the simplex."""
 
 
 @loop()
@@ -97,7 +98,7 @@ def grow(cones: Cones, edges: Array, limits: Limits) -> tuple[int, Array, Indice
 
 @loop()
 def _support(cones: Cones, y: Array, force: Array) -> float:
-    """Return the support of the set in the direction y; fill in local forces that attain it."""
+    """Return the support of the set in direction y, and fill in the local forces that attain it."""
     total, best, at = 0.0, -np.inf, np.empty(3)
     force.fill(0.0)
     for i in range(len(cones.friction)):
@@ -132,7 +133,7 @@ def _wrench(G: Array, force: Array, point: Array) -> None:
 
 @loop()
 def _begin(G: Array, edges: Array, limits: Limits, forces: Array, points: Array) -> float:
-    """Fill in seven widely spread points, each farthest from the affine hull of those before it.
+    """Choose seven points, each as far as possible from the affine hull of those before.
 
     Returns:
         The height from which on points see a simplex; -1 if all points are flat.
@@ -161,7 +162,7 @@ def _begin(G: Array, edges: Array, limits: Limits, forces: Array, points: Array)
 
 @loop()
 def _shift(wrenches: Array, origin: Array, rest: Array) -> float:
-    """Fill in the wrenches as seen from an origin; return the largest of their components."""
+    """Fill in the wrenches relative to an origin; return the largest of their components."""
     largest = 0.0
     for i in range(len(wrenches)):
         for j in range(D):
@@ -184,7 +185,7 @@ def _farthest(rest: Array) -> tuple[int, float]:
 
 @loop()
 def _flatten(rest: Array, chosen: int, length: float) -> None:
-    """Take away from each row its component along a chosen one."""
+    """Subtract from each row its component along a chosen row."""
     unit = np.empty(D)
     for j in range(D):
         unit[j] = rest[chosen, j] / length
@@ -198,7 +199,7 @@ def _flatten(rest: Array, chosen: int, length: float) -> None:
 
 @loop()
 def _extent(points: Array) -> float:
-    """Return the extent of the first seven points, along the axis where it is largest."""
+    """Return the extent of the first seven points along the axis on which it is largest."""
     extent = 0.0
     for j in range(D):
         least = largest = points[0, j]

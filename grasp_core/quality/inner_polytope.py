@@ -1,4 +1,4 @@
-"""A polytope inside a wrench set, and the proof that a ball around zero lies inside the polytope.
+"""Proves that a polytope inside a wrench set contains a ball around the zero wrench.
 
 The polytope is given by simplices between points of the set. Every ray from zero meets some
 simplex, at a combination of its corners, if every ridge belongs to an even number of simplices
@@ -22,17 +22,17 @@ from grasp_core.closure.wrenches import WRENCH
 from grasp_core.fields import are_units, is_array, is_indices
 
 ON_RIDGE = 1e-9
-"""A ray that passes a ridge at less than this share of the simplex proves nothing."""
+"""Distance of a ray from a ridge, as a share of the simplex, below which the ray proves nothing."""
 SAME_RAY = 1e-6
-"""Distance by which a flat simplex, which no generic ray crosses, misses the ray at least."""
+"""Least distance by which a flat simplex, which no generic ray crosses, must miss the ray."""
 ROUNDED = 1e-9
-"""How much farther than computed a ray may cross a simplex, as a share."""
+"""Share by which a ray may cross a simplex farther away than computed."""
 BLOCK = 2**15
-"""How many heights are compared at a time: as many as stay in a cache."""
+"""Number of heights compared at a time: as many as fit into a processor's cache."""
 TINY = 1e-300
-"""Least length that is divided by, where a normal may have length zero."""
+"""Smallest length that is divided by: a normal may have length zero."""
 LARGEST_KEY = 2**62
-"""Largest integer that names a ridge, with one digit per corner."""
+"""Largest integer that may name a ridge, with one digit for each of its corners."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,14 +40,14 @@ class InnerPolytope:
     """A polytope inside a wrench set whose planes bound the quality from below."""
 
     forces: Array
-    """Local contact forces whose wrenches are the points, (n, 3k)."""
+    """Local contact forces; their wrenches are the points of the polytope, (n, 3k)."""
     corners: Indices
     """Indices of the points of each simplex of the boundary, (m, 6)."""
     normals: Array
     """Outward unit normals of the simplices, (m, 6)."""
 
     def sound(self, width: int) -> bool:
-        """Return whether the fields fit each other and forces of `width` parts, without proof."""
+        """Return whether the fields fit each other and forces of `width` components."""
         count = len(self.corners) if is_indices(self.corners, None, WRENCH) else 0
         return (
             count > 0

@@ -1,4 +1,4 @@
-"""Metrics that users of other tools know, by the definitions of those tools.
+"""Computes the grasp metrics of other tools, by the definitions of those tools.
 
 Each metric replaces the friction cones by inscribed pyramids, whose edges are forces of unit normal
 part n + mu t; the first t is the first tangent of the contact's frame (see
@@ -27,13 +27,13 @@ from grasp_core.values import Grasp
 FEWEST_EDGES = 3
 KERNEL = "grasp_core.quality.min_weight_kernel"
 RANK = 1e-9
-"""Singular values below this share of the largest count as zero."""
+"""Share of the largest singular value below which a singular value counts as zero."""
 UNREACHABLE = 1e-9
-"""How far from zero the affine combinations of unit-size wrenches must stay to miss it."""
+"""Least distance from zero at which the affine combinations of unit-size wrenches miss zero."""
 
 
 def pyramid_wrenches(wrenches: WrenchSet, edges: int) -> Array:
-    """Return wrenches of the edges of pyramids inscribed in the friction cones, (k edges, 6).
+    """Compute wrenches of pyramid edges inscribed in friction cones, (k edges, 6).
 
     Raises:
         InputError: There are fewer than three edges, or more than ten thousand.
@@ -46,7 +46,7 @@ def pyramid_wrenches(wrenches: WrenchSet, edges: int) -> Array:
 
 
 def _circle(edges: int) -> Array:
-    """Return the edges of a pyramid of friction one, (normal, tangent, tangent), (edges, 3).
+    """Compute the edges (normal, tangent, tangent) of a pyramid for friction one, (edges, 3).
 
     Raises:
         InputError: There are fewer than three edges, or more than ten thousand.
@@ -63,7 +63,7 @@ def min_weight(
     *,
     edges: int = 8,
 ) -> float:
-    """Find the largest l such that weights of l or more, with sum one, balance the pyramids' edges.
+    """Find the largest l such that weights of at least l, with sum one, balance pyramid edges.
 
     Solved as the dual program: over twists y, with w_j the N wrenches and m their mean,
 
@@ -160,7 +160,7 @@ def _at_once(W: Array) -> Array:
 
 
 def _min_weight(W: Array) -> float:
-    """Find the min-weight metric of wrenches (N, 6)."""
+    """Compute the min-weight metric of wrenches (N, 6)."""
     N, mean = len(W), W.mean(axis=0)
     if not _balanced_by_any_weights(W):
         return -math.inf
@@ -169,7 +169,7 @@ def _min_weight(W: Array) -> float:
 
 
 def _balanced_by_any_weights(W: Array) -> bool:
-    """Return whether weights of whatever sign, summing to one, make the rows vanish."""
+    """Return whether some weights of any sign, with sum one, make rows vanish."""
     rows = np.vstack([W.T, np.ones(len(W))])
     wanted = np.append(np.zeros(len(rows) - 1), 1.0)
     weights = np.asarray(np.linalg.lstsq(rows, wanted, rcond=RANK)[0], dtype=np.float64)
@@ -216,9 +216,10 @@ def hull_volume(
 def smallest_singular_value(
     positions: ArrayLike | Grasp, *, center: ArrayLike = (0.0, 0.0, 0.0), torque_scale: float
 ) -> float:
-    """Compute the smallest singular value of the map from contact forces to wrenches.
+    """Compute the least singular value of the map from forces to wrenches.
 
-    It is zero for contacts on one line, and for two: they turn nothing about their line.
+    It is zero for contacts on one line, hence for two contacts: they resist no torque about their
+    line.
 
     Args:
         positions: Contact points, (k, 3) [m]; or a Grasp.
@@ -234,6 +235,6 @@ def smallest_singular_value(
     given = positions.positions if isinstance(positions, Grasp) else positions
     points = frozen(given, (None, 3), "positions")
     if not len(points):
-        raise InputError("positions must be those of at least one contact, got none")
+        raise InputError("positions must hold at least one contact, got none")
     values = np.linalg.svd(grasp_map(scaled_arms(points, center, torque_scale)), compute_uv=False)
     return float(values[-1]) if len(values) == WRENCH else 0.0

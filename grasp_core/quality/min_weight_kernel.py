@@ -1,4 +1,4 @@
-"""The min-weight programs of many grasps are solved one after the other (see `metrics`).
+"""Solves the min-weight programs of many grasps one after the other (see `metrics`).
 
 Solved: for each grasp, with its N wrenches w_j and their mean m, a best vertex y of
 
@@ -19,7 +19,7 @@ WRENCH = 6
 
 @loop("numpy")
 def vertices(wrenches: Array, twists: Array, multipliers: Array, rows: Indices) -> None:
-    """Find a best vertex of each program.
+    """Find a best vertex of the min-weight program of each grasp.
 
     Args:
         wrenches: Wrenches of each grasp, (g, N, 6).

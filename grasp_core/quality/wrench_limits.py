@@ -30,30 +30,33 @@ from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.values import Grasp
 
 HELD = 1e-7
-"""How far forces at a limit may leave cones and balance, relative to the largest wrench of a unit
-normal force: the accuracy of conic programs."""
+"""How far forces at a limit may leave the cones and miss balance, relative to the largest wrench of
+a unit normal force: the accuracy of conic programs."""
 ROUNDING = 1e-9
-"""Slack of the upper bound, relative to it, and of the facet's power, relative to the lengths of
-its factors."""
+"""Slack of the upper bound, relative to it, and of the facet's power, relative to its factors'
+lengths."""
 LAST_DIGITS = 1e-12
 """Slack of an upper bound near zero, relative to the largest that the facet's length allows."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WrenchLimit:
-    """The largest multiple of an external wrench that is resisted, with both sides of the proof."""
+    """The largest multiple of an external wrench that contacts resist, proved from both sides."""
 
     wrench: Array
     """External wrench (force, torque), (6,) [N, N m], torque about the stated centre."""
     limit: float
-    """Largest multiple of `wrench` that is resisted, since `forces` balance it; dimensionless."""
+    """Largest multiple of `wrench` that is resisted; `forces` prove it by balancing that multiple.
+    """
     upper: float
-    """Multiple above which nothing is resisted: the support of `facet`, in plain arithmetic."""
+    """Multiple above which the wrench is not resisted: the support of `facet`, in plain arithmetic.
+    """
     forces: Array
     """Contact forces that resist the wrench at the limit, (k, 3) [N]: in their cones, with normal
     parts up to the largest, and balanced, all to within `HELD`."""
     facet: Array
-    """Twist y of the limiting facet, (6,), with y.wrench = -1, about the stated centre."""
+    """Twist y of the facet that limits the wrench, (6,), with y.wrench = -1, about the stated
+    centre."""
 
     def verify(
         self,
@@ -64,7 +67,7 @@ class WrenchLimit:
         max_normal_force: float,
         center: ArrayLike = (0.0, 0.0, 0.0),
     ) -> bool:
-        """Re-check both sides in plain arithmetic, for the contacts they are said to be about.
+        """Check both bounds again in plain arithmetic, for the contacts they refer to.
 
         Args:
             positions: Contact points or Grasp, as given to `wrench_limits`, (k, 3) [m].
@@ -74,7 +77,7 @@ class WrenchLimit:
             center: Point about which torques are taken, (3,) [m].
 
         Returns:
-            Whether every field is true; False if they are no certificate.
+            Whether both bounds are proved; False if the fields are no certificate.
 
         Raises:
             InputError: The arguments do not describe contacts.
@@ -138,9 +141,9 @@ def wrench_limits(
     max_normal_force: float,
     center: ArrayLike = (0.0, 0.0, 0.0),
 ) -> tuple[WrenchLimit, ...]:
-    """Find how far each of several wrenches is resisted, with forces that resist it and a bound.
+    """Find the largest multiple of each wrench that contacts resist, with forces and a bound.
 
-    The weakest of them is `min(limits, key=lambda found: found.limit)`.
+    The weakest of the limits is `min(limits, key=lambda found: found.limit)`.
 
     Args:
         positions: Contact points, (k, 3) [m]; or a Grasp, with `normals` None.
@@ -165,12 +168,12 @@ def wrench_limits(
 
 
 def _check_sizes(loads: Array, name: str) -> None:
-    """Refuse wrenches (n, 6) that are zero, or nearly so: every multiple of zero is resisted."""
+    """Refuse wrenches (n, 6) that are zero, because every multiple of zero is resisted."""
     sizes = np.abs(loads).max(axis=1)
     if len(loads) and not SMALLEST <= float(sizes.min()) <= float(sizes.max()) <= LARGEST:
         wrong = sizes[(sizes < SMALLEST) | (sizes > LARGEST)][0]
         raise InputError(
-            f"{name} must not be zero: the largest part is from {SMALLEST:g} to {LARGEST:g}, got "
+            f"{name} must not be zero: its largest component is {SMALLEST:g} to {LARGEST:g}, got "
             f"{float(wrong):.6g}"
         )
 
@@ -181,7 +184,7 @@ class WrenchBody:
     def __init__(
         self, arms: Array, normals: Array, friction: Array, max_normal_force: float
     ) -> None:
-        """Set up the conic program, whose last column is the wrench asked about.
+        """Set up the conic program; its last column will hold the wrench in question.
 
         Args:
             arms: Contact points from the centre of torques, (k, 3) [m].
@@ -233,7 +236,7 @@ class WrenchBody:
         )
 
     def attains(self, found: WrenchLimit) -> bool:
-        """Return whether the forces are allowed, and balance the limit's multiple of the wrench."""
+        """Return whether the forces are allowed and balance the limit's multiple of the wrench."""
         shares = np.einsum("kij,ki->kj", self.frames, found.forces) / self.max_normal_force
         # what is left of (1) after adding the limit's multiple of the wrench
         left = self.G @ shares.ravel()
@@ -243,7 +246,7 @@ class WrenchBody:
         return balanced and allowed
 
     def bounds(self, found: WrenchLimit) -> bool:
-        """Return whether the facet shows that no larger multiple than the upper one is resisted."""
+        """Return whether the facet proves that no multiple above the upper one is resisted."""
         load, twist = self._about_middle(found.wrench), found.facet * self.scale
         slides = np.asarray(np.cross(found.facet[3:], self.middle), dtype=np.float64)
         twist[:3] += slides
@@ -257,7 +260,7 @@ class WrenchBody:
         return bounded and abs(power + 1.0) <= ROUNDING * lengths
 
     def _about_middle(self, wrench: Array) -> Array:
-        """Return a wrench about the contacts' middle, at unit size."""
+        """Move a wrench's reference point to the contacts' mean, and scale it to unit size."""
         moved = np.append(wrench[:3], wrench[3:] - np.cross(self.middle, wrench[:3]))
         return moved / self.scale
 
@@ -267,7 +270,7 @@ class WrenchBody:
 
 
 def axis_wrenches(torque_scale: float) -> Array:
-    """Return the twelve wrenches along and against each axis, (12, 6) [N, N m].
+    """Return the twelve unit wrenches along and against each axis, (12, 6) [N, N m].
 
     Args:
         torque_scale: Torque that goes with a force of one newton [m].

@@ -1,5 +1,5 @@
 """How are grasps and contacts kept in JSON files?
 
-Plans and contact sets come in, or the text of `grasps.json` and contacts files. Text goes out, or
-values whose every field is checked again.
+Plans, contact sets, and the texts of `grasps.json` and contacts files come in. Texts go out, and
+values whose every field has been checked.
 """

@@ -1,4 +1,4 @@
-"""Reads the text of a contacts file, or of a `grasps.json`, as checked contacts.
+"""Reads and checks the contacts in the text of a contacts file or of a `grasps.json`.
 
 A contacts file is JSON: `{"contacts": [...]}` for one grasp, or `{"grasps": [{"id": ...,
 "contacts": [...]}, ...]}`, where a contact is `{"position_m": [3], "normal": [3]}` and perhaps
@@ -21,18 +21,19 @@ from grasp_core.records.grasps_json import grasps_from_json
 
 FEWEST_CONTACTS = 2
 MOST_CONTACTS = 100
-"""Most contacts of one grasp: so many take some seconds, most of it for the hull's volume."""
+"""Largest number of contacts of one grasp: analysing a hundred takes some seconds, most of them for
+the volume of the wrench hull."""
 MOST_GRASPS = 100_000
-"""Most grasps of one file: two hours' work for one processor."""
+"""Largest number of grasps in one file: two hours of work for one processor."""
 LARGEST_LENGTH_M = 1e6
-"""Largest length: longer ones are mistakes, and their squares might overflow."""
+"""Largest length [m]: longer ones are mistakes, and their squares might overflow."""
 NEARLY_UNIT = 1e-3
-"""How far the length of a normal may be from 1: rounding of a file with three digits."""
+"""Largest error of a normal's length in a file: the rounding of three digits."""
 ROUNDING = 1e-15
-"""How far rounding takes the length of a unit vector from 1."""
+"""Largest difference from 1 that rounding leaves in the length of a unit vector."""
 SAME_POINT = 1e-9
-"""Contacts closer than this to their mean, relative to the numbers in the file, are at one point:
-rounding leaves nothing of smaller differences."""
+"""Distance below which contacts are at one point, relative to the numbers in the file: rounding
+leaves nothing of smaller differences."""
 
 CenterSource: TypeAlias = Literal["file", "mean contact", "center of mass"]
 ScaleSource: TypeAlias = Literal["flag", "file", "farthest contact", "object radius"]
@@ -79,7 +80,7 @@ class _ContactsFile(_Strict):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactSet:
-    """The contacts of one grasp, and how its wrenches are measured."""
+    """The contacts of one grasp, with the centre and the length by which torques are measured."""
 
     id: str
     positions: Array
@@ -106,12 +107,12 @@ class ContactSet:
 
 @dataclass(frozen=True, slots=True)
 class Overrides:
-    """Values that a user gives in place of those in a file of contacts."""
+    """Values that a user gives in place of those in a contacts file."""
 
     friction: float | None = None
-    """Friction of contacts without their own, in place of the file's."""
+    """Friction of contacts that have no friction of their own, in place of the file's."""
     torque_scale: float | None = None
-    """Torque scale, in place of the file's or of the object's radius [m]."""
+    """Torque scale [m], in place of the file's or of the object's radius."""
     outward: bool = False
     """Whether the file's normals point out of the object."""
 
@@ -119,9 +120,9 @@ class Overrides:
 def contact_sets_from_json(text: str, overrides: Overrides = Overrides()) -> tuple[ContactSet, ...]:
     """Read the text of a contacts file or of a `grasps.json`.
 
-    Without a centre in the file, torques are taken about the mean contact (about the centre of
-    mass for a `grasps.json`). Without a torque scale, the largest distance of a contact from the
-    centre makes them comparable with forces (the object's radius for a `grasps.json`).
+    Without a centre in the file, torques are taken about the mean contact (about the centre of mass
+    for a `grasps.json`). Without a torque scale, the largest distance of a contact from that centre
+    makes torques comparable with forces (the object's radius for a `grasps.json`).
 
     Raises:
         InputError: The text is neither, or no friction is given; the message names the field.
@@ -131,7 +132,9 @@ def contact_sets_from_json(text: str, overrides: Overrides = Overrides()) -> tup
         return _planned(text, overrides)
     file = record_of(_ContactsFile, text, "contacts file", nulls=False)
     if (file.contacts is None) == (file.grasps is None):
-        raise InputError('expected one key of "contacts" (one grasp) and "grasps" (several)')
+        raise InputError(
+            'the file must have either the key "contacts" (one grasp) or "grasps" (several)'
+        )
     if file.contacts is not None:
         return (_contact_set(file, file.contacts, "0", "contacts", overrides),)
     listed = file.grasps or ()
@@ -154,12 +157,12 @@ def _check_ids(ids: list[str]) -> None:
 
 
 def _planned(text: str, overrides: Overrides) -> tuple[ContactSet, ...]:
-    """The contacts of a `grasps.json`."""
+    """Read the contacts of a `grasps.json`."""
     if overrides.outward:
-        raise InputError("normals of a grasps.json point into the object: leave out --outward")
+        raise InputError("the normals of a grasps.json point into the object: leave out --outward")
     saved = grasps_from_json(text)
     if not saved.grasps:
-        raise InputError("grasps: the list is empty, there is nothing to analyse")
+        raise InputError("grasps: the list is empty; give at least one grasp")
     friction = saved.friction if overrides.friction is None else overrides.friction
     scale, source = _first((overrides.torque_scale, "flag"), (saved.body.radius, "object radius"))
     return tuple(
@@ -208,7 +211,7 @@ def _check_apart(positions: Array, center: Array, where: str) -> None:
     largest = float(max(np.abs(positions).max(), np.abs(center).max()))
     if extent <= SAME_POINT * largest:
         raise InputError(
-            f"{where}: all lie within {extent:.2g} m of one point, next to numbers of "
+            f"{where}: all contacts lie within {extent:.2g} m of one point, at coordinates of "
             f"{largest:.2g} m; move the contacts apart or the frame's origin nearer"
         )
 
@@ -234,12 +237,12 @@ def _frictions(
     known = [value for value in values if value is not None]
     if len(known) < len(values):
         raise InputError(
-            f"{where}[{values.index(None)}].friction: missing; give it there, as a key "
+            f"{where}[{values.index(None)}].friction: the key is missing; give it there, as a key "
             '"friction" of the file, or with --friction'
         )
     return contact_frictions(known, len(known))
 
 
 def _first(*given: tuple[float | None, ScaleSource]) -> tuple[float, ScaleSource]:
-    """The first of some values that is given, and its source."""
+    """Return the first of several values that is given, and its source."""
     return next((value, source) for value, source in given if value is not None)

@@ -28,44 +28,45 @@ if TYPE_CHECKING:
 
 SCHEMA = 1
 SAME_DIRECTION = 1e-6
-"""Largest distance of a witness direction from its force's: six digits in a file keep it."""
+"""Largest distance between the unit vectors of a witness line and of its force: files that keep six
+digits stay within it."""
 
 RECORDED = MeshLimits(max_triangles=2_000_000, max_faces=50_000, max_parts=640)
-"""Limits for objects in grasps files: ten times the usual, for users who raised a limit."""
+"""Limits for the meshes in grasps files: ten times the usual, for users who raised a limit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SavedGrasps:
-    """The contents of a `grasps.json`, as values."""
+    """The contents of a `grasps.json`, read and checked."""
 
     body: Polyhedron
     friction: float
     seed: int
     grasps: tuple[Grasp, ...]
     finger: Finger | None = None
-    """The finger that was planned to get to the contacts; None if reach was not asked for."""
+    """The finger whose free paths to the contacts were planned; None if none were planned."""
 
 
 @dataclass(frozen=True, slots=True)
 class Moved:
-    """How optimisation changed the quality of a grasp, with proved bounds (lower, upper)."""
+    """How optimisation changed a grasp's quality, as proved bounds (lower, upper)."""
 
     id: str
     moved_from: str
-    """Id of the planned grasp; equal to `id` where the grasp stayed."""
+    """Id of the planned grasp; equal to `id` where the grasp was not moved."""
     before: tuple[float, float]
     after: tuple[float, float]
     ceiling: float | None
-    """Quality that no contacts on the same faces exceed; None where it was not asked for."""
+    """Quality that no contacts on the same faces exceed; None where no ceiling was asked for."""
 
     @property
     def gain(self) -> float:
-        """Ratio of the proved lower bounds, after to before."""
+        """Return the ratio of the proved lower bounds, after to before."""
         return self.after[0] / self.before[0]
 
 
 def plan_to_json(body: Polyhedron, plan: Plan, moves: Sequence[Moved] = ()) -> str:
-    """The text of `grasps.json`; equal plans give equal text."""
+    """Write a plan as the text of a `grasps.json`; equal plans give equal text."""
     document: dict[str, object] = {
         "schema": SCHEMA,
         "object": {
@@ -163,18 +164,20 @@ def grasps_from_json(text: str) -> SavedGrasps:
         limits=RECORDED,
     )
     if body.content_sha256 != record.object.content_sha256:
-        raise InputError("object.content_sha256: is not the hash of its mesh; plan again")
+        raise InputError(
+            "object.content_sha256: the hash does not fit the mesh in the file; plan again"
+        )
     grasps = tuple(
         _named_grasp(body, grasp, record.friction, i) for i, grasp in enumerate(record.grasps)
     )
     if len({grasp.id for grasp in grasps}) < len(grasps):
-        raise InputError("grasps: two have the same id; ids must differ")
+        raise InputError("grasps: two grasps have the same id; ids must differ")
     finger = None if record.finger is None else Finger(**record.finger.model_dump())
     return SavedGrasps(body, record.friction, record.seed, grasps, finger)
 
 
 def _named_grasp(body: Polyhedron, record: "GraspRecord", friction: float, number: int) -> Grasp:
-    """Read a grasp; a refusal names its place in the file."""
+    """Read a grasp from its record; a refusal names the grasp's place in the file."""
     try:
         return _grasp_from_record(body, record, friction)
     except InputError as error:
@@ -213,5 +216,7 @@ def _grasp_from_record(body: Polyhedron, record: "GraspRecord", friction: float)
     check_witness(body, grasp, friction)
     off = np.abs(grasp.witness.directions - np.array(record.witness.directions)).max()
     if off > SAME_DIRECTION:
-        raise InputError(f"grasp {grasp.id}: a witness direction differs from that of its force")
+        raise InputError(
+            f"grasp {grasp.id}: a witness line does not run along its force; plan again"
+        )
     return grasp

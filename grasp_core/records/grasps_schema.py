@@ -1,4 +1,4 @@
-"""The fields of a `grasps.json`, with their units, types and bounds."""
+"""Lists the fields of a `grasps.json`, with their units, types and bounds."""
 
 from typing import Annotated, Any, Literal
 
@@ -17,14 +17,14 @@ class _Record(BaseModel):
 
 
 class MeshRecord(_Record):
-    """The triangles of the object."""
+    """The triangles of the object's surface."""
 
     vertices_m: list[Triple]
     triangles: list[tuple[int, int, int]]
 
 
 class PatchesRecord(_Record):
-    """Limits of flatness for the patches of a curved surface, and their number."""
+    """How flat patches of a curved surface must be, and how many patches are kept."""
 
     spread_deg: Finite
     depth: Finite
@@ -32,7 +32,7 @@ class PatchesRecord(_Record):
 
 
 class ObjectRecord(_Record):
-    """The object that grasps were planned on."""
+    """The object that the grasps were planned on."""
 
     name: str
     source_sha256: str
@@ -40,7 +40,7 @@ class ObjectRecord(_Record):
     mesh: MeshRecord
     center_of_mass_m: Triple
     patches: PatchesRecord | None = None
-    """Limits of patches; None for exact planar faces."""
+    """Limits of patches on a curved surface; None where faces are exactly planar."""
 
 
 class ContactRecord(_Record):
@@ -51,14 +51,14 @@ class ContactRecord(_Record):
 
 
 class ConeRecord(_Record):
-    """A force cone of the construction."""
+    """The force cone that the construction used for one finger."""
 
     axis: Triple
     half_angle_deg: Finite
 
 
 class RegionRecord(_Record):
-    """The region in which a finger may stand."""
+    """The region in which one finger may stand."""
 
     kind: RegionKind
     polygon_m: list[Triple]
@@ -66,7 +66,7 @@ class RegionRecord(_Record):
 
 
 class WitnessRecord(_Record):
-    """Balanced forces along four lines, normal parts summing to one."""
+    """Balanced forces along four lines; their normal parts sum to one."""
 
     points_m: FourTriples
     directions: FourTriples
@@ -74,10 +74,10 @@ class WitnessRecord(_Record):
 
 
 class GraspRecord(_Record):
-    """One grasp, with everything that its claims need to be checked again."""
+    """One grasp, with all that is needed to check its claims again."""
 
     id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,99}$")
-    """Id of the grasp; it also names the grasp's scene file, hence no dots or slashes."""
+    """Id of the grasp; it also names the grasp's scene file, so it has no dots or slashes."""
     family: Family
     faces: tuple[int, int, int, int]
     contacts: tuple[ContactRecord, ContactRecord, ContactRecord, ContactRecord]
@@ -91,7 +91,8 @@ class GraspRecord(_Record):
     ferrari_canny: tuple[Finite, Finite]
     witness: WitnessRecord
     approach_directions: FourTriples | None = None
-    """Direction in which each finger moves in on a free line; None if that was not asked for."""
+    """Direction in which each finger moves in along its free line; None if no free lines were asked
+    for."""
 
 
 class MovedRecord(_Record):
@@ -105,14 +106,14 @@ class MovedRecord(_Record):
 
 
 class FingerRecord(_Record):
-    """The fingers whose free lines were planned."""
+    """The size of the fingers whose free approach lines were planned."""
 
     radius_m: Annotated[Finite, Field(gt=0.0)]
     approach_m: Annotated[Finite, Field(gt=0.0)]
 
 
 class GraspsRecord(_Record):
-    """A whole `grasps.json`."""
+    """The contents of a whole `grasps.json`."""
 
     schema_version: Literal[1] = Field(alias="schema")
     object: ObjectRecord
@@ -120,7 +121,7 @@ class GraspsRecord(_Record):
     theta_deg: Finite
     seed: Annotated[int, Field(ge=0, le=MOST_SEED)]
     finger: FingerRecord | None = None
-    """The finger that was planned for; None if reach was not asked for."""
+    """The finger whose free approach lines were planned; None if none were planned."""
     versions: dict[str, str]
     counts: dict[str, Any]
     outcomes: dict[str, int] = Field(default_factory=dict)

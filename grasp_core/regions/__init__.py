@@ -1,5 +1,5 @@
-"""Where may each finger stand while the grasp stays closed?
+"""Where may each finger stand while the grasp stays in force closure?
 
-A grasp and its faces come in, with a friction coefficient. Independent regions go out, with a cover
-of all twists that proves them and that `verify` checks again.
+A grasp and its faces come in, with a friction coefficient. Independent regions go out, with a proof
+that covers all twists of the object and that `verify` checks again.
 """

@@ -1,15 +1,16 @@
 """Moves the centres of discs so that the discs can be larger.
 
-A cover has fixed forces on fixed twists, and the power of a fixed force is linear in the place of
-its contact. So the largest radius r that its forces allow, over all centres c_i with the discs on
-their faces, is one linear program:
+A cover is a list of cones that fill the space of twists, with fixed contact forces for each cone.
+The power of a fixed force is linear in the position of its contact. So the largest radius r that
+these forces allow, over all centres c_i with the discs on their faces, is one linear program:
 
     maximise r  over c_i, r
     sum over i of F_i.(a + b x c_i) - r |T_i'(F_i x b)| >= 0   for each ray of each cone,   (1)
     E_i c_i + r <= b_i                                          for each face.              (2)
 
-New centres allow other forces, so covers are sought anew around them, and so on while the radius
-grows: the paper's own program for concurrent grasps is of this kind, with one focus for all twists.
+New centres allow other forces, so new covers are sought around them, again and again while the
+radius grows. The paper's own program for concurrent grasps is of this kind, with one focus for all
+twists.
 """
 
 from dataclasses import replace
@@ -26,19 +27,23 @@ from grasp_core.solvers.ties import first_best, nearest_optimum, on_grid
 
 MOVES = 12  # of all centres, at most
 MOVING = 8
-"""Covers are sought with this many times fewer cones while centres move."""
+"""While centres move, covers have at most this many times fewer cones."""
 WORTH = 1.005
-"""Least growth of the radius, as a factor, for which moving goes on."""
+"""Least growth of the radius, as a factor, at which centres are moved once more."""
 FARTHEST = 1.0
-"""Largest move of a centre at once, in radii."""
+"""Largest distance that a centre moves at once, in radii."""
 MOVED_DIGITS = 6
-"""Digits after the point that moved centres keep."""
+"""Digits after the point to which moved centres are rounded."""
 NEAR = 3.0
-"""Rays count in the program if they would stop a radius up to this factor of the present one."""
+"""Largest factor between the present radius and the radius at which a ray would stop growth: rays
+beyond it are left out of the program."""
 
 
 def better_centers(grounds: Grounds, ys: Array) -> Array:
-    """Centres in plane coordinates, (k, 2), with larger discs than `ys` if any are found."""
+    """Find centres with larger discs than `ys` has, in plane coordinates, (k, 2).
+
+    The result is `ys` itself if none are found.
+    """
     coarse = replace(grounds, cones=grounds.cones // MOVING)
     best = largest_discs(coarse, ys)
     if best is None:
@@ -53,20 +58,20 @@ def better_centers(grounds: Grounds, ys: Array) -> Array:
 
 
 def larger_inside(grounds: Grounds, one: Proved | None, other: Proved | None) -> Proved | None:
-    """The one of two sets of discs that has the larger discs inside the faces."""
+    """Return whichever of two sets of discs has the larger discs inside the faces."""
     if one is None or other is None:
         return other if one is None else one
     return (one, other)[first_best([inside_faces(grounds, each) for each in (one, other)])]
 
 
 def inside_faces(grounds: Grounds, proved: Proved) -> float:
-    """The largest radius of discs that are proved and inside the faces."""
+    """Return the largest radius of discs that are proved and lie inside the faces."""
     depths = [(p.b - p.E @ y).min() for p, y in zip(grounds.pieces, proved.ys, strict=True)]
     return min(proved.radius, *map(float, depths))
 
 
 def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
-    """The best centres for the forces of a cover, near the present ones, (k, 2), or None."""
+    """Find the best centres near the present ones for a cover's forces, (k, 2), or None."""
     k = len(proved.ys)
     rows, limits = list[Array](), list[Array]()
     points = grounds.points(proved.ys)
@@ -112,5 +117,5 @@ def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
 
 
 def _sizes(forces: Array) -> Array:
-    """Lengths of all forces of each cone together, (m, 1)."""
+    """Return the length of all forces of each cone together, (m, 1)."""
     return np.sqrt(np.einsum("mki,mki->m", forces, forces))[:, None]

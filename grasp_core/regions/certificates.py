@@ -1,4 +1,4 @@
-"""Independent regions with their proof: what is claimed about them, and how it is checked."""
+"""Holds independent regions with their proof, and checks every claim about them."""
 
 import math
 from dataclasses import dataclass
@@ -25,41 +25,44 @@ from grasp_core.regions.proof import TwistCover
 from grasp_core.values import FINGERS, ContactRegion
 
 PLACED = 1e-9
-"""How far points may be off the planes and borders they are on, and radii off their measured
-values, relative to `scale`: files with ten digits keep this much."""
+"""How far points may be off their planes and borders, and radii off their measured values, relative
+to `scale`: files that keep ten digits stay within it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CertifiedRegions:
-    """Regions where each finger may stand while the others are anywhere in their own regions."""
+    """Regions in which each finger may stand while the others stand anywhere in theirs."""
 
     regions: tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
     """Contact regions, one per finger: convex polygons inside `borders`."""
     borders: tuple[Array, Array, Array, Array]
-    """Convex piece of the face that each region is on, clear of edges as asked for, (k, 3) [m]."""
+    """Convex piece of a face around each region, at the asked distance from edges, (k, 3) [m]."""
     radius: float
-    """Radius of discs around `centers` [m]. Each polygon holds what its border has of its disc, but
-    for two thousandths of the polygon's area. No larger than discs that hold all of `borders`."""
+    """Radius of discs around `centers` [m]. Each polygon holds the part of its disc inside its
+    border, except for at most 0.2 % of the polygon's area. The radius is at most that of discs that
+    hold all of `borders`."""
     centers: Array
-    """Centres of the discs, in the polygons, (4, 3) [m]."""
+    """Centres of the discs, which lie in the polygons, (4, 3) [m]."""
     limit: float
-    """Radius of somewhat larger discs that hold `open_choice` [m]; infinite if none was found."""
+    """Radius of slightly larger discs that contain the contacts `open_choice` [m]; infinite if no
+    such contacts were found."""
     open_choice: Array | None
-    """Contacts inside `borders`, in those discs, that are not force-closed, (4, 3) [m]."""
+    """Contacts inside `borders` and the discs of radius `limit` that are not force-closed, (4, 3)
+    [m]."""
     open_wrench: Array | None
-    """Proof that the choice is open: like `ClosureCertificate.separating_wrench`, (6,)."""
+    """Separating wrench of `open_choice`, like `ClosureCertificate.separating_wrench`, (6,)."""
     friction: Array
-    """Coulomb coefficients at which all choices are force-closed, (4,)."""
+    """Coulomb coefficients at which all contacts in the regions are force-closed, (4,)."""
     origin: Array
-    """Point about which the proof counts torques, (3,) [m]."""
+    """Point about which torques are taken in the proof, (3,) [m]."""
     normals: Array
     """Unit normals of the faces, into the object, (4, 3)."""
     depths: Array
-    """Largest distance of the surface from each region's plane, (4,) [m]."""
+    """Largest distance of the true surface from each region's plane, (4,) [m]."""
     cover: TwistCover
-    """The proof that all choices are force-closed, with lengths relative to `scale`."""
+    """Proof that all contacts in the regions are force-closed, with lengths relative to `scale`."""
     scale: float
-    """Unit of length of the proof [m]."""
+    """Length that the proof uses as its unit [m]."""
 
     def __post_init__(self) -> None:
         for name in ("centers", "normals"):
@@ -77,7 +80,7 @@ class CertifiedRegions:
             raise InputError(f"depths must not be negative, got {float(self.depths.min()):.6g}")
 
     def verify(self) -> bool:
-        """Re-check every field in plain arithmetic.
+        """Check every field again in plain arithmetic.
 
         This checks that every choice of contacts in `regions`, on planes with `normals` and at most
         `depths` off them, is force-closed with `friction`; that the polygons are convex, in their
@@ -125,21 +128,24 @@ class CertifiedRegions:
         return self.radius <= (farthest + PLACED) * self.scale
 
     def _flat(self, i: int, polygon: Array) -> FlatPolygon | None:
-        """A polygon in the plane of a finger's border, at unit size; None if it is not one."""
+        """Write a polygon in the plane of a finger's border, at unit size.
+
+        The result is None if it is not a convex polygon in that plane.
+        """
         if not is_array(polygon, None, 3) or not FEWEST_CORNERS <= len(polygon) <= MOST_CORNERS:
             return None
         start = self.borders[i][0]
         return flat_polygon((polygon - start) / self.scale, self.normals[i], PLACED)
 
     def _at(self, i: int, point: Array) -> Array | None:
-        """A point in the plane coordinates of `_flat`, (2,); None if it is off the plane."""
+        """Write a point in the coordinates of `_flat`, (2,); None if it is off the plane."""
         arm = (point - self.borders[i][0]) / self.scale
         if abs(float(arm @ self.normals[i])) > PLACED:
             return None
         return arm @ plane_frame(self.normals[i])
 
     def _is_open(self) -> bool:
-        """Whether the open choice is on the borders, at radius `limit`, and not force-closed."""
+        """Return whether `open_choice` is on the borders, at radius `limit`, and not closed."""
         choice, wrench = self.open_choice, self.open_wrench
         if choice is None:
             return wrench is None and self.limit == math.inf
@@ -163,10 +169,10 @@ class CertifiedRegions:
 
 
 def _check_parts(found: CertifiedRegions) -> None:
-    """Refuse parts of the wrong type, number or sign.
+    """Refuse fields of the wrong type, number or sign.
 
     Raises:
-        InputError: A part is not a region, a cover or a length, or one is missing.
+        InputError: A field is not a region, a cover or a length, or one is missing.
     """
     each = partial(instance, kind=ContactRegion, name="regions")
     count = len(several(found.regions, each, "regions", "ContactRegion values"))

@@ -1,13 +1,13 @@
-"""Independent regions for the fingers of any grasp, polygons on its faces, with a proof.
+"""Finds independent regions for the fingers of a grasp, polygons on its faces, with a proof.
 
-Contacts may be anywhere in their own regions, whatever the others do, and the grasp stays in force
-closure. First come the largest equal discs for which that is proved (`largest_discs`), around the
-contacts or around better centres (`centers`); then polygons around the discs that the same proof
-allows, or as much area as covers are found for (`growth`). Every proof is checked by
-`CertifiedRegions.verify` before it is returned.
+Contacts may be anywhere in their own regions, wherever the others are, and the grasp stays in force
+closure. The search begins with the largest equal discs for which this is proved (`largest_discs`),
+around the contacts or around better centres (`centers`). Then polygons grow around the discs, as
+far as the same proof allows, or as long as larger proofs are found (`growth`). Every proof is
+checked by `CertifiedRegions.verify` before it is returned.
 
 On patches of curved surfaces a contact may be as far off the plane as the surface is. The plane's
-normals are used there, with friction smaller by the angle that the surface leans.
+normals are used there, and the friction angle is reduced by the angle between surface and plane.
 """
 
 import math
@@ -49,16 +49,18 @@ from grasp_core.solvers.ties import coarse, first_best, on_grid
 from grasp_core.values import ContactRegion, Grasp, four
 
 Balance: TypeAlias = Literal["radius", "area"]
-"""What regions are grown for: the smallest inscribed disc, or the total area."""
+"""What regions are made large for: the smallest inscribed disc, or the total area."""
 FEWEST = 64
-"""Least number of cones to ask for: the orthants, with which every search begins."""
+"""Least number of cones that a caller may ask for: every search begins with the 64 orthants."""
 MOST_CONES = 1_000_000
 CONES = 10_000
-"""Default for the most cones of one cover: half a second's work."""
+"""Default for the largest number of cones in one proof, which takes half a second."""
 UNIT_DIGITS, PLACE_DIGITS = 6, 8
-"""Digits after the point: of the unit and its origin, in object radii; of centres, in the unit."""
+"""Digits after the point: of the unit of length and its origin, in object radii, and of centres, in
+that unit."""
 NARROWED = 1e-3
-"""Precision to which discs in grown polygons are measured, relative to the proved radius."""
+"""Precision to which the largest discs in grown polygons are measured, relative to the proved
+radius."""
 
 
 def certify_regions(  # noqa: PLR0913 - what a user may choose
@@ -73,7 +75,7 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     max_cones: int = CONES,
     cones: object = None,
 ) -> CertifiedRegions | None:
-    """Find regions around the contacts of a grasp, as large as a proof is found for.
+    """Find independent regions around the contacts of a grasp, as large as can be proved.
 
     Args:
         body: The object.
@@ -111,7 +113,7 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     positions, normals = stacked(grasp.contacts)
     if not force_closure(positions, normals, left).closed:
         raise InputError(
-            f"grasp {grasp.id} is not in force closure at friction {left:.6g}; allow more friction"
+            f"grasp {grasp.id} is not in force closure at friction {left:.6g}; raise the friction"
         )
     unit = _Unit.of(body, positions)
     pieces = _pieces(body, grasp, unit, clearance)
@@ -136,15 +138,16 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
         return None
     found = _placed(grounds, proved, polygons, cover, unit)
     if not found.verify():
-        raise SolverError(f"grasp {grasp.id}: the proof of its regions fails its check")
+        raise SolverError(f"grasp {grasp.id}: its regions failed their own check; please report it")
     return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Unit:
-    """The unit of length and the origin in which the contacts' largest lever is about one.
+    """A unit of length and an origin that make the contacts' longest lever about one.
 
-    Both have few digits, so that places in this unit do not depend on the contacts' last digits.
+    Both are rounded to few digits, so that places in this unit do not depend on the last digits of
+    the contacts.
     """
 
     origin: Array
@@ -171,9 +174,10 @@ class _Unit:
 def _pieces(
     body: Polyhedron, grasp: Grasp, unit: _Unit, clearance: float
 ) -> tuple[FacePiece, ...] | None:
-    """The convex pieces that contacts lie on, clear of edges; None if one has no room.
+    """Return the convex piece under each contact, at a distance from edges, or None.
 
-    If a face has several pieces, the piece that holds the contact deepest is taken.
+    If a face has several pieces, the one in which the contact is deepest is taken. The result is
+    None if a face is too narrow.
     """
     found = list[FacePiece]()
     for index, contact in zip(grasp.faces, grasp.contacts, strict=True):
@@ -191,14 +195,14 @@ def _pieces(
 
 
 def _room(point: Array, piece: FacePiece) -> float:
-    """Distance of a point inside a piece from its nearest edge; negative outside."""
+    """Return the distance of a point in a piece from the nearest edge; negative outside."""
     return float((piece.b - piece.E @ (piece.frame.T @ (point - piece.origin))).min())
 
 
 def _polygons(
     grounds: Grounds, proved: Proved, balance: Balance, grasp: Grasp, unit: _Unit
 ) -> tuple[list[Array], TwistCover]:
-    """Polygons in plane coordinates, (c, 2) each, and their proof."""
+    """Grow polygons in plane coordinates, (c, 2) each, and return them with their proof."""
     if balance == "radius":
         discs = grounds.discs(proved.ys, proved.radius)
         return shared_out(grounds, proved.ys, discs, proved.cover), proved.cover
@@ -215,7 +219,7 @@ def _polygons(
 def _placed(
     grounds: Grounds, proved: Proved, polygons: list[Array], cover: TwistCover, unit: _Unit
 ) -> CertifiedRegions:
-    """Put polygons together as regions in the object's frame, with their proof."""
+    """Return polygons as regions in the object's frame, with their proof."""
     trimmed = [_trimmed(polygon, y) for polygon, y in zip(polygons, proved.ys, strict=True)]
     centers = unit.back(grounds.points(proved.ys))
     opened = _open_choice(grounds, proved, unit)
@@ -249,9 +253,9 @@ def _farthest(points: Array, centers: Array) -> float:
 
 
 def _radius_held(grounds: Grounds, proved: Proved, polygons: list[Array]) -> float:
-    """The largest radius, up to the proved one, of discs that the polygons hold.
+    """Return the largest radius, up to the proved one, of discs inside the polygons.
 
-    Polygons grown for their area may begin with smaller discs than the proved ones.
+    Polygons that grew for their area may begin with smaller discs than the proved ones.
     """
     pairs = [
         (convex_polygon(polygon, PLACED), convex_polygon(piece.corners, PLACED), y)
@@ -274,16 +278,16 @@ def _radius_held(grounds: Grounds, proved: Proved, polygons: list[Array]) -> flo
 
 
 def _trimmed(polygon: Array, y: Array) -> Array:
-    """A polygon with fewer corners, if it still holds its centre; else the polygon itself."""
+    """Reduce the corners of a polygon, unless the result would lose its centre."""
     fewer = with_fewer_corners(polygon)
     E, b = edge_rows(fewer)
     return fewer if (E @ y <= b).all() else polygon
 
 
 def _open_choice(grounds: Grounds, proved: Proved, unit: _Unit) -> ClosureCertificate | None:
-    """The proof, in the object's frame, that the choice that a search found is open.
+    """Return the proof, in the object's frame, that the contacts found are not closed.
 
-    The result is None unless the exact test says so and the choice is on the pieces. Patches of
+    The result is None unless the exact test agrees and the contacts are on the pieces. Patches of
     curved surfaces are not planes, so nothing is claimed about them.
     """
     if proved.choice is None or any(piece.depth or piece.spread for piece in grounds.pieces):

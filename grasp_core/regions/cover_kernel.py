@@ -1,9 +1,9 @@
-"""Compiled search for cones that cover all twists, with forces that have power on each cone.
+"""Searches in compiled code for cones that cover all twists, with forces that resist each cone.
 
-`grasp_core.regions.proof` derives what is covered and why, and checks every answer; here only cones
-are cut and forces chosen. Numbers in comments are those of its derivation. Cones are cut level by
-level, the oldest first, so the answer is a tree in levels: for each cone the edge that is cut, or
-the forces.
+`grasp_core.regions.proof` derives what is covered and why, and checks every answer; here cones are
+only divided and forces chosen. Numbers in comments refer to that derivation. Cones are divided
+level by level, the oldest first, so the answer is a tree in levels: for each cone the edge at which
+it is divided, or the forces.
 """
 
 import math
@@ -22,21 +22,21 @@ COVERED, REFUTED, UNDECIDED = 1, -1, 0
 
 
 class Tree(NamedTuple):
-    """The outcome for each cone, n of them at most; arrays are filled in by `search`."""
+    """The outcome of a search for at most n cones; `search` fills in the arrays."""
 
     codes: Indices
-    """Number of the edge that is cut, or `LEAF`, (n,)."""
+    """For each cone, the number of the edge at which it is divided, or `LEAF`, (n,)."""
     forces: Array
-    """Forces on cones that are not cut, along the frames, (n, k, 3)."""
+    """Forces on cones that are not divided, along the frames, (n, k, 3)."""
     shifts: Array
-    """Shifts from the points, along the frames, that leave a twist unresisted, (k, 3)."""
+    """Shifts of the contacts, along the frames, at which they do not resist some twist, (k, 3)."""
 
 
 @loop("numpy")
 def pivot(ids: Indices, weights: Array, motions: Array, i: int, most: float) -> tuple[float, float]:
-    """The tangential part of a contact's force along the axis of the mean twist, if allowed.
+    """Compute a tangential force on the axis of the mean twist, if friction allows it.
 
-    A force along the axis has the same power wherever the contact is.
+    Along this axis a contact's force has the same power wherever the contact is.
     """
     f, g, along = 0.0, 0.0, 0.0
     for place in range(RAYS):
@@ -52,7 +52,7 @@ def pivot(ids: Indices, weights: Array, motions: Array, i: int, most: float) -> 
 def answer(
     ids: Indices, weights: Array, motions: Array, sites: Sites, i: int
 ) -> tuple[float, float, float]:
-    """The sum of a contact's least powers on weighted rays for a good force, and that force."""
+    """Choose a good force of one contact; return its weighted power on the rays, and the force."""
     most = sites.friction[i] * (1.0 - TINY)
     best, best_f, best_g = -np.inf, 0.0, 0.0
     f, g = pivot(ids, weights, motions, i, most)
@@ -80,7 +80,7 @@ def answer(
 
 @loop("numpy")
 def together(ids: Indices, motions: Array, sites: Sites, forces: Array, clear: Array) -> bool:
-    """Whether some forces have power together on the rays of a cone: h > 0 in (2)."""
+    """Return whether forces together have positive power on all rays of a cone: h > 0 in (2)."""
     least, needed = np.inf, 0.0
     for i in range(len(forces)):
         needed += forces[i, 0] * clear[i]
@@ -97,7 +97,7 @@ def together(ids: Indices, motions: Array, sites: Sites, forces: Array, clear: A
 
 @loop("numpy")
 def dot(u: Array, v: Array) -> float:
-    """Inner product of two lists of six numbers, summed in one order on all machines."""
+    """Return the inner product of two lists of six numbers, added in the same order everywhere."""
     total = 0.0
     for place in range(RAYS):
         total += u[place] * v[place]
@@ -106,7 +106,7 @@ def dot(u: Array, v: Array) -> float:
 
 @loop("numpy")
 def reweigh(regrets: Array, powers: Array, weights: Array) -> None:
-    """Move weight to rays by the power they have lacked so far, counting the last round twice."""
+    """Move weight to rays by the power they have lacked so far; the last round counts twice."""
     mean, total = dot(weights, powers), 0.0
     for place in range(RAYS):
         regrets[place] = max(0.0, regrets[place] + mean - powers[place])
@@ -122,10 +122,10 @@ def reweigh(regrets: Array, powers: Array, weights: Array) -> None:
 def find_forces(
     ids: Indices, motions: Array, sites: Sites, clear: Array, forces: Array, weights: Array
 ) -> bool:
-    """Fill in forces with power on all rays of a cone, if some are found; else a bad twist in it.
+    """Find forces with power on all rays of a cone; return whether they were found.
 
-    This is the game of `grasp_core.regions.sites`. It ends at once where no answer has power, and
-    leaves the weights of the bad twist.
+    `grasp_core.regions.sites` describes the method. It stops as soon as no force of any contact has
+    power for the weights; the weights are then those of a twist that may be unresisted.
     """
     regrets, powers = np.zeros(RAYS), np.empty(RAYS)
     weights[:] = 1.0 / RAYS
@@ -173,7 +173,7 @@ def fill_motions(ray: int, rays: Array, sites: Sites, axes: Array, motions: Arra
 
 @loop("numpy")
 def edge_to_cut(ids: Indices, rays: Array, weights: Array) -> tuple[int, int, int]:
-    """Number and ends of the edge to cut: long, between rays that weigh much."""
+    """Return number and ends of the edge to divide: a long one between rays of large weight."""
     longest, chosen, number, first, last = -1.0, 0, 0, 0, 0
     lengths = np.empty(RAYS)
     for i in range(RAYS):
@@ -204,12 +204,12 @@ def orthants(rays: Array, sites: Sites, axes: Array, motions: Array, cones: Indi
 
 @loop("numpy")
 def search(sites: Sites, axes: Array, needs: tuple[int, Array], tree: Tree) -> tuple[int, int]:
-    """Cut cones until each is covered, one ray is refuted, or there are too many.
+    """Divide cones until each is covered, a twist is unresisted, or there are too many cones.
 
     Args:
         sites: Where contacts may be.
         axes: Twists of the first rays as rows, (6, 6).
-        needs: Most cones, and the result of `Sites.clear`, (k,).
+        needs: Largest number of cones, and the result of `Sites.clear`, (k,).
         tree: Filled with the outcome for each cone.
 
     Returns:

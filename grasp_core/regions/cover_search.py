@@ -1,9 +1,9 @@
-"""Searches covers of all twists in compiled code.
+"""Searches for covers of all twists, the proofs of independent regions, in compiled code.
 
-Cones are cut until forces have power together on all rays of each cone; `regions.proof` derives why
-that is enough, and checks the answer. Numbers in comments are those of its derivation. Forces are
-found by the game of `regions.sites`: weight moves to the rays that lack power, forces answer, and
-the mean answer counts. The search also stops at a twist that contacts at some places do not resist.
+A cover is a list of cones that fill the space of twists, each with contact forces that together
+have power on all its rays. Cones are divided until such forces are found for each; `regions.proof`
+derives why that is enough, and checks the answer. `regions.sites` describes how forces are found.
+The search also stops when it finds a twist that contacts at some places do not resist.
 """
 
 from dataclasses import dataclass
@@ -20,20 +20,20 @@ KERNEL = "grasp_core.regions.cover_kernel"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Searched:
-    """How a search ended: with a cover, an open choice, or neither within the cones allowed."""
+    """How a search ended: with a cover, with contacts that are not closed, or with neither."""
 
     cover: TwistCover | None = None
     choice: Array | None = None
-    """Contact places that leave a twist unresisted, but for rounding, (k, 3)."""
+    """Contacts that leave a twist unresisted, except for rounding, (k, 3)."""
 
 
 def search_cover(sites: Sites, axes: Array, cones: int) -> Searched:
-    """Search a cover for contacts at sites.
+    """Search for a cover that proves force closure for all contacts in given sites.
 
     Args:
         sites: Where contacts may be.
         axes: Twists of the first rays, as rows, (6, 6).
-        cones: Most cones; the sixty-four orthants are always tried.
+        cones: Largest number of cones; the 64 orthants are always tried.
     """
     # the search sees sites on a grid, so that it ends alike on all machines
     kernel, told = compiled(KERNEL), sites.on_grid()

@@ -1,4 +1,4 @@
-"""Grows polygons as large as a cover allows, and larger ones by covers of their own.
+"""Grows polygons as far as a proof allows, and then further with new proofs.
 
 A cover proves more than the discs it was sought for. On a ray of one of its cones the least powers
 of the forces sum to s > 0. Each of the m contacts with a force may lose s / m there and no more, so
@@ -26,19 +26,20 @@ from grasp_core.regions.sites import Sites
 from grasp_core.solvers.ties import first_best, surpassing
 
 SHARINGS = 2
-"""Number of times that spare power is shared out."""
+"""Number of times that spare power is shared out among the contacts."""
 MARGIN = 4.0
-"""Factor by which powers are kept above the slack of their check."""
+"""Power that polygons leave over, as a multiple of the slack with which the proof is checked."""
 FIRST_STEP, LAST_STEP = 0.4, 0.03
-"""Steps by which polygons are moved outwards, relative to the radius of the discs."""
+"""First and last step by which edges of polygons are moved outwards, relative to the radius of the
+discs."""
 BEGINNINGS = (1.0, 0.6)
-"""Radii of discs from which areas grow, relative to the largest proved ones."""
+"""Radii of the discs from which large areas grow, relative to the largest proved ones."""
 GROWING = 4
-"""Each attempt to grow takes this many times fewer cones."""
+"""Factor by which the attempts to grow have fewer cones than the proof before."""
 
 
 def shared_out(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) -> list[Array]:
-    """Polygons around sites that the same cover proves, in plane coordinates, (c, 2) each.
+    """Grow polygons around sites as far as their proof allows, in the planes, (c, 2) each.
 
     Args:
         grounds: The pieces that contacts may stand on.
@@ -56,7 +57,7 @@ def shared_out(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) -> 
 
 
 def _given_away(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) -> list[Array]:
-    """The parts of the pieces in all half-planes (1), for one sharing of the spare power."""
+    """Cut the pieces by all half-planes (1), after sharing out the spare power once."""
     each = range(len(ys))
     rows, limits = [list[Array]() for _ in each], [list[Array]() for _ in each]
     for where, rays in cover.leaves():
@@ -87,7 +88,7 @@ def _given_away(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) ->
 
 
 def _inside(polygon: Array, rows: Array, limits: Array) -> Array:
-    """Part of a convex polygon (c, 2) in half-planes rows @ y <= limits, most of them idle."""
+    """Cut a convex polygon (c, 2) by half-planes rows @ y <= limits, few of which matter."""
     while len(rows) and len(polygon):
         beyond = (rows @ polygon.T).max(axis=1) - limits
         worst = first_best(beyond, ON_LINE)
@@ -100,7 +101,7 @@ def _inside(polygon: Array, rows: Array, limits: Array) -> Array:
 
 
 def disc_polygons(grounds: Grounds, ys: Array, radius: float) -> list[Array]:
-    """Parts of the pieces in polygons around discs, in plane coordinates, (c, 2) each."""
+    """Replace discs by polygons, cut to their pieces, in plane coordinates, (c, 2) each."""
     return [
         tidy(part_of_disc(piece, y, radius)) for piece, y in zip(grounds.pieces, ys, strict=True)
     ]
@@ -109,7 +110,7 @@ def disc_polygons(grounds: Grounds, ys: Array, radius: float) -> list[Array]:
 def most_area(
     grounds: Grounds, proved: Proved, beginnings: Sequence[list[Array]]
 ) -> tuple[list[Array], TwistCover]:
-    """Polygons of much total area: the best that discs and other beginnings grow to."""
+    """Grow polygons of large total area: the best result from discs and other beginnings."""
     axes, discs = grounds.axes(proved.ys), grounds.discs(proved.ys, proved.radius)
     best = shared_out(grounds, proved.ys, discs, proved.cover), proved.cover
     for polygons in beginnings:
@@ -125,14 +126,14 @@ def most_area(
 
 
 def total_area(polygons: Sequence[Array]) -> float:
-    """Total area of counter-clockwise polygons, (c, 2) each."""
+    """Add up the areas of counter-clockwise polygons, (c, 2) each."""
     return sum(map(signed_area, polygons))
 
 
 def _grown(
     grounds: Grounds, proved: Proved, polygons: list[Array], cover: TwistCover, axes: Array
 ) -> tuple[list[Array], TwistCover]:
-    """Move polygons outwards in turn, in steps that are halved where no cover is found."""
+    """Move polygons outwards in turn; steps are halved where no proof is found."""
     steps = np.full(len(polygons), FIRST_STEP * proved.radius)
     while (steps > LAST_STEP * proved.radius).any():
         for i, piece in enumerate(grounds.pieces):
@@ -155,6 +156,6 @@ def _cover(grounds: Grounds, ys: Array, polygons: list[Array], axes: Array) -> T
 
 
 def _offset(piece: Array, polygon: Array, distance: float) -> Array:
-    """The part of a piece (c, 2) in a convex polygon with its edges moved out, (c, 2)."""
+    """Move the edges of a convex polygon outwards and cut the result to a piece, (c, 2)."""
     E, b = edge_rows(polygon)
     return tidy(clip(piece, E, b + distance))

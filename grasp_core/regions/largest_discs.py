@@ -1,9 +1,9 @@
-"""Finds the largest equal discs around contacts in which all choices are proved force-closed.
+"""Finds the largest equal discs around contacts that are proved to keep force closure.
 
-Solved: for contacts on faces, a radius for which a cover of all twists is found (`cover_search`),
-and a larger radius for which some choice is open. Parts of a disc that its face does not have are
-left out. The radius is doubled from a small one and then bisected, first with few cones for each
-attempt, then in smaller steps with as many cones as are allowed.
+Solved: for contacts on faces, a radius at which a cover of all twists is found (`cover_search`),
+and a larger radius at which some contacts in the discs are not force-closed. Parts of a disc
+outside its face are left out. The radius is doubled from a small one and then bisected, first with
+few cones for each attempt, then in smaller steps with as many cones as are allowed.
 """
 
 import math
@@ -21,50 +21,52 @@ from grasp_core.regions.sites import TINY, Sites, stacked_corners
 from grasp_core.solvers.ties import coarse
 
 FINENESS = 0.02
-"""Precision to which the radius is found, relative to it."""
+"""Relative precision to which the largest radius is found."""
 FIRST_RADIUS, LEAST_RADIUS = 0.05, 1e-6
-"""Radii where the search begins and gives up, relative to the levers of the contacts."""
+"""Radii at which the search begins and at which it gives up, relative to the levers of the
+contacts."""
 COARSE = 16
-"""The first attempts take this many times fewer cones."""
+"""Factor by which the first attempts have fewer cones."""
 FAST, SLOW = 2.0, 1.1
 """Factors by which the radius grows, in the first attempts and in the others."""
 NEAR = 0.04
-"""Distance from the proved radius up to which an open choice is sought, relative to it."""
+"""Distance above the proved radius, relative to it, within which contacts that are not closed are
+sought."""
 REFUTING = 4
-"""Attempts to find an open choice take this many times fewer cones."""
+"""Factor by which attempts to find contacts that are not closed have fewer cones."""
 REACH_DIGITS = 10
-"""Digits after the point of the largest radius that is tried."""
+"""Digits after the point to which the largest radius to try is rounded."""
 SIDES = 16
-"""Number of sides of the polygon around a disc that the border of a face cuts."""
+"""Number of sides of the polygon around a disc that extends beyond its face."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grounds:
-    """The pieces that contacts may stand on, at unit size, with the means of a proof."""
+    """The pieces that contacts may stand on, at unit size, with friction and the effort allowed."""
 
     pieces: tuple[FacePiece, ...]
-    """One piece per contact, about any common origin."""
+    """Convex piece of a face for each contact, with lengths about any common origin."""
     friction: Array
     """Coulomb coefficient of each contact, (k,)."""
     cones: int
-    """Most cones of one proof."""
+    """Largest number of cones in one proof."""
 
     @property
     def frames(self) -> Array:
-        """Frames of the pieces as columns (normal, tangent, tangent), (k, 3, 3)."""
+        """Return the frames of the pieces as columns (normal, tangent, tangent), (k, 3, 3)."""
         return np.array([np.column_stack([p.normal, p.frame]) for p in self.pieces])
 
     def points(self, ys: Array) -> Array:
-        """Points of the pieces, (k, 3), with the plane coordinates `ys`, (k, 2)."""
+        """Return the points in space, (k, 3), with the plane coordinates `ys`, (k, 2)."""
         return np.array([piece.point(y) for piece, y in zip(self.pieces, ys, strict=True)])
 
     def places(self, i: int) -> Array:
-        """Corners of a piece, (c, 3): no contact is farther away, but for the piece's depth."""
+        """Return the corners of a piece in space, (c, 3)."""
         piece = self.pieces[i]
         return piece.origin + piece.corners @ piece.frame.T
 
     def around(self, ys: Array, polygons: Sequence[Array], radii: Array) -> Sites:
-        """Sites in polygons (c, 2), in plane coordinates, widened by discs of `radii`, (k,)."""
+        """Make sites of polygons (c, 2), in the planes, widened by `radii`, (k,)."""
         return Sites(
             self.points(ys),
             self.frames,
@@ -75,7 +77,7 @@ class Grounds:
         )
 
     def discs(self, ys: Array, radius: float) -> Sites:
-        """Sites in the parts of the pieces within discs around points `ys`, (k, 2)."""
+        """Return the sites within discs around points `ys`, (k, 2), cut to the pieces."""
         radii, polygons = np.zeros(len(ys)), list[Array]()
         for i, (piece, y) in enumerate(zip(self.pieces, ys, strict=True)):
             if (piece.E @ y + radius <= piece.b - SAME_CORNER).all():  # not if it touches an edge
@@ -86,9 +88,10 @@ class Grounds:
         return self.around(ys, polygons, radii)
 
     def axes(self, ys: Array) -> Array:
-        """Twists as rows, (6, 6), that move contacts alike, tangents counted with the friction.
+        """Choose six twists as rows, (6, 6), that move the contacts at similar speeds.
 
-        With them, long objects need no more cones than round ones.
+        Tangential speeds count in proportion to the friction. With these twists, long objects need
+        no more cones than round ones.
         """
         motions = list[Array]()
         for (x, y, z), F, mu in zip(self.points(ys), self.frames, self.friction, strict=True):
@@ -103,27 +106,27 @@ class Grounds:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proved:
-    """Discs in which all choices are closed, and larger ones in which one choice is open."""
+    """Discs proved to keep force closure, and larger discs with contacts that are not closed."""
 
     ys: Array
-    """Centres, in plane coordinates, (k, 2)."""
+    """Centres of the discs, in plane coordinates, (k, 2)."""
     radius: float
     cover: TwistCover
     limit: float
-    """Radius of discs with an open choice; infinite where none was found."""
+    """Radius of discs that contain contacts that are not closed; infinite where none were found."""
     choice: Array | None
-    """Contacts of the open choice, (k, 3)."""
+    """Contacts that are not force-closed, in discs of radius `limit`, (k, 3)."""
 
 
 def part_of_disc(piece: FacePiece, y: Array, radius: float) -> Array:
-    """Corners of the part of a piece in a polygon around a disc about a point of it, (c, 2)."""
+    """Return the corners of a polygon around a disc, cut to its piece, (c, 2)."""
     turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
     rows = np.column_stack([np.cos(turns), np.sin(turns)])
     return clip(piece.corners, rows, rows @ y + radius)
 
 
 def reach_of(grounds: Grounds, ys: Array) -> float:
-    """The least radius of discs that hold the whole pieces, or a little more."""
+    """Return a radius at which discs hold the whole pieces, or slightly more."""
     least = max(
         float(np.linalg.norm(piece.corners - y, axis=1).max())
         for piece, y in zip(grounds.pieces, ys, strict=True)
@@ -132,7 +135,7 @@ def reach_of(grounds: Grounds, ys: Array) -> float:
 
 
 def largest_discs(grounds: Grounds, ys: Array, first: float = FIRST_RADIUS) -> Proved | None:
-    """The largest equal discs, up to whole faces, for which a cover is found, or None.
+    """Find the largest equal discs, up to whole faces, that a cover proves, or None.
 
     Args:
         grounds: The pieces that contacts may stand on.
@@ -149,7 +152,7 @@ def largest_discs(grounds: Grounds, ys: Array, first: float = FIRST_RADIUS) -> P
 
 
 class _Search:
-    """The state of a search around some centres: what is proved and what is refuted."""
+    """The state of a search for the largest discs: radii proved so far, and radii refuted."""
 
     def __init__(self, grounds: Grounds, ys: Array) -> None:
         self.grounds, self.ys, self.axes = grounds, ys, grounds.axes(ys)
@@ -160,7 +163,7 @@ class _Search:
         self.choice: Array | None = None
 
     def widen(self, cones: int, radius: float, growth: float, fineness: float) -> None:
-        """Try a radius, then larger ones by a factor each, then bisect."""
+        """Try a radius, then radii growing by a factor, then bisect."""
         upper, radius = self.limit, min(radius, 0.5 * (self.lower + self.limit))
         while radius >= LEAST_RADIUS and upper - self.lower > fineness * self.lower:
             radius = min(radius, self.reach)
@@ -179,7 +182,7 @@ class _Search:
                 radius = 0.5 * (self.lower + upper) if self.lower > 0.0 else 0.25 * upper
 
     def refute(self, cones: int) -> None:
-        """Look for an open choice in larger discs, then bisect."""
+        """Look for contacts that are not closed in larger discs, then bisect."""
         below, radius = self.lower, (1.0 + NEAR) * self.lower
         while self.limit - below > NEAR * self.lower and min(radius, self.reach) > below:
             radius = min(radius, self.reach)

@@ -1,7 +1,8 @@
-"""How a twist moves a contact anywhere in its site, and whether friction resists it there.
+"""Decides how a twist moves a contact anywhere in its site, and whether friction resists it.
 
-A motion is six numbers per twist of length one and contact: the velocity of the contact's point
-along its normal and two tangents, and the rate of turning about these tangents and the normal.
+A motion is six numbers for each contact and each twist of length one: the velocity of the contact's
+point along its normal and two tangents, and the rate of turning about these tangents and the
+normal.
 """
 
 import math
@@ -14,14 +15,14 @@ from grasp_core.regions.sites import AHEAD, TINY, Sites
 
 MOTIONS = 6
 STEPS = 40
-"""Most steps towards the place of a contact where a twist is resisted least."""
+"""Largest number of steps towards the place where a contact resists a twist least."""
 
 
 @loop("numpy")
 def lowest(
     motion: Array, sites: Sites, i: int, force: tuple[float, float]
 ) -> tuple[float, float, float, float]:
-    """Least power of a force n + f t_1 + g t_2 over a contact's site, and where, (n, t_1, t_2)."""
+    """Find the least power of a force n + f t_1 + g t_2 over a contact's site, and the place."""
     f, g = force
     u, v, w = motion[3] - motion[5] * f, motion[4] - motion[5] * g, f * motion[4] - g * motion[3]
     least, x, y = np.inf, 0.0, 0.0
@@ -42,7 +43,7 @@ def lowest(
 def velocity(
     motion: Array, place: Array | tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """Velocity of a contact that is off its point, along the frame."""
+    """Compute the velocity of a contact at a place away from its point, along the frame."""
     out, x, y = place
     return (
         motion[0] + motion[3] * y - motion[4] * x,
@@ -53,14 +54,14 @@ def velocity(
 
 @loop("numpy")
 def longest(f: float, g: float, most: float) -> tuple[float, float]:
-    """The tangential part in a direction, as long as friction allows."""
+    """Scale a tangential direction (f, g) to the length that friction allows."""
     length = math.sqrt(f * f + g * g)
     return (f * most / length, g * most / length) if length > 0.0 else (0.0, 0.0)
 
 
 @loop("numpy")
 def holds(sites: Sites, i: int, x: float, y: float) -> bool:
-    """Whether a place in its plane is in a contact's polygon or in its disc."""
+    """Return whether a place in a contact's plane is in its polygon or in its disc."""
     if x * x + y * y <= sites.radii[i] ** 2:
         return True
     corners, sides = sites.corners[i], 0
@@ -75,11 +76,11 @@ def holds(sites: Sites, i: int, x: float, y: float) -> bool:
 
 @loop("numpy")
 def resists(motion: Array, sites: Sites, i: int, shift: Array) -> bool:
-    """Whether a contact resists a twist wherever it is; if not, `shift` is where it may not.
+    """Return whether a contact resists a twist wherever it is; `shift` is a place where it may not.
 
-    Friction has no power on a contact that does not slide. Elsewhere the most power that friction
-    allows is convex in the place, and steps go to where it is least. The result is also False, with
-    a place that does resist, where the steps do not suffice.
+    Friction has no power on a contact that does not slide. Elsewhere the largest power that
+    friction allows is convex in the place, and the search steps to where it is least. The result is
+    also False, with a place that does resist, if too many steps would be needed.
     """
     most = sites.friction[i] * (1.0 - TINY)
     out, x, y = 0.0, 0.0, 0.0
@@ -106,7 +107,7 @@ def resists(motion: Array, sites: Sites, i: int, shift: Array) -> bool:
 
 @loop("numpy")
 def is_open(motions: Array, sites: Sites, shifts: Array) -> bool:
-    """Whether no contact resists a twist at the places `shifts`, which are filled in."""
+    """Return whether no contact resists a twist at some places; fill these in as `shifts`."""
     for i in range(len(sites.points)):
         if resists(motions[i], sites, i, shifts[i]):
             return False

@@ -1,4 +1,4 @@
-"""Proof that regions for fingers keep force closure wherever in them the contacts are.
+"""Proves that contacts anywhere in given regions stay in force closure.
 
 Solved: given convex regions K_i on planes, are contacts x_i in K_i force-closed for every choice?
 
@@ -53,30 +53,31 @@ from grasp_core.fields import are_frictions, are_units, is_a, is_array
 
 TWIST = 6
 LEAF = 15
-"""Code of a cone that is not cut; smaller codes number its edges (0, 1), (0, 2), ... (4, 5)."""
+"""Code of a cone that is not divided; smaller codes number the edges (0, 1), (0, 2), ... (4, 5)."""
 EDGES = tuple((i, j) for i in range(TWIST) for j in range(i + 1, TWIST))
 SLACK = 1e-12
-"""Rounding of a power, relative to the lengths of wrench and `summed` twist: thousands of
-roundings."""
+"""Rounding of a power, relative to the lengths of the wrench and of the sums `summed`: thousands of
+rounding errors."""
 LARGEST = 2.0**50
-"""Entries of rays up to this are exact: they are sums of whole numbers. Lengths of axes must be
-between its inverse and it."""
+"""Largest entry of a ray: up to it, entries are sums of whole numbers and exact. Lengths of axes
+must be between its inverse and it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TwistCover:
-    """Cones of twists, on each of which forces of the contacts have power together.
+    """Cones that fill the space of twists, each with contact forces that resist all its twists.
 
-    The rays of a cone are whole numbers in the coordinates of `axes`, so that cutting is exact.
+    The rays of a cone are whole numbers in the coordinates of `axes`, so that dividing cones is
+    exact.
     """
 
     axes: Array
-    """Independent twists as rows, velocity of the points' origin before turning, (6, 6)."""
+    """Six independent twists as rows: velocity of the origin, then angular velocity, (6, 6)."""
     codes: Indices
-    """The tree of cones, (n,), level by level from the sixty-four orthants: for each cone the
-    number of the edge that is cut, or `LEAF`."""
+    """The tree of cones, (n,), level by level from the 64 orthants: for each cone the number of the
+    edge at which it is divided, or `LEAF`."""
     forces: Array
-    """Forces on the object for each cone that is not cut, in the same order, (m, k, 3)."""
+    """Forces on the object for each cone that is not divided, in the same order, (m, k, 3)."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axes", frozen(self.axes, (TWIST, TWIST), "axes"))
@@ -85,10 +86,10 @@ class TwistCover:
         forces = frozen(self.forces, (leaves, None, 3), "forces", most=np.inf)  # of any size
         object.__setattr__(self, "forces", forces)
         if self.codes.min(initial=0) < 0 or self.codes.max(initial=0) > LEAF:
-            raise InputError(f"codes of a cover must be whole numbers from 0 to {LEAF}")
+            raise InputError(f"cover.codes must be whole numbers from 0 to {LEAF}")
 
     def leaves(self) -> Iterator[tuple[slice, Array]]:
-        """Yield the uncut cones by levels: their slice of `forces`, and their rays, (m, 6, 6).
+        """Yield the undivided cones by levels: their slice of `forces`, and their rays, (m, 6, 6).
 
         Raises:
             InputError: The codes do not describe a tree.
@@ -98,7 +99,7 @@ class TwistCover:
             codes = self.codes[at : at + len(cones)]
             if len(codes) < len(cones):
                 raise InputError(
-                    "codes end before the cones of the cover do; expected one code per cone"
+                    "cover.codes must hold one code per cone, but it ends before the last cone"
                 )
             uncut = codes == LEAF
             count = int(np.count_nonzero(uncut))
@@ -107,11 +108,11 @@ class TwistCover:
             cones = halves(cones[~uncut], codes[~uncut])
         if at < len(self.codes):
             raise InputError(
-                "codes go on after the last cone of the cover; expected one code per cone"
+                "cover.codes must hold one code per cone, but it goes on after the last cone"
             )
 
     def verify(self, regions: Sequence[Array], normals: Array, friction: Array) -> bool:
-        """Whether all choices of contacts in regions are force-closed, in plain arithmetic.
+        """Return whether all contacts in regions are proved force-closed, in plain arithmetic.
 
         The answer is False for arguments that are not regions, normals or friction.
 
@@ -146,7 +147,7 @@ class TwistCover:
         return bool(np.linalg.svd(self.axes / lengths[:, None], compute_uv=False)[-1] > SLACK)
 
     def _powerful(self, forces: Array, rays: Array, regions: Sequence[Array]) -> bool:
-        """Whether h > 0 in (2) for each cone's forces on its rays."""
+        """Return whether h > 0 in (2) for each cone's forces on its rays."""
         # beyond this the rays would not be exact, nor the cuts (4)
         if np.abs(rays).max(initial=0.0) > LARGEST:
             return False
@@ -161,42 +162,44 @@ class TwistCover:
 
 
 def _are_places(regions: Sequence[Array], count: int) -> bool:
-    """Whether regions are lists of points, `count` of them."""
+    """Return whether regions are `count` lists of points."""
     listed = is_a(regions, Sequence) and len(regions) == count
     return listed and all(is_array(region, None, 3) and len(region) > 0 for region in regions)
 
 
 def power_of(F: Array, twists: Array) -> tuple[Array, Array]:
-    """Power F.(a + b x x) of forces (m, 3) on twists (m, r, 6), as slopes in x and constant part.
+    """Compute the power F.(a + b x x) of forces (m, 3) at x under twists (m, r, 6).
+
+    It is linear in x: slope times x plus a constant.
 
     Returns:
-        The slopes F x b, (m, r, 3), and the constant parts F.a, (m, r).
+        The slopes F x b, (m, r, 3), and the constants F.a, (m, r).
     """
     return np.cross(F[:, None], twists[..., 3:]), np.einsum("mi,mri->mr", F, twists[..., :3])
 
 
 def summed(rays: Array, axes: Array) -> Array:
-    """Lengths of the sums that twists are made of, (m, r): rounding is relative to them.
+    """Return the sum of the lengths that make up each twist, (m, r), for bounds on rounding.
 
-    The twists themselves are shorter where axes nearly cancel.
+    The twists themselves are shorter where axes nearly cancel each other.
     """
     return np.linalg.norm(np.abs(rays) @ np.abs(axes), axis=2)
 
 
 def slack_of(F: Array, places: Array) -> Array:
-    """Rounding of powers of forces (m, 3) at places (c, 3), per length `summed`, (m,)."""
+    """Bound the rounding of powers of forces (m, 3) at places (c, 3), per `summed`, (m,)."""
     farthest = np.linalg.norm(places, axis=1).max()
     return SLACK * np.linalg.norm(F, axis=1) * (1.0 + farthest)
 
 
 def orthants() -> Array:
-    """Rays of the sixty-four orthants, (64, 6, 6)."""
+    """Return the rays of the 64 orthants, (64, 6, 6)."""
     signs = 1.0 - 2.0 * (np.arange(1 << TWIST)[:, None] >> np.arange(TWIST) & 1)
     return signs[:, :, None] * np.eye(TWIST)
 
 
 def halves(cones: Array, codes: Indices) -> Array:
-    """Cut cones (m, 6, 6) at the edges with these numbers, with both parts next to each other."""
+    """Divide cones (m, 6, 6) at the edges with these numbers; halves are next to each other."""
     ends = np.array(EDGES)[codes]
     rows = np.arange(len(cones))
     # (4): the sum of its ends cuts an edge

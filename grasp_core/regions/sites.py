@@ -1,9 +1,9 @@
-"""The sites where the contacts of a cover may be, and the game by which its forces are found.
+"""Describes the sites where contacts may be, for the search for proofs (covers).
 
-A cone is covered if forces have power together on all of its six rays. In each round the rays have
-weights, by how much power each has lacked so far, and the force that answers these weights best is
-played. The mean of the answers, later ones counting more, comes to have power on all rays if any
-forces do.
+A cone of twists is covered if contact forces together have power on all of its six rays. Such
+forces are found in rounds. In each round every ray has a weight, by how much power it has lacked so
+far, and the forces that are best for these weights are chosen. The mean of the chosen forces, later
+ones counting more, comes to have power on all rays if any forces do.
 """
 
 from typing import NamedTuple
@@ -17,18 +17,19 @@ from grasp_core.solvers.ties import GRID_DIGITS, coarse, on_grid
 # of the game, at most
 ROUNDS = 30
 ANSWERS = 3
-"""Number of forces tried per contact as the best answer to weights."""
+"""Number of forces per contact that are tried as the best one for given weights."""
 AHEAD = 1e-8
 """Least power of a force that counts, relative to its size and the farthest place: more than
-rounding sites to a grid may cost it."""
+rounding sites to a grid can change it."""
 EVEN = 0.02
-"""Weight added to each ray in the choice of the edge to cut, so that all edges are cut in time."""
+"""Weight added to each ray when the edge to divide is chosen, so that every edge is divided in
+time."""
 TINY = 1e-12
-"""Share of the friction that forces keep clear of, for rounding."""
+"""Share of the friction that forces leave unused, for rounding."""
 
 
 class Sites(NamedTuple):
-    """Sites of k contacts, in plain arrays as compiled loops take them."""
+    """Where each of k contacts may be, as plain arrays for compiled loops."""
 
     points: Array
     """Points of the contacts about any origin, (k, 3)."""
@@ -37,15 +38,18 @@ class Sites(NamedTuple):
     friction: Array
     """Coulomb coefficients, (k,)."""
     corners: Array
-    """Corners of convex polygons, along the tangents about the points, some perhaps twice,
-    (k, c, 2)."""
+    """Corners of convex polygons, along the tangents and relative to `points`, (k, c, 2); the last
+    corner may be repeated."""
     radii: Array
-    """Radii of discs that widen the polygons, (k,)."""
+    """Radii of the discs by which the polygons are widened, (k,)."""
     depths: Array
-    """Largest distance of contacts from the planes, (k,)."""
+    """Largest distance of contacts from the planes of their polygons, (k,)."""
 
     def on_grid(self) -> "Sites":
-        """These sites rounded for a search that must not see last digits; friction never grows."""
+        """Round the sites to a grid, so that a search does not depend on last digits.
+
+        Rounding never raises the friction.
+        """
         friction = -coarse(-self.friction, GRID_DIGITS)
         return Sites(
             on_grid(self.points),
@@ -57,9 +61,9 @@ class Sites(NamedTuple):
         )
 
     def clear(self) -> Array:
-        """Power per length of twist that one unit of each contact's normal force must leave, (k,).
+        """Return the power that a unit normal force must keep per unit of twist, (k,).
 
-        Rounding to the grid costs forces less than this.
+        Rounding to the grid changes the power by less.
         """
         aside = np.sqrt(np.einsum("kcj,kcj->kc", self.corners, self.corners)).max(axis=1)
         places = np.sqrt(np.einsum("kj,kj->k", self.points, self.points))
@@ -67,7 +71,7 @@ class Sites(NamedTuple):
         return AHEAD * farthest * (1.0 + self.friction)
 
     def lowest(self, i: int, slopes: Array) -> Array:
-        """Least values of linear functions over a contact's polygon and disc, (...,).
+        """Find the least values of linear functions over a contact's polygon and disc, (...,).
 
         Args:
             i: Index of the contact.
@@ -78,13 +82,13 @@ class Sites(NamedTuple):
 
 
 def stacked_corners(polygons: list[Array]) -> Array:
-    """Polygons (c, 2) of different numbers of corners as one array, last corners repeated.
+    """Put polygons (c, 2) into one array, with the last corners of shorter ones repeated.
 
     Raises:
         InputError: A polygon has no corners, so that nothing would be asked of its contact.
     """
     if min(map(len, polygons)) == 0:
-        raise InputError("a contact's site has no corners, expected one at least")
+        raise InputError("the site of each contact must have at least one corner, got none")
     most = max(map(len, polygons))
     return np.array([
         np.vstack([polygon, np.repeat(polygon[-1:], most - len(polygon), axis=0)])

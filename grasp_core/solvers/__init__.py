@@ -1,5 +1,5 @@
 """What is the optimum of a program, and how is the answer checked?
 
-Linear, conic and nearest-point programs come in as arrays. Answers go out that plain arithmetic has
-checked; `ties` decides between equal optima.
+Linear, quadratic, conic and nearest-point programs come in as arrays. Answers go out that plain
+arithmetic has checked; `ties` decides between equal optima.
 """

@@ -1,4 +1,4 @@
-"""A conic program goes in, a re-checked primal and dual solution comes out; the door to Clarabel.
+"""Solves conic programs, and checks each primal and dual solution again; only it calls Clarabel.
 
     minimise q.x  subject to  b - A x in K,
 
@@ -18,55 +18,55 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import SolverError
 
 RESIDUAL = 1e-7
-"""Largest accepted violation, relative to the solution's size. Callers turn a solution into a
-certificate of their own, so this only catches answers that are wrong outright."""
+"""Largest accepted violation, relative to the solution's size. Callers prove their own results from
+a solution, so this only catches answers that are plainly wrong."""
 REQUESTED = 1e-11
-"""Tolerance asked of the solver."""
+"""Tolerance that Clarabel is asked for."""
 
 WAYS: tuple[tuple[str, float] | None, ...] = (
     None,
     ("equilibrate_enable", False),
     ("max_step_fraction", 0.9),
 )
-"""Changes to the solver's settings, in the order they are tried: at frictions below 1e-3 it stops
-early now and then, and succeeds with other settings."""
+"""Changes to Clarabel's settings, in the order they are tried: at frictions below 1e-3 it sometimes
+stops early, and succeeds with other settings."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConicProgram:
-    """Data of one program; rows are in the order zero, non-negative, second-order (bound first)."""
+    """The data of one conic program, rows ordered as zero, non-negative, second-order."""
 
     q: Array
-    """Objective, (n,)."""
+    """Coefficients of the objective q.x, (n,)."""
     A: Array
-    """Matrix of the rows, (rows, n)."""
+    """Matrix of the constraints b - A x in K, (rows, n)."""
     b: Array
-    """Right-hand sides, (rows,)."""
+    """Right-hand sides of the constraints, (rows,)."""
     zeros: int
-    """How many rows must vanish."""
+    """Number of rows of b - A x that must be zero."""
     nonnegatives: int
-    """How many rows must not be negative."""
+    """Number of rows of b - A x that must not be negative."""
     cones: tuple[int, ...] = ()
-    """Length of each second-order cone: (s0, s1, ...) with s0 >= |(s1, ...)|."""
+    """Length of each second-order cone, whose rows satisfy s0 >= |(s1, ...)|."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConicSolution:
-    """A primal and a dual solution, each checked against the data."""
+    """A primal and a dual solution, both checked against the program's data."""
 
     x: Array
     z: Array
-    """Dual variable, (rows,)."""
+    """Dual variable: one multiplier per row of the program, (rows,)."""
     value: float
 
 
 def minimize(program: ConicProgram) -> ConicSolution:
-    """Solve a feasible and bounded conic program.
+    """Solve a conic program that is feasible and bounded.
 
     Raises:
-        SolverError: Every answer failed our check; an infeasible program also ends so.
+        SolverError: Every answer failed the check, as it does where the program is infeasible.
     """
-    failure = SolverError("no settings were tried")
+    failure = SolverError("Clarabel was not called with any settings")
     for change in WAYS:
         try:
             return _solved(program, change)
@@ -96,14 +96,16 @@ def _solved(program: ConicProgram, change: tuple[str, float] | None) -> ConicSol
 def _check(program: ConicProgram, solution: ConicSolution, status: str) -> None:
     x, z = solution.x, solution.z
     if not (np.isfinite(x).all() and np.isfinite(z).all()):
-        raise SolverError(f"the conic solver returned no numbers ({status})")
+        raise SolverError(f"the conic solver Clarabel returned no numbers (status {status})")
     slack = program.b - program.A @ x
     allowed = RESIDUAL * (1.0 + float(np.abs(x).max()) + float(np.abs(z).max()))
     failures = {
-        "a primal row is violated": _outside(program, slack, dual=False),
-        "a multiplier leaves the dual cone": _outside(program, z, dual=True),
-        "the multipliers do not give the objective": np.abs(program.A.T @ z + program.q).max(),
-        "primal and dual values differ": abs(program.q @ x + program.b @ z),
+        "the conic solver's answer violates a constraint": _outside(program, slack, dual=False),
+        "the conic solver's multipliers leave the dual cone": _outside(program, z, dual=True),
+        "the conic solver's multipliers do not give the objective": np.abs(
+            program.A.T @ z + program.q
+        ).max(),
+        "the conic solver's primal and dual values differ": abs(program.q @ x + program.b @ z),
     }
     for failure, size in failures.items():
         if not size <= allowed:  # nor is it when a number is missing
@@ -111,7 +113,7 @@ def _check(program: ConicProgram, solution: ConicSolution, status: str) -> None:
 
 
 def _outside(program: ConicProgram, rows: Array, *, dual: bool) -> float:
-    """Return how far a vector lies outside K (or its dual, where the zero rows are free)."""
+    """Return how far a vector lies outside the cone K, or outside its dual cone."""
     start = program.zeros
     worst = 0.0 if dual else float(np.abs(rows[:start]).max(initial=0.0))
     worst = max(worst, -float(rows[start : start + program.nonnegatives].min(initial=0.0)))
@@ -125,10 +127,10 @@ def _outside(program: ConicProgram, rows: Array, *, dual: bool) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Columns:
-    """A matrix as compressed columns, with the attributes that Clarabel reads.
+    """A matrix in compressed columns, with the attributes that Clarabel reads.
 
-    A matrix of scipy has them too, but checks what is known to be in order, and takes longer to
-    import than a small object to plan on.
+    A sparse matrix of scipy has these attributes too, but it checks its data again, and importing
+    it takes longer than planning on a small object.
     """
 
     data: Array

@@ -1,4 +1,4 @@
-"""The growing hull of `growing_hull` is compiled here, for points with six coordinates.
+"""Grows a convex hull of points with six coordinates, point by point, in compiled code.
 
 A point sees simplices, first the lowest one, then neighbours of those it sees. Across each corner
 j of a seen simplex f lies a neighbour: if it is not seen, the point takes the place of corner j.
@@ -25,39 +25,39 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
 
 D = 6
-"""Number of coordinates of a point."""
+"""Number of coordinates of each point of the hull."""
 DEAD = 1e300
-"""Offset of a simplex that was removed."""
+"""Offset that marks a simplex as removed."""
 SINGULAR = 1e-13
-"""Smallest pivot accepted for the first simplex, whose points are widely spread."""
+"""Smallest pivot accepted while the first simplex is built, whose points are widely spread."""
 TINY = 1e-300
-"""Least square that is divided by, where a simplex may be folded flat."""
+"""Smallest square that is divided by: a simplex may be folded flat."""
 
 
 class Hull(NamedTuple):
-    """The simplices, live and removed, and what is known about the latest point."""
+    """The simplices of a hull, kept and removed, with what the latest point sees."""
 
     normals: Array
-    """Outward unit normals, (room, 6)."""
+    """Outward unit normals of the simplices, (room, 6)."""
     offsets: Array
     corners: Indices
     """Indices of the points of each simplex, (room, 6)."""
     neighbors: Indices
-    """Neighbour of each simplex across the ridge without each corner, (room, 6)."""
+    """Neighbour of each simplex across the ridge opposite each corner, (room, 6)."""
     sums: Indices
-    """Sum of the corners' indices of each simplex, (room,)."""
+    """Sum of the point indices in `corners` of each simplex, (room,)."""
     heights: Array
     """Height, above each simplex, of the latest point that was compared with it, (room,)."""
     rounds: Indices
-    """Index of that latest point, (room,)."""
+    """Index of the latest point that was compared with each simplex, (room,)."""
     made: Indices
-    """New simplex without each corner of a seen one, (room, 6)."""
+    """New simplex across the ridge opposite each corner of a seen simplex, (room, 6)."""
     seen: Indices
-    """Simplices that the point sees, (room,)."""
+    """Indices of the simplices that the latest point sees, (room,)."""
     free: Indices
-    """Places of removed simplices, (room,)."""
+    """Indices of removed simplices, which new ones may replace, (room,)."""
     counts: Indices
-    """How many places were ever used, and how many of them are free, (2,)."""
+    """Number of simplices ever made, and number of free places, (2,)."""
 
 
 @loop()
@@ -73,7 +73,7 @@ def vacant_hull(room: int) -> Hull:
 
 @loop()
 def larger(hull: Hull) -> Hull:
-    """Copy a hull with room for all that one point can add, and for twice as many simplices."""
+    """Copy a hull with room for twice as many simplices and for all that one point can add."""
     room = 2 * len(hull.offsets) + D * hull.counts[0]
     return Hull(
         _wider(hull.normals, room), _longer(hull.offsets, room), _wider(hull.corners, room),
@@ -102,10 +102,10 @@ def _longer(column: Any, room: int) -> Any:
 
 @loop()
 def enclose(hull: Hull, points: Array) -> bool:
-    """Put the seven simplices around the first points; false if these are nearly flat.
+    """Make the seven simplices around the first points; return False if these are nearly flat.
 
-    With A the points as columns over ones, row i of inv(A) is the affine function that is one at
-    point i and zero at the others.
+    With the points as columns over ones in the matrix A, row i of inv(A) is the affine function
+    that is one at point i and zero at the others.
     """
     n = D + 1
     A = np.zeros((n, 2 * n))
@@ -128,7 +128,7 @@ def enclose(hull: Hull, points: Array) -> bool:
 
 @loop()
 def _eliminate(A: Array) -> bool:
-    """Turn (A, 1) into (1, inv(A)); return false if A is nearly singular."""
+    """Turn (A, 1) into (1, inv(A)); return False if A is nearly singular."""
     for i in range(len(A)):
         best = i
         for k in range(i, len(A)):
@@ -146,7 +146,7 @@ def _eliminate(A: Array) -> bool:
 
 @loop()
 def _clear(A: Array, i: int) -> None:
-    """Take multiples of row i from the others, so that column i is zero there."""
+    """Subtract multiples of row i from the others, so that column i is zero there."""
     for k in range(len(A)):
         share = A[k, i]
         if k != i:
@@ -156,7 +156,7 @@ def _clear(A: Array, i: int) -> None:
 
 @loop()
 def lowest(hull: Hull) -> int:
-    """Return the simplex with the least offset."""
+    """Return the simplex whose plane has the least offset."""
     offsets, found = hull.offsets, 0
     for i in range(hull.counts[0]):
         if offsets[i] < offsets[found]:
@@ -166,7 +166,7 @@ def lowest(hull: Hull) -> int:
 
 @loop()
 def look(hull: Hull, point: Array, first: int, slack: float, now: int) -> tuple[int, int]:
-    """Fill in what the point sees; return the number of simplices and of ridges around them."""
+    """Find the simplices that a point sees; return their number and that of ridges around them."""
     normals, offsets, neighbors = hull.normals, hull.offsets, hull.neighbors
     heights, rounds, seen = hull.heights, hull.rounds, hull.seen
     count, ridges, at = 0, 0, 0
@@ -199,7 +199,7 @@ def _height(normals: Array, offsets: Array, i: int, point: Array) -> float:
 
 @loop()
 def extend(hull: Hull, count: int, point: int, slack: float) -> bool:
-    """Replace the first `count` seen simplices by new ones with the point; false if that fails."""
+    """Replace the first `count` seen simplices by new ones; return False if that fails."""
     seen = hull.seen[:count]
     _raise(hull, seen, point, slack)
     joined = _join(hull, seen, slack)
@@ -209,7 +209,7 @@ def extend(hull: Hull, count: int, point: int, slack: float) -> bool:
 
 @loop()
 def _raise(hull: Hull, seen: Indices, point: int, slack: float) -> None:
-    """Make a new simplex wherever a seen one has a neighbour that is not seen."""
+    """Make a new simplex wherever a seen simplex has a neighbour that is not seen."""
     normals, offsets, corners, neighbors = hull.normals, hull.offsets, hull.corners, hull.neighbors
     sums, heights, free, counts = hull.sums, hull.heights, hull.free, hull.counts
     for f in seen:
@@ -234,7 +234,7 @@ def _raise(hull: Hull, seen: Indices, point: int, slack: float) -> None:
 
 @loop()
 def _vacant(free: Indices, counts: Indices) -> int:
-    """Return a place for a new simplex: that of a removed one, or one at the end."""
+    """Return the place for a new simplex: that of a removed one, or one at the end."""
     if counts[1] > 0:
         counts[1] -= 1
         return int(free[counts[1]])
@@ -255,7 +255,7 @@ def _normalize(normals: Array, offsets: Array, i: int) -> None:
 
 @loop()
 def _join(hull: Hull, seen: Indices, slack: float) -> bool:
-    """Make new simplices neighbours; return false if one of them has none."""
+    """Connect new simplices with their neighbours; return False if one has no neighbour."""
     corners, neighbors, made = hull.corners, hull.neighbors, hull.made
     sums, heights = hull.sums, hull.heights
     for f in seen:
@@ -283,7 +283,7 @@ def _join(hull: Hull, seen: Indices, slack: float) -> bool:
 
 @loop()
 def _bury(hull: Hull, seen: Indices) -> None:
-    """Free the places of simplices that are removed."""
+    """Free the places of the removed simplices for new ones."""
     for f in seen:
         hull.offsets[f] = DEAD
         hull.free[hull.counts[1]] = f
@@ -292,7 +292,7 @@ def _bury(hull: Hull, seen: Indices) -> None:
 
 @loop()
 def _place(corners: Indices, i: int, corner: int) -> int:
-    """Return where a simplex has a corner; 0 if nowhere, which checks of the answer find out."""
+    """Return at which place a simplex has a corner; 0 if it has not, which later checks detect."""
     place = 0
     for j in range(D):  # without a way out, which would be predicted wrongly most of the time
         if corners[i, j] == corner:

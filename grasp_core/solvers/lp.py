@@ -1,4 +1,4 @@
-"""A linear program goes in, an optimum or a proof that there is none comes out; the door to HiGHS.
+"""Solves linear programs and proves every answer; only this module calls HiGHS.
 
     maximise c.x  subject to  A x <= b,  A_eq x = b_eq,  x free.
 
@@ -25,23 +25,23 @@ from grasp_core.compiled import compiled
 from grasp_core.errors import SolverError
 
 RESIDUAL = 1e-8
-"""Largest accepted violation, for programs whose data are of order one (the planner scales
-objects to unit size): ten times the tolerance the solver is asked for."""
+"""Largest accepted violation, for programs whose data are of order one (the planner scales objects
+to unit size): ten times the tolerance that HiGHS is asked for."""
 FARTHEST = 1e4
-"""Largest |x|_1 that a proof of infeasibility has to exclude, at unit size."""
+"""Largest |x|_1 that a proof of infeasibility must exclude, at unit size."""
 
 KERNEL = "grasp_core.solvers.lp_kernel"
 STRATEGIES = (1, 4)
-"""HiGHS's dual and primal simplex, in the order they are tried: one program in some thousand ends
-as unknown under the one and is solved under the other."""
+"""HiGHS's dual and primal simplex methods, in the order they are tried: about one program in a
+thousand ends as unknown with one and is solved with the other."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearProgram:
-    """Data of one program; the equality part may be empty."""
+    """The data of one linear program; the equalities may be missing."""
 
     c: Array
-    """Objective, (n,)."""
+    """Coefficients of the objective c.x, (n,)."""
     A: Array
     """Matrix of the inequalities, (rows, n)."""
     b: Array
@@ -52,7 +52,7 @@ class LinearProgram:
     """Right-hand sides of the equalities, (equalities,)."""
 
     def stacked(self) -> tuple[Array, Array]:
-        """Return inequality rows, then equality rows, with their right-hand sides."""
+        """Return the rows of inequalities and then of equalities, with right-hand sides."""
         if self.A_eq is None or self.b_eq is None:
             return self.A, self.b
         return np.vstack([self.A, self.A_eq]), np.concatenate([self.b, self.b_eq])
@@ -60,7 +60,7 @@ class LinearProgram:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Optimum:
-    """A best point, with the multipliers that prove it is best."""
+    """A best point, with the multipliers that prove that it is best."""
 
     x: Array
     value: float
@@ -70,7 +70,7 @@ class Optimum:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Infeasible:
-    """A proof, by a combination of the rows (Farkas), that no |x|_1 <= `FARTHEST` is feasible."""
+    """A proof (Farkas), by a combination of the rows, that no |x|_1 <= `FARTHEST` is feasible."""
 
     multipliers: Array
     """Multipliers y, then z, of the combination, (rows + equalities,)."""
@@ -78,10 +78,10 @@ class Infeasible:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Below:
-    """A proof, by multipliers as of an optimum, that no feasible value reaches the cutoff."""
+    """A proof, by multipliers as for an optimum, that no feasible value reaches the cutoff."""
 
     bound: float
-    """Largest value that the multipliers allow, b.y + b_eq.z."""
+    """Upper bound on all feasible values that the multipliers prove, b.y + b_eq.z."""
     multipliers: Array
     """Multipliers y, then z, (rows + equalities,); the first `rows` are non-negative."""
 
@@ -90,11 +90,13 @@ def maximize(program: LinearProgram) -> Optimum | Infeasible:
     """Solve a linear program, or prove that it has no feasible point.
 
     Raises:
-        SolverError: The solver's answer failed our check, or the program is unbounded.
+        SolverError: The solver's answer failed the check, or the program is unbounded.
     """
     found = maximize_above(program, -math.inf)
     if isinstance(found, Below):
-        raise SolverError("the simplex method called the optimum smaller than minus infinity")
+        raise SolverError(
+            "the simplex method stopped at a cutoff, though no cutoff was given; please report this"
+        )
     return found
 
 
@@ -106,7 +108,7 @@ def maximize_above(program: LinearProgram, cutoff: float) -> Optimum | Infeasibl
         cutoff: Smallest value that is of interest.
 
     Raises:
-        SolverError: The solver's answer failed our check, or the program is unbounded.
+        SolverError: The solver's answer failed the check, or the program is unbounded.
     """
     try:
         return _by_simplex(program, cutoff)
@@ -115,7 +117,7 @@ def maximize_above(program: LinearProgram, cutoff: float) -> Optimum | Infeasibl
 
 
 def _by_highs(program: LinearProgram) -> Optimum | Infeasible:
-    failure = SolverError("no strategy was tried")
+    failure = SolverError("HiGHS was not called with any strategy")
     for strategy in STRATEGIES:
         try:
             return _solved(program, strategy)
@@ -125,9 +127,10 @@ def _by_highs(program: LinearProgram) -> Optimum | Infeasible:
 
 
 def _refuted_by_least_violation(program: LinearProgram, failure: SolverError) -> Infeasible:
-    """Prove a program infeasible by its least violation of some row, which always exists.
+    """Prove a program infeasible by its least violation of some row.
 
-    The violation, a further variable, is kept above -1 to bound it.
+    The program with the violation as a further variable always has an optimum; the violation is
+    kept above -1 to bound it.
     """
     G, h = program.stacked()
     rows = len(program.b)
@@ -153,7 +156,7 @@ def _by_simplex(program: LinearProgram, cutoff: float) -> Optimum | Infeasible |
     rows = kernel.Rows(np.array(G.T, order="C"), np.array(h), norms, count - len(program.b))
     status, against = kernel.solve(program.c, rows, cutoff, ended)
     if status == kernel.LOST:
-        raise SolverError("the simplex method did not end")
+        raise SolverError("the simplex method reached its limit of steps without an answer")
     basis.sort()
     vertex = np.vstack([G, np.repeat(np.eye(n), 2, axis=0)])[basis]
     multipliers = np.zeros(count + 2 * n)
@@ -163,13 +166,17 @@ def _by_simplex(program: LinearProgram, cutoff: float) -> Optimum | Infeasible |
         as_given = (row == G[against]).all() and rows.b[against] == h[against]
         multipliers[against] = 1.0 if as_given else -1.0
         if np.abs(multipliers[count:]).max() > RESIDUAL:
-            raise SolverError("infeasible only inside the box of the simplex method")
+            raise SolverError(
+                "the simplex method proved infeasibility only near the origin, not everywhere"
+            )
         return _checked_ray(program, multipliers[:count])
     multipliers[basis] = np.linalg.solve(vertex.T, program.c)
     if status == kernel.BELOW:
         return _checked_bound(program, multipliers[:count], cutoff)
     if basis[-1] >= count:
-        raise SolverError("the simplex method ended at its box; the program may be unbounded")
+        raise SolverError(
+            "the simplex method reached its largest numbers; the program may be unbounded"
+        )
     x = np.asarray(np.linalg.solve(vertex, h[basis]), dtype=np.float64)
     return _checked_optimum(program, x, multipliers[:count])
 
@@ -180,7 +187,9 @@ def _checked_bound(program: LinearProgram, multipliers: Array, cutoff: float) ->
     off = float(np.abs(program.c - G.T @ multipliers).max())
     bound = float(h @ multipliers)
     if not (off <= RESIDUAL and bound <= cutoff):  # nor if one is not a number
-        raise SolverError(f"the optimum was called below {cutoff:.3g}, its bound is {bound:.3g}")
+        raise SolverError(
+            f"the simplex method put the optimum below {cutoff:.3g}, but proved {bound:.3g}"
+        )
     return Below(bound, multipliers)
 
 
@@ -193,7 +202,9 @@ def _solved(program: LinearProgram, strategy: int) -> Optimum | Infeasible:
         return _checked_optimum(program, x, duals)
     if status == kinds.kInfeasible:
         return _checked_ray(program, np.array(solver.getDualRay()[2]))
-    raise SolverError(f"the linear program ended as {solver.modelStatusToString(status)}")
+    raise SolverError(
+        f"HiGHS ended without an optimum or a proof: {solver.modelStatusToString(status)}"
+    )
 
 
 def _checked_optimum(program: LinearProgram, x: Array, duals: Array) -> Optimum:
@@ -204,10 +215,10 @@ def _checked_optimum(program: LinearProgram, x: Array, duals: Array) -> Optimum:
     scale = 1.0 + float(np.abs(x).max(initial=0.0))
     value = float(program.c @ x)
     failures = {
-        "a row is violated": np.max([-slack[:rows].min(initial=0.0), np.abs(slack[rows:]).max(initial=0.0)]),  # noqa: E501
-        "a multiplier is negative": -duals[:rows].min(initial=0.0),
-        "the multipliers do not give the objective": stationarity,
-        "the bound does not meet the value": abs(float(h @ duals) - value),
+        "the linear program's answer violates a row": np.max([-slack[:rows].min(initial=0.0), np.abs(slack[rows:]).max(initial=0.0)]),  # noqa: E501
+        "a multiplier of the linear program is negative": -duals[:rows].min(initial=0.0),
+        "the linear program's multipliers do not give the objective": stationarity,
+        "the linear program's bound differs from its value": abs(float(h @ duals) - value),
     }  # fmt: skip
     for failure, size in failures.items():
         if not size <= RESIDUAL * scale:  # nor if it is not a number
@@ -226,7 +237,7 @@ def _checked_ray(program: LinearProgram, ray: Array) -> Infeasible:
         combined = np.abs(G.T @ multipliers).max(initial=0.0)
         if -float(h @ multipliers) > FARTHEST * combined + RESIDUAL:
             return Infeasible(multipliers)
-    raise SolverError("the program was called infeasible, but the proof fails our check")
+    raise SolverError("HiGHS called the linear program infeasible, but its proof fails the check")
 
 
 def _run(program: LinearProgram, strategy: int) -> tuple[Any, Any]:

@@ -1,4 +1,4 @@
-"""The dual simplex method is compiled here, for one small dense program at a time.
+"""Solves one small dense linear program by the dual simplex method, in compiled code.
 
     maximise c.x  subject to  a_k.x <= b_k (or = b_k).
 
@@ -24,28 +24,29 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
 
 BOX = 1e3
-"""Half the side of the starting box: programs are of order one, and one that ends at the box is
-left to another solver."""
+"""Half the side of the box in which the search begins: data are of order one, and a program whose
+search ends at the box is left to another solver."""
 VIOLATED = 1e-10
-"""Distance from a row above which a point violates it."""
+"""Distance beyond a row's plane at which a point violates the row."""
 POSITIVE = 1e-9
-"""Least alpha_j that may become a pivot."""
+"""Least alpha_j that may serve as a pivot."""
 SAME_RATIO = 1e-12
 UNCHANGED = 1e-13
-"""Steps that lower c.x by less than this do not count as progress."""
+"""Decrease of c.x in one step below which the step counts as no progress."""
 PATIENCE, MOST = 3, 60
-"""Steps without progress until the first row enters, and steps in all, per variable."""
+"""Steps without progress until the first violated row is chosen, and largest number of steps, both
+per variable."""
 REFINEMENTS = 3
 NEGLIGIBLE = 1e-12
-"""Multipliers of at most this size are zero but for rounding."""
+"""Size up to which a multiplier counts as zero."""
 OPTIMAL, INFEASIBLE, BELOW, LOST = 0, 1, 2, 3
 
 
 class Rows(NamedTuple):
-    """The rows of a program; equalities come last, and may be turned around."""
+    """The rows of a program; equalities come last, and their signs may be changed."""
 
     At: Array
-    """A transposed, (n, rows): the loops over all rows then run over neighbours in memory."""
+    """Transpose of the matrix A of rows, (n, rows): loops over rows then read adjacent memory."""
     b: Array
     """Right-hand sides, (rows,)."""
     norms: Array
@@ -54,20 +55,21 @@ class Rows(NamedTuple):
 
 
 class Vertex(NamedTuple):
-    """The basis at which the method stands, its vertex and its multipliers."""
+    """The basis that the search has reached, with its vertex and multipliers."""
 
     basis: Indices
-    """Rows of the basis, (n,); rows + 2 i and rows + 2 i + 1 are the upper and the lower side of
-    the box."""
+    """Rows of the basis, (n,); the numbers rows + 2 i and rows + 2 i + 1 stand for the upper and
+    the lower side of the box."""
     y: Array
-    """Multipliers of the basis; where a row contradicts it, that row's combination alpha, (n,)."""
+    """Multipliers of the basis, (n,); if a row contradicts the basis, its coefficients alpha
+    instead."""
     x: Array
-    """Point where the rows of the basis meet, (n,)."""
+    """Point at which the rows of the basis meet, (n,)."""
 
 
 @loop("numpy")
 def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex) -> tuple[int, int]:
-    """Find a best vertex.
+    """Find a best vertex of a program, or a row that contradicts others.
 
     Args:
         c: Objective, (n,).
@@ -115,7 +117,7 @@ def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex) -> tuple[int, int
 
 @loop("numpy")
 def proved_bound(c: Array, rows: Rows, vertex: Vertex, accuracy: float) -> float:
-    """Return y.b, a bound of feasible values, if y >= 0 gives c to an accuracy; else infinity."""
+    """Return y.b, a bound of feasible values, if y >= 0 gives c closely enough; else infinity."""
     bound, left = 0.0, c.copy()
     for j in range(len(c)):
         share = vertex.y[j]
@@ -131,9 +133,9 @@ def proved_bound(c: Array, rows: Rows, vertex: Vertex, accuracy: float) -> float
 
 @loop("numpy")
 def proved_empty(rows: Rows, vertex: Vertex, against: int, farthest: float) -> bool:
-    """Return whether a row and the basis that it contradicts exclude all |x|_1 up to `farthest`.
+    """Return whether a row and a basis it contradicts exclude all |x|_1 up to `farthest`.
 
-    Where a_r = alpha_1 a_1 + .. with alpha <= 0, its excess over b_r is at least that of
+    Where a_r = alpha_1 a_1 + .. with alpha <= 0, the excess of a_r.x over b_r is at least that of
     alpha_1 b_1 + .. .
     """
     gap, left = -rows.b[against], rows.At[:, against].copy()
@@ -150,14 +152,14 @@ def proved_empty(rows: Rows, vertex: Vertex, against: int, farthest: float) -> b
 
 @loop("numpy")
 def _may_weigh(share: float, k: int, rows: Rows) -> bool:
-    """Return whether a proof may use a row this much: never the box, equalities always."""
+    """Return whether a proof may use row k this much: never the box, equalities always."""
     count = len(rows.b)
     return k < count and (share > 0.0 or k >= count - rows.equalities)
 
 
 @loop("numpy")
 def _corner(c: Array, count: int, vertex: Vertex) -> tuple[Array, float]:
-    """Return the corner of the box on the side of c: the inverse of its basis, and c.x."""
+    """Return the inverse basis of the box's corner on the side of c, and its value c.x."""
     n = len(c)
     inverse, value = np.zeros((n, n)), 0.0
     for i in range(n):
@@ -178,7 +180,7 @@ def _leans_on_box(y: Array, basis: Indices, count: int) -> bool:
 
 @loop("numpy")
 def _exceeded(x: Array, rows: Rows, excess: Array) -> None:
-    """Fill in how far x is beyond each row."""
+    """Fill in by how much x violates each row."""
     for k in range(len(excess)):
         excess[k] = -rows.b[k]
     for i in range(len(x)):
@@ -189,7 +191,7 @@ def _exceeded(x: Array, rows: Rows, excess: Array) -> None:
 
 @loop("numpy")
 def _violated(excess: Array, rows: Rows, inside: NDArray[np.bool_], first: bool) -> int:
-    """Return the row that is violated most, or the first one; -1 if none is."""
+    """Return the row that is violated most, or the first violated row; -1 if none is violated."""
     worst, found, inequalities = VIOLATED, -1, len(excess) - rows.equalities
     for k in range(len(excess)):
         beyond = excess[k] if k < inequalities else abs(excess[k])
@@ -202,7 +204,7 @@ def _violated(excess: Array, rows: Rows, inside: NDArray[np.bool_], first: bool)
 
 @loop("numpy")
 def _turn(rows: Rows, k: int) -> None:
-    """Turn an equality, so that points beneath it are beyond it."""
+    """Change the sign of an equality, so that points below it violate it."""
     rows.b[k] = -rows.b[k]
     for i in range(len(rows.At)):
         rows.At[i, k] = -rows.At[i, k]
@@ -221,7 +223,7 @@ def _combined(rows: Rows, entering: int, inverse: Array, alpha: Array) -> None:
 
 @loop("numpy")
 def _refine(c: Array, rows: Rows, basis: Indices, inverse: Array, y: Array) -> None:
-    """Compute the multipliers afresh: rounding errors have added up over the steps."""
+    """Compute the multipliers afresh, without the rounding errors that steps have added up."""
     y[:] = 0.0
     for _ in range(REFINEMENTS):
         left = c.copy()
@@ -234,7 +236,7 @@ def _refine(c: Array, rows: Rows, basis: Indices, inverse: Array, y: Array) -> N
 
 @loop("numpy")
 def _subtract(left: Array, share: float, rows: Rows, k: int) -> None:
-    """Take a share of a row away from `left`; the row may be a side of the box."""
+    """Subtract a multiple of a row, or of a side of the box, from `left`."""
     side = k - len(rows.b)
     if side >= 0:
         left[side // 2] -= share if side % 2 == 0 else -share
@@ -245,9 +247,9 @@ def _subtract(left: Array, share: float, rows: Rows, k: int) -> None:
 
 @loop("numpy")
 def _leaving(y: Array, alpha: Array, basis: Indices, rows: Rows) -> int:
-    """Return the place of least y / alpha, the largest alpha among equals; -1 if none is positive.
+    """Return the place in the basis with the least y / alpha, -1 if no alpha is positive.
 
-    Equalities stay in the basis.
+    Of equal quotients the one with the largest alpha is taken. Equalities stay in the basis.
     """
     count, least, found = len(rows.b), np.inf, -1
     for j in range(len(y)):
@@ -262,7 +264,7 @@ def _leaving(y: Array, alpha: Array, basis: Indices, rows: Rows) -> int:
 
 @loop("numpy")
 def _exchange(inverse: Array, x: Array, alpha: Array, leaving: int, excess: float) -> None:
-    """Put a row in the place of another: the point moves onto it along the others."""
+    """Put a row in the place of another in the basis: the point moves onto it along the others."""
     n = len(x)
     for i in range(n):
         step = inverse[i, leaving] / alpha[leaving]

@@ -1,4 +1,4 @@
-"""The point of a polyhedron nearest to the origin, for many polyhedra with equal normals.
+"""Finds the point nearest to the origin in each of many polyhedra with the same normals.
 
 Solved: minimise |x| subject to C x <= d, for every row d of D.
 
@@ -27,18 +27,20 @@ from grasp_core.compiled import compiled
 
 KERNEL = "grasp_core.solvers.nearest_point_kernel"
 EXACT = 1e-11
-"""Accepted violation of the conditions, relative to x: some thousand times the rounding of such
-numbers, a hundred times less than any use can tell apart."""
+"""Accepted violation of the conditions, relative to x: some thousand rounding errors, and a
+hundredth of any difference that matters."""
 TRIED = 200
-"""Right-hand sides on which active rows are tried: it takes about twice as long as finding them."""
+"""Number of right-hand sides on which known active rows are tried: this takes about twice as long
+as finding new ones."""
 WORTH = 2
-"""Uses above which trying active rows pays; while it does not, they are tried half as often."""
+"""Number of successes at which trying active rows saves time; below it, they are tried half as
+often."""
 
 
 def least_distance(C: Array, D: Array, *, accuracy: float = EXACT) -> Array:
-    """Find the nearest points, (n, v), as rows; NaN where none was found that meets the conditions.
+    """Find the nearest points, (n, v), as rows; a row is NaN where none was proved.
 
-    A row of the answer does not depend on the other rows of D, but for rounding.
+    A row of the answer does not depend on the other rows of D, except for rounding.
 
     Args:
         C: Normals of all polyhedra, (m, v).
@@ -58,7 +60,7 @@ def least_distance(C: Array, D: Array, *, accuracy: float = EXACT) -> Array:
 
 
 def _by_kernel(C: Array, D: Array, accuracy: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Find points by the compiled method, (n, v), and return which are proved to be nearest."""
+    """Find points by the compiled method, (n, v), and return which of them are proved."""
     X, U = np.zeros((len(D), C.shape[1])), np.zeros(D.shape)
     compiled(KERNEL).solve(np.array(C, order="C"), np.array(D, order="C"), X, U)
     slack = D - X @ C.T
@@ -70,7 +72,7 @@ def _by_kernel(C: Array, D: Array, accuracy: float) -> tuple[Array, NDArray[np.b
 
 
 def _by_least_squares(C: Array, D: Array) -> Array:
-    """Find nearest points, (n, v), where every row of D has a negative entry."""
+    """Find nearest points by least squares, (n, v); every row of D has a negative entry."""
     X, V = np.zeros((len(D), C.shape[1])), np.zeros(D.shape)
     waiting, solved = np.ones(len(D), dtype=bool), np.zeros(len(D), dtype=bool)
     pause, wait = 1, 0
@@ -90,7 +92,7 @@ def _by_least_squares(C: Array, D: Array) -> Array:
 
 
 def _weights(C: Array, d: Array) -> Array:
-    """Find the v of the module's derivation; zero if there are too many iterations."""
+    """Compute the vector v of the module's derivation; zero after too many iterations."""
     target = np.zeros(C.shape[1] + 1)
     target[-1] = -1.0
     try:
@@ -100,7 +102,7 @@ def _weights(C: Array, d: Array) -> Array:
 
 
 def _from_weights(C: Array, D: Array, V: Array) -> Array:
-    """Compute the nearest points of weights v, check them, and correct them where they fail."""
+    """Compute nearest points from vectors v, check them, and correct them where they fail."""
     left = np.maximum(1.0 + (D * V).sum(axis=1, keepdims=True), np.finfo(np.float64).eps)
     X = -(V @ C) / left
     slack = D - X @ C.T
@@ -112,7 +114,7 @@ def _from_weights(C: Array, D: Array, V: Array) -> Array:
 
 
 def _on_rows(C: Array, D: Array, active: Indices) -> tuple[Array, NDArray[np.bool_]]:
-    """Compute nearest points if these rows are active, (n, v), and which are proved to be."""
+    """Compute nearest points if these rows are active, (n, v); also return which are proved."""
     inverse = np.linalg.pinv(C[active])
     X = D[:, active] @ inverse.T
     slack, multipliers = D - X @ C.T, -(X @ inverse)

@@ -1,4 +1,4 @@
-"""The dual active-set method finds the nearest points of polyhedra with equal normals.
+"""Finds the nearest points of polyhedra with the same normals by a dual active-set method.
 
     minimise |x|  subject to  C x <= d,  for every row d of D.
 
@@ -26,37 +26,38 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
 
 VIOLATED = 1e-13
-"""Distance from a row, relative to x or one, above which a point violates it."""
+"""Distance beyond a row's plane, relative to |x| or 1, at which a point violates the row."""
 DEPENDENT = 1e-9
-"""Share of its length that a row must leave orthogonal to the active ones to be independent."""
+"""Share of its length that a row must keep orthogonal to the active rows to be independent of them.
+"""
 TINY = 1e-300
-"""Least length that is divided by."""
+"""Smallest length that is divided by."""
 MOST = 20
-"""Most steps per variable."""
+"""Largest number of steps per variable."""
 
 
 class Active(NamedTuple):
-    """The active rows A, with A = R'Q."""
+    """The active rows A of one problem, factored as A = R'Q."""
 
     rows: Indices
     """Indices of the active rows, followed by the one that enters, (v + 1,)."""
     inside: NDArray[np.bool_]
-    """Whether a row is active, (m,)."""
+    """Whether each row is active, (m,)."""
     Q: Array
-    """Orthonormal rows that span the active ones, (v, v)."""
+    """Orthonormal rows that span the active rows, (v, v)."""
     R: Array
-    """Upper triangle, (v, v + 1); the last column is that of the row that enters."""
+    """Upper triangular factor, (v, v + 1); its last column belongs to the row that enters."""
     u: Array
-    """Multipliers of these rows, (v + 1,)."""
+    """Multipliers of the active rows, then of the row that enters, (v + 1,)."""
     z: Array
-    """Part of the entering row that is orthogonal to the active ones, (v,)."""
+    """Part of the entering row that is orthogonal to the active rows, (v,)."""
     r: Array
-    """Shares of the active rows in the entering row, (v,)."""
+    """Coefficients of the active rows in the entering row, (v,)."""
 
 
 @loop()
 def solve(C: Array, D: Array, X: Array, U: Array) -> None:
-    """Find nearest points.
+    """Find the nearest point of each polyhedron.
 
     Args:
         C: Normals, (m, v), contiguous like all of these arrays.
@@ -84,7 +85,7 @@ def solve(C: Array, D: Array, X: Array, U: Array) -> None:
 
 @loop()
 def _solve(C: Array, d: Array, norms: Array, active: Active, x: Array) -> int:
-    """Find the nearest point; return how many rows are active there, -1 if none was found."""
+    """Find one nearest point; return how many rows are active there, -1 if none was found."""
     count = 0
     x.fill(0.0)
     active.inside.fill(False)
@@ -101,9 +102,9 @@ def _solve(C: Array, d: Array, norms: Array, active: Active, x: Array) -> int:
 
 @loop()
 def _enter(C: Array, active: Active, count: int, excess: float, least: float, x: Array) -> int:
-    """Step until the row after the active ones is active; return how many then are, -1 if it fails.
+    """Step until the entering row is active; return the number of active rows, -1 on failure.
 
-    `least` is the length up to which a rest counts as zero.
+    `least` is the length up to which a remainder counts as zero.
     """
     entering, z = active.rows[count], active.z
     for _ in range(count + 1):
@@ -130,7 +131,7 @@ def _enter(C: Array, active: Active, count: int, excess: float, least: float, x:
 def _violated(
     C: Array, d: Array, norms: Array, inside: NDArray[np.bool_], x: Array
 ) -> tuple[int, float]:
-    """Return the row that x violates most, -1 if none, and its excess."""
+    """Return the row that x violates most, and its excess; the row is -1 if none is violated."""
     size = 1.0
     for j in range(len(x)):
         size = max(size, abs(x[j]))
@@ -144,9 +145,9 @@ def _violated(
 
 @loop()
 def _split(row: Array, active: Active, count: int) -> float:
-    """Write a row as R[:, count] on Q and a rest z orthogonal to it; return the square of the rest.
+    """Write a row as R[:, count] on Q plus a remainder z orthogonal to Q; return z.z.
 
-    This is done twice, as once leaves rounding of the size of the row.
+    This is done twice, because once leaves rounding errors of the size of the row.
     """
     Q, R, z = active.Q, active.R, active.z
     for j in range(len(row)):
@@ -162,7 +163,7 @@ def _split(row: Array, active: Active, count: int) -> float:
 
 @loop()
 def _append(active: Active, count: int, square: float) -> None:
-    """Add the rest z, with its square, to the orthonormal rows."""
+    """Add the remainder z, with its square, to the orthonormal rows."""
     length = max(np.sqrt(square), TINY)
     active.R[count, count] = length
     for j in range(len(active.z)):
@@ -186,7 +187,7 @@ def _leaving(active: Active, count: int) -> tuple[int, float]:
 
 @loop()
 def _move(active: Active, count: int, step: float) -> None:
-    """Change the multipliers of the active rows and of the one that enters."""
+    """Change the multipliers of the active rows and of the entering row by one step."""
     for j in range(count):
         active.u[j] = max(active.u[j] - step * active.r[j], 0.0)
     active.u[count] += step
@@ -194,7 +195,7 @@ def _move(active: Active, count: int, step: float) -> None:
 
 @loop()
 def _drop(C: Array, active: Active, count: int, leaving: int) -> int:
-    """Remove a row from the active ones; return how many are left."""
+    """Remove a row from the active rows; return how many are left."""
     active.inside[active.rows[leaving]] = False
     for j in range(leaving, count):
         active.rows[j], active.u[j] = active.rows[j + 1], active.u[j + 1]
@@ -205,7 +206,7 @@ def _drop(C: Array, active: Active, count: int, leaving: int) -> int:
 
 @loop()
 def _recompute(d: Array, active: Active, count: int, x: Array) -> None:
-    """Compute the point where the active rows hold with equality: Q'y with R'y = d, R u = -y."""
+    """Compute the point at which the active rows hold with equality: Q'y, R'y = d, R u = -y."""
     rows, Q, R, u = active.rows, active.Q, active.R, active.u
     x.fill(0.0)
     for i in range(count):

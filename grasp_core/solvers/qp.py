@@ -1,4 +1,4 @@
-"""Quadratic program -> the optimum on its active constraints; the door to ProxQP.
+"""Solves quadratic programs with ProxQP, exactly on the constraints that are active.
 
     minimise x'Px/2 + q'x  subject to  G x <= h,  A x = b,  lower <= x <= upper.                 (1)
 
@@ -23,40 +23,40 @@ from grasp_core.arrays import Array
 from grasp_core.errors import SolverError
 
 REQUESTED = 1e-8
-"""Absolute tolerance asked of ProxQP."""
+"""Absolute tolerance that ProxQP is asked for."""
 MAX_ITERATIONS = 300
-"""Most iterations of ProxQP: feasible programs of forces take about twenty; infeasible ones would
-go on for minutes."""
+"""Largest number of iterations of ProxQP: feasible programs of forces take about twenty; infeasible
+ones would go on for minutes."""
 ACTIVE = (1e-6, 1e-5, 1e-7, 1e-8)
-"""Slacks below which a constraint may count as active, tried in turn."""
+"""Slacks below which a constraint may count as active; they are tried in turn."""
 EXACT = 1e-6
-"""By how much the answer of (2) may miss its equations, the constraints or the objective: a hundred
-times the accuracy asked of ProxQP."""
+"""Error up to which the solution of (2) is accepted, in its equations, the constraints or the
+objective: a hundred times the accuracy asked of ProxQP."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class QuadraticProgram:
-    """The data of (1)."""
+    """The data of the quadratic program (1)."""
 
     P: Array
-    """Symmetric and positive definite, (n, n)."""
+    """Matrix of the quadratic term, symmetric and positive definite, (n, n)."""
     q: Array
-    """(n,)"""
+    """Linear term of the objective, (n,)."""
     G: Array
-    """(m, n)"""
+    """Matrix of the inequalities, (m, n)."""
     h: Array
-    """(m,)"""
+    """Right-hand sides of the inequalities, (m,)."""
     A: Array
-    """(p, n), perhaps without rows."""
+    """Matrix of the equalities, (p, n); p may be 0."""
     b: Array
-    """(p,)"""
+    """Right-hand sides of the equalities, (p,)."""
     lower: Array
-    """(n,), minus infinity where there is no bound."""
+    """Lower bounds of x, (n,); minus infinity where there is no bound."""
     upper: Array
-    """(n,), infinity where there is no bound."""
+    """Upper bounds of x, (n,); infinity where there is no bound."""
 
     def rows(self) -> tuple[Array, Array]:
-        """Return C, d of all inequalities C x <= d, the bounds among them."""
+        """Return C and d of all inequalities C x <= d, including the bounds."""
         below, above = np.isfinite(self.lower), np.isfinite(self.upper)
         unit = np.eye(len(self.q))
         C = np.vstack([self.G, unit[above], -unit[below]])
@@ -64,7 +64,7 @@ class QuadraticProgram:
 
 
 def minimize(program: QuadraticProgram) -> Array | None:
-    """Solve a program, (n,); None where ProxQP returns no numbers.
+    """Solve a quadratic program, (n,); None where ProxQP returns no numbers.
 
     Raises:
         SolverError: ProxQP cannot be loaded.
@@ -84,7 +84,7 @@ def minimize(program: QuadraticProgram) -> Array | None:
 
 
 def _polished(program: QuadraticProgram, x: Array) -> Array:
-    """Return the answer of (2) for what is active at x, if it is feasible and as good as x."""
+    """Solve (2) for the constraints active at x; return x itself if that is no better."""
     P, q, A, b = program.P, program.q, program.A, program.b
     C, d = program.rows()
     for slack in ACTIVE:

@@ -1,4 +1,4 @@
-"""Equal candidates are decided by a rule with a margin, never by the last digits of a number.
+"""Decides between equal candidates with a margin, never by the last digits of numbers.
 
 Two machines, or two ways to write the same object down, give numbers that differ in their last
 digits. Where candidates are equal in truth, a plain comparison would pick another one on each.
@@ -33,19 +33,20 @@ from grasp_core.solvers.lp import LinearProgram, Optimum
 from grasp_core.solvers.nearest_point import least_distance
 
 SAME_VALUE = 1e-5
-"""Share of a program's value that the nearest optimum may give up: with less, optima are slivers in
-which rounding moves the nearest point farther."""
+"""Share of a program's value that the nearest optimum may give up: with less, optima form thin
+slivers, in which rounding moves the nearest point farther."""
 FOUND = 1e-7
-"""How far the nearest optimum may miss its conditions. They are met by far or not at all: an answer
-near this border would be accepted on one machine only."""
+"""Error up to which the conditions of a nearest optimum are met. They are met by far or not at all:
+an answer near this limit would be accepted on one machine only."""
 GRID_DIGITS = 9
-"""Digits after the point that searches of many steps are given, at size one."""
+"""Digits after the point to which numbers are rounded before searches of many steps, at size one.
+"""
 FEASIBLE = 1e-9
-"""How far the nearest optimum may be beyond a row."""
+"""Distance by which the nearest optimum may violate a row."""
 SAME_DIGITS = 7
-"""Digits after the point, at object size one, within which figures are equal by default."""
+"""Default number of digits after the point to which numbers are compared, at object size one."""
 SAME_SHARE = 1e-6
-"""Share of the best figure below which a difference from it does not count."""
+"""Difference from the best value, as a share of it, that does not count."""
 
 
 @overload
@@ -53,7 +54,7 @@ def graded(values: float, digits: int = SAME_DIGITS) -> float: ...
 @overload
 def graded(values: Array, digits: int = SAME_DIGITS) -> Array: ...
 def graded(values: float | Array, digits: int = SAME_DIGITS) -> float | Array:
-    """Number the cell in which each value lies, of any shape; equal values share a cell.
+    """Number the cells of a grid in which values lie, of any shape; equal values share a cell.
 
     Args:
         values: Numbers to grade; infinite ones lie in infinite cells.
@@ -81,7 +82,7 @@ def on_grid(values: Array, digits: int = GRID_DIGITS) -> Array:
 
 
 def ranks(values: ArrayLike, share: float = SAME_SHARE) -> Indices:
-    """Rank each number, (n,): 0 for the smallest and all that equal it, and so on.
+    """Rank numbers, (n,): 0 for the smallest and all that equal it, 1 for the next, and so on.
 
     Args:
         values: Numbers to rank, (n,).
@@ -100,17 +101,17 @@ def ranks(values: ArrayLike, share: float = SAME_SHARE) -> Indices:
 
 
 def smallest_first(values: ArrayLike) -> list[int]:
-    """List places of numbers in rising order, (n,); equal ones keep the order they come in."""
+    """List the indices of numbers in rising order, (n,); equal ones keep their order."""
     return [int(place) for place in np.argsort(ranks(values), kind="stable")]
 
 
 def largest_first(values: ArrayLike) -> list[int]:
-    """List places of numbers in falling order, (n,); equal ones keep the order they come in."""
+    """List the indices of numbers in falling order, (n,); equal ones keep their order."""
     return smallest_first(-np.asarray(values, dtype=np.float64))
 
 
 def first_best(values: ArrayLike, margin: float | None = None) -> int:
-    """Find the place of the first value that is as large as the largest, ties apart.
+    """Find the index of the first value that equals the largest one within a margin.
 
     Args:
         values: Numbers to compare, (n,), at least one.
@@ -124,12 +125,12 @@ def first_best(values: ArrayLike, margin: float | None = None) -> int:
 
 
 def surpassing(best: float) -> float:
-    """Return what a challenger's figure must exceed to beat the best so far, ties apart."""
+    """Return what a later candidate must exceed to count as better than the best so far."""
     return best + SAME_SHARE * abs(best) if math.isfinite(best) else best
 
 
 def nearest_optimum(program: LinearProgram, optimum: Optimum, share: float = SAME_VALUE) -> Array:
-    """Find, of all optima of a program, the one nearest to the origin, (n,).
+    """Find the optimum of a program that is nearest to the origin, (n,).
 
     Args:
         program: Program whose data are of order one.

@@ -1,4 +1,4 @@
 """What does a grasp or a motion look like?
 
-This room turns objects, grasps and motions into pictures and clips.
+This package turns objects, grasps and motions into pictures and clips.
 """

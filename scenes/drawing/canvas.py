@@ -1,6 +1,6 @@
-"""The only module that uses matplotlib: figures, their files, and polygons in them.
+"""Makes figures, fills them with polygons and writes them; only this module uses matplotlib.
 
-Figures are made without `pyplot`, so that none outlives its use and no display is looked for.
+Figures are made without `pyplot`, so that no figure stays in memory and no display is needed.
 """
 
 # pyright: basic
@@ -43,14 +43,15 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "webp": {"quality": 70, "method": 3},
     "jpg": {"quality": 90},
 }
-"""How pictures are compressed: lines keep their colours, files stay small."""
+"""Compression options of each picture format: lines keep their colours, and files stay small."""
 
 
 def _part(name: str) -> Any:
     """Import a module of matplotlib.
 
-    The import must not look for a display, so a user's choice of a backend is hidden from it. Its
-    warning about where it caches fonts is hidden too, because it finds another place by itself.
+    The import must not look for a display, so the user's choice of a matplotlib backend is hidden
+    from it. Matplotlib's warning about the folder of its font cache is hidden too, because
+    matplotlib finds another folder by itself.
     """
     backend, logger = os.environ.pop("MPLBACKEND", None), logging.getLogger("matplotlib")
     level = logger.level
@@ -64,7 +65,7 @@ def _part(name: str) -> Any:
 
 
 def in_style(make: Callable[Given, Made]) -> Callable[Given, Made]:
-    """Decorate a function that makes figures, so that users' own style settings do not matter."""
+    """Decorate a function that makes figures so that users' own style settings do not matter."""
 
     @wraps(make)
     def styled(*args: Given.args, **kwargs: Given.kwargs) -> Made:
@@ -93,7 +94,7 @@ def new_figure(width_in: float, height_in: float) -> Any:
 
 
 def panels(figure: Any, count: int, *, around: Around = Around()) -> list[Any]:
-    """Make axes side by side at given places; searching room for labels would double the time."""
+    """Make axes side by side at given places; an automatic layout would take twice as long."""
     room = {"left": around.left, "right": 1.0 - around.right, "bottom": around.below,
             "top": 1.0 - around.above, "wspace": around.between}  # fmt: skip
     found = list(figure.subplots(1, count, squeeze=False, gridspec_kw=room)[0])
@@ -103,7 +104,7 @@ def panels(figure: Any, count: int, *, around: Around = Around()) -> list[Any]:
 
 
 def entitle(axes: Any, title: str) -> None:
-    """Give axes a title at a fixed place; searching a free one takes as long as all the rest."""
+    """Give axes a title at a fixed place; an automatic place takes longer than all the rest."""
     axes.set_title(title, fontsize=LETTERS, y=1.0)
 
 
@@ -111,7 +112,7 @@ def add_polygons(
     axes: Any, polygons: Sequence[Array], colours: Sequence[tuple[float, ...]],
     smooth: Sequence[bool],
 ) -> None:  # fmt: skip
-    """Add filled polygons to axes, in the order given."""
+    """Add filled polygons to axes in the given order; later ones cover earlier ones."""
     collections: Any = _part("collections")
     axes.add_collection(
         collections.PolyCollection(
@@ -135,7 +136,7 @@ def legend_line(colour: str, label: str, *, style: str = "-", marker: str = "") 
 
 @in_style
 def encoded(figure: Any, form: str) -> bytes:
-    """Encode a figure as the bytes of a file; equal figures give equal bytes.
+    """Encode a figure as the bytes of a picture file; equal figures give equal bytes.
 
     Args:
         figure: A figure from `new_figure`.
@@ -151,7 +152,7 @@ def encoded(figure: Any, form: str) -> bytes:
 def write_frames(
     figure: Any, draw: Callable[[int], None], count: int, rate: float, path: Path
 ) -> Path:
-    """Write an animated picture.
+    """Write an animated picture, frame by frame.
 
     Args:
         figure: A figure from `new_figure`.
@@ -170,7 +171,7 @@ def write_frames(
 
 
 def write_figure(figure: Any, path: Path) -> Path:
-    """Write a figure to a file whose ending says the format.
+    """Write a figure to a file; the ending of the file's name selects the format.
 
     Raises:
         InputError: The ending is unknown.
@@ -179,12 +180,12 @@ def write_figure(figure: Any, path: Path) -> Path:
 
 
 def format_of(path: Path) -> str:
-    """The format that the ending of a picture's name says.
+    """Return the picture format that the ending of a file's name stands for.
 
     Raises:
         InputError: The ending is unknown.
     """
     form = path.suffix.lower().removeprefix(".").replace("jpeg", "jpg")
     if form not in FORMATS:
-        raise InputError(f"{path}: pictures end in {', '.join('.' + name for name in FORMATS)}")
+        raise InputError(f"{path}: a picture's name must end in .{', .'.join(FORMATS)}")
     return form

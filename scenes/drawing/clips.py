@@ -1,8 +1,9 @@
-"""Motion of a scene -> a clip, drawn in a process of its own, where graphics are available.
+"""Draws the motion of a scene as a clip, in a separate process, where graphics are available.
 
-The motions of a grasp that holds are micrometres, so they can be shown magnified. Shifts and turns
-of the object about the point between the contacts, and slides of the fingertips, are counted from
-the first sample and multiplied by one factor, so that one still sees which parts move together.
+The object in a good grasp moves by micrometres, so motions can be shown magnified. The object's
+shifts and turns about the point between the contacts, and the slides of the fingertips, are
+measured from the first sample and multiplied by one factor, so that one still sees which parts move
+together.
 """
 
 import importlib
@@ -26,26 +27,26 @@ from scenes.mjcf import Scene
 
 FORMATS = (".gif", ".webp")
 ANGLES_DEG = (-50.0, 25.0)
-"""Azimuth and elevation of the camera by default [deg]."""
+"""Default azimuth and elevation of the camera [deg]."""
 SIZE = (480, 360)
 """Width and height of the picture [pixels]."""
 RATE = 25.0
-"""Frames per second."""
+"""Frames per second of a clip."""
 NEARER = 0.9
-"""Share of the farthest reach of the fingertips that the picture must show; they may come nearer to
-its border than the object."""
+"""Share of the fingertips' farthest reach that the picture must show: fingertips may come nearer to
+the picture's border than the object."""
 RIGID = 7
-"""Numbers in each row of joint positions of a scene with rigid fingertips: the pose of the
-object."""
+"""Length of each row of joint positions in a scene with rigid fingertips, which holds only the pose
+of the object."""
 VISIBLE = 0.1
-"""Size of a motion that is easily seen, in grasp sizes."""
+"""Size, in grasp sizes, to which small motions are magnified so that they are easily seen."""
 MOST = 1000.0
-"""Largest factor by which motions are multiplied."""
+"""Largest factor by which motions are magnified."""
 PATIENCE_S = 300.0
 
 
 class GraphicsError(GraspError):
-    """Nothing can be drawn on this machine."""
+    """Raised when no graphics library can draw on this machine."""
 
 
 def write_clip(
@@ -79,11 +80,11 @@ def write_clip(
             said = _drawn(job, out, graphics)
             if not said:
                 return write_parts(path, [out.read_bytes()])
-    raise GraphicsError(f"no graphics: {said}; {remedy()}")
+    raise GraphicsError(f"MuJoCo cannot draw on this machine: {said}; {remedy()}")
 
 
 def _reach(scene: Scene, joints: Array) -> float:
-    """The distance from the object's centre up to which there is something to see [m]."""
+    """Return how far from the object's centre the scene has anything to show [m]."""
     layout = scene.layout
     slides = np.zeros((1, len(layout.contacts), 3))
     if joints.shape[1] > RIGID:
@@ -94,17 +95,17 @@ def _reach(scene: Scene, joints: Array) -> float:
 
 
 def require_clip(path: Path) -> None:
-    """Refuse a file name that is not a clip's.
+    """Refuse a file name that does not end like a clip's.
 
     Raises:
         InputError: The name does not end in gif or webp.
     """
     if path.suffix.lower() not in FORMATS:
-        raise InputError(f"{path}: clips end in {' or '.join(FORMATS)}")
+        raise InputError(f"{path}: a clip's name must end in {' or '.join(FORMATS)}")
 
 
 def available_graphics() -> str:
-    """The graphics library that MuJoCo's renderer can draw with here.
+    """Return the name of the graphics library that MuJoCo can draw with here.
 
     Raises:
         GraphicsError: No library works; the message says what was tried.
@@ -119,21 +120,21 @@ def available_graphics() -> str:
 
 
 def remedy() -> str:
-    """Advice for a machine without graphics."""
+    """Advise what to do on a machine where nothing can be drawn."""
     if (chosen := os.environ.get("MUJOCO_GL")) is not None:
-        return f"MUJOCO_GL is set to {chosen!r}: unset it to have others tried"
+        return f"unset MUJOCO_GL, which is {chosen!r}, so that other graphics libraries are tried"
     return "install libegl1 or libosmesa6, or use a display"
 
 
 def has_display() -> bool:
-    """Whether MuJoCo's viewer has a display to open on."""
+    """Return whether there is a display on which MuJoCo's viewer can open."""
     if sys.platform != "linux":
         return True
     return any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
 
 
 def _graphics() -> Iterator[str]:
-    """Graphics libraries that MuJoCo may draw with, in the order to try."""
+    """Yield the graphics libraries that MuJoCo may draw with, in the order to try them."""
     chosen = os.environ.get("MUJOCO_GL")
     if chosen is not None:
         yield chosen
@@ -144,13 +145,16 @@ def _graphics() -> Iterator[str]:
 
 
 def _drawn(job: Path, out: Path, graphics: str) -> str:
-    """Draw in another process; return what went wrong, or an empty text."""
+    """Draw a clip in another process; return what went wrong, or an empty text."""
     trouble = _run_frames(graphics, [str(job), str(out)])
     return trouble or ("" if out.is_file() else f"{graphics}: nothing was drawn")
 
 
 def _run_frames(graphics: str, arguments: list[str]) -> str:
-    """Run the drawing program, or only try it if there are no arguments; return what went wrong."""
+    """Run the drawing program; return what went wrong, or an empty text.
+
+    Without arguments the program only tries whether it can draw.
+    """
     program = str(Path(__file__).with_name("frames.py"))
     command = [sys.executable, "-P", program, *arguments]
     settings = {**os.environ, "MUJOCO_GL": graphics}
@@ -175,7 +179,7 @@ def magnified(joints: Array, scene: Scene) -> tuple[Array, float]:
 
     Returns:
         Joint positions that begin at the planned pose, with every motion since the first sample
-        multiplied, and the factor: a number of one significant digit, at least 1.
+        multiplied by one factor, and that factor: a number of one significant digit, at least 1.
     """
     center, size = scene.layout.center, scene.layout.grasp_size_m
     rotation: Any = importlib.import_module("scipy.spatial.transform").Rotation
@@ -192,7 +196,7 @@ def magnified(joints: Array, scene: Scene) -> tuple[Array, float]:
 
 
 def _rounded_down(factor: float) -> float:
-    """The next smaller number of one significant digit, at least 1."""
+    """Round a factor down to one significant digit, but not below 1."""
     if factor < 1.0:
         return 1.0
     power = 10.0 ** math.floor(math.log10(factor))

@@ -1,9 +1,9 @@
-"""The shapes that show a grasp, after the figures of the paper.
+"""Makes the shapes that show an object and a grasp, in the style of the paper's figures.
 
-The object is glass. Outside of it, fingers are long bars. Inside of it, each contact has its
-friction cone and in this the cone of forces that the construction used. Lines of force run through
-the focus points; a pencil also shows the plane of each pair, a regulus the surface of its lines.
-Pictures and turnable pages draw these shapes.
+The object is drawn as glass. Outside of it, each finger is a long bar. Inside of it, each contact
+has its friction cone and, within that, the force cone that the construction used. Lines of force
+run through the focus points. For a pencil the plane of each pair of fingers is shown too, for a
+regulus the ruled surface on which the lines lie. Pictures and web pages draw these shapes.
 """
 
 import math
@@ -24,22 +24,23 @@ BAR_LENGTH, BAR_RADIUS = 0.75, 0.05
 CONE_LENGTH = 0.42
 """Length of a cone's sides, in object radii."""
 BEYOND = 0.2
-"""Length by which lines go on behind the points that they are drawn for, in object radii."""
+"""Length by which a line is drawn past the points it connects, in object radii."""
 REACH = 0.95
-"""Distance from the object's centre up to which a regulus's surface is drawn, in object radii."""
+"""Radius around the object's centre within which the ruled surface of a regulus is drawn, in object
+radii."""
 FARTHEST = 4.0
-"""Largest length of a line of force, and largest distance from the centre of foci whose planes are
-drawn, in object radii; the foci of built-in objects are within three."""
+"""Greatest length of a line of force, and greatest distance from the centre at which a focus still
+has its plane drawn, in object radii; the foci of built-in objects are within three."""
 SLACK_RAD = 1e-6
-"""Angle by which rounding may let a force cone stick out of its friction cone [rad]."""
+"""Angle by which rounding may make a force cone exceed its friction cone [rad]."""
 POLYGON = 3
-"""Least number of corners of a region that can be shaded."""
+"""Least number of corners of a region that can be filled with colour."""
 MOST_TRIANGLES = 2500
-"""Largest number of triangles of the glass; finer surfaces are drawn coarser."""
+"""Largest number of triangles drawn for the object; finer surfaces are simplified first."""
 
 
 def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, ...]:
-    """List everything that is drawn of a grasp.
+    """List the shapes that show an object with a grasp.
 
     Args:
         body: The object.
@@ -62,7 +63,7 @@ def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, 
 
 
 def glass(body: Polyhedron) -> tuple[Shape, ...]:
-    """The surface of the object, and the borders of its faces."""
+    """Return the shapes of the object: its surface, and the borders of its faces."""
     loops = [loop for face in body.faces for loop in (face.polygon, *face.holes)]
     return (
         Shape("object", polygons=_panes(body)),
@@ -71,7 +72,7 @@ def glass(body: Polyhedron) -> tuple[Shape, ...]:
 
 
 def _panes(body: Polyhedron) -> tuple[Array, ...]:
-    """The pieces of planar faces, or the triangles of a curved surface."""
+    """Return the polygons of the surface: face pieces, or the triangles of a curved surface."""
     if body.patches is None:
         return tuple(piece for face in body.faces for piece in face.pieces)
     fine = len(body.triangles) > MOST_TRIANGLES
@@ -79,7 +80,7 @@ def _panes(body: Polyhedron) -> tuple[Array, ...]:
 
 
 def _coarse(body: Polyhedron) -> Array:
-    """Simplify a surface on a grid, without tearing it apart, (t, 3, 3) [m].
+    """Simplify a surface by joining vertices on a grid, without tearing it, (t, 3, 3) [m].
 
     Each vertex moves to the mean of the vertices in its cell. Triangles that then have no area are
     dropped.
@@ -122,7 +123,7 @@ def _finger(body: Polyhedron, grasp: Grasp, finger: int, half_angle: float) -> l
 
 
 def _family(body: Polyhedron, grasp: Grasp) -> list[Shape]:
-    """Lines of force, and the shapes that show the grasp's family."""
+    """Return the lines of force, and the shapes that show the grasp's family."""
     if grasp.family == "regulus":
         return _regulus(body, grasp)
     beyond = BEYOND * body.radius
@@ -139,7 +140,7 @@ def _family(body: Polyhedron, grasp: Grasp) -> list[Shape]:
 
 
 def _regulus(body: Polyhedron, grasp: Grasp) -> list[Shape]:
-    """Lines along the witness forces, and the surface that they lie on."""
+    """Return the lines along the witness forces, and the ruled surface that they lie on."""
     reach, beyond = REACH * body.radius, BEYOND * body.radius
     ways = grasp.witness.directions
     ruled = rulings(grasp.positions, ways, body.center_of_mass, reach)
@@ -152,7 +153,7 @@ def _regulus(body: Polyhedron, grasp: Grasp) -> list[Shape]:
 
 
 def _planes(grasp: Grasp, beyond: float) -> list[Shape]:
-    """The planes of both pairs of a pencil; each holds the line through the foci."""
+    """Return the plane of each pair of a pencil; both planes hold the line through the foci."""
     one, two = grasp.focus_points
     along = beyond * _unit(two - one)
     ends = np.array([one - along, two + along])

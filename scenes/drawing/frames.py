@@ -1,8 +1,9 @@
-"""A scene and its motion -> an animated picture; a program of its own.
+"""Draws a scene in motion as an animated picture; it runs as a separate program.
 
-Only `scenes.drawing.clips` runs it, as `python -P frames.py JOB.npz OUT`. It is a process of its
-own because MuJoCo chooses its graphics when it is first imported, and a broken driver may end the
-whole process. Without arguments it draws an empty scene, to try whether that works.
+Only `scenes.drawing.clips` starts it, as `python -P frames.py JOB.npz OUT`. It is a separate
+process because MuJoCo chooses its graphics library when it is first imported, and because a broken
+graphics driver may end the whole process. Without arguments it draws an empty scene, to find out
+whether drawing works.
 """
 
 # pyright: basic, reportAttributeAccessIssue=false
@@ -16,7 +17,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont  # noqa: TID251
 
 DISTANCE = 3.2
-"""Distance of the camera, in radii of what is seen."""
+"""Distance of the camera from the scene, in radii of the part that is shown."""
 SKY, AMBIENT, DIFFUSE = (0.93, 0.95, 0.97), 0.45, 0.45
 """Colour of the background, and strengths of the ambient light and of the light from the camera."""
 INK, LETTERS = (30, 30, 40), 18
@@ -24,7 +25,7 @@ INK, LETTERS = (30, 30, 40), 18
 
 
 def main(job: str, out: str) -> None:
-    """Draw one frame for every row of joint positions."""
+    """Draw one frame of a clip for every row of joint positions, and write the clip."""
     given = np.load(job, allow_pickle=False)
     model = _lit(str(given["xml"]))
     for finger, colour in enumerate(given["colours"]):
@@ -56,7 +57,7 @@ def main(job: str, out: str) -> None:
 
 
 def try_out() -> None:
-    """Draw an empty scene, which fails where there are no graphics."""
+    """Draw an empty scene; this fails on a machine without graphics."""
     model = mujoco.MjModel.from_xml_string("<mujoco/>")
     with mujoco.Renderer(model, 8, 8) as renderer:
         data = mujoco.MjData(model)
@@ -66,7 +67,7 @@ def try_out() -> None:
 
 
 def _lit(xml: str) -> mujoco.MjModel:
-    """Compile a scene with a bright sky and light."""
+    """Compile a scene with a bright background and light."""
     spec = mujoco.MjSpec.from_string(xml)
     spec.add_texture(
         name="sky",

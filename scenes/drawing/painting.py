@@ -1,7 +1,7 @@
-"""Shapes as seen from a view -> flat coloured polygons, the farthest first.
+"""Projects shapes to flat coloured polygons, sorted so that the farthest is drawn first.
 
-Lines and points become polygons, too, so that one order by depth holds for everything: a finger in
-front of a line of force hides it, glass in front of the line does not.
+Lines and points become polygons too, so that one order by depth holds for everything: a finger in
+front of a line of force hides it, and glass in front of the line lets it show through.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,34 +15,35 @@ from scenes.drawing.shapes import SIDES, Shape
 from scenes.drawing.views import View
 
 LIGHT = np.array([-0.4, 0.7, 0.6]) / np.linalg.norm([-0.4, 0.7, 0.6])
-"""Direction towards the light: left, above, in front; (right, up, towards the viewer)."""
+"""Direction towards the light, as (right, up, towards the viewer): from the left, above and in
+front."""
 DARKEST = 0.55
 """Brightness of a side that faces away from the light, as a share of its colour."""
 DASHES = 24
-"""Number of parts, every other one drawn, of a dashed line as long as the picture is wide."""
+"""Number of parts, every other one drawn, in a dashed line as long as the picture is wide."""
 SEAMS = 0.5
-"""Opacity up to which polygons get hard borders, because smooth ones would show as lines."""
+"""Opacity up to which polygons are drawn without smoothed borders, which would show as lines."""
 PIECES = 12
-"""Number of parts of a solid line as long as the picture is wide, each with its own depth."""
+"""Number of parts in a solid line as long as the picture is wide; each part has its own depth."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Patch:
-    """One flat polygon of a picture."""
+    """One flat polygon of a picture, with its depth and colour."""
 
     polygon: Array
     """Corners in the picture, (k, 2) [m]."""
     nearness: float
-    """Position along the line of sight, larger if nearer [m]."""
+    """Position along the line of sight [m]; larger values are nearer to the viewer."""
     colour: tuple[float, float, float, float]
     """Red, green, blue and opacity, from 0 to 1."""
     smooth: bool
-    """Whether the polygon's border is smoothed; it is not where neighbours share a border, which
-    would then show."""
+    """Whether the border of the polygon is smoothed; False where polygons share a border, because
+    smoothing would make that border visible."""
 
 
 def painted(shapes: Iterable[Shape], view: View, width: float) -> tuple[Patch, ...]:
-    """The polygons of a picture of a given width [m], in the order to draw them."""
+    """Return the polygons of a picture of a given width [m], in the order to draw them."""
     patches = [patch for shape in shapes for patch in _patches(shape, view, width)]
     return tuple(sorted(patches, key=lambda patch: patch.nearness))
 
@@ -71,7 +72,7 @@ def _filled(polygon: Array, look: Look, colour: tuple[float, float, float], view
 
 
 def _brightness(polygon: Array, view: View) -> float:
-    """Brightness of a flat side, from `DARKEST` to 1, by its visible side's angle to the light."""
+    """Compute the brightness of a flat side from its angle to the light, `DARKEST` to 1."""
     normal = view.axes @ np.cross(polygon[1] - polygon[0], polygon[2] - polygon[1])
     length = float(np.linalg.norm(normal))
     if length == 0.0:
@@ -98,7 +99,7 @@ def _line(
 
 
 def _spans(length: float, look: Look) -> Sequence[tuple[float, float]]:
-    """The parts of a line that are drawn, each as two shares of its length."""
+    """Return which parts of a line are drawn, each as two shares of the line's length."""
     if look.dashed:
         count = 2 * max(round(0.5 * DASHES * length), 1) + 1
         return [(part / count, (part + 1) / count) for part in range(0, count, 2)]

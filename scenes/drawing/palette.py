@@ -1,4 +1,4 @@
-"""Colours of drawings, after Okabe and Ito, which colour-blind people can tell apart.
+"""Sets the colours of drawings, after Okabe and Ito, which colour-blind people can tell apart.
 
 Source: Okabe & Ito, "Color Universal Design", 2008.
 """
@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from scenes.drawing.shapes import Role, Shape
 
 FINGERS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7")
-"""Colour of each finger and all that belongs to it: its cones, region, line of force, curves."""
+"""Colour of each finger, which its cones, region, line of force and curves share."""
 INK, GLASS, FOCUS, SURFACE = "#30363d", "#8296ab", "#D55E00", "#0072B2"
 GOOD, BAD, NEUTRAL = "#0072B2", "#D55E00", "#767c85"
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How shapes of one role are drawn."""
+    """How shapes of one role, such as force cones, are drawn."""
 
     fill: float = 0.0
     """Opacity of polygons, from 0 to 1."""
@@ -50,11 +50,11 @@ OF_ROLES: dict[Role, str] = {
 
 
 def colour_of(shape: Shape) -> str:
-    """The colour of a shape, as #rrggbb."""
+    """Return the colour of a shape, written as #rrggbb."""
     return OF_ROLES.get(shape.role, INK) if shape.finger is None else FINGERS[shape.finger]
 
 
 def rgb(colour: str) -> tuple[float, float, float]:
-    """Red, green and blue of a colour #rrggbb, from 0 to 1."""
+    """Convert a colour written as #rrggbb to red, green and blue from 0 to 1."""
     red, green, blue = (int(colour[at : at + 2], 16) / 255.0 for at in (1, 3, 5))
     return red, green, blue

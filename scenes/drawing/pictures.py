@@ -1,4 +1,4 @@
-"""A grasp -> its picture in the style of the paper, as a figure or a file."""
+"""Draws a grasp in the style of the paper, as a matplotlib figure or a file."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -33,9 +33,9 @@ SIDE_IN = 5.0
 LEGEND_IN = 0.5
 """Height of the legend [inches]."""
 MARGIN = 0.04
-"""Margin around what is drawn, as a share of the picture."""
+"""Width of the empty margin, as a share of the picture's width."""
 FARTHEST = 2.0
-"""Distance from the centre beyond which points may be cut off, in object radii."""
+"""Distance from the object's centre beyond which points may be cut off, in object radii."""
 NUMBER_BEYOND = 0.12
 """Distance of a finger's number from the end of its bar, in object radii."""
 EXPLAINED: tuple[Role, ...] = (
@@ -52,7 +52,7 @@ def write_picture(
     *,
     view: View | None = None,
 ) -> Path:
-    """Draw a grasp as in the paper, and write the picture.
+    """Draw a grasp in the style of the paper, and write the picture to a file.
 
     Args:
         body: The object.
@@ -76,7 +76,7 @@ def grasp_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
     legend: bool = True,
 ) -> Any:  # fmt: skip
-    """Draw a grasp as in the paper, as a matplotlib figure.
+    """Draw a grasp in the style of the paper, as a matplotlib figure.
 
     Raises:
         InputError: The grasp does not lie on the body, or the friction is out of range.
@@ -94,7 +94,7 @@ def grasp_figure(
 
 
 def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | None) -> None:
-    """Refuse what cannot be drawn.
+    """Refuse an object, grasp, friction or view that cannot be drawn.
 
     Raises:
         InputError: The grasp does not lie on the body, the friction is out of range, or `view` is
@@ -107,7 +107,7 @@ def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | No
 
 
 def empty_picture(*, legend: bool = False) -> tuple[Any, Any]:
-    """Make a figure for a grasp, perhaps with a legend, and its axes."""
+    """Make a figure for a grasp, perhaps with a legend, and return it with its axes."""
     figure = new_figure(SIDE_IN, SIDE_IN + (LEGEND_IN if legend else 0.0))
     below = LEGEND_IN / (SIDE_IN + LEGEND_IN) if legend else 0.0
     (axes,) = panels(figure, 1, around=Around(0.0, 0.0, below, 0.0))
@@ -125,7 +125,7 @@ def draw_grasp(
         grasp: A grasp on the faces of `body`.
         friction: Coulomb coefficient of the friction cones.
         view: The view to draw from.
-        steady: Whether the scale is the same for all views.
+        steady: Whether to choose a scale that suits every view, as clips that turn need.
 
     Returns:
         The shapes that were drawn.
@@ -152,7 +152,7 @@ def draw_grasp(
 
 
 def number_places(body: Polyhedron, grasp: Grasp) -> Array:
-    """Places of the fingers' numbers, behind the ends of their bars, (4, 3) [m]."""
+    """Return where the fingers' numbers are written, behind their bars, (4, 3) [m]."""
     ways = grasp.normals if grasp.approach_directions is None else grasp.approach_directions
     return grasp.positions - (BAR_LENGTH + NUMBER_BEYOND) * body.radius * ways
 
@@ -160,7 +160,10 @@ def number_places(body: Polyhedron, grasp: Grasp) -> Array:
 def _frame(
     shapes: Sequence[Shape], numbers: Array, body: Polyhedron, view: View | None
 ) -> tuple[Array, Array]:
-    """Corners of a square around all that is seen, from one view or from any, (2,) each [m]."""
+    """Return two opposite corners of a square around the drawing, (2,) each [m].
+
+    The square suits the given view or, if that is None, every view.
+    """
     points = np.vstack([extent_of(shapes), numbers])
     distances = np.linalg.norm(points - body.center_of_mass, axis=1)
     near = distances <= FARTHEST * body.radius
@@ -175,7 +178,7 @@ def _frame(
 
 
 def _legend(shapes: Sequence[Shape]) -> list[Any]:
-    """Legend entries for the roles that occur."""
+    """Make a legend entry for each role that occurs among the shapes."""
     found = {shape.role: shape for shape in reversed(shapes)}
     handles = list[Any]()
     for role in EXPLAINED:

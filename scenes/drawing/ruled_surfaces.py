@@ -1,4 +1,4 @@
-"""The surface on which the lines of force of a regulus lie.
+"""Makes the ruled surface on which the lines of force of a regulus lie.
 
 Take three pairwise skew lines. Through each point of the first, exactly one line meets the other
 two: the intersection of the planes that the point spans with them. These transversals sweep a
@@ -16,12 +16,12 @@ from grasp_core.arrays import Array
 
 RULINGS = 40
 PARALLEL = 1e-9
-"""Least length of the cross product that gives a transversal's direction, relative to the squared
-reach."""
+"""Least length of the cross product that gives the direction of a transversal, relative to the
+squared reach."""
 
 
 def rulings(points: Array, directions: Array, center: Array, reach: float) -> tuple[Array, ...]:
-    """Segments of the transversals of three lines, inside a ball.
+    """Cut the transversals of three lines to segments inside a ball.
 
     Args:
         points: A point on each line, (k, 3) [m]; only the first three lines count.
@@ -44,7 +44,7 @@ def rulings(points: Array, directions: Array, center: Array, reach: float) -> tu
 
 
 def _inside(start: Array, way: Array, center: Array, reach: float) -> list[Array]:
-    """The part of a line inside a ball, as a list that is empty if there is none."""
+    """Return the part of a line inside a ball, as a list with one segment or none."""
     middle = float((center - start) @ way)
     room = reach**2 - float(np.linalg.norm(center - start - middle * way)) ** 2
     if room <= 0.0:
@@ -54,7 +54,7 @@ def _inside(start: Array, way: Array, center: Array, reach: float) -> list[Array
 
 
 def between(segments: Sequence[Array]) -> tuple[Array, ...]:
-    """Quadrilaterals between neighbouring segments, each (4, 3)."""
+    """Make the quadrilaterals between neighbouring segments, each (4, 3)."""
     quads = list[Array]()
     for one, two in pairwise(segments):
         turned = two if (one[1] - one[0]) @ (two[1] - two[0]) > 0.0 else two[::-1]

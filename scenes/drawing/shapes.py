@@ -1,4 +1,4 @@
-"""Shapes to draw: flat polygons, lines and points in space, each with the role it plays."""
+"""Describes shapes to draw: flat polygons, lines and points in space, each with a role."""
 
 import math
 from collections.abc import Iterable
@@ -15,12 +15,12 @@ Role: TypeAlias = Literal[
     "plane", "ruled surface", "contact",
 ]  # fmt: skip
 SIDES = 20
-"""Number of corners of the polygons that stand for circles."""
+"""Number of corners of the polygons that replace circles."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
-    """One thing to draw, in the object's frame."""
+    """One thing to draw: polygons, lines and points in the object's frame, with a role."""
 
     role: Role
     finger: int | None = None
@@ -30,7 +30,7 @@ class Shape:
     lines: tuple[Array, ...] = ()
     """Polylines, each (k, 3) [m]."""
     points: Array | None = None
-    """(k, 3) [m]"""
+    """Single points, (k, 3) [m]; None if the shape has none."""
 
     def __post_init__(self) -> None:
         for name in ("polygons", "lines"):
@@ -40,23 +40,23 @@ class Shape:
             object.__setattr__(self, "points", frozen(self.points, (None, 3), "points"))
 
     def vertices(self) -> Array:
-        """All points of the shape, (n, 3) [m]."""
+        """Return all points of the shape, (n, 3) [m]."""
         alone = [] if self.points is None else [self.points]
         return np.vstack([np.empty((0, 3)), *self.polygons, *self.lines, *alone])
 
 
 def extent_of(shapes: Iterable[Shape]) -> Array:
-    """All points of several shapes, (n, 3) [m]."""
+    """Return all points of several shapes, (n, 3) [m]."""
     return np.vstack([shape.vertices() for shape in shapes])
 
 
 def closed(loop: Array) -> Array:
-    """Close the border of a polygon as a line, (k + 1, 3)."""
+    """Repeat the first corner of a polygon at its end, to draw its border as a line, (k + 1, 3)."""
     return np.vstack([loop, loop[:1]])
 
 
 def ring(center: Array, axis: Array, radius: float) -> Array:
-    """Points of a circle around a unit axis, (SIDES, 3)."""
+    """Return points of a circle around a unit axis, (SIDES, 3)."""
     # The axis of the frame that is farthest from the circle's axis gives a safe cross product.
     side = np.cross(axis, np.eye(3)[first_best(-np.abs(axis), SAME_SHARE)])
     side /= np.linalg.norm(side)
@@ -66,7 +66,7 @@ def ring(center: Array, axis: Array, radius: float) -> Array:
 
 
 def tube(start: Array, end: Array, radius: float) -> tuple[Array, ...]:
-    """Sides and ends of a round bar between two points."""
+    """Make the sides and the two ends of a round bar between two points."""
     axis = (end - start) / np.linalg.norm(end - start)
     low, high = ring(start, axis, radius), ring(end, axis, radius)
     sides = [np.array([low[i - 1], low[i], high[i], high[i - 1]]) for i in range(SIDES)]
@@ -74,12 +74,12 @@ def tube(start: Array, end: Array, radius: float) -> tuple[Array, ...]:
 
 
 def cone_rim(tip: Array, axis: Array, half_angle: float, length: float) -> Array:
-    """The circle in which a cone ends whose sides have a given length, (SIDES, 3)."""
+    """Return the circle at the wide end of a cone with sides of a given length, (SIDES, 3)."""
     height = length * math.cos(half_angle)
     return ring(tip + height * axis, axis, length * math.sin(half_angle))
 
 
 def cone_sides(tip: Array, axis: Array, half_angle: float, length: float) -> tuple[Array, ...]:
-    """Triangles between the tip of a cone and its rim."""
+    """Make the triangles between the tip of a cone and its rim."""
     rim = cone_rim(tip, axis, half_angle, length)
     return tuple(np.array([tip, rim[i - 1], rim[i]]) for i in range(SIDES))

@@ -1,4 +1,4 @@
-"""A clip of a grasp's picture that turns once around; it needs no graphics library."""
+"""Draws a clip of a grasp's picture that turns around once, without any graphics library."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ ELEVATION_DEG = 25.0
 
 @in_style
 def write_turning_clip(body: Polyhedron, grasp: Grasp, path: Path, friction: float) -> Path:
-    """Draw a grasp from all around.
+    """Draw a grasp from all sides and write the pictures as a clip that turns around once.
 
     Args:
         body: The object.

@@ -1,4 +1,4 @@
-"""Where a camera stands, and the view that shows a grasp best."""
+"""Places the camera, and chooses the view that shows a grasp best."""
 
 import math
 from dataclasses import dataclass
@@ -13,15 +13,17 @@ from grasp_core.solvers.ties import first_best
 from grasp_core.values import Grasp
 
 DISTANCE = 9.0
-"""Distance of the camera, in object radii: some perspective, little distortion."""
+"""Distance of the camera, in object radii: perspective is visible, and distortion is small."""
 AZIMUTHS, ELEVATIONS = range(5, 360, 10), (18, 28, 40)
 """Azimuths and elevations of the views to choose from [deg]."""
 EDGE_ON = 0.12
-"""Cosine of the angle to the line of sight below which a face is seen as a line."""
+"""Cosine of the angle between a face's normal and the line of sight below which the face is seen
+nearly as a line."""
 SAME_MERIT = 1e-6
-"""Difference of merit below which two views are equally good; then the first one counts."""
+"""Largest difference of merit at which two views count as equally good; the first one is then
+taken."""
 FORESHORTENED = 0.8
-"""Cosine above which a finger points at the viewer."""
+"""Cosine of the angle to the line of sight above which a finger points at the viewer."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +35,7 @@ class View:
     center: Array
     """The point that the camera looks at, (3,) [m]."""
     distance: float
-    """Distance of the camera from that point [m]."""
+    """Distance of the camera from `center` [m]."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axes", frozen(self.axes, (3, 3), "axes"))
@@ -42,14 +44,14 @@ class View:
 
     @classmethod
     def of_angles(cls, azimuth_deg: float, elevation_deg: float, body: Polyhedron) -> Self:
-        """Place a camera around an object, by its direction as seen from the object."""
+        """Place a camera by its azimuth and elevation [deg] as seen from the object."""
         number(azimuth_deg, "azimuth_deg")
         number(elevation_deg, "elevation_deg")
         axes = _axes(math.radians(azimuth_deg), math.radians(elevation_deg))
         return cls(axes, body.center_of_mass, DISTANCE * body.radius)
 
     def seen(self, points: Array) -> tuple[Array, Array]:
-        """Project points (n, 3): places in the picture, (n, 2) [m], and nearness, (n,) [m]."""
+        """Project points (n, 3) to the picture, (n, 2) [m], with their nearness, (n,) [m]."""
         turned = (points - self.center) @ self.axes.T
         nearness = turned[:, 2]
         scale = self.distance / np.maximum(self.distance - nearness, 0.1 * self.distance)
@@ -65,7 +67,7 @@ def _axes(azimuth: float, elevation: float) -> Array:
 
 
 def best_view(body: Polyhedron, grasp: Grasp) -> View:
-    """Choose a view with contacts and fingers apart, no finger end on, few faces seen as lines."""
+    """Choose a view that keeps contacts and fingers apart and shows few faces edge-on."""
     outward = -grasp.normals if grasp.approach_directions is None else -grasp.approach_directions
     ends = grasp.positions + body.radius * outward
     areas = np.array([face.area for face in body.faces])
@@ -85,6 +87,6 @@ def best_view(body: Polyhedron, grasp: Grasp) -> View:
 
 
 def _least_gap(points: Array) -> float:
-    """Smallest distance between any two of several points (n, 2) [m]."""
+    """Return the smallest distance between any two of several points, (n, 2) [m]."""
     gaps = np.linalg.norm(points[:, None] - points[None], axis=2)
     return float(gaps[np.triu_indices(len(points), 1)].min())

@@ -298,7 +298,7 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
     fingers = ["--finger-radius-m", "0.004", "--approach-m", "0.03"]
     assert main(["run", "scan.ply", *flags, *fingers]) == Exit.GOOD
     shown = capsys.readouterr()
-    assert "not a closed surface" in shown.err
+    assert "the surface is not closed" in shown.err
     assert "4 of 4 grasps held" in shown.out
     verdict = json.loads((here / "r" / "verdicts.json").read_text())["verdicts"][0]
     assert verdict["settings"]["drive"]["radius_m"] == 0.004

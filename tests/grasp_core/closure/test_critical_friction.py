@@ -221,5 +221,5 @@ def test_bad_sets_are_refused():
         gc.critical_frictions(TETRA_CENTERS, TETRA_NORMALS)
     with pytest.raises(gc.InputError, match="at least two contacts"):
         gc.critical_frictions(np.zeros((3, 1, 3)), np.tile([0.0, 0, 1], (3, 1, 1)))
-    with pytest.raises(gc.InputError, match="or give normals"):
+    with pytest.raises(gc.InputError, match="or pass normals too"):
         gc.critical_frictions(TETRA_CENTERS[None])

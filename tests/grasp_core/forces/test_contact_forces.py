@@ -56,7 +56,7 @@ def test_a_push_on_a_tetrahedron_is_shared_by_symmetry():
 def test_a_wrench_beyond_the_limit_has_no_forces():
     body = example_object("wedge")
     grasp = gc.plan(body, 0.5, limit=1).grasps[0]
-    with pytest.raises(NoForcesError, match="no forces found"):
+    with pytest.raises(NoForcesError, match="no forces were found"):
         contact_forces(grasp, None, 0.5, [100.0, 0, 0, 0, 0, 0], normal_force=(0.0, 10.0))
 
 
@@ -219,7 +219,7 @@ def test_two_thousand_sets_of_contacts_in_closure_balance_every_wrench(objective
 
 def test_limits_are_no_remedy_where_there_are_none():
     pair = np.array([[1.0, 0, 0], [-1, 0, 0]])
-    with pytest.raises(NoForcesError, match="use more friction or place the contacts otherwise"):
+    with pytest.raises(NoForcesError, match="use more friction or move the contacts"):
         contact_forces(pair, -pair, 0.5, [0, 0, 0, 1.0, 0, 0])
 
 

@@ -57,7 +57,7 @@ def test_no_patch_spans_a_hole_in_the_surface():
     hole = whole.faces[0].centroid
     open_ = triangles[np.linalg.norm(middles - hole, axis=1) > 0.004]
     body = gc.Polyhedron.from_mesh(vertices, open_)
-    assert "not a closed surface" in " ".join(body.notes)
+    assert "the surface is not closed" in " ".join(body.notes)
     rng, lines = np.random.default_rng(0), 0
     for face in body.faces:
         for point in inside(face.polygon, rng, 40):
@@ -72,7 +72,7 @@ def test_the_centre_of_mass_can_be_given():
     vertices, triangles = bumpy_ellipsoid()
     body = gc.Polyhedron.from_mesh(vertices, triangles, center_of_mass=[0.01, 0.0, -0.01])
     np.testing.assert_array_equal(body.center_of_mass, [0.01, 0.0, -0.01])
-    with pytest.raises(gc.InputError, match="outside the object"):
+    with pytest.raises(gc.InputError, match="must be inside the object"):
         gc.Polyhedron.from_mesh(vertices, triangles, center_of_mass=[1.0, 0.0, 0.0])
     with pytest.raises(gc.InputError, match="center_of_mass"):
         gc.Polyhedron.from_mesh(vertices, triangles, center_of_mass=[0.0, np.nan, 0.0])
@@ -115,7 +115,7 @@ def test_of_an_open_surface_in_parts_only_the_largest_is_used_and_never_turned()
     small = 0.6 * large + [0.2, 0.0, 0.0]
     both = np.vstack([triangles[3:], triangles[:-2] + len(large)])
     body = gc.Polyhedron.from_mesh(np.vstack([large, small]), both)
-    assert "separate parts" in " ".join(body.notes)
+    assert "used alone" in " ".join(body.notes)
     assert body.vertices[:, 0].max() < 0.1
     inward = [face.normal @ (face.centroid - body.center_of_mass) for face in body.faces]
     assert max(inward) < 0.0

@@ -58,8 +58,8 @@ def test_the_file_has_the_fields_that_users_rely_on(text):
 
 
 CHANGES = {
-    "not JSON": (lambda _: "{", "not JSON, or not all of it"),
-    "schema from the future": (lambda d: d | {"schema": 2}, "got 2: written by a newer graspproof"),
+    "not JSON": (lambda _: "{", "not complete JSON"),
+    "schema from the future": (lambda d: d | {"schema": 2}, "got 2: a newer graspproof"),
     "unknown key": (lambda d: d | {"extra": 1}, "extra"),
     "missing key": (lambda d: {k: v for k, v in d.items() if k != "seed"}, "seed"),
     "text for a number": (lambda d: d | {"friction": "much"}, "friction"),
@@ -100,7 +100,7 @@ CHANGES = {
     ),
     "witness direction that is not its force's": (
         lambda d: _set(d, ["grasps", 0, "witness", "directions", 0], [1.0, 0.0, 0.0]),
-        "direction",
+        "witness line",
     ),
     "another family": (
         lambda d: _set(d, ["grasps", 0, "family"], "regulus"),

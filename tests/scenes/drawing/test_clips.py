@@ -78,6 +78,8 @@ def test_a_clip_shows_the_object_moving(scene, tmp_path):
 
 def test_without_graphics_the_message_says_so(scene, tmp_path, monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "no-such-library")
-    with pytest.raises(GraphicsError, match=r"no graphics: no-such-library: .+"):
+    with pytest.raises(
+        GraphicsError, match=r"MuJoCo cannot draw on this machine: no-such-library: .+"
+    ):
         write_clip(scene, np.eye(1, 19, 3), tmp_path / "clip.gif", "")
     assert not list(tmp_path.iterdir())

@@ -179,9 +179,9 @@ def test_a_picture_is_the_same_each_time(wedge, tmp_path, form):
 
 
 def test_other_endings_are_refused(wedge, tmp_path):
-    with pytest.raises(InputError, match=r"a\.exe: pictures end in \.png, \.svg"):
+    with pytest.raises(InputError, match=r"a\.exe: a picture's name must end in \.png, \.svg"):
         write_picture(*wedge, tmp_path / "a.exe")
-    with pytest.raises(InputError, match=r"a\.mp4: clips end in \.gif or \.webp"):
+    with pytest.raises(InputError, match=r"a\.mp4: a clip's name must end in \.gif or \.webp"):
         write_turning_clip(*wedge, tmp_path / "a.mp4", 0.5)
     assert not list(tmp_path.iterdir())
 

@@ -54,7 +54,7 @@ def with_entry(**changed):
         (spoiled(lambda r: r.update(friction="x")), "friction: expected a number, got"),
         (spoiled(lambda r: r.update(grasps_file=3)), "grasps_file: expected text, got 3"),
         (spoiled(lambda r: r.update(versions=[])), "versions: expected an object"),
-        (spoiled(lambda r: r.update(taste=1)), "taste: unknown key; expected are "),
+        (spoiled(lambda r: r.update(taste=1)), "taste: unknown key; known keys are "),
         (spoiled(lambda r: r.update(grasps=[])), "grasps: expected a list, got null"),
         (spoiled(lambda r: r.update(grasps=[1])), r"grasps\[0\]: "),
         (spoiled(lambda r: r["grasps"][0].pop("id")), r"grasps\[0\].id: missing"),

@@ -203,7 +203,10 @@ def test_files_of_another_kind_are_named(copy, capsys):
     assert check(copy, "--grasps", base) == Exit.INPUT
     assert base in capsys.readouterr().err
     assert main(["baseline", "check", str(copy / "grasps.json")]) == Exit.INPUT
-    assert "grasps.json: this is a grasps.json; give the baseline" in capsys.readouterr().err
+    assert (
+        "grasps.json: this is a grasps.json, not a baseline; give the baseline"
+        in capsys.readouterr().err
+    )
 
 
 def test_noise_without_repeats_is_refused(copy, capsys):

@@ -158,7 +158,7 @@ def test_dataset_rows(tmp_path, replay, capsys):
         ("x.json", "", "not JSON"),
         ("x.json", "[]", "expected a baseline, verdicts or grasps"),
         ("x.json", "{}", "expected a baseline, verdicts or grasps"),
-        ("x.json", '{"verdicts": []}', "schema: missing; expected 1"),
+        ("x.json", '{"verdicts": []}', "schema: the key is missing; expected 1"),
         ("x.json", json.dumps(HEAD), "complete: missing"),
         ("x.json", json.dumps(NO_VERDICTS), "is missing"),
     ],

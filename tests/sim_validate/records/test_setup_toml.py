@@ -78,7 +78,7 @@ def test_wrenches_of_a_task_are_read_as_they_are(tmp_path):
             '{"wrenches": [{"name": "a", "force_n": [1, 0, 1e999]}]}',
             "force_n\\[2\\]: expected",
         ),
-        ("[", "not JSON"),
+        ("[", "not complete JSON"),
     ],
 )
 def test_what_is_wrong_with_wrenches_is_said(tmp_path, text, words):

@@ -241,7 +241,7 @@ def rewritten(folder, change):
         (lambda r: r.update(schema=2), "schema: expected 1, got 2: written by a newer graspproof"),
         (lambda r: r["files"].append(r["files"][0]), "expected every path only once"),
         (lambda r: r.update(units="4"), 'units: expected a whole number, got "4"'),
-        (lambda r: r.update(taste=1), "taste: unknown key; expected are config_sha256"),
+        (lambda r: r.update(taste=1), "taste: unknown key; known keys are config_sha256"),
         (lambda r: r.pop("files"), "files: missing"),
     ],
 )
