@@ -170,7 +170,7 @@ def test_an_unfaithful_simulator_ends_a_build_before_it_begins(tmp_path, monkeyp
 
 def test_two_builds_do_not_work_in_one_folder(tmp_path):
     def another(_):
-        with pytest.raises(gc.InputError, match="another command is at work"):
+        with pytest.raises(gc.InputError, match="another command is writing to it"):
             build(CONFIG, tmp_path / "ds", Here(), silent)
         tried.append(1)
 
