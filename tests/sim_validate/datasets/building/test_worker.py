@@ -102,7 +102,7 @@ def test_a_worker_that_cannot_begin_ends_the_run(tmp_path):
     def lack(_):
         raise ModuleNotFoundError("No module named 'sim_validate'")
 
-    with pytest.raises(WorkerError, match=r"could compute .ModuleNotFoundError: No module"):
+    with pytest.raises(WorkerError, match=r"units of work .ModuleNotFoundError: No module"):
         build(CONFIG, tmp_path / "ds", Here(lack), silent)
     assert build(CONFIG, tmp_path / "ds", Here(), silent).quarantined == 0
 
