@@ -329,7 +329,7 @@ def test_a_file_is_refused_by_name_and_field(tmp_path, monkeypatch, capsys, cont
 def test_a_file_that_is_missing_or_asks_too_much_is_refused(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["analyze", "none.json"]) == Exit.INPUT
-    assert "none.json: cannot be read" in capsys.readouterr().err
+    assert "none.json: the file cannot be read" in capsys.readouterr().err
     Path("contacts.json").write_text(json.dumps(TETRAHEDRON))
     assert main(["analyze", "contacts.json", "--edges", "2501"]) == Exit.INPUT
     assert "--edges 2500 or less" in capsys.readouterr().err
