@@ -61,9 +61,9 @@ class Entry:
     noisy_trials: Count
     """Number of repeats with noise."""
     noisy_not_held: tuple[Count, ...]
-    """Numbers of the repeats with noise that were not held."""
+    """Indices of the repeats with noise in which the grasp did not hold."""
     noisy_close: tuple[Count, ...]
-    """Numbers of the repeats with noise whose load is very close to the largest that can be
+    """Indices of the repeats with noise whose load is very close to the largest that can be
     resisted."""
 
     def __post_init__(self) -> None:

@@ -62,11 +62,9 @@ def source_of(
     if found:
         raise ChangedPartError(
             f"{found[0]}: this is not the mesh that {grasps} was planned on: the mesh has changed "
-            "since, or "
-            f"is another object's. Plan on it again (graspproof plan {found[0]} --out ...) and "
-            "write the baseline with pytest --grasp-bless, put the former file back, or name the "
-            "right file with `object` "
-            "in a *.grasps.toml"
+            f"since, or is another object's. Plan on it again (graspproof plan {found[0]} --out "
+            "...) and write the baseline with pytest --grasp-bless, put the former file back, or "
+            "name the right file with `object` in a *.grasps.toml"
         )
     return Source(
         note=f"{grasps}: the mesh that it holds was tested; the file it was planned from, "

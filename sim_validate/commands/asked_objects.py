@@ -39,9 +39,9 @@ def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
         )
     if replace(mesh, limits=flag_groups.MeshLimits()) != flag_groups.Mesh():
         raise InputError(
-            f"{name} is a built-in object, so leave out "
-            "--unit, --faces, --patches, --patch-spread-deg, --patch-depth and "
-            "--center-of-mass-m, which say how mesh files are read"
+            f"{name} is a built-in object, so leave out --unit, --faces, --patches, "
+            "--patch-spread-deg, --patch-depth and --center-of-mass-m, which say how mesh files "
+            "are read"
         )
     return example_object(name)
 
@@ -90,8 +90,7 @@ def asked_finger(planning: flag_groups.Planning) -> Finger | None:
         if planning.finger_radius_m is not None and not planning.optimize:
             raise InputError(
                 "--finger-radius-m also needs --approach-m, the length of the straight free path "
-                "on which "
-                "fingers approach, or --optimize, which keeps contacts that far from edges"
+                "on which fingers approach, or --optimize, which keeps contacts that far from edges"
             )
         return None
     if planning.finger_radius_m is None:

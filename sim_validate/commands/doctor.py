@@ -114,8 +114,8 @@ def _concluded(checks: Mapping[str, bool], reporter: Reporter) -> int:
     if any(name.startswith(GATE) for name in failed):
         reporter.warn(
             "the simulator failed its checks: this MuJoCo does not give the answers of statics, "
-            "and `validate` "
-            "will refuse to certify anything; install the versions of .ci/constraints.txt"
+            "and `validate` will refuse to certify anything; install the versions of "
+            ".ci/constraints.txt"
         )
     else:
         reporter.warn("solvers or simulation give wrong answers: reinstall the package")

@@ -169,8 +169,7 @@ def _check_size(path: Path, claimed: Any) -> None:
     if not 0 <= rows <= MOST_ROWS or not 0 <= largest <= MOST_GROUP_BYTES:
         raise InputError(
             f"{path}: the file claims {rows} rows, and {largest} bytes in one group of rows; the "
-            "limits are "
-            f"{MOST_ROWS} and {MOST_GROUP_BYTES}"
+            f"limits are {MOST_ROWS} and {MOST_GROUP_BYTES}"
         )
 
 

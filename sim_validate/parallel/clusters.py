@@ -127,8 +127,7 @@ def dask_workers(workers: int, address: str | None) -> Generator[DaskCluster]:
         if any(count > 1 for count in threads.values()):
             raise InputError(
                 "a Dask worker has several threads, but work that takes too long must end its "
-                "whole "
-                "process: start workers with --nthreads 1"
+                "whole process: start workers with --nthreads 1"
             )
         yield DaskCluster(client, max(1, len(threads)))
 

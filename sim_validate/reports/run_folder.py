@@ -88,8 +88,8 @@ def runs_in(folder: Path) -> tuple[RunFolder, ...]:
     found = [path for path in inside if (path / GRASPS).is_file()]
     if not found:
         raise InputError(
-            f"{folder}: the folder has no {GRASPS}, and neither has a folder in it; "
-            f"`graspproof run OBJECT --out {folder}` writes one"
+            f"{folder}: the folder has no {GRASPS}, and neither has a folder in it; `graspproof "
+            f"run OBJECT --out {folder}` writes one"
         )
     own = found[0] == folder
     return tuple(_run(path) for path in (found[:1] if own else found))
@@ -121,8 +121,7 @@ def _by_id(path: Path, records: Sequence[Record], saved: SavedGrasps) -> Mapping
         if contacts.get(each["id"]) != each["contacts_sha256"]:
             raise InputError(
                 f"{path}: the contacts of {each['id']} differ from those in {GRASPS} beside it, "
-                "or the grasp is not "
-                "in that file: write {path.name} again, or remove it"
+                f"or the grasp is not in that file: write {path.name} again, or remove it"
             )
     found = {each["id"]: each for each in records}
     if len(found) < len(records):
@@ -140,8 +139,7 @@ def _check_summary(path: Path, summary: Record, verdicts: Sequence[Record]) -> N
         if each["held"] != (each["outcome"] == Outcome.HELD):
             raise InputError(
                 f"{path}: verdicts[{number}]: `held` is {each['held']}, which contradicts "
-                "`outcome` "
-                f"{each['outcome'].value}; write the file again, or remove it"
+                f"`outcome` {each['outcome'].value}; write the file again, or remove it"
             )
     counted = {
         "grasps": len(verdicts),
@@ -153,8 +151,7 @@ def _check_summary(path: Path, summary: Record, verdicts: Sequence[Record]) -> N
         if summary[name] != count:
             raise InputError(
                 f"{path}: summary.{name}: expected {count}, as the verdicts say, got "
-                f"{summary[name]}; write "
-                "the file again, or remove it"
+                f"{summary[name]}; write the file again, or remove it"
             )
 
 

@@ -29,9 +29,9 @@ LEAST_PUSH = 1e-3
 """Least normal force that counts as pushing, relative to the largest one. With less than half of
 it, boxes were seen to turn up to 9 % above their critical friction."""
 TILT = 2e-3
-"""Largest displacement, in grasp sizes times the critical friction. A tilt of the object acts like
-that much additional friction; servos hide a force imbalance of five times as much, in largest
-normal forces."""
+"""Largest displacement at which the object still counts as staying, relative to the grasp size
+times the critical friction. A tilt of the object acts like that much additional friction; servos
+hide a force imbalance of five times as much, in largest normal forces."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -99,8 +99,8 @@ def _check_model(physics: PhysicsSettings) -> None:
     if any(physics.gravity):
         raise InputError(
             f"physics.gravity must be zero, got {physics.gravity}: masses are scaled, so it would "
-            "not be the object's weight; give the weight as a wrench "
-            "(--weight-n, or Agenda.wrenches)"
+            "not be the object's weight; give the weight as a wrench (--weight-n, or "
+            "Agenda.wrenches)"
         )
     if physics.condim != HARD_FINGER:
         raise InputError(

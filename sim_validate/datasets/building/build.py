@@ -122,8 +122,7 @@ def _refuse_others(folder: Path, config: DatasetConfig) -> None:
     if stated.is_file() and read_text(stated) != config_to_toml(config):
         raise InputError(
             f"{folder}: the folder holds a dataset made with other settings (see its {CONFIG}); "
-            "give "
-            "another --out, or the same settings to resume that dataset"
+            "give another --out, or the same settings to resume that dataset"
         )
 
 

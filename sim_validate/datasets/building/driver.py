@@ -114,8 +114,7 @@ def _succeeded(future: "Future[None]", task: Task, engine: Engine) -> bool:
             return True
         raise WorkerError(
             f"{task.staging.folder}: a worker process has computed rows that do not appear here; "
-            "--out must be "
-            "on a file system that all processes share"
+            "--out must be on a file system that all processes share"
         )
     if type(error).__name__ in engine.ended:
         return False
@@ -123,6 +122,6 @@ def _succeeded(future: "Future[None]", task: Task, engine: Engine) -> bool:
         raise error
     name = type(error).__name__
     raise WorkerError(
-        f"a worker process failed before it could compute ({name}: {error}); install the same "
-        "packages for all workers"
+        f"a worker process cannot compute units of work ({name}: {error}); check that all worker "
+        "processes have the same packages"
     ) from error

@@ -99,8 +99,7 @@ def _check_worker(task: Task) -> None:
     if not task.staging.folder.is_dir():
         raise WorkerError(
             f"{task.staging.folder}: a worker process cannot see this folder; --out must be on a "
-            "file "
-            "system that all processes share"
+            "file system that all processes share"
         )
 
 

@@ -39,8 +39,8 @@ def require_faithful(
     if not gate.passed:
         failed = "; ".join(str(check) for check in gate.checks if not check.passed)
         raise UnfaithfulError(
-            "the simulator is not faithful with these settings, so no grasp is certified; "
-            f"these checks failed: {failed}"
+            "the simulator is not faithful with these settings, so no grasp is certified; these "
+            f"checks failed: {failed}"
         )
     return gate
 

@@ -78,8 +78,7 @@ def require_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -
     if not worst.right:
         raise UnfaithfulError(
             f"fingertip {worst.finger} does not touch the mesh as the planned face lies: the "
-            "normal is off "
-            f"by {worst.normal_error_rad:.3g} rad (at most {NORMAL_ERROR:g}), the depth by "
-            f"{worst.depth_error:.3g} of it (at most {DEPTH_ERROR:g}; nan is no contact); let "
-            "fingertips touch pads, or raise ccd_iterations"
+            f"normal is off by {worst.normal_error_rad:.3g} rad (at most {NORMAL_ERROR:g}), the "
+            f"depth by {worst.depth_error:.3g} of it (at most {DEPTH_ERROR:g}; nan is no "
+            "contact); let fingertips touch pads, or raise ccd_iterations"
         )

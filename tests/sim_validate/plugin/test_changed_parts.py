@@ -56,7 +56,7 @@ def test_a_changed_part_fails_its_tests_and_is_named(project):
     code, said = run_pytest(project, "--grasp-report", "report")
     assert code == 1
     assert "1 failed" in said
-    assert f"{part}: is not the mesh that {project / 'grasps.json'} was planned on" in said
+    assert f"{part}: this is not the mesh that {project / 'grasps.json'} was planned on" in said
     assert f"graspproof plan {part}" in said
     assert "Traceback" not in said
     (line,) = json.loads((project / "report" / "report.json").read_text())["grasps"]
@@ -92,7 +92,7 @@ def test_blessing_and_commands_refuse_a_changed_part_too(project, capsys):
         suite_from_toml(project / "part.grasps.toml").bless()
     baseline, grasps = str(project / "part.baseline.json"), str(project / "grasps.json")
     assert main(["baseline", "check", baseline, "--bless"]) == Exit.INPUT
-    assert "part.obj: is not the mesh that" in capsys.readouterr().err
+    assert "part.obj: this is not the mesh that" in capsys.readouterr().err
     assert main(["baseline", "record", grasps, "-o", baseline]) == Exit.INPUT
     assert (project / "part.baseline.json").read_text() == before
     with pytest.raises(ChangedPartError):

@@ -68,7 +68,7 @@ def test_marked_tests_run_with_each_grasp(blessed, tmp_path):
     ("marker", "message"),
     [
         ("", "needs the path of a grasps.json, or object="),
-        ("object='wedge', taste=1", "got 'taste'"),
+        ("object='wedge', taste=1", "no setting 'taste'"),
         ("'grasps.json', limit=1", "no setting 'limit' beside a file of grasps; it takes friction"),
         ("'a.json', 'b.json'", "takes the path of one file of grasps"),
         ("3", "takes the path of one file of grasps"),

@@ -335,7 +335,7 @@ def test_a_control_that_says_nothing_is_bad_news(small_run):
         ("verdicts.json", lambda each: each["summary"].update(grasps_held=99),
          r"summary\.grasps_held: expected .*, got 99"),
         ("verdicts.json", lambda each: each["verdicts"].clear(), r"summary\.grasps: expected 0"),
-        ("verdicts.json", lambda each: each["verdicts"].append(each["verdicts"][0]), "twice|99"),
+        ("verdicts.json", lambda each: each["verdicts"].append(each["verdicts"][0]), "twice|got"),
         ("regions.json", lambda each: each["grasps"][0].update(contacts_sha256="0"), "contacts"),
         ("regions.json", lambda each: each["grasps"][0]["regions"].pop(), "at least 4 items"),
         ("regions.json", lambda each: each["grasps"].append(3), r"grasps\[3\]: expected an object"),

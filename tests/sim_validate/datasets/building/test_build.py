@@ -180,7 +180,7 @@ def test_two_builds_do_not_work_in_one_folder(tmp_path):
 
 
 def test_folders_of_something_else_are_refused(copy, tmp_path):
-    with pytest.raises(gc.InputError, match="another configuration"):
+    with pytest.raises(gc.InputError, match="made with other settings"):
         build(dataclasses.replace(CONFIG, limit=3), copy, Here(), silent)
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("all my work")

@@ -58,7 +58,7 @@ def burn(*_):
 def test_a_worker_with_another_version_refuses_and_the_run_ends(tmp_path, monkeypatch, name):
     other = dict(provenance()) | {name: "0.0.1"}
     monkeypatch.setattr(driver, "provenance", lambda: other)
-    with pytest.raises(WorkerError, match=rf"another {name} .* instead of 0\.0\.1"):
+    with pytest.raises(WorkerError, match=rf"version of {name}: .* instead of 0\.0\.1"):
         build(CONFIG, tmp_path / "ds", Here(), silent)
     monkeypatch.undo()
     assert build(CONFIG, tmp_path / "ds", Here(), silent).made == 1
@@ -102,7 +102,7 @@ def test_a_worker_that_cannot_begin_ends_the_run(tmp_path):
     def lack(_):
         raise ModuleNotFoundError("No module named 'sim_validate'")
 
-    with pytest.raises(WorkerError, match=r"could compute .ModuleNotFoundError: No module"):
+    with pytest.raises(WorkerError, match=r"units of work .ModuleNotFoundError: No module"):
         build(CONFIG, tmp_path / "ds", Here(lack), silent)
     assert build(CONFIG, tmp_path / "ds", Here(), silent).quarantined == 0
 
