@@ -244,7 +244,7 @@ def _pairs(cones: Sequence[ForceCone]) -> list[_Pair]:
 
 
 def _slope(pair: _Pair, share: float) -> float:
-    """Compute the slope y / x at a share of its interval (3), with the sign of x."""
+    """Compute the slope y / x of a pair's lines of force, at a share of its interval (3)."""
     width = pair.largest_angle - pair.least_angle
     return pair.resultant * math.tan(pair.least_angle + share * width)
 

@@ -26,7 +26,7 @@ class PairFrames(NamedTuple):
     N: Array
     """Unit normals of the planes, (2, 3)."""
     tau: Array
-    """Slopes that are tried for each pair, (2, slopes)."""
+    """Slopes y / x of the lines of force that are tried for each pair, (2, slopes)."""
     tight: Array
     """Rows (alpha, beta) of alpha x + beta z >= 0 that bound z / x from below and from above, for
     each slope, (2, slopes, 2, 2)."""
