@@ -87,7 +87,7 @@ class WrenchSet:
     friction: Array
     """Coulomb coefficients, (k,)."""
     norm: Norm
-    """How normal forces are bounded: their sum is at most one newton (`l1`), or each of them is
+    """How normal forces are bounded: their sum is one newton (`l1`), or each is at most one newton
     (`linf`)."""
 
     @classmethod
