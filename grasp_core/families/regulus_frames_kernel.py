@@ -20,9 +20,9 @@ class PairFrames(NamedTuple):
     """Frames of both pairs of an attempt, with the slopes to try."""
 
     u: Array
-    """Direction that lies in both pairs' planes, (3,)."""
+    """Unit vector along the focus line, which lies in both pairs' planes, (3,)."""
     v: Array
-    """Unit vectors in each pair's plane, across u, (2, 3)."""
+    """Unit vectors in each pair's plane, perpendicular to the focus line's direction u, (2, 3)."""
     N: Array
     """Unit normals of the planes, (2, 3)."""
     tau: Array
