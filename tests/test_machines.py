@@ -58,7 +58,11 @@ def test_other_regions_and_improvements_are_noticed():
         others = {
             "exact": [*own["exact"][:-1], False],
             "places": [own["places"][0] + 2e-7, *own["places"][1:]],
-            **{kind: [moved(own[kind][0]), *own[kind][1:]] for kind, moved in MOVED.items() if own.get(kind)},
+            **{
+                kind: [moved(own[kind][0]), *own[kind][1:]]
+                for kind, moved in MOVED.items()
+                if own.get(kind)
+            },
         }
         assert len(others) == 3
         for field, value in others.items():

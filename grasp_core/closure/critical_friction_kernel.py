@@ -174,7 +174,7 @@ def _in_space(pair: Array, primal: float, friction: float, axes: Array, forces: 
 
 @loop("numpy")
 def _separates(rows: Array, z: Array, span: Array, twist: Array) -> float:
-    """Return the friction up to which a twist separates, with slow contacts put to rest."""
+    """Return the friction up to which a twist refutes closure, with slow contacts at rest."""
     still = 0.0
     for i in range(len(rows)):
         still = max(still, AT_REST * z[i, 0])

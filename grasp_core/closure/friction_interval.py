@@ -33,9 +33,9 @@ need slightly more than `FRICTIONLESS` on one machine and not on another."""
 class FrictionInterval:
     """Friction up to `lower`, at which contacts are open, and from `upper` on, closed.
 
-    The proof that the contacts are open (not in force closure) allows each to move by 1e-12 of
-    their size, because wrenches may be dependent except for rounding; the proof that they are
-    closed holds for the contacts as they are.
+    Open means not in force closure. Where wrenches are dependent except for rounding, the proof
+    that the contacts are open holds for contacts moved by at most 1e-12 of their size; the proof
+    that they are closed holds for the contacts as they are.
     """
 
     lower: float

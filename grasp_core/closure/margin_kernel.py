@@ -57,7 +57,7 @@ SHORTER = 0.99
 def least_cone_sum(
     columns: Array, mean: Array, share: float, pair: Array, y: Array
 ) -> tuple[float, float]:
-    """Solve the programs (1) and (2), up to a gap between their values.
+    """Solve the margin program (1) and its dual (2), up to a gap between their values.
 
     Args:
         columns: Columns of each A_i, as rows, (k, 3, 6).

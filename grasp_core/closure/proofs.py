@@ -160,7 +160,7 @@ def proved_margin(
 def margin_ceiling(
     twist: Array, arms: Array, normals: Array, friction: Array, caution: float = 1.0
 ) -> float:
-    """Compute the bound (3) of the margin, from a twist on which no support is positive.
+    """Compute an upper bound (3) of the margin from a twist on which no support is positive.
 
     Args:
         twist: Velocity at the mean contact and angular velocity, (6,).

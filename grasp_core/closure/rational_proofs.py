@@ -220,15 +220,15 @@ def _solution(rows: list[Exact], right: Exact) -> Exact | None:
 
 
 def _inside(force: Exact, normal: Exact, slope: Fraction) -> bool:
-    """Return whether inequality (1) holds, `slope` being the square of the friction."""
+    """Return whether a force is inside its friction cone, (1); `slope` is mu^2."""
     along, across = _squares(force, normal)
     return _dot(force, normal) > 0 and across < slope * along
 
 
 def _departs(velocity: Exact, normal: Exact, slope: Fraction | None) -> bool:
-    """Return whether (2) holds, or the speed is at most `SAME`.
+    """Return whether a contact departs steeply enough, (2), or its speed is at most `SAME`.
 
-    With `slope` None, (2) must hold for every friction.
+    `slope` is the square of the friction; with None, (2) must hold for every friction.
     """
     if _dot(velocity, velocity) <= SAME**2:
         return True

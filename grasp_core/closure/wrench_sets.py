@@ -52,8 +52,8 @@ def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
     """Compute levers of contacts (k, 3) about a centre, divided by the torque scale.
 
     Raises:
-        InputError: The scale or the centre is so far from those of the contacts that rounding
-            would decide.
+        InputError: The scale or the centre does not fit the contacts: rounding would
+            decide.
     """
     scale = positive(torque_scale, "torque_scale")
     spread = np.ptp(points, axis=0)
@@ -87,7 +87,7 @@ class WrenchSet:
     friction: Array
     """Coulomb coefficients, (k,)."""
     norm: Norm
-    """How normal forces are bounded: their sum is at most one newton (`l1`), or each of them is
+    """How normal forces are bounded: their sum is one newton (`l1`), or each is at most one newton
     (`linf`)."""
 
     @classmethod
@@ -152,13 +152,13 @@ class WrenchSet:
         return float(longest * np.sqrt(1.0 + self.friction.max() ** 2))
 
     def supports(self, directions: Array) -> Array:
-        """Compute the support (1) in several directions (n, 6), without the forces, (n,)."""
+        """Compute how far the set reaches in several directions (n, 6), its support (1), (n,)."""
         slopes = (directions @ self.G).reshape(len(directions), -1, 3)
         each = slopes[:, :, 0] + self.friction * np.hypot(slopes[:, :, 1], slopes[:, :, 2])
         return each.max(axis=1) if self.norm == "l1" else np.maximum(each, 0.0).sum(axis=1)
 
     def support(self, direction: Array) -> tuple[float, Array]:
-        """Compute the support (1) in a direction, with the local forces that attain it, (3k,)."""
+        """Compute how far the set reaches in a direction, and the local forces that attain it."""
         slopes = (direction @ self.G).reshape(-1, 3)
         across = np.hypot(slopes[:, 1], slopes[:, 2])
         each = slopes[:, 0] + self.friction * across

@@ -66,7 +66,7 @@ def corners_of(body: Polyhedron) -> Corners:
 def disc_limits(
     corners: Corners, normals: Array, faces: Indices, axes: Array, half_angles: Array
 ) -> Array:
-    """Bound the discs of many quadruples from above, (q, 4).
+    """Bound the radius of the smallest disc of many quadruples from above, (q, 4).
 
     Args:
         corners: Corners of all faces.
@@ -110,10 +110,11 @@ def distances(corners: Corners) -> Array:
 
 
 def widths_apart(faces: Indices, apart: Array, halves: Array, leaning: Array) -> Array:
-    """Bound s_i + s_j from above for axes that lean from the normals, (q, 4, 4).
+    """Bound the sum of two contacts' distances from a common focus, (q, 4, 4).
 
-    The vector d of (2) has the length 2 / |a_i - a_j|, and the angle between the axes differs from
-    the angle between the normals by at most the sum of both leans.
+    These are the s_i + s_j of (2), for axes that lean from the normals. The vector d of (2) has the
+    length 2 / |a_i - a_j|, and the angle between the axes differs from the angle between the
+    normals by at most the sum of both leans.
 
     Args:
         faces: Faces of each quadruple, (q, 4).

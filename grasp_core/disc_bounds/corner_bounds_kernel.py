@@ -58,7 +58,7 @@ def fill(
 
 @loop()
 def reaches(corners: Corners, faces: Indices, axes: Array) -> tuple[float, float]:
-    """Compute the bounds (1) on the mean distance of a focus before and behind its contacts."""
+    """Bound the mean distance of contacts from a focus before and behind them, by (1)."""
     weights, before, behind = np.empty(FINGERS), 0.0, 0.0
     balancing_weights(axes, weights)
     for i in range(FINGERS):
@@ -69,7 +69,7 @@ def reaches(corners: Corners, faces: Indices, axes: Array) -> tuple[float, float
 
 @loop()
 def _width(corners: Corners, faces: Indices, axes: Array, pair: tuple[int, int]) -> float:
-    """Compute the bound (2) on s_i + s_j."""
+    """Bound the sum of two contacts' distances s_i and s_j from a common focus, by (2)."""
     (i, j), apart = pair, np.empty(3)
     for d in range(3):
         apart[d] = axes[i, d] - axes[j, d]
@@ -88,7 +88,7 @@ def _across(
     places: tuple[int, int, int, int],
     half: float,
 ) -> float:
-    """Compute the bound on r by (3) and (4), with N across the axes of the first two fingers."""
+    """Bound a disc's radius by the faces' heights across the axes of two fingers, (3) and (4)."""
     N, limit, pair = np.empty(3), np.inf, FINGERS // 2
     cross(axes[places[0]], axes[places[1]], N)
     length = np.sqrt(dotted(N, N))
@@ -118,7 +118,7 @@ def _across(
 
 @loop()
 def _lean(normal: Array, N: Array) -> float:
-    """Compute |T'N|: how far a disc of radius one reaches along N."""
+    """Compute |T'N|, which is how far a disc of radius one reaches along N."""
     return np.sqrt(max(1.0 - dotted(normal, N) ** 2, 0.0))
 
 

@@ -61,7 +61,11 @@ def pencil_bounds(
 def _depth_along(
     faces: FaceTable, attempts: Attempts, place: tuple[int, int], cell: float, u: Array
 ) -> tuple[Array, float, float]:
-    """Express the depth s of a finger by (1): slopes in (x0, k), constant, sign of k u."""
+    """Express a finger's distance s from its focus by (1), as a linear function.
+
+    Returns:
+        Its slopes in (x0, k), its constant, and the sign of k u.
+    """
     a, finger = place
     face, s = attempts.faces[a, finger], np.empty(K + 1)
     n, o = faces.normals[face], faces.origins[face]
@@ -82,7 +86,7 @@ def _ball_row(
     rows: Rows,
     row: int,
 ) -> int:
-    """Fill in the row (2): the ball about a focus stays in the cones of a disc."""
+    """Fill in row (2), which keeps the ball about a focus in the cones of a disc's points."""
     (a, finger), (s, s0, _) = place, depth
     face, psi, largest = attempts.faces[a, finger], attempts.half_angles[a], 0.0
     for other in range(FINGERS):
@@ -105,7 +109,7 @@ def _edge_rows(
     rows: Rows,
     row: int,
 ) -> int:
-    """Fill in rows that keep the disc about q = c - s a inside its face."""
+    """Fill in rows that keep the disc around a contact inside its face."""
     (a, finger, u), (s, s0, sign) = setting, depth
     face, axis = attempts.faces[a, finger], attempts.axes[a, finger]
     T, o = faces.frames[face], faces.origins[face]
@@ -136,7 +140,7 @@ def _near_row(
     rows: Rows,
     row: int,
 ) -> int:
-    """Fill in the row (5): a focus of cell B does not pass the other pair's crossing point."""
+    """Fill in row (5), by which a focus of cell B does not pass the other pair's crossing point."""
     (a, finger, u), (s, s0, sign) = setting, depth
     face = attempts.faces[a, finger]
     toward = sign * dotted(attempts.axes[a, finger], u)

@@ -124,7 +124,10 @@ def _best(
 
 
 def _reaches(pieces: Sequence[FacePiece], cones: Sequence[ForceCone]) -> tuple[float, float]:
-    """Bound the weighted mean of s_i in (5), for a focus before and behind all fingers."""
+    """Bound the weighted mean distance of contacts from a focus before or behind all fingers.
+
+    These are the s_i of (5).
+    """
     heights = [
         cone.axis @ (piece.origin[:, None] + piece.frame @ piece.corners.T)
         for piece, cone in zip(pieces, cones, strict=True)
@@ -177,9 +180,9 @@ def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array, contact: Arr
 
 
 def concurrent_radius_bounds(reaches: Array, _: Array, half_angles: Array) -> Array:
-    """Bound the discs of quadruples from above by (5), (..., 1).
+    """Bound the disc radii of concurrent grasps from above, (..., 1).
 
-    The least s_i is at most the weighted mean of all s_i.
+    The bound is (5), as the least s_i is at most the weighted mean of all s_i.
 
     Args:
         reaches: Upper bounds on the weighted mean of s_i, any shape [object radii].

@@ -44,7 +44,7 @@ class Construction:
     place: Callable[[Sequence[FacePiece], Sequence[ForceCone], float], Placement | NoPlacement]
     """Function that places contacts, given pieces, force cones and the least merit that counts."""
     limits: slice | None
-    """Columns of `disc_limits` that belong to the finger orders; None where no disc is claimed."""
+    """Columns of `disc_limits`, one per finger order; None where no disc is claimed."""
     admits: Callable[[Array, Array], NDArray[np.bool_]]
     """Function that returns for which quadruples a program may be feasible, (q,), from normals in
     finger order, (q, 4, 3), and half-angles, (q,) [rad]."""

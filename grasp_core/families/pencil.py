@@ -109,7 +109,7 @@ def place_pencil(
 def pencil_radius_bounds(
     reaches: Array, widths: Array, half_angles: Array, orders: Sequence[FaceQuadruple]
 ) -> Array:
-    """Bound the discs of quadruples from above, for several finger orders, (..., orders).
+    """Bound the disc radii of pencil grasps from above, for several finger orders.
 
     With kappa >= cos(psi), (2) and (3) leave r <= s tan(psi / 2) for each finger, and so for the
     mean of any fingers. Two fingers of a pair share a focus, hence the mean of their s is at most
@@ -227,7 +227,7 @@ def _rows(
 def _near_rows(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone], discs: _Discs, u: Array
 ) -> tuple[Array, Array]:
-    """Build the rows (5) that keep the foci of cell B near each other, one row per finger."""
+    """Build the rows (5), which keep the foci of cell B near each other, one row per finger."""
     # u_1 = u and u_2 = -u
     toward = np.repeat(CELL_A, 2) * -np.array([float(cone.axis @ u) for cone in cones])
     across = np.array([abs(float(piece.normal @ u)) for piece in pieces])
@@ -240,6 +240,6 @@ def _near_rows(
 
 
 def _kappa(piece: FacePiece, cone: ForceCone) -> float:
-    """Compute kappa in (2): how far a disc of radius one reaches towards a cone's facets."""
+    """Compute kappa in (2), how far a disc of radius one reaches towards a cone's facets."""
     lean = float(angles_between(piece.normal, cone.axis))
     return 1.0 if lean >= cone.half_angle else math.cos(cone.half_angle - lean)

@@ -20,13 +20,13 @@ class PairFrames(NamedTuple):
     """Frames of both pairs of an attempt, with the slopes to try."""
 
     u: Array
-    """Direction that lies in both pairs' planes, (3,)."""
+    """Unit vector along the focus line, which lies in both pairs' planes, (3,)."""
     v: Array
-    """Unit vectors in each pair's plane, across u, (2, 3)."""
+    """Unit vectors in each pair's plane, perpendicular to the focus line's direction u, (2, 3)."""
     N: Array
     """Unit normals of the planes, (2, 3)."""
     tau: Array
-    """Slopes that are tried for each pair, (2, slopes)."""
+    """Slopes y / x of the lines of force that are tried for each pair, (2, slopes)."""
     tight: Array
     """Rows (alpha, beta) of alpha x + beta z >= 0 that bound z / x from below and from above, for
     each slope, (2, slopes, 2, 2)."""

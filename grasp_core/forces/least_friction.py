@@ -25,8 +25,8 @@ IMPROVEMENT = 1e-4
 """Share by which the coefficient must fall in a round for the iteration to go on; it ends some 1e-4
 above the least."""
 MAX_ROUNDS = 12
-"""Largest number of programs: the excess falls by half or more in each, and faster unless a finger
-does not push."""
+"""Largest number of programs solved: the excess over the least friction falls by half or more in
+each, and faster unless a finger does not push."""
 ROUNDING = 1e-9
 """Largest imbalance, and largest distance outside the limits, in units of the largest force."""
 FRICTIONLESS = 1e-6

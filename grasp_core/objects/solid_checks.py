@@ -137,7 +137,7 @@ def oriented(points: Array, corners: Indices, most: int) -> tuple[Indices, bool]
         )
         raise MeshError(MeshRefusal.OVERLAP, message)
     if len(bodies) > 1:
-        message = f"the mesh holds {len(bodies)} separate solids; give each its own file"
+        message = f"the mesh holds {len(bodies)} solids, expected one solid; give each its own file"
         raise MeshError(MeshRefusal.SEPARATE, message)
     for cavity in cavities:
         inside = sum(intersection_volume(body, cavity) for body in bodies)

@@ -58,8 +58,7 @@ class Improvement:
     before: FerrariCanny
     after: FerrariCanny
     clearances: tuple[float, ...]
-    """Distance [m] that each contact had to keep from the edges of its face, (4,); 0 if not moved.
-    """
+    """Distance [m] that each contact had to keep from the edges of its face in the search, (4,)."""
 
     @property
     def gain(self) -> float:

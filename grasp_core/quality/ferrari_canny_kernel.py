@@ -23,7 +23,7 @@ from grasp_core.solvers.hull_kernel import (
 )
 
 ROOM = 2048
-"""Number of simplices that fit at first; the room is doubled whenever it does not suffice."""
+"""Number of simplices for which there is room at first; it is at least doubled when it is full."""
 GROWN, OUTSIDE, FLAT, LOST = 0, 1, 2, 3
 """How growing ends: with a polytope around zero, with zero outside, with all points in a plane, or
 with a hull that rounding has broken."""

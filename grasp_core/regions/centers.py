@@ -27,7 +27,7 @@ from grasp_core.solvers.ties import first_best, nearest_optimum, on_grid
 
 MOVES = 12  # of all centres, at most
 MOVING = 8
-"""While centres move, covers have at most this many times fewer cones."""
+"""Factor by which covers have fewer cones while centres move than are allowed in the end."""
 WORTH = 1.005
 """Least growth of the radius, as a factor, at which centres are moved once more."""
 FARTHEST = 1.0
@@ -40,9 +40,9 @@ beyond it are left out of the program."""
 
 
 def better_centers(grounds: Grounds, ys: Array) -> Array:
-    """Find centres with larger discs than `ys` has, in plane coordinates, (k, 2).
+    """Find centres with larger discs than around `ys`, in plane coordinates, (k, 2).
 
-    The result is `ys` itself if none are found.
+    The result is `ys` itself if no radius is proved around it.
     """
     coarse = replace(grounds, cones=grounds.cones // MOVING)
     best = largest_discs(coarse, ys)

@@ -35,7 +35,7 @@ discs."""
 BEGINNINGS = (1.0, 0.6)
 """Radii of the discs from which large areas grow, relative to the largest proved ones."""
 GROWING = 4
-"""Factor by which the attempts to grow have fewer cones than the proof before."""
+"""Factor by which the covers of attempts to grow have fewer cones than are allowed."""
 
 
 def shared_out(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) -> list[Array]:

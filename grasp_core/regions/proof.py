@@ -147,7 +147,7 @@ class TwistCover:
         return bool(np.linalg.svd(self.axes / lengths[:, None], compute_uv=False)[-1] > SLACK)
 
     def _powerful(self, forces: Array, rays: Array, regions: Sequence[Array]) -> bool:
-        """Return whether h > 0 in (2) for each cone's forces on its rays."""
+        """Return whether forces have positive power, h > 0 in (2), on the rays of each cone."""
         # beyond this the rays would not be exact, nor the cuts (4)
         if np.abs(rays).max(initial=0.0) > LARGEST:
             return False

@@ -92,7 +92,7 @@ def _by_least_squares(C: Array, D: Array) -> Array:
 
 
 def _weights(C: Array, d: Array) -> Array:
-    """Compute the vector v of the module's derivation; zero after too many iterations."""
+    """Compute the least-squares weights v of the module; zero after too many iterations."""
     target = np.zeros(C.shape[1] + 1)
     target[-1] = -1.0
     try:

@@ -133,5 +133,5 @@ def test_bad_numbers_are_refused(bad):
 
 
 def test_a_direction_of_approach_must_point_somewhere():
-    with pytest.raises(gc.InputError, match="approach must be a direction"):
+    with pytest.raises(gc.InputError, match="approach must not be the zero vector"):
         scenes.FingerSettings(approach=(0.0, 0.0, 0.0))

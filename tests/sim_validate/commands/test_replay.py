@@ -155,7 +155,7 @@ def test_dataset_rows(tmp_path, replay, capsys):
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("x.json", "", "not JSON"),
+        ("x.json", "", "not complete JSON"),
         ("x.json", "[]", "expected a baseline, verdicts or grasps"),
         ("x.json", "{}", "expected a baseline, verdicts or grasps"),
         ("x.json", '{"verdicts": []}', "schema: the key is missing; expected 1"),
