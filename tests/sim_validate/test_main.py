@@ -46,7 +46,7 @@ def test_run_writes_grasps_verdicts_and_scenes_and_tells(here, capsys):
 
 
 def test_a_second_run_leaves_nothing_of_the_first_behind(here):
-    assert main(["run", "box", "--limit", "2", "--out", "results", "-q"]) == Exit.GOOD
+    assert main(["run", "box", "--limit", "1", "--out", "results", "-q"]) == Exit.GOOD
     kept = here / "results" / "scenes" / "mine.xml"
     kept.write_text("<mujoco/>")
     nothing = ["--cones", "normal", "--family", "concurrent", "--out", "results", "-q"]
@@ -107,7 +107,7 @@ def test_plan_validate_and_scene_work_on_the_same_file(here, capsys):
 def test_one_and_two_processes_give_the_same_verdicts(here, monkeypatch):
     """To the last digit: whatever is simulated was planned with digits that solvers agree on."""
     monkeypatch.setattr(processes, "UNITS_PER_PROCESS", 2)
-    assert main(["plan", "icosahedron", "--limit", "4", "--out", "p", "-q"]) == Exit.GOOD
+    assert main(["plan", "tetrahedron", "--limit", "4", "--out", "p", "-q"]) == Exit.GOOD
     for jobs in ("1", "2"):
         command = ["validate", "p/grasps.json", "--jobs", jobs, "--out", jobs, "-q"]
         assert main(command) == Exit.GOOD
@@ -118,7 +118,7 @@ def test_one_and_two_processes_give_the_same_verdicts(here, monkeypatch):
 @pytest.mark.usefixtures("here")
 def test_json_output_is_one_document_and_the_rest_goes_elsewhere(capsys):
     commands = {
-        "plan wedge --limit 1 --out p": 0, "inspect box": 0, "objects": 0, "run tetrahedron --no-report": 0,
+        "plan wedge --limit 1 --out p": 0, "inspect box": 0, "objects": 0, "run tetrahedron --limit 1 --no-report": 0,
         "doctor": 0, "report graspproof-out/tetrahedron": 0,
         "run box --family pencil --cones normal": 5,
         "plan box --family pencil --cones normal --out b": 5, "validate b/grasps.json": 5,
@@ -340,7 +340,7 @@ def test_planning_flags_reach_the_planner(capsys):
     assert main(["plan", "double-wedge-bar", *flags]) == Exit.GOOD
     assert "0 undecided, 0 left open" in capsys.readouterr().out
     reach = ["--finger-radius-m", "0.006", "--approach-m", "0.05", "--edge-clearance-m", "0.001"]
-    assert main(["plan", "l-bracket", *reach, "--share-faces-m", "0.01", "--limit", "150"]) == 0
+    assert main(["plan", "l-bracket", *reach, "--share-faces-m", "0.01", "--limit", "40"]) == 0
     assert "out of reach" in capsys.readouterr().out
 
 
