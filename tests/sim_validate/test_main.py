@@ -118,8 +118,9 @@ def test_one_and_two_processes_give_the_same_verdicts(here, monkeypatch):
 @pytest.mark.usefixtures("here")
 def test_json_output_is_one_document_and_the_rest_goes_elsewhere(capsys):
     commands = {
-        "plan wedge --limit 1 --out p": 0, "inspect box": 0, "objects": 0, "run tetrahedron --limit 1 --no-report": 0,
-        "doctor": 0, "report graspproof-out/tetrahedron": 0,
+        "plan wedge --limit 1 --out p": 0, "inspect box": 0, "objects": 0,
+        "run tetrahedron --limit 1 --no-report": 0, "doctor": 0,
+        "report graspproof-out/tetrahedron": 0,
         "run box --family pencil --cones normal": 5,
         "plan box --family pencil --cones normal --out b": 5, "validate b/grasps.json": 5,
         "scene p/grasps.json --out s": 0,

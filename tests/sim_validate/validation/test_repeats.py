@@ -12,6 +12,7 @@ from sim_validate.simulation.noise import Noise
 from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.setup import Agenda, NamedWrench, Setup
 from sim_validate.validation.repeats import disturbed_in, heavier, interval, noisy_trial
+from tests.marks import more
 from tests.sim_validate.rigs import grasps
 
 STILL = Noise(shift=0.0, turn_deg=0.0, normal_deg=0.0, friction=0.0, mass=0.0)
@@ -23,12 +24,13 @@ def repeated(body, grasp, friction, **changed):
     return sv.validate(body, grasp, friction, agenda=agenda)
 
 
-def test_analysis_and_simulation_agree_on_every_repeat():
+@pytest.mark.parametrize("each", [1, *more(2)])
+def test_analysis_and_simulation_agree_on_every_repeat(each):
     """With noise that opens contacts, makes loads too large, and lets fingers miss."""
     held = let_go = missed = 0
     much = Noise(shift=0.02, turn_deg=3.0, normal_deg=3.0, friction=0.3, mass=0.3)
     for name in ("wedge", "screwdriver", "mug"):
-        body, found = grasps(name, 0.5, 2)
+        body, found = grasps(name, 0.5, each)
         for grasp in found:
             verdict = repeated(body, grasp, 0.5, noise=much)
             assert verdict.held
@@ -40,7 +42,7 @@ def test_analysis_and_simulation_agree_on_every_repeat():
                 held += trial.predicted
                 missed += trial.wrench == "" and not trial.predicted
                 let_go += trial.wrench != ""
-    assert min(held, let_go, missed) >= 3
+    assert min(held, let_go, missed) >= 1 + each
 
 
 def test_without_noise_every_repeat_holds():
