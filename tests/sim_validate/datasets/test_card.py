@@ -11,7 +11,7 @@ from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.parquet import read_rows
 from sim_validate.datasets.verifying.verify import verify
 from sim_validate.main import main
-from tests.sim_validate.datasets.small import SMALL, build_small
+from tests.sim_validate.datasets.small import SMALL
 
 pytest.importorskip("pyarrow")
 yaml = pytest.importorskip("yaml")
@@ -28,8 +28,8 @@ HOSTILE = (
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return build_small(tmp_path_factory.mktemp("card") / "ds")
+def folder(small_dataset):
+    return small_dataset
 
 
 @pytest.fixture(scope="module")
