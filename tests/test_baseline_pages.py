@@ -16,7 +16,7 @@ from sim_validate.baselines.suite_toml import KINDS, suite_from_toml
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.simulation.noise import Noise
-from tests.sim_validate.plugin.project import run_pytest_alone
+from tests.sim_validate.plugin.project import run_pytest, run_pytest_alone
 
 ROOT = Path(__file__).parent.parent
 BEFORE, FIRST_STEPS, AFTER = re.fullmatch(
@@ -31,18 +31,24 @@ def block(text, language):
 
 
 @pytest.fixture
-def project(tmp_path, monkeypatch):
-    """A folder in which the commands of the first steps were run."""
+def first_steps(tmp_path, monkeypatch):
+    """Runs the commands of the first steps in a folder, with so many grasps, and tells which."""
     monkeypatch.chdir(tmp_path)
-    lines = block(FIRST_STEPS, "sh").splitlines()
-    assert len(lines) == 3
-    for line in lines:
-        assert main([*shlex.split(line)[1:], "-q"]) == Exit.GOOD
-    return tmp_path
+
+    def followed(grasps):
+        said = block(FIRST_STEPS, "sh")
+        assert said.count("\n") == 3
+        assert said.count(" --limit 3 ") == 1
+        for line in said.replace("--limit 3", f"--limit {grasps}").splitlines():
+            assert main([*shlex.split(line)[1:], "-q"]) == Exit.GOOD
+        return tmp_path
+
+    return followed
 
 
 @pytest.mark.slow
-def test_the_first_steps_in_a_project_of_somebody_else(project):
+def test_the_first_steps_in_a_project_of_somebody_else(first_steps):
+    project = first_steps(3)
     assert (project / "results.xml").is_file()
     (project / "wedge.grasps.toml").write_text(block(FIRST_STEPS, "toml"))
     (project / "test_mine.py").write_text(block(FIRST_STEPS, "py"))
@@ -57,11 +63,12 @@ def test_the_first_steps_in_a_project_of_somebody_else(project):
     assert "3 same, 2 stable" in (project / "report" / "index.html").read_text()
 
 
-def test_the_tests_of_the_page_pass(project):
+def test_the_tests_of_the_page_pass(first_steps):
+    project = first_steps(1)
     (project / "test_page.py").write_text(block(PAGE, "python"))
-    code, said = run_pytest_alone(project, "test_page.py", "--strict-markers", "-W", "error")
+    code, said = run_pytest(project, "test_page.py", "--strict-markers", "-W", "error")
     assert code == 0, said
-    assert "5 passed" in said
+    assert "3 passed" in said
 
 
 def test_all_settings_are_shown(tmp_path):

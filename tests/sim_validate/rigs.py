@@ -1,5 +1,7 @@
 """Grasps on the bench, as several tests need them."""
 
+from functools import cache
+
 import numpy as np
 
 import grasp_core as gc
@@ -15,6 +17,7 @@ from sim_validate.simulation.simulate import Bench
 MAX_FORCE = 10.0
 
 
+@cache
 def grasps(name, friction, limit, families=("concurrent",), cones="normal"):
     body = scenes.example_object(name)
     return body, gc.plan(body, friction, limit=limit, families=families, cones=cones).grasps

@@ -126,17 +126,20 @@ def test_moving_turning_and_scaling_the_object_moves_its_grasps(name):
     assert len(here.grasps) >= 50
 
 
+FEW, MANY = (0.1, 0.5), (0.05, 0.1, 0.2, 0.35, 0.7)
+
+
 @pytest.mark.parametrize(
-    ("name", "least"),
+    ("name", "frictions", "least"),
     [
-        ("wedge", 200),
-        pytest.param("random-10-1", 500, marks=MORE),
-        pytest.param("random-12-1", 1000, marks=MORE),
+        ("wedge", FEW, 50),
+        pytest.param("wedge", MANY, 200, marks=MORE),
+        pytest.param("random-10-1", MANY, 500, marks=MORE),
+        pytest.param("random-12-1", MANY, 1000, marks=MORE),
     ],
 )
-def test_more_friction_never_loses_a_grasp(name, least):
+def test_more_friction_never_loses_a_grasp(name, frictions, least):
     body, tested = example_object(name), 0
-    frictions = (0.05, 0.1, 0.2, 0.35, 0.7)
     plans = [gc.plan(body, friction, families=DISCS, cones="normal") for friction in frictions]
     for less, greater in pairwise(plans):
         radii = {grasp.id: grasp.radius for grasp in greater.grasps}
@@ -165,8 +168,15 @@ def test_symmetric_objects_are_planned_at_small_friction(friction):
     assert {grasp.critical_friction for grasp in found.grasps} == {0.0}
 
 
-@pytest.mark.parametrize("name", ["random-10-1", "octahedron"])
-@pytest.mark.parametrize("family", DISCS)
+@pytest.mark.parametrize(
+    ("name", "family"),
+    [
+        ("random-10-1", "concurrent"),
+        ("octahedron", "pencil"),
+        pytest.param("random-10-1", "pencil", marks=MORE),
+        pytest.param("octahedron", "concurrent", marks=MORE),
+    ],
+)
 def test_a_limit_returns_the_best_of_all_grasps(name, family):
     """Also where symmetry makes many grasps equally good."""
     body = example_object(name)
@@ -189,7 +199,8 @@ def test_a_larger_limit_only_adds_grasps(name):
 
 
 def test_plans_are_the_same_every_time():
-    one, two = (gc.plan(example_object("wedge"), 0.4) for _ in range(2))
+    one, two = (gc.plan(example_object("box"), 0.4) for _ in range(2))
+    assert len(one.grasps) >= 20
     assert [g.id for g in one.grasps] == [g.id for g in two.grasps]
     assert len({g.id for g in one.grasps}) == len(one.grasps)
     for a, b in zip(one.grasps, two.grasps, strict=True):
@@ -323,7 +334,7 @@ def test_a_limit_is_shared_between_the_families():
 
 
 def test_grasps_are_streamed_as_they_are_found():
-    body = example_object("wedge")
+    body = example_object("box")
     streamed = gc.iter_grasps(body, 0.4)
     first = next(streamed)
     everything = {first.id} | {grasp.id for grasp in streamed}
@@ -363,7 +374,7 @@ def test_radii_stay_below_the_bounds_that_prune():
 
 def test_tilted_cones_never_make_discs_smaller():
     tested = larger = 0
-    for name in ("wedge", "random-12-1"):
+    for name in ("wedge", "random-10-1"):
         body = example_object(name)
         paper, ours = (
             {g.id: g.radius for g in gc.plan(body, 0.3, families="concurrent", cones=cones).grasps}

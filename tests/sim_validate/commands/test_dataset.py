@@ -19,6 +19,7 @@ from tests.patience import HANGING_S
 
 pytest.importorskip("pyarrow")
 FLAGS = ("--friction", "0.4", "--friction", "0.5", "--family", "concurrent", "--limit", "2")
+LIGHT = ("--friction", "0.5", "--family", "concurrent", "--limit", "1")
 OBJECTS = ("tetrahedron", "wedge", "prism")
 
 
@@ -36,11 +37,20 @@ def command(folder, jobs):
             "--out", str(folder), "--jobs", str(jobs), "-q"]  # fmt: skip
 
 
+def built(folder, names, flags):
+    assert main(["dataset", "build", *names, *flags, "--out", str(folder), "-q"]) == Exit.GOOD
+    return folder
+
+
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("made") / "ds"
-    assert main(["dataset", "build", *OBJECTS, *FLAGS, "--out", str(folder), "-q"]) == Exit.GOOD
-    return folder
+    return built(tmp_path_factory.mktemp("made") / "ds", OBJECTS[:2], LIGHT)
+
+
+@pytest.fixture(scope="module")
+def large_dataset(tmp_path_factory):
+    """What the command of killed processes makes."""
+    return built(tmp_path_factory.mktemp("large") / "ds", OBJECTS, FLAGS)
 
 
 def test_a_dataset_is_made_and_nothing_is_wrong_with_it(dataset, capsys):
@@ -72,7 +82,7 @@ def test_a_toml_file_says_the_same_as_flags(dataset, tmp_path):
 def test_a_bad_mesh_is_left_out_and_said(tmp_path, capsys):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "bad.stl").write_text("solid nothing")
-    names = ["tetrahedron", str(tmp_path / "meshes"), *FLAGS]
+    names = ["tetrahedron", str(tmp_path / "meshes"), *FLAGS[:4], *LIGHT[2:]]
     code = main(["dataset", "build", *names, "--jobs", "1", "--out", str(tmp_path / "ds")])
     assert code == Exit.PARTIAL
     assert "quarantine.jsonl" in capsys.readouterr().err
@@ -81,7 +91,7 @@ def test_a_bad_mesh_is_left_out_and_said(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_a_driver_killed_at_random_moments_loses_nothing(dataset, tmp_path):
+def test_a_driver_killed_at_random_moments_loses_nothing(large_dataset, tmp_path):
     folder, rng, killed = tmp_path / "ds", np.random.default_rng(0), 0
     for _ in range(20):
         process = subprocess.Popen(command(folder, 2), start_new_session=True)
@@ -94,11 +104,11 @@ def test_a_driver_killed_at_random_moments_loses_nothing(dataset, tmp_path):
     assert killed >= 3
     subprocess.run(command(folder, 2), check=True)
     assert verify(folder) == []
-    assert files(folder) == files(dataset)
+    assert files(folder) == files(large_dataset)
 
 
 @pytest.mark.slow
-def test_a_worker_that_is_killed_costs_nothing_but_time(dataset, tmp_path):
+def test_a_worker_that_is_killed_costs_nothing_but_time(large_dataset, tmp_path):
     folder = tmp_path / "ds"
     process = subprocess.Popen(command(folder, 2))
     children, killed = Path(f"/proc/{process.pid}/task/{process.pid}/children"), 0
@@ -110,7 +120,7 @@ def test_a_worker_that_is_killed_costs_nothing_but_time(dataset, tmp_path):
                 killed += 1
     assert killed
     assert process.wait(timeout=HANGING_S) == Exit.GOOD
-    assert files(folder) == files(dataset)
+    assert files(folder) == files(large_dataset)
 
 
 @pytest.mark.slow

@@ -7,9 +7,16 @@ import pytest
 from sim_validate.datasets.building.build import build
 from tests.sim_validate.datasets.engines import Here, silent
 from tests.sim_validate.datasets.pair import CONFIG
+from tests.sim_validate.datasets.small import build_small
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
+def small_dataset(tmp_path_factory):
+    """The dataset of `small.py`, only to be read."""
+    return build_small(tmp_path_factory.mktemp("small") / "ds")
+
+
+@pytest.fixture(scope="session")
 def dataset(tmp_path_factory):
     folder = tmp_path_factory.mktemp("dataset") / "ds"
     built = build(CONFIG, folder, Here(), silent)

@@ -11,7 +11,7 @@ from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.parquet import read_rows
 from sim_validate.datasets.verifying.verify import verify
 from sim_validate.main import main
-from tests.sim_validate.datasets.small import SMALL, build_small
+from tests.sim_validate.datasets.small import SMALL
 
 pytest.importorskip("pyarrow")
 yaml = pytest.importorskip("yaml")
@@ -28,8 +28,8 @@ HOSTILE = (
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return build_small(tmp_path_factory.mktemp("card") / "ds")
+def folder(small_dataset):
+    return small_dataset
 
 
 @pytest.fixture(scope="module")
@@ -168,6 +168,7 @@ def test_licences_have_their_usual_names_where_they_are_known(manifest, given, h
 
 def test_a_build_says_once_which_flags_are_missing(tmp_path, capsys):
     names = ["dataset", "build", "tetrahedron", "--family", "concurrent", "--limit", "1"]
+    names += ["--jobs", "1"]
     flags = ["--license", "MIT", "--creator", "A", "--url", "https://a.b", "--published"]
     assert main([*names, "--out", str(tmp_path / "a")]) == Exit.GOOD
     said = capsys.readouterr().err

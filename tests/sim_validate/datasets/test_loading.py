@@ -8,7 +8,6 @@ import pytest
 
 import sim_validate
 from sim_validate.datasets.columns import TABLES
-from tests.sim_validate.datasets.small import build_small
 
 pytest.importorskip("pyarrow")
 SPLITS = ("train", "validation", "test")
@@ -16,8 +15,8 @@ PAGE = Path(__file__).parents[3] / "docs" / "datasets.md"
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return build_small(tmp_path_factory.mktemp("loading") / "ds")
+def folder(small_dataset):
+    return small_dataset
 
 
 @pytest.fixture

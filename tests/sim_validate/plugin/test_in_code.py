@@ -1,8 +1,7 @@
 """The marker, `assert_stable` and what it can be asked for, in tests of somebody else's."""
 
 import json
-
-import pytest
+import re
 
 from grasp_core.records.grasps_json import grasps_from_json
 from sim_validate.files.reading import write_text
@@ -38,14 +37,14 @@ import pytest
 pytestmark = pytest.mark.grasp(object="wedge")
 
 def test_good_enough(grasp_case, assert_stable):
-    assert_stable(grasp_case, min_margin=0.3, trials=5, min_pass_rate=0.5)
+    assert_stable(grasp_case, min_margin=0.3, trials=3, min_pass_rate=0.5)
 
 def test_close_to_slipping(grasp_case, assert_stable):
     assert_stable(grasp_case, min_margin=0.49)
 
 def test_often_dropped(grasp_case, assert_stable):
     from sim_validate.simulation.noise import Noise
-    assert_stable(grasp_case, trials=20, noise=Noise(mass=0.5), min_pass_rate=0.99)
+    assert_stable(grasp_case, trials=8, noise=Noise(mass=0.5), min_pass_rate=0.99)
 """
 
 
@@ -64,29 +63,38 @@ def test_marked_tests_run_with_each_grasp(blessed, tmp_path):
     assert f"{2 + len(names)} passed, 1 error" in said
 
 
-@pytest.mark.parametrize(
-    ("marker", "message"),
-    [
-        ("", "needs the path of a grasps.json, or object="),
-        ("object='wedge', taste=1", "no setting 'taste'"),
-        ("'grasps.json', limit=1", "no setting 'limit' beside a file of grasps; it takes friction"),
-        ("'a.json', 'b.json'", "takes the path of one file of grasps"),
-        ("3", "takes the path of one file of grasps"),
-        ("'nowhere.json'", "nowhere.json"),
-        ("object='wedg'", "did you mean wedge"),
-        ("object='wedge', friction='0.5'", "friction must be a number, got '0.5'"),
-        ("object='wedge', limit='2'", "limit must be a whole number from 1"),
-        ("object='box', cones='normal', families=('pencil',)", "no grasp of box was found"),
-    ],
-)
-def test_a_wrong_marker_is_named(tmp_path, marker, message):
-    write_text(
-        tmp_path / "test_it.py",
-        f"import pytest\n@pytest.mark.grasp({marker})\ndef test_it(grasp_case): pass\n",
-    )
+def answers(said, heading):
+    """What pytest says about each test, by the number in its heading."""
+    _, *parts = re.split(rf"_+ {heading}(\d+)\b.*_+\n", said.partition("= short test summary")[0])
+    return dict(zip(map(int, parts[::2]), parts[1::2], strict=True))
+
+
+WRONG_MARKERS = [
+    ("", "needs the path of a grasps.json, or object="),
+    ("object='wedge', taste=1", "no setting 'taste'"),
+    ("'grasps.json', limit=1", "no setting 'limit' beside a file of grasps; it takes friction"),
+    ("'a.json', 'b.json'", "takes the path of one file of grasps"),
+    ("3", "takes the path of one file of grasps"),
+    ("'nowhere.json'", "nowhere.json"),
+    ("object='wedg'", "did you mean wedge"),
+    ("object='wedge', friction='0.5'", "friction must be a number, got '0.5'"),
+    ("object='wedge', limit='2'", "limit must be a whole number from 1"),
+    ("object='box', cones='normal', families=('pencil',)", "no grasp of box was found"),
+]
+
+
+def test_wrong_markers_are_named(tmp_path):
+    for number, (marker, _) in enumerate(WRONG_MARKERS):
+        write_text(
+            tmp_path / f"test_{number}.py",
+            f"import pytest\n@pytest.mark.grasp({marker})\ndef test_it(grasp_case): pass\n",
+        )
     code, said = run_pytest(tmp_path)
     assert code == 2
-    assert message in said
+    found = answers(said, "ERROR collecting test_")
+    assert len(found) == len(WRONG_MARKERS) == 10
+    for number, (_, message) in enumerate(WRONG_MARKERS):
+        assert message in found[number]
     assert "Traceback" not in said
     assert "During handling" not in said
 
@@ -98,7 +106,7 @@ def test_more_can_be_asked_for(tmp_path):
     assert "2 failed, 1 passed" in said
     assert "less than 0.49 above the predicted critical one" in said
     assert "asked for are 0.99" in said
-    assert "of 20 held (" in said
+    assert "of 8 held (" in said
 
 
 def test_assert_stable_in_code(tmp_path):
@@ -111,28 +119,29 @@ def test_assert_stable_in_code(tmp_path):
     assert ".critical_friction" in (tmp_path / "j.xml").read_text()
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        ("assert_stable(grasp_case, min_pass_rate=0.9)", "as `trials`, too"),
-        ("assert_stable(grasp_case, trials=2, min_pass_rate=80)", "from 0 to 1, got 80"),
-        ("assert_stable(grasp_case, min_margin=float('nan'))", "min_margin must be from 0"),
-        ("assert_stable(grasp_case, min_margin='0.2')", "min_margin must be from 0"),
-        ("assert_stable(grasp_case, trial=2)", "no argument 'trial'; it takes wrenches"),
-        ("assert_stable(grasp_case, wrenches=[[1, 2]])", "must be NamedWrench values"),
-        ("assert_stable(grasp_case.grasp)", "expected a grasp_case"),
-        ("assert_stable(grasp_case, friction=0.01)", "needs friction above"),
-    ],
-)
-def test_demands_that_are_none_are_refused(tmp_path, call, message):
-    write_text(
-        tmp_path / "test_it.py",
-        "import pytest\n@pytest.mark.grasp(object='wedge')\n"
-        f"def test_it(grasp_case, assert_stable):\n    {call}\n",
-    )
+BAD_DEMANDS = [
+    ("assert_stable(grasp_case, min_pass_rate=0.9)", "as `trials`, too"),
+    ("assert_stable(grasp_case, trials=2, min_pass_rate=80)", "from 0 to 1, got 80"),
+    ("assert_stable(grasp_case, min_margin=float('nan'))", "min_margin must be from 0"),
+    ("assert_stable(grasp_case, min_margin='0.2')", "min_margin must be from 0"),
+    ("assert_stable(grasp_case, trial=2)", "no argument 'trial'; it takes wrenches"),
+    ("assert_stable(grasp_case, wrenches=[[1, 2]])", "must be NamedWrench values"),
+    ("assert_stable(grasp_case.grasp)", "expected a grasp_case"),
+    ("assert_stable(grasp_case, friction=0.01)", "needs friction above"),
+]
+
+
+def test_demands_that_are_none_are_refused(tmp_path):
+    tests = ["import pytest\npytestmark = pytest.mark.grasp(object='wedge', limit=1)\n"]
+    for number, (call, _) in enumerate(BAD_DEMANDS):
+        tests.append(f"def test_{number}(grasp_case, assert_stable):\n    {call}\n")
+    write_text(tmp_path / "test_it.py", "".join(tests))
     code, said = run_pytest(tmp_path)
     assert code == 1
-    assert message in said
+    found = answers(said, "test_")
+    assert len(found) == len(BAD_DEMANDS) == 8
+    for number, (_, message) in enumerate(BAD_DEMANDS):
+        assert message in found[number]
 
 
 def test_other_frictions_and_grasps_from_anywhere(tmp_path):

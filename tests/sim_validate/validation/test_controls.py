@@ -17,6 +17,7 @@ from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.validation.control_trials import try_control
 from sim_validate.validation.controls import negative_controls
 from sim_validate.validation.paper_as_printed import uncorrected_contacts
+from tests.marks import more
 from tests.sim_validate.rigs import grasps
 
 OBJECTS = ("tetrahedron", "wedge", "chamfered-box", "random-12-1", "l-bracket", "double-wedge-bar")
@@ -119,27 +120,29 @@ def test_what_the_paper_prints_lies_on_the_faces_of_the_grasp():
     assert tested >= 8
 
 
-def test_the_simulator_lets_go_of_every_control():
+@pytest.mark.parametrize("every", [2, *more(1)])
+def test_the_simulator_lets_go_of_every_control(every):
     kinds = Counter()
-    for body, _, control in all_controls():
+    for body, _, control in all_controls()[::every]:
         verdict = try_control(body, control, Agenda(), Setup())
         assert verdict.failed, (control.name, [t.hold.outcome for t in verdict.tried])
         assert not verdict.held
         kinds[control.name] += 1
-    assert sum(kinds.values()) >= 50
+    assert sum(kinds.values()) >= 50 // every
     assert len(kinds) >= 4
 
 
-def test_other_rules_accept_controls_that_ours_do_not():
+@pytest.mark.parametrize("every", [3, *more(1)])
+def test_other_rules_accept_controls_that_ours_do_not(every):
     """Why controls matter: the object of a grasp that is none often stays roughly there."""
     accepted, controls = Counter(), 0
     agenda = Agenda(rules=tuple(RULES))
-    for body, _, control in all_controls():
+    for body, _, control in all_controls()[::every]:
         verdict = try_control(body, control, agenda, Setup())
         assert set(verdict.accepted_by) == set(RULES)
         accepted.update(name for name, yes in verdict.accepted_by.items() if yes)
         controls += 1
-    assert controls >= 35
+    assert controls >= 50 // every
     assert accepted["contact-remains"] > 0.3 * controls
     assert accepted["5cm-15deg"] > 0
 

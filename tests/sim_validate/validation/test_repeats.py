@@ -12,6 +12,7 @@ from sim_validate.simulation.noise import Noise
 from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.setup import Agenda, NamedWrench, Setup
 from sim_validate.validation.repeats import disturbed_in, heavier, interval, noisy_trial
+from tests.marks import more
 from tests.sim_validate.rigs import grasps
 
 STILL = Noise(shift=0.0, turn_deg=0.0, normal_deg=0.0, friction=0.0, mass=0.0)
@@ -23,12 +24,13 @@ def repeated(body, grasp, friction, **changed):
     return sv.validate(body, grasp, friction, agenda=agenda)
 
 
-def test_analysis_and_simulation_agree_on_every_repeat():
+@pytest.mark.parametrize("each", [1, *more(2)])
+def test_analysis_and_simulation_agree_on_every_repeat(each):
     """With noise that opens contacts, makes loads too large, and lets fingers miss."""
     held = let_go = missed = 0
     much = Noise(shift=0.02, turn_deg=3.0, normal_deg=3.0, friction=0.3, mass=0.3)
     for name in ("wedge", "screwdriver", "mug"):
-        body, found = grasps(name, 0.5, 2)
+        body, found = grasps(name, 0.5, each)
         for grasp in found:
             verdict = repeated(body, grasp, 0.5, noise=much)
             assert verdict.held
@@ -40,7 +42,7 @@ def test_analysis_and_simulation_agree_on_every_repeat():
                 held += trial.predicted
                 missed += trial.wrench == "" and not trial.predicted
                 let_go += trial.wrench != ""
-    assert min(held, let_go, missed) >= 3
+    assert min(held, let_go, missed) >= 1 + each
 
 
 def test_without_noise_every_repeat_holds():
@@ -55,8 +57,8 @@ def test_a_load_beyond_the_limit_is_not_held_however_it_came_about():
     body, (grasp,) = grasps("wedge", 0.5, 1)
     noise = dataclasses.replace(STILL, mass=0.3)
     agenda = dataclasses.replace(ONLY_NOISE, noise=noise)
-    cases = [disturbed_in(body, grasp, 0.5, agenda, number) for number in range(40)]
-    found = repeated(body, grasp, 0.5, noise=noise, trials=40).robustness
+    cases = [disturbed_in(body, grasp, 0.5, agenda, number) for number in range(24)]
+    found = repeated(body, grasp, 0.5, noise=noise, trials=24).robustness
     assert {case.mass > 1.25 for case in cases} == {True, False}
     for case, trial in zip(cases, found.trials, strict=True):
         if abs(case.mass - 1.25) > 0.01:
@@ -108,12 +110,12 @@ def test_fingers_that_miss_are_not_held():
 
 def test_the_same_seed_gives_the_same_repeats():
     body, (grasp,) = grasps("screwdriver", 0.5, 1)
-    one, same = (repeated(body, grasp, 0.5).robustness for _ in range(2))
+    one, same = (repeated(body, grasp, 0.5, trials=6).robustness for _ in range(2))
     assert one == same
-    other = repeated(body, grasp, 0.5, seed=1).robustness
+    other = repeated(body, grasp, 0.5, trials=6, seed=1).robustness
     assert other.trials != one.trials
-    more = repeated(body, grasp, 0.5, trials=13).robustness
-    assert more.trials[:12] == one.trials
+    more = repeated(body, grasp, 0.5, trials=7).robustness
+    assert more.trials[:6] == one.trials
 
 
 def test_a_heavier_object_is_the_same_scene_with_more_mass():

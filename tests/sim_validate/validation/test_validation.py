@@ -37,11 +37,13 @@ def test_grasps_of_every_family_are_good(name, family):
         assert verdict.controls
 
 
-@pytest.mark.parametrize("friction", [0.5, *more(0.2, 0.8)])
-def test_planned_grasps_hold_all_wrenches_and_no_control_does(friction):
+@pytest.mark.parametrize(
+    ("friction", "each"), [(0.5, 1), *(pytest.param(mu, 2, marks=MORE) for mu in (0.2, 0.5, 0.8))]
+)
+def test_planned_grasps_hold_all_wrenches_and_no_control_does(friction, each):
     tested = controls = 0
     for name in OBJECTS:
-        body, found = grasps(name, friction, 2)
+        body, found = grasps(name, friction, each)
         for grasp in found:
             verdict = sv.validate(body, grasp, friction)
             assert verdict.held, [(w.name, w.hold.outcome) for w in verdict.wrenches]
@@ -51,8 +53,8 @@ def test_planned_grasps_hold_all_wrenches_and_no_control_does(friction):
             assert not verdict.mismatches
             controls += len(verdict.controls)
             tested += 1
-    assert tested >= 12
-    assert controls >= 24
+    assert tested >= 6 * each
+    assert controls >= 12 * each
 
 
 def test_holding_leaves_a_wide_margin_to_the_threshold():
@@ -202,7 +204,7 @@ def test_pads_are_where_the_surface_of_the_mesh_is(name, family):
 
 
 def test_an_object_that_is_not_convex_has_no_mesh_to_touch():
-    body, (grasp, *_) = grasps("l-bracket", 0.5, 1, ("free",))
+    body, (grasp, *_) = grasps("l-bracket", 0.5, 8, ("free",))
     with pytest.raises(gc.InputError, match="l-bracket is not convex"):
         sv.validate(body, grasp, 0.5, setup=Setup(surface="mesh"))
 
