@@ -27,9 +27,7 @@ from grasp_core.closure.proofs import (
 from grasp_core.closure.wrench_sets import WrenchSet, nearest_wrench
 from grasp_core.closure.wrenches import (
     WRENCH,
-    contact_frames,
     grasp_map,
-    in_frames,
     normal_and_tangential,
 )
 from grasp_core.errors import SolverError
@@ -112,7 +110,7 @@ def _decided_quickly(arms: Array, normals: Array, friction: Array) -> Answer | N
 
 def _apart(arms: Array, normals: Array, friction: Array) -> Answer:
     """Refute closure by the twist towards the nearest wrench, or leave it undecided."""
-    wrenches = WrenchSet(in_frames(grasp_map(arms), contact_frames(normals)), friction, "l1")
+    wrenches = WrenchSet.at(arms, normals, friction)
     _, facing = nearest_wrench(wrenches)
     refuted = refutes_closure(facing, arms, normals, friction)
     return Answer(-math.inf, np.zeros_like(arms), facing, closed=False if refuted else None)

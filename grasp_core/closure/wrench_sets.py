@@ -106,8 +106,12 @@ class WrenchSet:
         points, units = contact_arrays(positions, normals)
         one_of(norm, get_args(Norm), "norm")
         arms = scaled_arms(points, center, torque_scale)
-        G = in_frames(grasp_map(arms), contact_frames(units))
-        return cls(G, contact_frictions(friction, len(points)), norm)
+        return cls.at(arms, units, contact_frictions(friction, len(points)), norm)
+
+    @classmethod
+    def at(cls, arms: Array, normals: Array, friction: Array, norm: Norm = "l1") -> Self:
+        """Make the set of contacts with levers and inward unit normals, (k, 3) each, unchecked."""
+        return cls(in_frames(grasp_map(arms), contact_frames(normals)), friction, norm)
 
     def on_grid(self) -> "WrenchSet":
         """Return nearly the same set, on a grid, for searches that must not see last digits."""

@@ -182,18 +182,24 @@ def _nearest_to_middles(
 
 def _held_at(pieces: Sequence[FacePiece], positions: Array, friction: float) -> Placement | None:
     """Make a placement at given contacts if they are in force closure; None otherwise."""
-    inset = min(
-        float((piece.b - piece.E @ (piece.frame.T @ (at - piece.origin))).min())
-        for piece, at in zip(pieces, positions, strict=True)
-    )
+    inset = min(piece.inset(at) for piece, at in zip(pieces, positions, strict=True))
+    if inset < LEAST_INSET or _on_one_line(positions):
+        return None
+    return closed_at(pieces, positions, friction, inset)
+
+
+def closed_at(
+    pieces: Sequence[FacePiece], positions: Array, friction: float, merit: float
+) -> Placement | None:
+    """Make a placement, with forces that close it, at contacts on pieces; None if they do not."""
     normals = np.array([piece.normal for piece in pieces])
     try:
         certificate = force_closure(positions, normals, friction)
     except UndecidedError:
         return None
-    if certificate.forces is None or inset < LEAST_INSET or _on_one_line(positions):
+    if certificate.forces is None:
         return None
-    return Placement(positions, certificate.forces, np.empty((0, 3)), np.zeros(FINGERS), inset)
+    return Placement(positions, certificate.forces, np.empty((0, 3)), np.zeros(FINGERS), merit)
 
 
 def _on_one_line(positions: Array) -> bool:

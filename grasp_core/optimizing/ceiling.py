@@ -34,11 +34,11 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, frozen_each
 from grasp_core.checked import LARGEST, coefficient, number, several, whole
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
+from grasp_core.closure.wrenches import WRENCH
 from grasp_core.errors import InputError
 from grasp_core.families.face_parts import Path, corner_contacts, cover_everything, is_path, part_at
 from grasp_core.fields import are_frictions, are_units, is_a, is_number, is_tuple_of
-from grasp_core.objects.face_pieces import FacePiece, inset_piece, unit_pieces
+from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
@@ -194,15 +194,15 @@ def _choices(
     given = several(faces, each, "faces", "indices")
     if len(given) != FINGERS:
         raise InputError(f"faces must be {FINGERS} indices of faces, got {len(given)}")
-    pieces = unit_pieces(body)
-    by_face = [[piece for piece in pieces if piece.face == face] for face in faces]
+    pieces = pieces_by_face(body)
+    by_face = [pieces[face] for face in given]
     if not all(by_face):
         raise InputError(
             f"one of the faces {tuple(faces)} is too narrow for a contact; choose other faces"
         )
     # edges between the pieces of a face are no borders: contacts may lie on them
     rooms = [
-        [inset_piece(one[0], inset)] if len(one) == 1 else one
+        (inset_piece(one[0], inset),) if len(one) == 1 else one
         for one, inset in zip(by_face, insets.tolist(), strict=True)
     ]
     return tuple(product(*rooms))
@@ -232,5 +232,4 @@ def _bounded(
 
 def _corner_wrenches(choice: Sequence[FacePiece], path: Path, friction: float) -> WrenchSet:
     points, normals = corner_contacts(choice, part_at(choice, path))
-    G = in_frames(grasp_map(points), contact_frames(normals))
-    return WrenchSet(G, np.full(len(points), friction), "l1")
+    return WrenchSet.at(points, normals, np.full(len(points), friction))
