@@ -12,7 +12,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure.margin_program import (
-    TINY,
+    SMALLEST_NORMAL,
     deepest_forces,
     margin_program,
 )
@@ -122,14 +122,16 @@ def _touching_twist(twist: Array, arms: Array, normals: Array, friction: Array) 
     Where the margin is exactly zero, as with symmetric normals at just their critical friction, the
     solver's twist passes the cones by its own tolerance; Newton's method takes it onto them.
     """
-    twist = twist / max(float(np.linalg.norm(twist)), TINY)
+    twist = twist / max(float(np.linalg.norm(twist)), SMALLEST_NORMAL)
     for _ in range(NEWTON_STEPS):
         velocities = twist[:3] + np.cross(twist[3:], arms)
         along, across = normal_and_tangential(velocities, normals)
         excess = along + friction * across
         touched = excess > -TOUCHING
         # the gradient of s_i in y is the wrench of the force in cone i that works most along y
-        sideways = (velocities - along[:, None] * normals) / np.maximum(across, TINY)[:, None]
+        sideways = (velocities - along[:, None] * normals) / np.maximum(across, SMALLEST_NORMAL)[
+            :, None
+        ]
         forces = (normals + friction[:, None] * sideways)[touched]
         slopes = np.hstack([forces, np.cross(arms[touched], forces)])
         step, *_ = np.linalg.lstsq(slopes, excess[touched], rcond=RANK)

@@ -40,7 +40,7 @@ NO_SLIDE = 1e-290
 """A velocity along the surface that is smaller than this has no direction."""
 SAME_FRAME = 1e-9
 """How far frames may be from orthonormal: normals are unit vectors to nine digits."""
-SAME_DIGITS = 10
+SEARCH_DIGITS = 10
 """Digits after the point that searches are given: frames stay within `SAME_FRAME`."""
 LARGEST_RATIO = 1e6
 """Largest ratio of torque scale and contacts' extent, either way: beyond it, rounding decides."""
@@ -116,7 +116,7 @@ class WrenchSet:
     def on_grid(self) -> "WrenchSet":
         """Return nearly the same set, on a grid, for searches that must not see last digits."""
         return replace(
-            self, G=on_grid(self.G, SAME_DIGITS), friction=on_grid(self.friction, SAME_DIGITS)
+            self, G=on_grid(self.G, SEARCH_DIGITS), friction=on_grid(self.friction, SEARCH_DIGITS)
         )
 
     def sound(self) -> bool:

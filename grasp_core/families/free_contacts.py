@@ -47,7 +47,7 @@ from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.nearest_point import least_distance
 from grasp_core.values import FINGERS
 
-SIDES = 8
+PATCH_SIDES = 8
 """Number of facets of the pyramids."""
 DEPENDENT = 1e-6
 """Singular values smaller than this, relative to the largest, are zero but for rounding."""
@@ -112,7 +112,7 @@ def smallest_forces(
     Z = right[rank:].T
     f_0 = right[:rank].T @ (left[-1, :rank] / sizes[:rank])
     toward = np.array([piece.frame[:, 0] for piece in pieces])
-    facets = pyramid_facets(normals, math.atan(friction), toward, SIDES)
+    facets = pyramid_facets(normals, math.atan(friction), toward, PATCH_SIDES)
     # (2) in z: -(G_f Z) z <= G_f f_0 - depth
     rows = np.einsum("ksi,kiz->ksz", facets, Z.reshape(len(points), 3, -1)).reshape(-1, Z.shape[1])
     here = np.einsum("ksi,ki->ks", facets, f_0.reshape(-1, 3)).ravel()

@@ -24,12 +24,12 @@ from grasp_core.arrays import Array
 from grasp_core.closure.wrenches import contact_frames, grasp_map, in_frames
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns, inscribed_share
 
-RESIDUAL = 1e-6
+FORCE_RESIDUAL = 1e-6
 """Largest imbalance and cone violation accepted, in units of the largest normal force: a
 hundred times the accuracy asked of ProxQP."""
 
 CLEARLY = 1.01
-"""Factor by which a wrench must exceed all forces, so that rounding and `RESIDUAL` do not
+"""Factor by which a wrench must exceed all forces, so that rounding and `FORCE_RESIDUAL` do not
 matter."""
 NO_FORCE = 1e-100
 """Least normal force that is divided by, where a contact may have no force."""
@@ -133,7 +133,7 @@ class Balance:
             D.append(self.largest[:, None] - normal_parts)
         return np.vstack(C), np.hstack(D)
 
-    def checked(self, F: Array, residual: float = RESIDUAL) -> Array:
+    def checked(self, F: Array, residual: float = FORCE_RESIDUAL) -> Array:
         """Make forces (n, 3k) balance to rounding; NaN where they then break a limit."""
         # the least change that balances f is the pseudo-inverse of what is left
         exact = F - (F @ self.G.T + self.W) @ self.inverse.T
@@ -169,7 +169,7 @@ def needed_friction(F: Array, friction: Array) -> Array:
     """
     along, across = F[:, 0::3], np.hypot(F[:, 1::3], F[:, 2::3])
     shares = across / np.maximum(friction * along, NO_FORCE)
-    return np.where(across <= RESIDUAL, 0.0, shares).max(axis=1)
+    return np.where(across <= FORCE_RESIDUAL, 0.0, shares).max(axis=1)
 
 
 def _inverse_and_null_space(G: Array) -> tuple[Array, Array]:

@@ -26,7 +26,7 @@ IMPROVEMENT = 1e-4
 least."""
 MAX_ROUNDS = 12
 """Most programs: the excess falls by half or more in each, and faster unless a finger idles."""
-ROUNDING = 1e-9
+FINE_RESIDUAL = 1e-9
 """Largest imbalance, and distance outside the limits, in units of the largest force."""
 FRICTIONLESS = 1e-6
 """Coefficients below this are not lowered further."""
@@ -52,7 +52,7 @@ def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:
             better = _with_least_excess(program, friction * weights)
         except SolverError:
             break
-        better = balance.checked(better[None], ROUNDING)[0]
+        better = balance.checked(better[None], FINE_RESIDUAL)[0]
         needed = _needed_friction(better, weights)
         if not needed < friction:
             break

@@ -51,7 +51,7 @@ PART_GAP = 0.02
 MOST_PARTS = 1_000_000
 ENOUGH = 0.01
 """Parts whose bound is within this share of the known quality are not cut any more."""
-ROUNDING = 1e-9
+BOUND_SLACK = 1e-9
 """How far a part's bound may exceed the ceiling, relative to it or to one newton."""
 
 
@@ -81,7 +81,7 @@ class QualityCeiling:
         """Re-check every field in plain arithmetic.
 
         The check is that the pieces are convex polygons, that the parts cover them, and that all
-        are bounded, to within `ROUNDING`. Whether the pieces are those of an object's faces can
+        are bounded, to within `BOUND_SLACK`. Whether the pieces are those of an object's faces can
         only be checked with the object.
         """
         with np.errstate(all="ignore"):
@@ -96,7 +96,7 @@ class QualityCeiling:
                 and all(self._fits(leaf) for leaf in self.leaves)
                 and self._covers()
                 and all(
-                    self._bound(leaf) <= self.upper + ROUNDING * max(self.upper, 1.0)
+                    self._bound(leaf) <= self.upper + BOUND_SLACK * max(self.upper, 1.0)
                     for leaf in self.leaves
                 )
             )

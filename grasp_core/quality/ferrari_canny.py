@@ -47,11 +47,11 @@ FINEST_GAP = 1e-7
 MOST_SIMPLICES, MOST_POINTS = 60_000, 4096
 """Simplices and corners at which the polytope stops growing; its bounds hold all the same, farther
 apart."""
-FLAT = 1e-9
+FLATNESS = 1e-9
 """Points closer than this to a common plane, relative to their extent, span nothing more."""
 ABOVE = 1e-12
 """Height from which on a point sees a simplex, relative to the extent: some thousand roundings."""
-ROUNDING = 1e-12
+CHECK_SLACK = 1e-12
 """Slack of the plain-arithmetic checks, relative to the longest wrench."""
 KERNEL = "grasp_core.quality.ferrari_canny_kernel"
 
@@ -83,9 +83,9 @@ class FerrariCanny:
         with np.errstate(all="ignore"):
             sound = is_a(self.wrenches, WrenchSet) and self.wrenches.sound()
             ordered = is_number(self.lower) and is_number(self.upper) and self.lower <= self.upper
-            if not (sound and ordered and are_units(self.direction, WRENCH, slack=ROUNDING)):
+            if not (sound and ordered and are_units(self.direction, WRENCH, slack=CHECK_SLACK)):
                 return False
-            slack = ROUNDING * self.wrenches.size
+            slack = CHECK_SLACK * self.wrenches.size
             # (1) for the direction
             support, _ = self.wrenches.support(self.direction)
             return support <= self.upper + slack and self._proves_lower(slack)
@@ -98,13 +98,13 @@ class FerrariCanny:
                 self.forces is None
                 and is_a(self.polytope, InnerPolytope)
                 and self.polytope.sound(width)
-                and self.wrenches.holds(self.polytope.forces, ROUNDING)
+                and self.wrenches.holds(self.polytope.forces, CHECK_SLACK)
                 and self.polytope.proved_radius(self.wrenches) >= self.lower - slack
             )
         # (3), by the wrench of allowed forces
         return (
             is_array(self.forces, width)
-            and self.wrenches.holds(self.forces[None], ROUNDING)
+            and self.wrenches.holds(self.forces[None], CHECK_SLACK)
             and float(np.linalg.norm(self.wrenches.G @ self.forces)) <= -self.lower + slack
         )
 
@@ -152,9 +152,9 @@ def wrench_set_quality(wrenches: WrenchSet, gap: float = GAP) -> FerrariCanny:
     kernel = compiled(KERNEL)
     linf = wrenches.norm == "linf"
     cones = kernel.Cones(np.array(wrenches.G, order="C"), np.array(wrenches.friction), linf)
-    limits = kernel.Limits(gap, MOST_SIMPLICES, MOST_POINTS, FLAT, ABOVE)
+    limits = kernel.Limits(gap, MOST_SIMPLICES, MOST_POINTS, FLATNESS, ABOVE)
     status, forces, corners, normals, weakest = kernel.grow(cones, wrenches.edges(), limits)
-    slack = ROUNDING * wrenches.size
+    slack = CHECK_SLACK * wrenches.size
     if status == kernel.GROWN:
         polytope = InnerPolytope(forces, corners, normals)
         radius = polytope.proved_radius(wrenches)

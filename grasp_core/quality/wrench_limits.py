@@ -32,7 +32,7 @@ from grasp_core.values import Grasp
 HELD = 1e-7
 """How far forces at a limit may leave cones and balance, relative to the largest wrench of a unit
 normal force: the accuracy of conic programs."""
-ROUNDING = 1e-9
+FACET_SLACK = 1e-9
 """Slack of the upper bound, relative to it, and of the facet's power, relative to the lengths of
 its factors."""
 LAST_DIGITS = 1e-12
@@ -252,8 +252,8 @@ class WrenchBody:
         bound = self.max_normal_force * self.bounded.support(twist)[0]
         farthest = self.bounded.size * float(np.linalg.norm(twist))
         slack = LAST_DIGITS * self.max_normal_force * farthest
-        bounded = bound <= found.upper * (1.0 + ROUNDING) + slack
-        return bounded and abs(power + 1.0) <= ROUNDING * lengths
+        bounded = bound <= found.upper * (1.0 + FACET_SLACK) + slack
+        return bounded and abs(power + 1.0) <= FACET_SLACK * lengths
 
     def _about_middle(self, wrench: Array) -> Array:
         """Return a wrench about the contacts' middle, at unit size."""

@@ -28,7 +28,7 @@ LARGEST_LENGTH_M = 1e6
 """Largest length: longer ones are mistakes, and their squares might overflow."""
 NEARLY_UNIT = 1e-3
 """How far the length of a normal may be from 1: rounding of a file with three digits."""
-ROUNDING = 1e-15
+UNIT_ROUNDING = 1e-15
 """How far rounding takes the length of a unit vector from 1."""
 SAME_POINT = 1e-9
 """Contacts closer than this to their mean, relative to the numbers in the file, are at one point:
@@ -222,7 +222,7 @@ def _unit_normals(contacts: list[_GivenContact], where: str) -> Array:
             f"{where}[{worst}].normal: its length must be 1 within {NEARLY_UNIT:g}, got "
             f"{lengths[worst]:.6g}; divide it by its length"
         )
-    off = np.abs(lengths - 1.0) > ROUNDING  # what is a unit vector stays as it is
+    off = np.abs(lengths - 1.0) > UNIT_ROUNDING  # what is a unit vector stays as it is
     return np.where(off[:, None], normals / lengths[:, None], normals)
 
 

@@ -33,7 +33,7 @@ FARTHEST = 1.0
 """Largest move of a centre at once, in radii."""
 MOVED_DIGITS = 6
 """Digits after the point that moved centres keep."""
-NEAR = 3.0
+STOPPING = 3.0
 """Rays count in the program if they would stop a radius up to this factor of the present one."""
 
 
@@ -84,7 +84,7 @@ def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
             falls += np.linalg.norm(across, axis=1)
             moves.append(across)
         # (1), for moves from the present centres
-        near = powers < NEAR * proved.radius * falls
+        near = powers < STOPPING * proved.radius * falls
         rows.append(np.column_stack([-np.hstack(moves), falls])[near])
         limits.append(powers[near])
     # (2), for the same moves

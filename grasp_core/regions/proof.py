@@ -58,7 +58,7 @@ EDGES = tuple((i, j) for i in range(TWIST) for j in range(i + 1, TWIST))
 SLACK = 1e-12
 """Rounding of a power, relative to the lengths of wrench and `summed` twist: thousands of
 roundings."""
-LARGEST = 2.0**50
+LARGEST_ENTRY = 2.0**50
 """Entries of rays up to this are exact: they are sums of whole numbers. Lengths of axes must be
 between its inverse and it."""
 
@@ -141,14 +141,14 @@ class TwistCover:
 
     def _independent(self) -> bool:
         lengths = np.linalg.norm(self.axes, axis=1)
-        if not ((lengths > 1.0 / LARGEST) & (lengths < LARGEST)).all():
+        if not ((lengths > 1.0 / LARGEST_ENTRY) & (lengths < LARGEST_ENTRY)).all():
             return False
         return bool(np.linalg.svd(self.axes / lengths[:, None], compute_uv=False)[-1] > SLACK)
 
     def _powerful(self, forces: Array, rays: Array, regions: Sequence[Array]) -> bool:
         """Whether h > 0 in (2) for each cone's forces on its rays."""
         # beyond this the rays would not be exact, nor the cuts (4)
-        if np.abs(rays).max(initial=0.0) > LARGEST:
+        if np.abs(rays).max(initial=0.0) > LARGEST_ENTRY:
             return False
         powers, sizes = np.zeros(rays.shape[:2]), np.zeros(rays.shape[:2])
         twists, lengths = rays @ self.axes, summed(rays, self.axes)

@@ -23,7 +23,7 @@ AHEAD = 1e-8
 rounding sites to a grid may cost it."""
 EVEN = 0.02
 """Weight added to each ray in the choice of the edge to cut, so that all edges are cut in time."""
-TINY = 1e-12
+CLEAR_OF_CONE = 1e-12
 """Share of the friction that forces keep clear of, for rounding."""
 
 
