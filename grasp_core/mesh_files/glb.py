@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.mesh_files.polygon_soup import CORNERS, too_many
-from grasp_core.mesh_files.refusals import broken, outside, shown, unsupported
+from grasp_core.mesh_files.refusals import broken, not_finite, outside, shown, unsupported
 
 MAGIC, VERSION = b"glTF", 2
 HEAD, CHUNK_HEAD = 12, 8
@@ -191,8 +191,7 @@ def _floats(node: Tree, name: str, count: int) -> Array:
         broken("a node", f"its {name} must be {count} numbers, got {shown(given)}")
     values = np.array([float(each) for each in given])
     if not np.isfinite(values).all():
-        message = f"a node: its {name} must be finite, got {shown(given)}; repair it"
-        raise MeshError(MeshRefusal.NON_FINITE, message)
+        not_finite("a node", f"its {name} must be finite", shown(given))
     return values
 
 
