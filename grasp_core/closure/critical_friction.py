@@ -34,7 +34,7 @@ from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contact_arrays import contact_arrays, unit_size
 from grasp_core.closure.friction_interval import FRICTIONLESS, REPORTED_AS_ZERO, FrictionInterval
 from grasp_core.closure.friction_search import FRICTION_ACCURACY, SHAVED, Ends, search_interval
-from grasp_core.closure.margin_program import ROUNDING, deepest_forces
+from grasp_core.closure.margin_program import CHECK_SLACK, deepest_forces
 from grasp_core.closure.proofs import RANK, proves_closure
 from grasp_core.closure.wrenches import WRENCH, normal_and_tangential
 from grasp_core.compiled import compiled
@@ -186,8 +186,8 @@ def _separate(twists: Array, arms: Array, normals: Array, friction: Array) -> ND
         sizes = np.linalg.norm(twists, axis=1)[:, None]
         velocities = twists[:, None, :3] + np.cross(twists[:, None, 3:], arms)
         along, across = normal_and_tangential(velocities, normals)
-        departs = along + friction[:, None] * across <= ROUNDING * np.hypot(along, across)
-        still = np.hypot(along, across) <= ROUNDING * sizes
+        departs = along + friction[:, None] * across <= CHECK_SLACK * np.hypot(along, across)
+        still = np.hypot(along, across) <= CHECK_SLACK * sizes
     return (np.isfinite(sizes) & (sizes > 0.0) & (departs | still)).all(axis=1)
 
 

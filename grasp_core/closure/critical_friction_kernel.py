@@ -16,26 +16,26 @@ import math
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.margin_kernel import SHARE, WRENCH, least_cone_sum
+from grasp_core.closure.margin_kernel import SIGN_SHARE, least_cone_sum
+from grasp_core.closure.wrenches import WRENCH
 from grasp_core.compiled import loop
 
 FIRST_TRIAL = 0.5
 MOST_TRIALS = 30
-"""Largest number of programs per set of contacts; seven are usual."""
-SMALLEST, LARGEST = 1e-6, 1e3
-"""Smallest and largest friction at which a program is solved."""
+"""Most programs per set of contacts; seven are usual."""
+LEAST_FRICTION, MOST_FRICTION = 1e-6, 1e3
+"""Smallest and largest friction that is tried."""
 AT_REST = 1e-4
 """Share of the largest z_i below which a contact's z_i counts as zero, and the contact as at rest.
 """
 SPANNED = 1e-6
 """Sine of the angle between a row and the span of a basis below which the row adds nothing."""
 ABOVE, BELOW = 0.75, 0.15
-"""Shares of the wanted width by which trials pass the root, to close in from both sides: more from
-above, where the proof of closure is harder. The error of Newton's method, the square of its step
-over the friction, is added."""
-EVEN = 1e-10
-"""Distance of an optimum from one that shows nothing: ten times the gap that is left, for rounding.
-"""
+"""Trials pass the root by these shares of the width asked for, to close in from both sides: above
+it by more, as the proof of closure is the harder one; and by the error of Newton's method, the
+square of its step over the friction."""
+NEAR_ONE = 1e-10
+"""An optimum this close to one shows nothing: ten times the gap that is left, for rounding."""
 
 
 @loop("numpy")
@@ -62,13 +62,13 @@ def search(
         lower, upper, friction = 0.0, np.inf, FIRST_TRIAL
         for _ in range(MOST_TRIALS):
             _at_friction(rows, mean, friction, columns)
-            primal, dual = least_cone_sum(columns, mean, SHARE, pair, y)
+            primal, dual = least_cone_sum(columns, mean, SIGN_SHARE, pair, y)
             needed = _needed(pair, primal, friction)
-            if primal < 1.0 - EVEN and needed < upper:
+            if primal < 1.0 - NEAR_ONE and needed < upper:
                 upper = needed
                 # V below one: the forces close, at the friction that they need
                 _in_space(pair, primal, friction, axes, forces[g])
-            if dual > 1.0 + EVEN and friction > lower:
+            if dual > 1.0 + NEAR_ONE and friction > lower:
                 lower = friction
                 _copy(y, twists[g])
             _copy(y, twist)
@@ -80,7 +80,7 @@ def search(
             if upper - lower <= width * lower:
                 break
             friction = _next(pair, 0.5 * (primal + dual), friction, lower, upper, width)
-            if not SMALLEST <= friction <= LARGEST:
+            if not LEAST_FRICTION <= friction <= MOST_FRICTION:
                 break
         bounds[g, 0], bounds[g, 1] = lower, upper
 
@@ -190,8 +190,8 @@ def _separates(rows: Array, z: Array, span: Array, twist: Array) -> float:
 
 @loop("numpy")
 def _least_ratio(rows: Array, z: Array, still: float, twist: Array) -> float:
-    """Return the least ratio of leaving to sliding speed over contacts that are not at rest."""
-    least = LARGEST
+    """Return the least ratio of leaving to sliding over the contacts that are not at rest."""
+    least = MOST_FRICTION
     for i in range(len(rows)):
         if z[i, 0] > still:
             along, across = -_dot(rows[i, 0], twist), 0.0
@@ -256,7 +256,7 @@ def _next(
     slope = 0.0
     for i in range(pair.shape[1]):
         slope += pair[0, i, 1] * pair[1, i, 1] + pair[0, i, 2] * pair[1, i, 2]
-    if abs(value - 1.0) <= EVEN:
+    if abs(value - 1.0) <= NEAR_ONE:
         # 1 / V is linear: d(1/V) = -dV / V^2, over the logarithm of the friction
         return lower * (1.0 + ABOVE * width) if lower > friction else 0.0
     root = friction * (1.0 - value * (value - 1.0) / slope) if slope < 0.0 else np.nan

@@ -12,7 +12,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure.margin_program import (
-    TINY,
+    SMALLEST_NORMAL,
     deepest_forces,
     margin_program,
 )
@@ -27,9 +27,7 @@ from grasp_core.closure.proofs import (
 from grasp_core.closure.wrench_sets import WrenchSet, nearest_wrench
 from grasp_core.closure.wrenches import (
     WRENCH,
-    contact_frames,
     grasp_map,
-    in_frames,
     normal_and_tangential,
 )
 from grasp_core.errors import SolverError
@@ -112,8 +110,8 @@ def _decided_quickly(arms: Array, normals: Array, friction: Array) -> Answer | N
 
 
 def _apart(arms: Array, normals: Array, friction: Array) -> Answer:
-    """Refute closure by the twist towards the nearest wrench, or leave closure undecided."""
-    wrenches = WrenchSet(in_frames(grasp_map(arms), contact_frames(normals)), friction, "l1")
+    """Refute closure by the twist towards the nearest wrench, or leave it undecided."""
+    wrenches = WrenchSet.at(arms, normals, friction)
     _, facing = nearest_wrench(wrenches)
     refuted = refutes_closure(facing, arms, normals, friction)
     return Answer(-math.inf, np.zeros_like(arms), facing, closed=False if refuted else None)
@@ -125,14 +123,16 @@ def _touching_twist(twist: Array, arms: Array, normals: Array, friction: Array) 
     Where the margin is exactly zero, as with symmetric normals at just their critical friction, the
     solver's twist passes the cones by its own tolerance; Newton's method takes it onto them.
     """
-    twist = twist / max(float(np.linalg.norm(twist)), TINY)
+    twist = twist / max(float(np.linalg.norm(twist)), SMALLEST_NORMAL)
     for _ in range(NEWTON_STEPS):
         velocities = twist[:3] + np.cross(twist[3:], arms)
         along, across = normal_and_tangential(velocities, normals)
         excess = along + friction * across
         touched = excess > -TOUCHING
         # the gradient of s_i in y is the wrench of the force in cone i that works most along y
-        sideways = (velocities - along[:, None] * normals) / np.maximum(across, TINY)[:, None]
+        sideways = (velocities - along[:, None] * normals) / np.maximum(across, SMALLEST_NORMAL)[
+            :, None
+        ]
         forces = (normals + friction[:, None] * sideways)[touched]
         slopes = np.hstack([forces, np.cross(arms[touched], forces)])
         step, *_ = np.linalg.lstsq(slopes, excess[touched], rcond=RANK)

@@ -37,13 +37,13 @@ from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 DEPENDENT = 1e-9
 """Singular values of unit-size wrenches below this value count as zero."""
 SUPPORTED = 0.5
-"""Border between pushes that count as zero and as one: a push that can be positive can be one."""
-LARGEST = 1e4
-"""Largest size of a variable in the linear programs, whose answers are of order one."""
+"""Border between pushes of zero and of one: pushes that can be positive can be one."""
+LARGEST_VARIABLE = 1e4
+"""Largest size of a variable of the programs, whose answers are of order one."""
 POSITIVE = 1e-6
-"""Optima below this value count as zero: a hundred times the residual of a linear program."""
-SHARE = 0.5
-"""Share of the remaining depth in a cone that the forces of the next round may take."""
+"""Optima below this count as zero: a hundred times the residual of a linear program."""
+STEP_SHARE = 0.5
+"""Share of what is left of a cone that the forces of the next round may take."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +64,7 @@ class Rounds:
             along, across = normal_and_tangential(total, normals)
             sizes = np.linalg.norm(forces, axis=1)
             room, taken = (friction * along - across)[along > 0.0], sizes[along > 0.0]
-            share = SHARE / (1.0 + friction) * np.min(room / np.maximum(taken, DEPENDENT))
+            share = STEP_SHARE / (1.0 + friction) * np.min(room / np.maximum(taken, DEPENDENT))
             total = total + min(float(share), 1.0) * forces
         return total
 
@@ -115,7 +115,7 @@ def hopeless_twist(arms: Array, normals: Array) -> Array | None:
     basis = _null_space(np.hstack([grasp_map(arms).T, departing.reshape(3 * k, k)]))
     speeds = basis[WRENCH:]
     rows = np.vstack([-speeds, speeds.sum(axis=0), np.eye(basis.shape[1]), -np.eye(basis.shape[1])])
-    limits = np.repeat([0.0, 1.0, LARGEST, LARGEST], [k, 1, *basis.shape[1:] * 2])
+    limits = np.repeat([0.0, 1.0, LARGEST_VARIABLE, LARGEST_VARIABLE], [k, 1, *basis.shape[1:] * 2])
     found = _best(speeds.sum(axis=0), rows, limits)
     return None if found is None else basis[:WRENCH] @ found
 
@@ -146,7 +146,7 @@ def _most_pushes(rows: Array) -> Array | None:
     # shares from 0 to 1, each at most its weight: their sum counts the weights that can be positive
     shares = np.eye(k)
     nothing = np.zeros((k, n))
-    limits = np.repeat([0.0, 0.0, 1.0, LARGEST], k)
+    limits = np.repeat([0.0, 0.0, 1.0, LARGEST_VARIABLE], k)
     found = _best(
         np.repeat([0.0, 1.0], [n, k]),
         np.block([[-basis, shares], [nothing, -shares], [nothing, shares], [basis, 0.0 * shares]]),

@@ -32,10 +32,10 @@ from grasp_core.errors import InputError
 LineClass: TypeAlias = Literal["planar", "concurrent", "pencil", "regulus", "independent"]
 
 ON_CLASS = 1e-7
-"""Size of singular values and eigenvalues below which they count as zero, for unit directions and
-points spread over a unit length: ten times the error of a linear program's answer."""
-ROUNDING = 1e-12
-"""Distance, relative to coordinates, below which two points count as one."""
+"""Singular values and eigenvalues below this count as zero, for unit directions and points
+spread over a unit length: ten times what a linear program's answer may be off."""
+ONE_POINT = 1e-12
+"""Points closer than this, relative to their coordinates, are one point."""
 REGULUS = 3
 """Rank of the reciprocal form on the span of four lines that lie on a regulus."""
 
@@ -71,7 +71,7 @@ def classify_lines(points: ArrayLike, directions: ArrayLike) -> LineClass:
     # lengths count relative to the spread, unless the points are one point but for rounding
     arms = x - x.mean(axis=0)
     spread = float(np.linalg.norm(arms, axis=1).max())
-    if spread > ROUNDING * float(np.abs(x).max()):
+    if spread > ONE_POINT * float(np.abs(x).max()):
         arms = arms / spread
     _, sizes, basis = np.linalg.svd(plucker_vectors(arms, d))
     # dependent vectors are those of (1)

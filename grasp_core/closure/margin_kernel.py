@@ -30,6 +30,7 @@ import math
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.closure.wrenches import WRENCH
 from grasp_core.compiled import loop
 from grasp_core.solvers.cone_steps_kernel import (
     longest_step,
@@ -39,12 +40,10 @@ from grasp_core.solvers.cone_steps_kernel import (
     towards_the_middle,
 )
 
-WRENCH = 6
 MOST_STEPS = 40
-"""Largest number of Newton steps; ten are usual."""
-SHARE = 0.1
-"""Gap, as a share of the distance of V from one, at which it is certain on which side of one V is.
-"""
+"""Most Newton steps; ten are usual."""
+SIGN_SHARE = 0.1
+"""Gap, as a share of the distance of V from one, that leaves no doubt on which side of one V is."""
 SMALLEST_GAP = 1e-11
 """Gap below which only rounding is left, in programs of order one."""
 BALANCED = 1e-10
@@ -63,7 +62,7 @@ def least_cone_sum(
         columns: Columns of each A_i, as rows, (k, 3, 6).
         mean: The mean m of the normals' wrenches, (6,).
         share: The gap between primal and dual that may be left, relative to the distance of V from
-            one: with `SHARE` it is clear on which side of one V is.
+            one: with `SIGN_SHARE` it is clear on which side of one V is.
         pair: Filled with s and z, (2, k, 3).
         y: Filled with the twist, (6,).
 

@@ -15,18 +15,18 @@ from grasp_core.compiled import compiled
 from grasp_core.solvers.conic import ConicProgram, minimize
 
 KERNEL = "grasp_core.closure.critical_friction_kernel"
-"""Module with the compiled search for critical friction, which solves the same program at many
-frictions."""
-ROUNDING = 1e-12
-"""Slack of checks in plain arithmetic, for data scaled to unit size: some thousand rounding errors.
-"""
-TINY = float(np.finfo(np.float64).tiny)
-COARSE = 0.1
-"""Gap, as in `margin_kernel`, that may be left where only the sign of a margin is needed."""
+"""Kernel of the search for critical friction, which solves the same program at many frictions."""
+CHECK_SLACK = 1e-12
+"""Slack of the plain-arithmetic checks, for data scaled to unit size: some thousand
+rounding errors."""
+SMALLEST_NORMAL = float(np.finfo(np.float64).tiny)
+"""Least number that is divided by: the smallest of full precision."""
+SIGN_SHARE = 0.1
+"""Gap, as in `margin_kernel`, that may be left where only the sign of a margin is asked for."""
 
 
 def deepest_forces(
-    arms: Array, normals: Array, friction: Array, share: float = COARSE
+    arms: Array, normals: Array, friction: Array, share: float = SIGN_SHARE
 ) -> tuple[Array, Array, Array]:
     """Balance many sets of contacts with forces as deep in the cones as possible.
 
@@ -78,7 +78,7 @@ def margin_program(balance: Array, normals: Array, friction: Array) -> tuple[flo
     order = np.argsort(~np.repeat(flat, 3)[free], kind="stable")  # frictionless rows first
     A[m + 1 + np.arange(n), order] = -1.0
     # (3), over mu: the normal part less t / mu bounds the tangential part over mu
-    depths = largest / np.where(flat, 1.0, np.maximum(friction, TINY))
+    depths = largest / np.where(flat, 1.0, np.maximum(friction, SMALLEST_NORMAL))
     A[m + 1 :, n] = np.where(pushing, np.repeat(depths, 3)[free], 0.0)[order]
     b, q = np.zeros(len(A)), np.zeros(n + 1)
     b[m], q[-1] = 1.0, -1.0
@@ -99,15 +99,12 @@ def allowed(friction: Array) -> NDArray[np.bool_]:
 
 
 def _departing_twist(rows: Array, share: Array) -> Array | None:
-    """Find a twist with which every contact leaves along its normal.
-
-    Its existence proves that no forces balance.
-    """
-    sizes = np.maximum(np.linalg.norm(rows, axis=0), TINY)
+    """Find a twist with which every contact leaves along its normal: then no forces balance."""
+    sizes = np.maximum(np.linalg.norm(rows, axis=0), SMALLEST_NORMAL)
     scaled: Array = (rows / sizes).T
     twist = -np.asarray(np.linalg.lstsq(scaled, share / sizes, rcond=None)[0], dtype=np.float64)
     missed = np.abs(rows.T @ twist + share) / np.maximum(sizes, 1.0)
-    if not np.isfinite(missed).all() or missed.max() > ROUNDING * (
+    if not np.isfinite(missed).all() or missed.max() > CHECK_SLACK * (
         1.0 + float(np.abs(twist).max())
     ):
         return None

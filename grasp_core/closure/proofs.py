@@ -29,8 +29,8 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.closure.margin_program import (
-    ROUNDING,
-    TINY,
+    CHECK_SLACK,
+    SMALLEST_NORMAL,
     allowed,
 )
 from grasp_core.closure.wrenches import (
@@ -84,7 +84,7 @@ def refutes_closure(
     length: Array = np.linalg.norm(twist, axis=-1)
     # over the length of the longest force with unit normal part, which rounding is relative to
     excess: Array = supports(twist, arms, normals, friction) / np.sqrt(1.0 + friction**2)
-    return (length > 0.0) & (excess.max(axis=-1) <= ROUNDING * length)
+    return (length > 0.0) & (excess.max(axis=-1) <= CHECK_SLACK * length)
 
 
 def proves_closure(
@@ -116,7 +116,7 @@ def proves_closure(
     imbalance = np.linalg.norm(np.einsum("...wj,...j->...w", maps, stacked), axis=-1)
     least = np.linalg.svd(maps, compute_uv=False)[..., WRENCH - 1]
     # c of (1)
-    corrected = (imbalance + ROUNDING) / np.maximum(least, RANK)
+    corrected = (imbalance + CHECK_SLACK) / np.maximum(least, RANK)
     depths = depths_in_cones(forces, normals, friction)
     left = depths - np.sqrt(1.0 + friction**2) * corrected[..., None]
     proved: NDArray[np.bool_] = (least > RANK) & (left > 0.0).all(axis=-1)
@@ -151,7 +151,7 @@ def proved_margin(
     if least <= RANK:
         return -math.inf
     # c of (1); its normal parts sum to at most sqrt(k) c
-    corrected = caution * (imbalance + ROUNDING) / least
+    corrected = caution * (imbalance + CHECK_SLACK) / least
     pushes = float(along.sum()) + math.sqrt(len(arms)) * corrected
     left = float((depth - np.sqrt(1.0 + friction**2) * corrected).min())
     return left / pushes if pushes > 0.0 else -math.inf
@@ -176,13 +176,13 @@ def margin_ceiling(
     if not refutes_closure(twist, arms, normals, friction):
         return math.inf
     along, _ = normal_and_tangential(twist[:3] + np.cross(twist[3:], arms), normals)
-    rounding = caution * ROUNDING * float(np.linalg.norm(twist)) * np.sqrt(1.0 + friction**2)
+    rounding = caution * CHECK_SLACK * float(np.linalg.norm(twist)) * np.sqrt(1.0 + friction**2)
     # M of (3), which rounding may raise
     largest = float((supports(twist, arms, normals, friction) + rounding).max())
     if largest >= 0.0:
         return 0.0
     # r_i of (3); each term of the sum is raised by rounding, so that the bound is no less
-    shares = np.where(friction == 0.0, 1.0, 1.0 / np.maximum(friction, TINY))
+    shares = np.where(friction == 0.0, 1.0, 1.0 / np.maximum(friction, SMALLEST_NORMAL))
     return largest / float((shares * (largest - along + rounding)).sum())
 
 

@@ -39,10 +39,9 @@ Norm: TypeAlias = Literal["l1", "linf"]
 NO_SLIDE = 1e-290
 """Speed along the surface below which the direction of sliding is undefined."""
 SAME_FRAME = 1e-9
-"""Error up to which frames count as orthonormal: normals are unit vectors to nine digits."""
-SAME_DIGITS = 10
-"""Digits after the point to which frames are rounded for searches, so that they stay within
-`SAME_FRAME`."""
+"""How far frames may be from orthonormal: normals are unit vectors to nine digits."""
+SEARCH_DIGITS = 10
+"""Digits after the point that searches are given: frames stay within `SAME_FRAME`."""
 LARGEST_RATIO = 1e6
 """Largest ratio of torque scale and contacts' extent, and its inverse: beyond it, rounding decides.
 """
@@ -109,13 +108,17 @@ class WrenchSet:
         points, units = contact_arrays(positions, normals)
         one_of(norm, get_args(Norm), "norm")
         arms = scaled_arms(points, center, torque_scale)
-        G = in_frames(grasp_map(arms), contact_frames(units))
-        return cls(G, contact_frictions(friction, len(points)), norm)
+        return cls.at(arms, units, contact_frictions(friction, len(points)), norm)
+
+    @classmethod
+    def at(cls, arms: Array, normals: Array, friction: Array, norm: Norm = "l1") -> Self:
+        """Make the set of contacts with levers and inward unit normals, (k, 3) each, unchecked."""
+        return cls(in_frames(grasp_map(arms), contact_frames(normals)), friction, norm)
 
     def on_grid(self) -> "WrenchSet":
         """Round the set to a grid, so that searches do not depend on last digits."""
         return replace(
-            self, G=on_grid(self.G, SAME_DIGITS), friction=on_grid(self.friction, SAME_DIGITS)
+            self, G=on_grid(self.G, SEARCH_DIGITS), friction=on_grid(self.friction, SEARCH_DIGITS)
         )
 
     def sound(self) -> bool:

@@ -5,8 +5,8 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
 from grasp_core.geometry.vectors_kernel import cross, dotted
+from grasp_core.values import FINGERS
 
-FINGERS = 4
 DEPENDENT = 1e-12
 """Determinant below which three axes are coplanar, as in `grasp_core.cones.spanning`."""
 SLIGHT = 1e-6

@@ -44,8 +44,8 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import FINGERS
 
 KERNEL = "grasp_core.disc_bounds.corner_bounds_kernel"
-PARALLEL = 1e-6
-"""Value of 1 - a_i.a_j below which two axes are so nearly parallel that they bound no width."""
+LEAST_SINE = 1e-6
+"""Half angles between axes with a sine up to this are so small that they bound no width."""
 
 
 def corners_of(body: Polyhedron) -> Corners:
@@ -127,6 +127,6 @@ def widths_apart(faces: Indices, apart: Array, halves: Array, leaning: Array) ->
         pair = faces[:, i], faces[:, j]
         # |a_i - a_j| is twice the sine of half the angle between them
         sines = np.sin(np.maximum(halves[pair] - leaning, 0.0))
-        bound = np.where(sines > PARALLEL, apart[pair] / np.maximum(sines, PARALLEL), np.inf)
+        bound = np.where(sines > LEAST_SINE, apart[pair] / np.maximum(sines, LEAST_SINE), np.inf)
         widths[:, i, j] = widths[:, j, i] = bound
     return widths

@@ -7,14 +7,17 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
+from grasp_core.families.constructions import PAIRINGS
 from grasp_core.families.kernel_tables import Corners
 from grasp_core.geometry.vectors_kernel import balancing_weights, cross, dotted
+from grasp_core.values import FINGERS
 
-FINGERS = 4
-PAIRINGS = ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2))
-PARALLEL = 1e-6
-"""Size of 1 - a_i.a_j, or of a cross product, below which axes are nearly parallel and give no
-bound."""
+SAME_AXIS = 1e-6
+"""Axes with 1 - a_i.a_j up to this are so nearly parallel that (2) bounds no width."""
+NO_CROSSING = 1e-6
+"""Axes whose cross product is no longer than this leave the direction N undefined."""
+NO_LEAN = 1e-6
+"""Factors of r in (3) and (4) up to this bound no r: the discs hardly reach along N."""
 
 
 @loop()
@@ -74,7 +77,7 @@ def _width(corners: Corners, faces: Indices, axes: Array, pair: tuple[int, int])
     for d in range(3):
         apart[d] = axes[i, d] - axes[j, d]
     share = 0.5 * dotted(apart, apart)  # 1 - a_i.a_j of (2)
-    if share <= PARALLEL:
+    if share <= SAME_AXIS:
         return np.inf
     return (_extent(corners, faces[j], apart)[1] - _extent(corners, faces[i], apart)[0]) / share
 
@@ -92,7 +95,7 @@ def _across(
     N, limit, pair = np.empty(3), np.inf, FINGERS // 2
     cross(axes[places[0]], axes[places[1]], N)
     length = np.sqrt(dotted(N, N))
-    if length <= PARALLEL:
+    if length <= NO_CROSSING:
         return limit
     for d in range(3):
         N[d] /= length
@@ -107,7 +110,7 @@ def _across(
             away = dotted(axes[other], N) / half if f >= pair else 0.0
             # left sides of (3) and (4) per unit of r
             total = lean + _lean(normals[faces[other]], N) + abs(away)
-            if total <= PARALLEL:
+            if total <= NO_LEAN:
                 continue
             if away >= 0.0:
                 limit = min(limit, (high - lower) / total)

@@ -12,8 +12,8 @@ from grasp_core.arrays import Array
 from grasp_core.compiled import loop
 from grasp_core.families.kernel_tables import Attempts, FaceTable
 from grasp_core.solvers.lp_kernel import LOST, Rows, Vertex, proved_bound, solve
+from grasp_core.values import FINGERS
 
-FINGERS = 4
 ACCURACY = 1e-12
 """Error up to which multipliers give the objective: even if a focus is a thousand object radii
 away, the bound changes by less than the accuracy of a program's answer."""

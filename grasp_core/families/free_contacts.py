@@ -47,7 +47,7 @@ from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.nearest_point import least_distance
 from grasp_core.values import FINGERS
 
-SIDES = 8
+PATCH_SIDES = 8
 """Number of facets of the pyramids."""
 DEPENDENT = 1e-6
 """Singular values smaller than this, relative to the largest, are zero but for rounding."""
@@ -112,7 +112,7 @@ def smallest_forces(
     Z = right[rank:].T
     f_0 = right[:rank].T @ (left[-1, :rank] / sizes[:rank])
     toward = np.array([piece.frame[:, 0] for piece in pieces])
-    facets = pyramid_facets(normals, math.atan(friction), toward, SIDES)
+    facets = pyramid_facets(normals, math.atan(friction), toward, PATCH_SIDES)
     # (2) in z: -(G_f Z) z <= G_f f_0 - depth
     rows = np.einsum("ksi,kiz->ksz", facets, Z.reshape(len(points), 3, -1)).reshape(-1, Z.shape[1])
     here = np.einsum("ksi,ki->ks", facets, f_0.reshape(-1, 3)).ravel()
@@ -182,18 +182,24 @@ def _nearest_to_middles(
 
 def _held_at(pieces: Sequence[FacePiece], positions: Array, friction: float) -> Placement | None:
     """Make a placement at given contacts if they are in force closure; None otherwise."""
-    inset = min(
-        float((piece.b - piece.E @ (piece.frame.T @ (at - piece.origin))).min())
-        for piece, at in zip(pieces, positions, strict=True)
-    )
+    inset = min(piece.inset(at) for piece, at in zip(pieces, positions, strict=True))
+    if inset < LEAST_INSET or _on_one_line(positions):
+        return None
+    return closed_at(pieces, positions, friction, inset)
+
+
+def closed_at(
+    pieces: Sequence[FacePiece], positions: Array, friction: float, merit: float
+) -> Placement | None:
+    """Make a placement, with forces that close it, at contacts on pieces; None if they do not."""
     normals = np.array([piece.normal for piece in pieces])
     try:
         certificate = force_closure(positions, normals, friction)
     except UndecidedError:
         return None
-    if certificate.forces is None or inset < LEAST_INSET or _on_one_line(positions):
+    if certificate.forces is None:
         return None
-    return Placement(positions, certificate.forces, np.empty((0, 3)), np.zeros(FINGERS), inset)
+    return Placement(positions, certificate.forces, np.empty((0, 3)), np.zeros(FINGERS), merit)
 
 
 def _on_one_line(positions: Array) -> bool:

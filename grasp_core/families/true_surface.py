@@ -99,8 +99,7 @@ def _aimed(
 
 
 def _holds(facet: FacePiece, point: Array) -> bool:
-    beyond = facet.E @ (facet.frame.T @ (point - facet.origin)) - facet.b
-    return bool(beyond.max() <= ON_EDGE)
+    return facet.inset(point) >= -ON_EDGE
 
 
 def _facet(

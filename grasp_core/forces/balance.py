@@ -24,13 +24,13 @@ from grasp_core.arrays import Array
 from grasp_core.closure.wrenches import contact_frames, grasp_map, in_frames
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns, inscribed_share
 
-RESIDUAL = 1e-6
+FORCE_RESIDUAL = 1e-6
 """Largest imbalance and cone violation accepted, in units of the largest normal force: a
 hundred times the accuracy asked of ProxQP."""
 
 CLEARLY = 1.01
-"""Factor by which a wrench must exceed all forces to be refused, so that rounding does not matter.
-"""
+"""Factor by which a wrench must exceed all forces, so that rounding and `FORCE_RESIDUAL` do not
+matter."""
 NO_FORCE = 1e-100
 """Smallest normal force that is divided by: a contact may have no force."""
 
@@ -133,8 +133,8 @@ class Balance:
             D.append(self.largest[:, None] - normal_parts)
         return np.vstack(C), np.hstack(D)
 
-    def checked(self, F: Array, residual: float = RESIDUAL) -> Array:
-        """Make forces (n, 3k) balance up to rounding; NaN where they then break a limit."""
+    def checked(self, F: Array, residual: float = FORCE_RESIDUAL) -> Array:
+        """Make forces (n, 3k) balance to rounding; NaN where they then break a limit."""
         # the least change that balances f is the pseudo-inverse of what is left
         exact = F - (F @ self.G.T + self.W) @ self.inverse.T
         along = exact[:, 0::3]
@@ -169,7 +169,7 @@ def needed_friction(F: Array, friction: Array) -> Array:
     """
     along, across = F[:, 0::3], np.hypot(F[:, 1::3], F[:, 2::3])
     shares = across / np.maximum(friction * along, NO_FORCE)
-    return np.where(across <= RESIDUAL, 0.0, shares).max(axis=1)
+    return np.where(across <= FORCE_RESIDUAL, 0.0, shares).max(axis=1)
 
 
 def _inverse_and_null_space(G: Array) -> tuple[Array, Array]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import SolverError
-from grasp_core.forces.balance import RESIDUAL, Balance, needed_friction
+from grasp_core.forces.balance import FORCE_RESIDUAL, Balance, needed_friction
 from grasp_core.solvers.conic import ConicProgram, minimize
 
 KEPT_BACK = 1e-7
@@ -36,7 +36,7 @@ def least_norm_in_cones(balance: Balance, friction: Array) -> Array | None:
         except SolverError:
             return None
         found = balance.checked(f[None])
-        if needed_friction(found, friction)[0] <= 1.0 + RESIDUAL:
+        if needed_friction(found, friction)[0] <= 1.0 + FORCE_RESIDUAL:
             return found[0]
         unit = max(float(np.abs(f).max()), 1.0)
     return None

@@ -1,6 +1,6 @@
-"""Contact forces that balance wrenches, with what callers may ask of them.
+"""Contact forces that balance given wrenches, or come near to it, with checks of what is given.
 
-The programs behind the answers are in `force_programs`.
+`force_programs` derives the programs behind the answers and solves them.
 """
 
 import math

@@ -28,7 +28,7 @@ import math
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.forces.balance import RESIDUAL, Balance, needed_friction
+from grasp_core.forces.balance import FORCE_RESIDUAL, Balance, needed_friction
 from grasp_core.forces.cone_forces import least_norm_in_cones
 from grasp_core.forces.least_friction import lower_friction
 from grasp_core.solvers.nearest_point import least_distance
@@ -89,7 +89,7 @@ def least_friction_each(balance: Balance, friction: Array) -> Array:
 
 def in_cones(f: Array, friction: Array) -> bool:
     """Return whether local forces (3k,) are numbers and need no more than the friction."""
-    return bool(needed_friction(f[None], friction)[0] <= 1.0 + RESIDUAL)
+    return bool(needed_friction(f[None], friction)[0] <= 1.0 + FORCE_RESIDUAL)
 
 
 def least_friction(balance: Balance, start: float, weights: Array) -> Array | None:

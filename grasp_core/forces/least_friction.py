@@ -25,10 +25,9 @@ IMPROVEMENT = 1e-4
 """Share by which the coefficient must fall in a round for the iteration to go on; it ends some 1e-4
 above the least."""
 MAX_ROUNDS = 12
-"""Largest number of programs solved: the excess over the least friction falls by half or more in
-each, and faster unless a finger does not push."""
-ROUNDING = 1e-9
-"""Largest imbalance, and largest distance outside the limits, in units of the largest force."""
+"""Most programs: the excess falls by half or more in each, and faster unless a finger idles."""
+FINE_RESIDUAL = 1e-9
+"""Largest imbalance, and distance outside the limits, in units of the largest force."""
 FRICTIONLESS = 1e-6
 """Friction coefficient below which no lower one is searched for."""
 
@@ -53,7 +52,7 @@ def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:
             better = _with_least_excess(program, friction * weights)
         except SolverError:
             break
-        better = balance.checked(better[None], ROUNDING)[0]
+        better = balance.checked(better[None], FINE_RESIDUAL)[0]
         needed = _needed_friction(better, weights)
         if not needed < friction:
             break

@@ -12,30 +12,25 @@ becoming a huge scene, every primitive that is placed counts for at least one tr
 import json
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.mesh_files.polygon_soup import CORNERS, too_many
-from grasp_core.mesh_files.refusals import broken, outside, shown, unsupported
+from grasp_core.mesh_files.glb_primitives import Tree, check_place, decoded_primitive
+from grasp_core.mesh_files.polygon_soup import too_many
+from grasp_core.mesh_files.refusals import broken, not_finite, shown, unsupported
 
 MAGIC, VERSION = b"glTF", 2
 HEAD, CHUNK_HEAD = 12, 8
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
-INDEX_TYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4"}
-FLOAT_TYPE = 5126
-TRIANGLES, STRIP = 4, 5
 MOST_NODES = 10_000
 MOST_VALUES = 4_000_000
 """Largest number of JSON values allowed: each of them takes up to a quarter of a kilobyte of
 memory."""
 PLAIN_EXTENSIONS = ("KHR_materials", "KHR_texture", "KHR_lights", "EXT_texture", "KHR_xmp")
 """Prefixes of glTF extensions that change only the appearance; files with others are refused."""
-Tree = dict[str, Any]
 WRONG_TREE = (
     KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError,
 )  # fmt: skip
@@ -99,7 +94,7 @@ def _scene(tree: Tree, binary: bytes, most: int) -> tuple[Array, Indices]:
     for matrix, mesh in _placed(tree):
         mirrored = np.linalg.det(matrix[:3, :3]) < 0.0
         for primitive in tree["meshes"][mesh]["primitives"]:
-            corners, local = _primitive(tree, binary, primitive, most - placed)
+            corners, local = decoded_primitive(tree, binary, primitive, most - placed)
             placed += max(len(corners), 1)
             if placed > most:
                 too_many(placed, most)
@@ -135,12 +130,12 @@ def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
     if not scenes:
         return
     place = tree.get("scene", 0)
-    _check_place(place, scenes)
+    check_place(place, scenes)
     waiting, seen = list[tuple[Array, int]](), set[int]()
     _await(waiting, np.eye(4), scenes[place].get("nodes", []))
     while waiting:
         parent, number = waiting.pop()
-        _check_place(number, tree["nodes"])
+        check_place(number, tree["nodes"])
         if number in seen or len(seen) >= MOST_NODES:
             broken(f"node {number}", f"nodes must form a tree, of {MOST_NODES} at most")
         seen.add(number)
@@ -148,7 +143,7 @@ def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
         matrix = parent @ _matrix(node)
         _await(waiting, matrix, node.get("children", []))
         if "mesh" in node:
-            _check_place(node["mesh"], tree["meshes"])
+            check_place(node["mesh"], tree["meshes"])
             if "camera" in node:
                 unsupported(f"node {number} holds a mesh and a camera", "export the mesh alone")
             yield matrix, node["mesh"]
@@ -158,11 +153,6 @@ def _await(waiting: list[tuple[Array, int]], matrix: Array, nodes: list[int]) ->
     if len(waiting) + len(nodes) > MOST_NODES:
         broken("the JSON part", f"nodes must form a tree, of {MOST_NODES} at most")
     waiting += [(matrix, number) for number in nodes]
-
-
-def _check_place(place: object, listed: list[Any]) -> None:
-    if type(place) is not int or not 0 <= place < len(listed):
-        broken("the JSON part", f"refers to item {shown(place)} of a list of {len(listed)}")
 
 
 def _matrix(node: Tree) -> Array:
@@ -192,8 +182,7 @@ def _floats(node: Tree, name: str, count: int) -> Array:
         broken("a node", f"its {name} must be {count} numbers, got {shown(given)}")
     values = np.array([float(each) for each in given])
     if not np.isfinite(values).all():
-        message = f"a node: its {name} must be finite, got {shown(given)}; repair it"
-        raise MeshError(MeshRefusal.NON_FINITE, message)
+        not_finite("a node", f"its {name} must be finite", shown(given))
     return values
 
 
@@ -210,95 +199,3 @@ def _rotation(quaternion: Array) -> Array:
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
     )
-
-
-def _primitive(tree: Tree, binary: bytes, primitive: Tree, left: int) -> tuple[Indices, Array]:
-    """Read the triangles (t, 3) of one primitive of a mesh, and the vertices (n, 3) that they use.
-
-    Args:
-        tree: The JSON chunk.
-        binary: The binary chunk.
-        primitive: The primitive's entry in the JSON chunk.
-        left: How many more triangles are allowed.
-    """
-    mode = primitive.get("mode", TRIANGLES)
-    if "targets" in primitive or primitive.get("extensions"):
-        unsupported("a primitive has morph targets or extensions", "export plain triangles")
-    if mode not in (TRIANGLES, STRIP):
-        unsupported(f"a primitive has mode {shown(mode)}, not triangles", "export triangles only")
-    points = _stored(tree, binary, primitive["attributes"]["POSITION"], "VEC3")
-    order = (
-        _stored(tree, binary, primitive["indices"], "SCALAR") if "indices" in primitive else None
-    )
-    corners = points.count if order is None else order.count
-    triangles = corners - 2 if mode == STRIP else corners // CORNERS
-    if triangles > left:
-        too_many(triangles, left)
-    flat = np.arange(corners) if order is None else order.rows(slice(None)).ravel().astype(np.int64)
-    if mode == STRIP:
-        rows = np.stack([flat[:-2], flat[1:-1], flat[2:]], axis=1)
-        # every other triangle of a strip is wound the other way
-        rows[1::2] = rows[1::2, [1, 0, 2]]
-    elif len(flat) % CORNERS:
-        broken("a primitive", f"{len(flat)} corners are not a multiple of three")
-    else:
-        rows = flat.reshape(-1, 3)
-    if rows.size and rows.max() >= points.count:
-        wrong = int(rows.max())
-        outside(f"triangle {np.argwhere(rows == wrong)[0, 0]}", wrong, points.count)
-    used, rows = np.unique(rows, return_inverse=True)
-    return rows.reshape(-1, 3), points.rows(used).astype(np.float64)
-
-
-@dataclass(frozen=True, slots=True)
-class _Stored:
-    """The numbers of one accessor as raw bytes, converted only when `rows` is called."""
-
-    raw: NDArray[np.uint8]
-    """Bytes of each row, (number of rows, bytes per row)."""
-    item: "np.dtype[Any]"
-
-    @property
-    def count(self) -> int:
-        return len(self.raw)
-
-    def rows(self, which: "slice | Indices") -> "NDArray[Any]":
-        """Convert the selected rows to numbers, (n, numbers per row)."""
-        return np.ascontiguousarray(self.raw[which]).view(self.item)
-
-
-def _stored(tree: Tree, binary: bytes, number: int, shape: str) -> _Stored:
-    """Find the numbers of a glTF accessor in the binary chunk, one row per element."""
-    _check_place(number, tree["accessors"])
-    accessor = tree["accessors"][number]
-    kind = accessor["componentType"]
-    wanted = {FLOAT_TYPE: "<f4"} if shape == "VEC3" else INDEX_TYPES
-    if accessor["type"] != shape or kind not in wanted or accessor.get("normalized"):
-        unsupported(
-            f"accessor {number} has type {shown(accessor['type'])} of component {shown(kind)}",
-            "export plain triangles",
-        )
-    if "sparse" in accessor or "bufferView" not in accessor:
-        unsupported(f"accessor {number} is sparse or without data", "export plain triangles")
-    _check_place(accessor["bufferView"], tree["bufferViews"])
-    view = tree["bufferViews"][accessor["bufferView"]]
-    _check_place(view["buffer"], tree["buffers"])
-    item = np.dtype(wanted[kind])
-    row = item.itemsize * (CORNERS if shape == "VEC3" else 1)
-    stride, count = view.get("byteStride", row), accessor["count"]
-    inside, start = accessor.get("byteOffset", 0), view.get("byteOffset", 0)
-    sizes = (stride, inside, start, count, view["byteLength"])
-    if any(type(size) is not int or size < 0 for size in sizes) or stride < row:
-        broken(
-            f"accessor {number}",
-            f"sizes must be whole numbers from 0 on, byteStride at least {row}",
-        )
-    length = (count - 1) * stride + row if count else 0
-    if inside + length > view["byteLength"] or start + view["byteLength"] > len(binary):
-        broken(
-            f"accessor {number}",
-            f"{count} elements do not fit into the binary chunk of {len(binary)} bytes",
-        )
-    raw = np.frombuffer(binary, dtype=np.uint8)[start + inside :]
-    rows = np.lib.stride_tricks.as_strided(raw, (count, row), (stride, 1), writeable=False)
-    return _Stored(rows, item)

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.mesh_files.ply_header import LISTS, POINT, Element, Header, Property, read_header
 from grasp_core.mesh_files.polygon_soup import CORNERS, Polygons, points_of, too_many
-from grasp_core.mesh_files.refusals import broken, shown
+from grasp_core.mesh_files.refusals import broken, not_finite, shown
 from grasp_core.mesh_files.words import numbers, plain_text, whole, worded_lines
 
 LARGEST_CORNER = 2**32
@@ -37,11 +36,8 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
         points = _binary_points(header, data, polygons)
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if bad.size:
-        message = (
-            f"vertex {bad[0]}: a coordinate must be finite in the precision of its type, got "
-            f"{points[bad[0]].tolist()}; repair it"
-        )
-        raise MeshError(MeshRefusal.NON_FINITE, message)
+        said = "a coordinate must be finite in the precision of its type"
+        not_finite(f"vertex {bad[0]}", said, points[bad[0]].tolist())
     return polygons.on(points)
 
 

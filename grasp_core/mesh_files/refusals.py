@@ -32,6 +32,15 @@ def unsupported(said: str, remedy: str) -> NoReturn:
     raise MeshError(MeshRefusal.UNSUPPORTED, f"{said}; {remedy}")
 
 
+def not_finite(where: str, said: str, got: object) -> NoReturn:
+    """Refuse a number that is infinite or not a number.
+
+    Raises:
+        MeshError: Always.
+    """
+    raise MeshError(MeshRefusal.NON_FINITE, f"{where}: {said}, got {got}; repair it")
+
+
 def outside(where: str, corner: int, vertices: int) -> NoReturn:
     """Refuse a triangle that refers to a missing vertex.
 

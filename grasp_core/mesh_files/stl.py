@@ -6,9 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.mesh_files.polygon_soup import points_of, too_many
-from grasp_core.mesh_files.refusals import broken, shown
+from grasp_core.mesh_files.refusals import broken, not_finite, shown
 from grasp_core.mesh_files.words import numbers, plain_text, worded_lines
 
 HEADER, TRIANGLE = 80, 50
@@ -41,11 +40,9 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     points = _of_binary(data, most) if is_binary(data) else _of_text(plain_text(data), most)
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if bad.size:
-        message = (
-            f"triangle {bad[0] // 3}: a coordinate must be finite, got "
-            f"{points[bad[0]].tolist()}; repair it"
+        not_finite(
+            f"triangle {bad[0] // 3}", "a coordinate must be finite", points[bad[0]].tolist()
         )
-        raise MeshError(MeshRefusal.NON_FINITE, message)
     return points, np.arange(len(points)).reshape(-1, 3)
 
 

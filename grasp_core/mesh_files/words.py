@@ -5,8 +5,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 
-from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.mesh_files.refusals import broken, shown
+from grasp_core.mesh_files.refusals import broken, not_finite, shown
 
 LONGEST_LINE = 2**20
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
@@ -92,8 +91,7 @@ def _finite(word: bytes, where: Where) -> float:
 
 def _refused(word: bytes, where: Where) -> float:
     if NOT_FINITE.fullmatch(word) or NUMBER.fullmatch(word):
-        message = f"{where}: a coordinate must be finite, got {shown(word)}; repair it"
-        raise MeshError(MeshRefusal.NON_FINITE, message)
+        not_finite(where, "a coordinate must be finite", shown(word))
     broken(where, f"expected a number, got {shown(word)!r}")
 
 

@@ -98,6 +98,14 @@ class FacePiece:
         """Return the point in space, (3,), with plane coordinates `y`, (2,)."""
         return self.origin + self.frame @ y
 
+    def in_plane(self, point: Array) -> Array:
+        """The plane coordinates, (2,), of a point of the plane, (3,)."""
+        return self.frame.T @ (point - self.origin)
+
+    def inset(self, point: Array) -> float:
+        """Distance of a point inside the piece from its nearest edge line; negative outside."""
+        return float((self.b - self.E @ self.in_plane(point)).min())
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FaceShape:
@@ -116,16 +124,13 @@ Shapes: TypeAlias = Sequence[FaceShape | None]
 
 
 def face_shapes(body: Polyhedron) -> tuple[FaceShape | None, ...]:
-    """Make the shape of each face of an object; None for faces too narrow for a contact."""
-    by_face: list[list[FacePiece]] = [[] for _ in body.faces]
-    for piece in unit_pieces(body):
-        by_face[piece.face].append(piece)
+    """The faces of an object as the programs use them; None for faces without room."""
     corners = (body.vertices - body.center_of_mass)[body.triangles[:, ::-1]] / body.radius
     return tuple(
         replace(shape_of(pieces), facets=corners[face.facets] if len(face.facets) else None)
         if pieces
         else None
-        for face, pieces in zip(body.faces, by_face, strict=True)
+        for face, pieces in zip(body.faces, pieces_by_face(body), strict=True)
     )
 
 
@@ -161,14 +166,9 @@ def choices_near(
 
 
 def _nearest_first(pieces: Sequence[FacePiece], at: Array) -> list[FacePiece]:
-    """Order pieces of a face by their distance from a point of its plane."""
-    apart = [graded(_outside(piece, at), SAME_PLACE) for piece in pieces]
+    """Order pieces of a face, the nearest to a point of its plane first."""
+    apart = [graded(-piece.inset(at), SAME_PLACE) for piece in pieces]
     return [pieces[place] for place in sorted(range(len(pieces)), key=apart.__getitem__)]
-
-
-def _outside(piece: FacePiece, point: Array) -> float:
-    """Return how far a point of the plane is beyond the farthest edge line of a piece."""
-    return float((piece.E @ (piece.frame.T @ (point - piece.origin)) - piece.b).max())
 
 
 def inset_piece(piece: FacePiece, inset: float) -> FacePiece:
@@ -199,6 +199,14 @@ def unit_pieces(body: Polyhedron) -> tuple[FacePiece, ...]:
         for polygon in face.pieces
     ]
     return tuple(piece for piece in pieces if piece.inradius > THINNEST)
+
+
+def pieces_by_face(body: Polyhedron) -> tuple[tuple[FacePiece, ...], ...]:
+    """The convex pieces of each face with room for a contact, in the order of the faces."""
+    by_face: list[list[FacePiece]] = [[] for _ in body.faces]
+    for piece in unit_pieces(body):
+        by_face[piece.face].append(piece)
+    return tuple(tuple(pieces) for pieces in by_face)
 
 
 def piece_of(face: int, normal: Array, polygon: Array) -> FacePiece:

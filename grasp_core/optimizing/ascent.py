@@ -25,7 +25,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.closure.wrenches import contact_frames, grasp_map, in_frames
+from grasp_core.closure.wrenches import contact_frames
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.quality.ferrari_canny import FerrariCanny, InnerPolytope, wrench_set_quality
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
@@ -70,9 +70,9 @@ class ContactFaces:
     friction: float
 
     @property
-    def frames(self) -> Array:
-        """Return the contact frames of the pieces, (k, 3, 3)."""
-        return contact_frames(np.array([piece.normal for piece in self.pieces]))
+    def normals(self) -> Array:
+        """Inward unit normals of the pieces, (k, 3)."""
+        return np.array([piece.normal for piece in self.pieces])
 
     def positions(self, y: Array) -> Array:
         """Turn plane coordinates of contacts, (k, 2), into points in space, (k, 3)."""
@@ -84,8 +84,8 @@ class ContactFaces:
         Wrenches are rounded to a grid, because a polytope that grows where it is weakest often has
         to choose between several equally near planes.
         """
-        G = in_frames(grasp_map(self.positions(y)), self.frames)
-        wrenches = WrenchSet(G, np.full(len(y), self.friction), "l1")
+        friction = np.full(len(y), self.friction)
+        wrenches = WrenchSet.at(self.positions(y), self.normals, friction)
         return wrench_set_quality(wrenches.on_grid(), gap)
 
     def climbed(self, y: Array) -> tuple[Array, FerrariCanny]:
@@ -139,7 +139,7 @@ class ContactFaces:
         feet = np.asarray(np.linalg.pinv(columns, rcond=FLAT), dtype=np.float64)
         shares = np.einsum("mcj,mj->mc", feet, b[:, None] * normals)
         sound = np.abs(shares).max(axis=1) < STEEPEST
-        frames = self.frames
+        frames = contact_frames(self.normals)
         local = polytope.forces.reshape(len(polytope.forces), -1, 3)
         forces = np.einsum("kij,nkj->nki", frames, local)
         carried = np.einsum("mc,mcki->mki", shares[sound], forces[corners[sound]])

@@ -21,13 +21,11 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.checked import SMALLEST, coefficient, number, seed_of
-from grasp_core.closure.force_closure import force_closure
-from grasp_core.errors import InputError, UndecidedError
+from grasp_core.errors import InputError
 from grasp_core.families.constructions import point_region, regions_of
-from grasp_core.families.free_contacts import of_general_type
-from grasp_core.families.placements import Placement
+from grasp_core.families.free_contacts import closed_at, of_general_type
 from grasp_core.geometry.polygons import SAME_CORNER
-from grasp_core.objects.face_pieces import FacePiece, inset_piece, unit_pieces
+from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.ascent import ContactFaces
@@ -133,10 +131,7 @@ def _insets(
     """Return the distance that contacts keep from the edges of each piece, at unit size."""
     if finger_radius is not None:
         return [finger_radius / body.radius] * FINGERS
-    depths = [
-        float((piece.b - piece.E @ _in_plane(piece, at)).min())
-        for piece, at in zip(pieces, _unit_points(body, grasp), strict=True)
-    ]
+    depths = [piece.inset(at) for piece, at in zip(pieces, _unit_points(body, grasp), strict=True)]
     return [min(FINGER_RADIUS, max(-coarse(-depth, START_DIGITS), 0.0)) for depth in depths]
 
 
@@ -148,30 +143,25 @@ def _quality(body: Polyhedron, grasp: Grasp, friction: float) -> FerrariCanny:
 
 def pieces_under(body: Polyhedron, grasp: Grasp) -> tuple[FacePiece, ...]:
     """Return the convex piece of a face that each contact lies on."""
-    pieces = unit_pieces(body)
+    pieces = pieces_by_face(body)
     return tuple(
-        _deepest([piece for piece in pieces if piece.face == face], point)
+        _deepest(pieces[face], point)
         for face, point in zip(grasp.faces, _unit_points(body, grasp), strict=True)
     )
 
 
 def _deepest(pieces: Sequence[FacePiece], point: Array) -> FacePiece:
-    """Return the piece in which a point is deepest; of equal ones, the first."""
-    depths = [float((piece.b - piece.E @ _in_plane(piece, point)).min()) for piece in pieces]
-    return pieces[first_best(depths, SAME_CORNER)]
+    """Return the piece that a point is deepest in, or the first if it is on a common edge."""
+    return pieces[first_best([piece.inset(point) for piece in pieces], SAME_CORNER)]
 
 
 def _unit_points(body: Polyhedron, grasp: Grasp) -> Array:
     return (grasp.positions - body.center_of_mass) / body.radius
 
 
-def _in_plane(piece: FacePiece, point: Array) -> Array:
-    return piece.frame.T @ (point - piece.origin)
-
-
 def _clear_of_edges(room: FacePiece, point: Array) -> Array:
-    """Move a point towards the middle of a polygon until it is inside, (2,)."""
-    y, middle = on_grid(_in_plane(room, point), START_DIGITS), room.corners.mean(axis=0)
+    """Move a point in the plane of a face towards the middle of its room until inside, (2,)."""
+    y, middle = on_grid(room.in_plane(point), START_DIGITS), room.corners.mean(axis=0)
     beyond = room.E @ y - room.b
     inward = room.E @ (y - middle)
     share = float((beyond[beyond > 0.0] / inward[beyond > 0.0]).max(initial=0.0))
@@ -194,19 +184,10 @@ def _random_starts(
 def _certified(
     body: Polyhedron, grasp: Grasp, faces: ContactFaces, y: Array, rng: np.random.Generator
 ) -> Grasp | None:
-    """Return the grasp at these contacts if it can be certified, else None.
-
-    It is certified if force closure is proved and a witness of general type is found.
-    """
-    positions = faces.positions(y)
-    normals = np.array([piece.normal for piece in faces.pieces])
-    try:
-        closed = force_closure(positions, normals, faces.friction)
-    except UndecidedError:
+    """Return the grasp at these contacts if closure and a general witness confirm it, else None."""
+    plain = closed_at(faces.pieces, faces.positions(y), faces.friction, 0.0)
+    if plain is None:
         return None
-    if closed.forces is None:
-        return None
-    plain = Placement(positions, closed.forces, np.empty((0, 3)), np.zeros(FINGERS), 0.0)
     placement = of_general_type(faces.pieces, plain, faces.friction, rng)
     if placement is None:
         return None

@@ -34,11 +34,11 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, frozen_each
 from grasp_core.checked import LARGEST, coefficient, number, several, whole
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
+from grasp_core.closure.wrenches import WRENCH
 from grasp_core.errors import InputError
 from grasp_core.families.face_parts import Path, corner_contacts, cover_everything, is_path, part_at
 from grasp_core.fields import are_frictions, are_units, is_a, is_number, is_tuple_of
-from grasp_core.objects.face_pieces import FacePiece, inset_piece, unit_pieces
+from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
@@ -51,10 +51,9 @@ PART_GAP = 0.02
 parts are large."""
 MOST_PARTS = 1_000_000
 ENOUGH = 0.01
-"""Share by which the bound of a part may exceed the known quality so that the part is not divided
-any more."""
-ROUNDING = 1e-9
-"""How far the bound of a part may exceed the ceiling, relative to it or to one newton."""
+"""Parts whose bound is within this share of the known quality are not cut any more."""
+BOUND_SLACK = 1e-9
+"""How far a part's bound may exceed the ceiling, relative to it or to one newton."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +83,7 @@ class QualityCeiling:
         """Check every field again in plain arithmetic.
 
         The check is that the pieces are convex polygons, that the parts cover them, and that all
-        are bounded, to within `ROUNDING`. Whether the pieces are those of an object's faces can
+        are bounded, to within `BOUND_SLACK`. Whether the pieces are those of an object's faces can
         only be checked with the object.
         """
         with np.errstate(all="ignore"):
@@ -99,7 +98,7 @@ class QualityCeiling:
                 and all(self._fits(leaf) for leaf in self.leaves)
                 and self._covers()
                 and all(
-                    self._bound(leaf) <= self.upper + ROUNDING * max(self.upper, 1.0)
+                    self._bound(leaf) <= self.upper + BOUND_SLACK * max(self.upper, 1.0)
                     for leaf in self.leaves
                 )
             )
@@ -196,16 +195,16 @@ def _choices(
     each = partial(whole, name="faces", most=len(body.faces) - 1)
     given = several(faces, each, "faces", "indices")
     if len(given) != FINGERS:
-        raise InputError(f"faces must be {FINGERS} face numbers, got {len(given)}")
-    pieces = unit_pieces(body)
-    by_face = [[piece for piece in pieces if piece.face == face] for face in faces]
+        raise InputError(f"faces must be {FINGERS} indices of faces, got {len(given)}")
+    pieces = pieces_by_face(body)
+    by_face = [pieces[face] for face in given]
     if not all(by_face):
         raise InputError(
             f"faces {tuple(faces)}: one of them is too narrow for a contact; choose others"
         )
     # edges between the pieces of a face are no borders: contacts may lie on them
     rooms = [
-        [inset_piece(one[0], inset)] if len(one) == 1 else one
+        (inset_piece(one[0], inset),) if len(one) == 1 else one
         for one, inset in zip(by_face, insets.tolist(), strict=True)
     ]
     return tuple(product(*rooms))
@@ -235,5 +234,4 @@ def _bounded(
 
 def _corner_wrenches(choice: Sequence[FacePiece], path: Path, friction: float) -> WrenchSet:
     points, normals = corner_contacts(choice, part_at(choice, path))
-    G = in_frames(grasp_map(points), contact_frames(normals))
-    return WrenchSet(G, np.full(len(points), friction), "l1")
+    return WrenchSet.at(points, normals, np.full(len(points), friction))

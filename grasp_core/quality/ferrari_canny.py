@@ -46,14 +46,13 @@ FINEST_GAP = 1e-7
 """Smallest gap that may be asked for: below it, rounding of the planes of tiny simplices costs more
 than they gain."""
 MOST_SIMPLICES, MOST_POINTS = 60_000, 4096
-"""Number of simplices, and of corners, at which the polytope stops growing; its bounds are valid
-nevertheless, but farther apart."""
-FLAT = 1e-9
-"""Distance from a common plane, relative to the extent, below which points count as lying in it."""
+"""Simplices and corners at which the polytope stops growing; its bounds hold all the same, farther
+apart."""
+FLATNESS = 1e-9
+"""Points closer than this to a common plane, relative to their extent, span nothing more."""
 ABOVE = 1e-12
-"""Height above a simplex, relative to the extent, from which a point sees the simplex: some
-thousand rounding errors."""
-ROUNDING = 1e-12
+"""Height from which on a point sees a simplex, relative to the extent: some thousand roundings."""
+CHECK_SLACK = 1e-12
 """Slack of the plain-arithmetic checks, relative to the longest wrench."""
 KERNEL = "grasp_core.quality.ferrari_canny_kernel"
 
@@ -86,9 +85,9 @@ class FerrariCanny:
         with np.errstate(all="ignore"):
             sound = is_a(self.wrenches, WrenchSet) and self.wrenches.sound()
             ordered = is_number(self.lower) and is_number(self.upper) and self.lower <= self.upper
-            if not (sound and ordered and are_units(self.direction, WRENCH, slack=ROUNDING)):
+            if not (sound and ordered and are_units(self.direction, WRENCH, slack=CHECK_SLACK)):
                 return False
-            slack = ROUNDING * self.wrenches.size
+            slack = CHECK_SLACK * self.wrenches.size
             # (1) for the direction
             support, _ = self.wrenches.support(self.direction)
             return support <= self.upper + slack and self._proves_lower(slack)
@@ -101,13 +100,13 @@ class FerrariCanny:
                 self.forces is None
                 and is_a(self.polytope, InnerPolytope)
                 and self.polytope.sound(width)
-                and self.wrenches.holds(self.polytope.forces, ROUNDING)
+                and self.wrenches.holds(self.polytope.forces, CHECK_SLACK)
                 and self.polytope.proved_radius(self.wrenches) >= self.lower - slack
             )
         # (3), by the wrench of allowed forces
         return (
             is_array(self.forces, width)
-            and self.wrenches.holds(self.forces[None], ROUNDING)
+            and self.wrenches.holds(self.forces[None], CHECK_SLACK)
             and float(np.linalg.norm(self.wrenches.G @ self.forces)) <= -self.lower + slack
         )
 
@@ -155,9 +154,9 @@ def wrench_set_quality(wrenches: WrenchSet, gap: float = GAP) -> FerrariCanny:
     kernel = compiled(KERNEL)
     linf = wrenches.norm == "linf"
     cones = kernel.Cones(np.array(wrenches.G, order="C"), np.array(wrenches.friction), linf)
-    limits = kernel.Limits(gap, MOST_SIMPLICES, MOST_POINTS, FLAT, ABOVE)
+    limits = kernel.Limits(gap, MOST_SIMPLICES, MOST_POINTS, FLATNESS, ABOVE)
     status, forces, corners, normals, weakest = kernel.grow(cones, wrenches.edges(), limits)
-    slack = ROUNDING * wrenches.size
+    slack = CHECK_SLACK * wrenches.size
     if status == kernel.GROWN:
         polytope = InnerPolytope(forces, corners, normals)
         radius = polytope.proved_radius(wrenches)

@@ -11,10 +11,9 @@ vertex and the multipliers are solved for afresh, by elimination.
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.closure.wrenches import WRENCH
 from grasp_core.compiled import loop
 from grasp_core.solvers.lp_kernel import OPTIMAL, Rows, Vertex, solve
-
-WRENCH = 6
 
 
 @loop("numpy")

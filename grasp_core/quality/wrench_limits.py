@@ -30,11 +30,11 @@ from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.values import Grasp
 
 HELD = 1e-7
-"""How far forces at a limit may leave the cones and miss balance, relative to the largest wrench of
-a unit normal force: the accuracy of conic programs."""
-ROUNDING = 1e-9
-"""Slack of the upper bound, relative to it, and of the facet's power, relative to its factors'
-lengths."""
+"""How far forces at a limit may leave cones and balance, relative to the largest wrench of a unit
+normal force: the accuracy of conic programs."""
+FACET_SLACK = 1e-9
+"""Slack of the upper bound, relative to it, and of the facet's power, relative to the lengths of
+its factors."""
 LAST_DIGITS = 1e-12
 """Slack of an upper bound near zero, relative to the largest that the facet's length allows."""
 
@@ -256,8 +256,8 @@ class WrenchBody:
         bound = self.max_normal_force * self.bounded.support(twist)[0]
         farthest = self.bounded.size * float(np.linalg.norm(twist))
         slack = LAST_DIGITS * self.max_normal_force * farthest
-        bounded = bound <= found.upper * (1.0 + ROUNDING) + slack
-        return bounded and abs(power + 1.0) <= ROUNDING * lengths
+        bounded = bound <= found.upper * (1.0 + FACET_SLACK) + slack
+        return bounded and abs(power + 1.0) <= FACET_SLACK * lengths
 
     def _about_middle(self, wrench: Array) -> Array:
         """Move a wrench's reference point to the contacts' mean, and scale it to unit size."""

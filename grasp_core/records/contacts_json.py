@@ -28,9 +28,9 @@ MOST_GRASPS = 100_000
 LARGEST_LENGTH_M = 1e6
 """Largest length [m]: longer ones are mistakes, and their squares might overflow."""
 NEARLY_UNIT = 1e-3
-"""Largest error of a normal's length in a file: the rounding of three digits."""
-ROUNDING = 1e-15
-"""Largest difference from 1 that rounding leaves in the length of a unit vector."""
+"""How far the length of a normal may be from 1: rounding of a file with three digits."""
+UNIT_ROUNDING = 1e-15
+"""How far rounding takes the length of a unit vector from 1."""
 SAME_POINT = 1e-9
 """Distance below which contacts are at one point, relative to the numbers in the file: rounding
 leaves nothing of smaller differences."""
@@ -225,7 +225,7 @@ def _unit_normals(contacts: list[_GivenContact], where: str) -> Array:
             f"{where}[{worst}].normal: its length must be 1 within {NEARLY_UNIT:g}, got "
             f"{lengths[worst]:.6g}; divide it by its length"
         )
-    off = np.abs(lengths - 1.0) > ROUNDING  # what is a unit vector stays as it is
+    off = np.abs(lengths - 1.0) > UNIT_ROUNDING  # what is a unit vector stays as it is
     return np.where(off[:, None], normals / lengths[:, None], normals)
 
 

@@ -33,10 +33,9 @@ WORTH = 1.005
 FARTHEST = 1.0
 """Largest distance that a centre moves at once, in radii."""
 MOVED_DIGITS = 6
-"""Digits after the point to which moved centres are rounded."""
-NEAR = 3.0
-"""Largest factor between the present radius and the radius at which a ray would stop growth: rays
-beyond it are left out of the program."""
+"""Digits after the point that moved centres keep."""
+STOPPING = 3.0
+"""Rays count in the program if they would stop a radius up to this factor of the present one."""
 
 
 def better_centers(grounds: Grounds, ys: Array) -> Array:
@@ -89,7 +88,7 @@ def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
             falls += np.linalg.norm(across, axis=1)
             moves.append(across)
         # (1), for moves from the present centres
-        near = powers < NEAR * proved.radius * falls
+        near = powers < STOPPING * proved.radius * falls
         rows.append(np.column_stack([-np.hstack(moves), falls])[near])
         limits.append(powers[near])
     # (2), for the same moves

@@ -124,7 +124,7 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
     leaning = [math.tan(math.atan(left) - p.spread) if p.spread else left for p in pieces]
     grounds = Grounds(pieces, np.array(leaning), max_cones)
     ys = np.array([
-        nearest_point(piece.corners, on_grid(piece.frame.T @ (x - piece.origin), PLACE_DIGITS))
+        nearest_point(piece.corners, on_grid(piece.in_plane(x), PLACE_DIGITS))
         for piece, x in zip(pieces, unit.at(positions), strict=True)
     ])  # fmt: skip
     proved = largest_discs(grounds, ys)
@@ -185,18 +185,13 @@ def _pieces(
         normal = face.normal / np.linalg.norm(face.normal)  # files round normals
         every = [piece_of(index, normal, unit.at(corners)) for corners in face.pieces]
         point = unit.at(contact.position)
-        whole = every[first_best([_room(point, piece) for piece in every], SAME_CORNER)]
+        whole = every[first_best([piece.inset(point) for piece in every], SAME_CORNER)]
         corners = tidy(clip(whole.corners, whole.E, whole.b - clearance / unit.scale))
         if len(corners) < 3:  # noqa: PLR2004 - not a polygon
             return None
         clear = piece_of(index, normal, whole.origin + corners @ whole.frame.T)
         found.append(replace(clear, spread=face.spread, depth=face.depth / unit.scale))
     return tuple(found)
-
-
-def _room(point: Array, piece: FacePiece) -> float:
-    """Return the distance of a point in a piece from the nearest edge; negative outside."""
-    return float((piece.b - piece.E @ (piece.frame.T @ (point - piece.origin))).min())
 
 
 def _polygons(
@@ -293,7 +288,7 @@ def _open_choice(grounds: Grounds, proved: Proved, unit: _Unit) -> ClosureCertif
     if proved.choice is None or any(piece.depth or piece.spread for piece in grounds.pieces):
         return None
     on_pieces = all(
-        _room(x, piece) >= -SAME_CORNER
+        piece.inset(x) >= -SAME_CORNER
         for piece, x in zip(grounds.pieces, proved.choice, strict=True)
     )
     normals = np.array([piece.normal for piece in grounds.pieces])

@@ -15,7 +15,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
 from grasp_core.regions.motions_kernel import MOTIONS, is_open, longest, lowest, velocity
 from grasp_core.regions.proof import LEAF, TWIST
-from grasp_core.regions.sites import AHEAD, ANSWERS, EVEN, ROUNDS, TINY, Sites
+from grasp_core.regions.sites import AHEAD, ANSWERS, CLEAR_OF_CONE, EVEN, ROUNDS, Sites
 
 RAYS = TWIST
 COVERED, REFUTED, UNDECIDED = 1, -1, 0
@@ -52,8 +52,8 @@ def pivot(ids: Indices, weights: Array, motions: Array, i: int, most: float) -> 
 def answer(
     ids: Indices, weights: Array, motions: Array, sites: Sites, i: int
 ) -> tuple[float, float, float]:
-    """Choose a good force of one contact; return its weighted power on the rays, and the force."""
-    most = sites.friction[i] * (1.0 - TINY)
+    """The sum of a contact's least powers on weighted rays for a good force, and that force."""
+    most = sites.friction[i] * (1.0 - CLEAR_OF_CONE)
     best, best_f, best_g = -np.inf, 0.0, 0.0
     f, g = pivot(ids, weights, motions, i, most)
     mean_f, mean_g = 0.0, 0.0

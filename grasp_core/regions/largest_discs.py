@@ -17,9 +17,11 @@ from grasp_core.geometry.polygons import SAME_CORNER, clip
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.regions.cover_search import search_cover
 from grasp_core.regions.proof import TwistCover
-from grasp_core.regions.sites import TINY, Sites, stacked_corners
+from grasp_core.regions.sites import Sites, stacked_corners
 from grasp_core.solvers.ties import coarse
 
+DIAGONAL = 1e-12
+"""Number added to the diagonal of a product of motions, so that it has a triangular factor."""
 FINENESS = 0.02
 """Relative precision to which the largest radius is found."""
 FIRST_RADIUS, LEAST_RADIUS = 0.05, 1e-6
@@ -29,9 +31,8 @@ COARSE = 16
 """Factor by which the first attempts have fewer cones."""
 FAST, SLOW = 2.0, 1.1
 """Factors by which the radius grows, in the first attempts and in the others."""
-NEAR = 0.04
-"""Distance above the proved radius, relative to it, within which contacts that are not closed are
-sought."""
+OPEN_NEAR = 0.04
+"""Distance from the proved radius up to which an open choice is sought, relative to it."""
 REFUTING = 4
 """Factor by which attempts to find contacts that are not closed have fewer cones."""
 REACH_DIGITS = 10
@@ -100,7 +101,7 @@ class Grounds:
             motions.append(weights[:, None] * (F.T @ np.hstack([np.eye(3), turning])))
         J = np.vstack(motions)
         # a triangular factor is the same on all machines, unlike eigenvectors of symmetric contacts
-        factor = np.linalg.cholesky(J.T @ J + TINY * np.eye(J.shape[1]))
+        factor = np.linalg.cholesky(J.T @ J + DIAGONAL * np.eye(J.shape[1]))
         return to_digits(np.asarray(np.linalg.inv(factor), dtype=np.float64))
 
 
@@ -182,14 +183,14 @@ class _Search:
                 radius = 0.5 * (self.lower + upper) if self.lower > 0.0 else 0.25 * upper
 
     def refute(self, cones: int) -> None:
-        """Look for contacts that are not closed in larger discs, then bisect."""
-        below, radius = self.lower, (1.0 + NEAR) * self.lower
-        while self.limit - below > NEAR * self.lower and min(radius, self.reach) > below:
+        """Look for an open choice in larger discs, then bisect."""
+        below, radius = self.lower, (1.0 + OPEN_NEAR) * self.lower
+        while self.limit - below > OPEN_NEAR * self.lower and min(radius, self.reach) > below:
             radius = min(radius, self.reach)
             found = search_cover(self.grounds.discs(self.ys, radius), self.axes, cones)
             if found.choice is not None:
                 self.limit, self.choice = radius, found.choice
             else:
                 below = radius
-            ahead = below + 2.0 * max(below - self.lower, NEAR * self.lower)
+            ahead = below + 2.0 * max(below - self.lower, OPEN_NEAR * self.lower)
             radius = min(0.5 * (below + self.limit), ahead)

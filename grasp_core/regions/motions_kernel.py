@@ -11,7 +11,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
-from grasp_core.regions.sites import AHEAD, TINY, Sites
+from grasp_core.regions.sites import AHEAD, CLEAR_OF_CONE, Sites
 
 MOTIONS = 6
 STEPS = 40
@@ -82,7 +82,7 @@ def resists(motion: Array, sites: Sites, i: int, shift: Array) -> bool:
     friction allows is convex in the place, and the search steps to where it is least. The result is
     also False, with a place that does resist, if too many steps would be needed.
     """
-    most = sites.friction[i] * (1.0 - TINY)
+    most = sites.friction[i] * (1.0 - CLEAR_OF_CONE)
     out, x, y = 0.0, 0.0, 0.0
     if motion[5] != 0.0:
         # the one place that does not slide

@@ -56,11 +56,11 @@ LEAF = 15
 """Code of a cone that is not divided; smaller codes number the edges (0, 1), (0, 2), ... (4, 5)."""
 EDGES = tuple((i, j) for i in range(TWIST) for j in range(i + 1, TWIST))
 SLACK = 1e-12
-"""Rounding of a power, relative to the lengths of the wrench and of the sums `summed`: thousands of
-rounding errors."""
-LARGEST = 2.0**50
-"""Largest entry of a ray: up to it, entries are sums of whole numbers and exact. Lengths of axes
-must be between its inverse and it."""
+"""Rounding of a power, relative to the lengths of wrench and `summed` twist: thousands of
+roundings."""
+LARGEST_ENTRY = 2.0**50
+"""Entries of rays up to this are exact: they are sums of whole numbers. Lengths of axes must be
+between its inverse and it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,14 +142,14 @@ class TwistCover:
 
     def _independent(self) -> bool:
         lengths = np.linalg.norm(self.axes, axis=1)
-        if not ((lengths > 1.0 / LARGEST) & (lengths < LARGEST)).all():
+        if not ((lengths > 1.0 / LARGEST_ENTRY) & (lengths < LARGEST_ENTRY)).all():
             return False
         return bool(np.linalg.svd(self.axes / lengths[:, None], compute_uv=False)[-1] > SLACK)
 
     def _powerful(self, forces: Array, rays: Array, regions: Sequence[Array]) -> bool:
         """Return whether forces have positive power, h > 0 in (2), on the rays of each cone."""
         # beyond this the rays would not be exact, nor the cuts (4)
-        if np.abs(rays).max(initial=0.0) > LARGEST:
+        if np.abs(rays).max(initial=0.0) > LARGEST_ENTRY:
             return False
         powers, sizes = np.zeros(rays.shape[:2]), np.zeros(rays.shape[:2])
         twists, lengths = rays @ self.axes, summed(rays, self.axes)

@@ -22,10 +22,9 @@ AHEAD = 1e-8
 """Least power of a force that counts, relative to its size and the farthest place: more than
 rounding sites to a grid can change it."""
 EVEN = 0.02
-"""Weight added to each ray when the edge to divide is chosen, so that every edge is divided in
-time."""
-TINY = 1e-12
-"""Share of the friction that forces leave unused, for rounding."""
+"""Weight added to each ray in the choice of the edge to cut, so that all edges are cut in time."""
+CLEAR_OF_CONE = 1e-12
+"""Share of the friction that forces keep clear of, for rounding."""
 
 
 class Sites(NamedTuple):

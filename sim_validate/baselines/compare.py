@@ -54,8 +54,8 @@ EXACT = Bands(
     predicted=1e-9, simulated=1e-9, least=0.0, displacement_m=1e-12, rotation_rad=1e-12,
     grey=0.0, exact=True,
 )  # fmt: skip
-"""Tolerances for the same versions and rounding: only the rounding of written numbers."""
-ROUNDING = Bands(
+"""Bands for the same versions and rounding: only the rounding of written numbers."""
+OTHER_PROCESSOR = Bands(
     predicted=1e-6, simulated=5e-3, least=1e-7, displacement_m=1e-6, rotation_rad=1e-5,
     grey=1e-4, exact=True,
 )  # fmt: skip
@@ -96,7 +96,7 @@ def bands_between(before: Baseline, after: Baseline) -> tuple[Bands, str]:
         return OTHER_VERSIONS, f"with the bands of other versions: {', '.join(others)}"
     if others or before.arithmetic != after.arithmetic:
         why = ", ".join([*others, *(["another processor"] if not others else [])])
-        return ROUNDING, f"with the bands of rounding: {why}"
+        return OTHER_PROCESSOR, f"with the bands of rounding: {why}"
     return EXACT, "exactly"
 
 

@@ -153,7 +153,7 @@ def entry_of(grasp: Grasp, verdict: Verdict, radius_m: float) -> Entry:
         wrenches=len(verdict.wrenches),
         not_held=tuple(trial.name for trial in verdict.failures),
         controls=len(verdict.controls),
-        controls_let_go=sum(control.failed for control in verdict.controls),
+        controls_let_go=sum(control.let_go for control in verdict.controls),
         mismatches=len(verdict.mismatches),
         noisy_trials=len(noisy),
         noisy_not_held=tuple(t.number for t in noisy if t.outcome is not Outcome.HELD),

@@ -41,7 +41,7 @@ def unstable(verdict: Verdict) -> str:
     lines = [f"{verdict.id} at friction {verdict.friction}: {verdict.outcome.value}"]
     lines += [f"  {in_words(failed)}" for failed in verdict.failures[:1]]
     lines += [f"  control {each.control.name} was not let go"
-              for each in verdict.controls if not each.failed]  # fmt: skip
+              for each in verdict.controls if not each.let_go]  # fmt: skip
     lines += [f"  {text}" for text in verdict.mismatches]
     return "" if verdict.good else "\n".join(lines)
 

@@ -78,7 +78,7 @@ def _checks(body: Polyhedron, grasp: Grasp, gate: Gate) -> Mapping[str, bool]:
         **{f"{GATE}{check.name}": check.passed for check in gate.checks},
         "simulated grasp holds": verdict is not None and verdict.held,
         "simulated controls do not": (
-            verdict is not None and verdict.controls_failed and bool(verdict.controls)
+            verdict is not None and verdict.controls_let_go and bool(verdict.controls)
         ),
     }
 

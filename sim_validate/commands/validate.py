@@ -91,7 +91,7 @@ def _show(
     for grasp, verdict in zip(grasps[:TABLE_ROWS], verdicts, strict=False):
         # the maximum is NaN if one is
         worst = np.max([trial.hold.displacement_m for trial in verdict.wrenches])
-        let_go = sum(control.failed for control in verdict.controls)
+        let_go = sum(control.let_go for control in verdict.controls)
         friction = verdict.critical_friction
         rows.append(
             (grasp.id, grasp.family, f"{friction.predicted:.4f}",
@@ -205,7 +205,7 @@ def _surprises(verdicts: Sequence[Verdict]) -> Iterable[str]:
         for verdict in verdicts
         for control in verdict.controls
         for trial in control.tried
-        if not control.failed
+        if not control.let_go
     ]
     more = [f"and {len(lines) - TABLE_ROWS} more lines"] if len(lines) > TABLE_ROWS else []
     return lines[:TABLE_ROWS] + more

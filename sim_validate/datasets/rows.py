@@ -153,7 +153,7 @@ class GraspRows:
                 "held": first is None,
                 "outcome": Outcome.HELD.value if first is None else first.hold.outcome.value,
                 "trials": len(verdict.tried),
-                "mismatches": int(not verdict.failed),
+                "mismatches": int(not verdict.let_go),
                 **about,
             }
         )

@@ -91,7 +91,7 @@ def summary(verdicts: Iterable[Verdict]) -> Summary:
         "grasps_held": sum(verdict.held for verdict in listed),
         "controls": len(controls),
         "controls_held": sum(control.held for control in controls),
-        "controls_let_go": sum(control.failed for control in controls),
+        "controls_let_go": sum(control.let_go for control in controls),
         "mismatches": sum(len(verdict.mismatches) for verdict in listed),
     }
 

@@ -23,8 +23,9 @@ from scenes.drawing.pictures import check_drawn
 from scenes.drawing.views import View, best_view
 
 TURNS = 181
-"""Number of points on the border of a projection; the first is also the last."""
-TINY = np.finfo(np.float64).tiny
+"""Number of points on the border of a shadow; the first is also the last."""
+SMALLEST_NORMAL = np.finfo(np.float64).tiny
+"""Least number that is divided by: the smallest of full precision."""
 
 
 @in_style
@@ -102,7 +103,7 @@ def shadow_of(wrenches: WrenchSet, plane: Array) -> Array:
     rows = np.arange(TURNS)
     forces = np.zeros_like(slopes)
     forces[rows, farthest, 0] = 1.0
-    sliding = wrenches.friction[farthest] / np.maximum(across[rows, farthest], TINY)
+    sliding = wrenches.friction[farthest] / np.maximum(across[rows, farthest], SMALLEST_NORMAL)
     forces[rows, farthest, 1:] = slopes[rows, farthest, 1:] * sliding[:, None]
     return forces.reshape(TURNS, -1) @ (plane @ wrenches.G).T
 

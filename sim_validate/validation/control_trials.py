@@ -22,6 +22,7 @@ from sim_validate.simulation.setup import AXIS_NAMES, Agenda, Setup
 from sim_validate.simulation.simulate import Bench
 from sim_validate.simulation.traces import Trace
 from sim_validate.validation.controls import Control
+from sim_validate.validation.renamed import Renamed
 
 SEPARATING = "separating"
 """Name of the trial with the separating wrench, which the contacts provably cannot resist."""
@@ -64,13 +65,15 @@ class ControlVerdict:
     accepted_by: dict[str, bool]
     """For each acceptance rule of another tool, whether it would accept the control."""
 
+    failed = Renamed("let_go")
+
     @property
     def held(self) -> bool:
         """Whether the control held any of the loads, which it must not."""
         return any(trial.hold.outcome is Outcome.HELD for trial in self.tried)
 
     @property
-    def failed(self) -> bool:
+    def let_go(self) -> bool:
         """Whether the object moved in every trial, as it must."""
         return all(trial.hold.outcome in LET_GO for trial in self.tried)
 

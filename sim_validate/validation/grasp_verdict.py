@@ -10,6 +10,7 @@ from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.simulation.unplanned_bounds import Bounds
 from sim_validate.validation.control_trials import ControlVerdict
+from sim_validate.validation.renamed import Renamed
 from sim_validate.validation.repeats import Robustness
 from sim_validate.validation.wrench_verdict import AGREEMENT, WrenchVerdict
 
@@ -35,6 +36,8 @@ class Verdict:
     setup: Setup
     agenda: Agenda
 
+    controls_failed = Renamed("controls_let_go")
+
     @property
     def failures(self) -> tuple[WrenchVerdict, ...]:
         """The wrenches that were not held, in order."""
@@ -51,9 +54,9 @@ class Verdict:
         return self.outcome is Outcome.HELD
 
     @property
-    def controls_failed(self) -> bool:
+    def controls_let_go(self) -> bool:
         """Whether every negative control let go of the object, as it must."""
-        return all(control.failed for control in self.controls)
+        return all(control.let_go for control in self.controls)
 
     @property
     def mismatches(self) -> tuple[str, ...]:
@@ -73,7 +76,7 @@ class Verdict:
     @property
     def good(self) -> bool:
         """Whether all wrenches held, negative controls let go, and nothing was contradicted."""
-        return self.held and self.controls_failed and not self.mismatches
+        return self.held and self.controls_let_go and not self.mismatches
 
 
 def _disagreement(friction: CriticalFriction) -> str:

@@ -126,7 +126,7 @@ def examine(case):
         shares=[limit.share if limit else float("nan") for limit in ramped_limits(rig, limits)],
         inside=ends[: len(near)],
         outside=ends[len(near) :],
-        controls=[(each.control.name, each.held, each.failed) for each in verdicts],
+        controls=[(each.control.name, each.held, each.let_go) for each in verdicts],
         accepted=accepted,
         bounds=bounds,
     )

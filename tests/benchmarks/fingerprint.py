@@ -46,7 +46,7 @@ def judged(body):
         {
             "outcome": verdict.outcome,
             "trials": [trial.hold.outcome for trial in verdict.wrenches],
-            "controls": [control.failed for control in verdict.controls],
+            "controls": [control.let_go for control in verdict.controls],
             "friction": rounded(verdict.critical_friction.simulated, 6),
         }
         for verdict in verdicts

@@ -107,7 +107,7 @@ def as_json(body, grasp):
 def simulated(body, grasp, friction):
     verdict = sv.validate(body, grasp, friction)
     trials = [trial.hold.outcome for trial in verdict.wrenches]
-    controls = [trial.failed for trial in verdict.controls]
+    controls = [trial.let_go for trial in verdict.controls]
     return {
         "exact": [verdict.outcome, trials, controls],
         "figures": [verdict.critical_friction.simulated],

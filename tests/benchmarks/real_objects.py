@@ -38,7 +38,7 @@ def examine(case):
         len(plan.grasps), certified, sum(grasp.radius > 0.0 for grasp in plan.grasps),
         sum(verdict.held for verdict in verdicts),
         sum(len(verdict.controls) for verdict in verdicts),
-        sum(not trial.failed for verdict in verdicts for trial in verdict.controls),
+        sum(not trial.let_go for verdict in verdicts for trial in verdict.controls),
         sum(bool(verdict.mismatches) for verdict in verdicts),
         planned, time.perf_counter() - begun,
     )  # fmt: skip

@@ -33,8 +33,8 @@ from sim_validate.datasets.units import WorkUnit, provenance
 from sim_validate.datasets.verifying.rows_by_object import ObjectRows, Row, by_object
 from sim_validate.files.reading import read_text
 
-ROUNDING = 1e-6
-"""Relative difference that other packages or processors may cause in numbers by rounding."""
+OTHER_ROUNDING = 1e-6
+"""Relative difference that numbers may have when other packages or processors round them."""
 MOST_NAMED = 20
 """Largest number of faults that are listed for one object at one friction."""
 
@@ -187,7 +187,7 @@ def _loose_differences(stored: ObjectRows, made: ObjectRows) -> Iterator[str]:
     for name in sorted(before.keys() & after.keys()):
         one, other = before[name], after[name]
         points = [np.array(row["contact_points_m"], dtype=np.float64) for row in (one, other)]
-        if not np.allclose(*points, rtol=ROUNDING, atol=0.0):
+        if not np.allclose(*points, rtol=OTHER_ROUNDING, atol=0.0):
             continue  # the best contacts are not unique
         if one["held"] != other["held"] or one["force_closed"] != other["force_closed"]:
             yield (
@@ -195,8 +195,5 @@ def _loose_differences(stored: ObjectRows, made: ObjectRows) -> Iterator[str]:
                 "computed again"
             )
         frictions = [float(row["critical_friction"] or 0.0) for row in (one, other)]
-        if not np.isclose(*frictions, rtol=ROUNDING, atol=0.0):
-            yield (
-                f"grasps: {name}: critical friction is {frictions[0]}, but {frictions[1]} when "
-                "computed again"
-            )
+        if not np.isclose(*frictions, rtol=OTHER_ROUNDING, atol=0.0):
+            yield f"grasps: {name}: critical friction {frictions[0]}, done again {frictions[1]}"

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 
 from grasp_core.cones.spanning import balancing_weights
-from grasp_core.disc_bounds.corner_bounds import PARALLEL
+from grasp_core.disc_bounds.corner_bounds_kernel import SAME_AXIS
 from grasp_core.families.concurrent import concurrent_radius_bounds
 from grasp_core.families.constructions import PAIRINGS
 from grasp_core.families.pencil import pencil_radius_bounds
@@ -39,6 +39,6 @@ def widths(corners, axes):
         high = np.einsum("qki,qi->qk", corners[:, j], apart).max(axis=1, initial=-np.inf)
         # 1 - a_i.a_j of (2) is half of |a_i - a_j|^2
         share = 0.5 * np.einsum("qi,qi->q", apart, apart)
-        bound = np.where(share > PARALLEL, (high - low) / np.maximum(share, PARALLEL), np.inf)
+        bound = np.where(share > SAME_AXIS, (high - low) / np.maximum(share, SAME_AXIS), np.inf)
         found[:, i, j] = found[:, j, i] = bound
     return found

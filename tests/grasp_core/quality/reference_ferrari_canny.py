@@ -19,7 +19,7 @@ def reference_quality(positions, normals, friction, *, norm="l1", gap=module.GAP
         positions, normals, friction, center=np.zeros(3), torque_scale=1.0, norm=norm
     )
     direction, polytope = _grown(wrenches, gap)
-    slack = module.ROUNDING * wrenches.size
+    slack = module.CHECK_SLACK * wrenches.size
     if polytope is None or polytope.radius(wrenches) <= slack:
         return module._outside(wrenches, direction)
     upper = wrenches.support(direction)[0]

@@ -7,7 +7,7 @@ some ties differently.
 import numpy as np
 
 from grasp_core.regions.proof import EDGES, LEAF, TWIST, TwistCover, halves, orthants
-from grasp_core.regions.sites import AHEAD, ANSWERS, EVEN, ROUNDS, TINY
+from grasp_core.regions.sites import AHEAD, ANSWERS, CLEAR_OF_CONE, EVEN, ROUNDS
 
 
 def reference_cover(sites, axes, cones):
@@ -45,7 +45,7 @@ class _Game:
         a, b = twists[:, :, None, :3], twists[:, :, None, 3:]
         self.velocity = np.einsum("mrki,kij->mrkj", a + np.cross(b, sites.points), sites.frames)
         self.turning = np.einsum("mri,kij->mrkj", twists[..., 3:], sites.frames)
-        self.sites, self.most = sites, sites.friction * (1.0 - TINY)
+        self.sites, self.most = sites, sites.friction * (1.0 - CLEAR_OF_CONE)
         self.clear = sites.clear()
 
     def play(self):

@@ -40,7 +40,7 @@ BEFORE = Baseline(
     entries=(ENTRY,),
 )
 OTHERS = {"versions": {**BEFORE.versions, "mujoco": "4.1.0"}}
-ROUNDING = {"arithmetic": "as elsewhere"}
+OTHER_ARITHMETIC = {"arithmetic": "as elsewhere"}
 SLIPPED = {"outcome": Outcome.SLIPPED, "not_held": ("weakest",)}
 
 
@@ -64,7 +64,7 @@ def test_it_is_said_how_things_are_compared():
     exact, numpy = now(), now({"versions": {**BEFORE.versions, "numpy": "3"}})
     assert bands_between(BEFORE, exact)[1] == "exactly"
     assert bands_between(BEFORE, numpy)[1] == "with the bands of rounding: numpy 2 -> 3"
-    assert bands_between(BEFORE, now(ROUNDING))[1].endswith("another processor")
+    assert bands_between(BEFORE, now(OTHER_ARITHMETIC))[1].endswith("another processor")
     assert bands_between(BEFORE, now(OTHERS))[1].endswith("mujoco 4.0.0 -> 4.1.0")
     assert "python" not in bands_between(BEFORE, now({"versions": {"python": "3"}}))[1]
 
@@ -89,7 +89,9 @@ def test_it_is_said_how_things_are_compared():
         ({"noisy_trials": 99}, "repeats with noise: 100 -> 99"),
     ],
 )
-@pytest.mark.parametrize("header", [{}, ROUNDING, OTHERS], ids=["same", "rounding", "others"])
+@pytest.mark.parametrize(
+    "header", [{}, OTHER_ARITHMETIC, OTHERS], ids=["same", "rounding", "others"]
+)
 def test_what_is_worse_is_a_regression_and_the_other_way_round_an_improvement(
     changed, reason, header
 ):
@@ -109,7 +111,7 @@ def test_what_is_worse_is_a_regression_and_the_other_way_round_an_improvement(
     ],
 )  # fmt: skip
 def test_small_differences_count_with_the_same_versions_only(changed):
-    for header in ({}, ROUNDING):
+    for header in ({}, OTHER_ARITHMETIC):
         assert found(now(header, **changed)).status in (Status.REGRESSED, Status.IMPROVED)
     within = found(now(OTHERS, **changed))
     assert within.status is Status.WITHIN
@@ -127,7 +129,7 @@ def test_small_differences_count_with_the_same_versions_only(changed):
 )  # fmt: skip
 def test_what_rounding_does_counts_on_processors_that_round_alike_only(changed):
     assert found(now(**changed)).status is Status.REGRESSED
-    assert found(now(ROUNDING, **changed)).status is Status.WITHIN
+    assert found(now(OTHER_ARITHMETIC, **changed)).status is Status.WITHIN
 
 
 def test_the_last_digits_do_not_count():

@@ -31,7 +31,7 @@ def hold_all(body, friction, limit):
         assert "fingers_removed" in names, (body.name, grasp.id)
         needs_friction = FRICTION_SHARE * verdict.critical_friction.predicted >= LEAST_FRICTION
         assert ("low_friction" in names) == needs_friction, (body.name, grasp.id)
-        assert verdict.controls_failed, (body.name, grasp.id)
+        assert verdict.controls_let_go, (body.name, grasp.id)
         controls += len(verdict.controls)
     return len(plan.grasps), controls
 

@@ -48,7 +48,7 @@ def test_planned_grasps_hold_all_wrenches_and_no_control_does(friction, each):
             verdict = sv.validate(body, grasp, friction)
             assert verdict.held, [(w.name, w.hold.outcome) for w in verdict.wrenches]
             assert len(verdict.wrenches) == 13
-            assert verdict.controls_failed
+            assert verdict.controls_let_go
             assert verdict.controls
             assert not verdict.mismatches
             controls += len(verdict.controls)
@@ -215,7 +215,7 @@ def test_trials_out_of_time_say_so():
     verdict = sv.validate(body, grasp, 0.5, setup=setup)
     assert verdict.outcome is Outcome.TIMEOUT
     assert not verdict.good
-    assert not verdict.controls_failed
+    assert not verdict.controls_let_go
 
 
 def test_contacts_that_are_not_closed_are_refused_whatever_they_claim():
@@ -294,9 +294,9 @@ def test_trials_that_say_nothing_neither_confirm_nor_contradict():
     assert {trial.hold.outcome for trial in verdict.wrenches} == {Outcome.TIMEOUT}
     assert not any(trial.contradiction for trial in verdict.wrenches)
     assert not any(trial.simulated_limit for trial in verdict.wrenches)
-    assert not any(control.failed or control.held for control in verdict.controls)
+    assert not any(control.let_go or control.held for control in verdict.controls)
     assert not any(verdict.accepted_by.values())
-    assert not verdict.controls_failed
+    assert not verdict.controls_let_go
     assert not verdict.good
 
 
