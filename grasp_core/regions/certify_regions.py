@@ -56,11 +56,9 @@ MOST_CONES = 1_000_000
 CONES = 10_000
 """Default for the largest number of cones in one proof, which takes half a second."""
 UNIT_DIGITS, PLACE_DIGITS = 6, 8
-"""Digits after the point: of the unit of length and its origin, in object radii, and of centres, in
-that unit."""
+"""Digits after the point of the unit and its origin [object radii], and of centres."""
 NARROWED = 1e-3
-"""Precision to which the largest discs in grown polygons are measured, relative to the proved
-radius."""
+"""Precision of the largest discs in grown polygons, relative to the proved radius."""
 
 
 def certify_regions(  # noqa: PLR0913 - what a user may choose
@@ -174,10 +172,9 @@ class _Unit:
 def _pieces(
     body: Polyhedron, grasp: Grasp, unit: _Unit, clearance: float
 ) -> tuple[FacePiece, ...] | None:
-    """Return the convex piece under each contact, at a distance from edges, or None.
+    """Return the convex piece under each contact, clear of edges; None if a face is too narrow.
 
-    If a face has several pieces, the one in which the contact is deepest is taken. The result is
-    None if a face is too narrow.
+    If a face has several pieces, the one in which the contact is deepest is taken.
     """
     found = list[FacePiece]()
     for index, contact in zip(grasp.faces, grasp.contacts, strict=True):
@@ -248,10 +245,7 @@ def _farthest(points: Array, centers: Array) -> float:
 
 
 def _radius_held(grounds: Grounds, proved: Proved, polygons: list[Array]) -> float:
-    """Return the largest radius, up to the proved one, of discs inside the polygons.
-
-    Polygons that grew for their area may begin with smaller discs than the proved ones.
-    """
+    """Return the largest radius, up to the proved one, of discs that fit into the polygons."""
     pairs = [
         (convex_polygon(polygon, PLACED), convex_polygon(piece.corners, PLACED), y)
         for piece, polygon, y in zip(grounds.pieces, polygons, proved.ys, strict=True)
@@ -282,8 +276,8 @@ def _trimmed(polygon: Array, y: Array) -> Array:
 def _open_choice(grounds: Grounds, proved: Proved, unit: _Unit) -> ClosureCertificate | None:
     """Return the proof, in the object's frame, that the contacts found are not closed.
 
-    The result is None unless the exact test agrees and the contacts are on the pieces. Patches of
-    curved surfaces are not planes, so nothing is claimed about them.
+    The result is None unless the exact test agrees and the contacts are on the pieces. Nothing is
+    claimed about patches, as curved surfaces are not planes.
     """
     if proved.choice is None or any(piece.depth or piece.spread for piece in grounds.pieces):
         return None
