@@ -274,65 +274,6 @@ def _inside(point, polygon, normal):
     return (np.cross(edges, point - polygon) @ normal >= -1e-12).all()
 
 
-def test_every_family_is_planned_and_every_witness_is_of_its_family():
-    found = gc.plan(example_object("chamfered-box"), TEN_DEGREES, families=FAMILIES, cones="normal")
-    assert list(found.counts.families) == list(FAMILIES)
-    assert {grasp.family for grasp in found.grasps} == set(FAMILIES)
-    for grasp in found.grasps:
-        x, f = grasp.witness.points, grasp.witness.forces
-        assert gc.classify_lines(x, grasp.witness.directions) == grasp.family
-        np.testing.assert_array_equal(x, grasp.positions)
-        np.testing.assert_allclose(f.sum(axis=0), 0.0, atol=1e-9)
-        assert np.einsum("ki,ki->", f, grasp.normals) == pytest.approx(1.0)
-        assert len(grasp.focus_points) == (1 if grasp.family == "concurrent" else 2)
-
-
-@pytest.mark.parametrize("name", ["chamfered-box", "double-wedge-bar", "random-12-1"])
-def test_counts_add_up_and_nothing_is_rejected(name):
-    found = gc.plan(example_object(name), TEN_DEGREES, limit=30, families=FAMILIES, cones="normal")
-    for family, counts in found.counts.families.items():
-        ended = counts.infeasible + counts.found + counts.duplicates + counts.rejected
-        assert counts.tried == ended
-        assert counts.rejected == counts.undecided == 0
-        orders = 1 if family == "concurrent" else 3
-        assert counts.tried + counts.pruned == orders * found.counts.quadruples
-
-
-def test_an_elongated_object_has_pencils_where_it_has_no_concurrent_grasp():
-    found = gc.plan(
-        example_object("double-wedge-bar"), TEN_DEGREES, families=FAMILIES, cones="normal"
-    )
-    families = [grasp.family for grasp in found.grasps]
-    assert families.count("concurrent") == 0
-    assert families.count("pencil") == 9
-    assert found.grasps[0].radius == pytest.approx(0.113774 * 0.02, rel=1e-5)
-    needing_friction = [g for g in found.grasps if g.critical_friction > 0.05]
-    assert {grasp.family for grasp in needing_friction} == {"regulus"}
-
-
-def test_one_family_may_be_chosen_and_gives_the_same_grasps():
-    body = example_object("octahedron")
-    together = {g.id for g in gc.plan(body, 0.3, families=FAMILIES, cones="normal").grasps}
-    apart = [
-        g.id for f in FAMILIES for g in gc.plan(body, 0.3, families=(f,), cones="normal").grasps
-    ]
-    assert len(apart) == len(together)
-    assert set(apart) == together
-
-
-def test_pairings_that_lead_to_the_same_contacts_are_kept_once():
-    counts = gc.plan(example_object("tetrahedron"), 0.3).counts.families["regulus"]
-    assert (counts.tried, counts.duplicates, counts.found) == (3, 2, 1)
-
-
-def test_a_limit_is_shared_between_the_families():
-    found = gc.plan(example_object("icosahedron"), TEN_DEGREES, limit=9)
-    assert [g.family for g in found.grasps].count("regulus") == 3
-    assert [g.family for g in found.grasps].count("pencil") == 3
-    radii = np.array([g.radius for g in found.grasps])
-    assert (np.diff(radii) < 1e-12).all()
-
-
 def test_grasps_are_streamed_as_they_are_found():
     body = example_object("box")
     streamed = gc.iter_grasps(body, 0.4)
