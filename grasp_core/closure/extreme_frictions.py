@@ -15,8 +15,6 @@ round does to a contact is small beside the push that the contact has already. T
 margin that grows with the square of mu, three one with its cube. Otherwise, by Stiemke's lemma, a
 twist leaves S at rest while all others depart along their normals; it separates up to the least
 ratio of departing to sliding, which is a positive friction.
-leaves S at rest while all others depart along their normals; it separates up to the least ratio of
-departing to sliding, which is a positive friction.
 
 No friction. Cones grow into the half-spaces n_i.f > 0 with the friction, so none is enough iff no
 balanced forces push at all contacts, or the wrenches do not span; that is, iff some twist makes
