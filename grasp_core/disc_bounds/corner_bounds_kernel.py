@@ -17,7 +17,7 @@ SAME_AXIS = 1e-6
 NO_CROSSING = 1e-6
 """Axes whose cross product is no longer than this leave the direction N undefined."""
 NO_LEAN = 1e-6
-"""Factors of r in (3) and (4) up to this bound no r: the discs hardly reach along N."""
+"""Smallest factor of r in (3) and (4) that is divided by: below it discs hardly reach along N."""
 
 
 @loop()
