@@ -32,7 +32,7 @@ Found: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement]
 
 MOST_CHOICES = 8
 """Most choices of pieces tried on faces that are not convex; the free method multiplies it by
-`max_parts`."""
+`max_face_parts`."""
 TOGETHER = 32
 """Blocks that are open at once: a million quadruples take some hundred megabytes."""
 SAME_MERIT = 1e-5

@@ -48,7 +48,7 @@ class FreeRequest:
     theta: float
     """Half-angle of the friction cones to plan with [rad]."""
     seed: int
-    max_parts: int
+    max_face_parts: int
     """Most parts into which the faces of one quadruple may be cut."""
     upgrades: Sequence[Construction]
     """Constructions to try with force cones around the forces of each free grasp."""
@@ -162,7 +162,7 @@ def _answers(
     if isinstance(whole, Absence) or all(len(shape.pieces) == 1 for shape in shapes):
         return [(hulls, whole)]
     at = whole.positions if isinstance(whole, Placement) else np.array([h.origin for h in hulls])
-    most = MOST_CHOICES * request.max_parts
+    most = MOST_CHOICES * request.max_face_parts
     answers: list[Answer] = []
     for pieces in choices_near(shapes, at, most):
         search.tally.count("solved")
@@ -212,7 +212,7 @@ def _place(
     theta = request.theta - spread if spread < request.theta else LEAST_SPAN_ANGLE
     try:
         return place_free(
-            pieces, math.tan(theta), rng=rng, cells=request.max_parts, restarts=restarts
+            pieces, math.tan(theta), rng=rng, cells=request.max_face_parts, restarts=restarts
         )
     except SolverError:
         return Undecided(1, 1.0)

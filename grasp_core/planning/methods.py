@@ -139,14 +139,14 @@ class Searches:
         """
         return self.spanning_blocks if construction.limits is None else self.tilted_blocks
 
-    def _free_request(self, max_parts: int | None = None) -> FreeRequest:
+    def _free_request(self, max_face_parts: int | None = None) -> FreeRequest:
         request = self.request
         structured = [CONSTRUCTIONS[method] for method in self.constructions]
         upgrades = [each for each in structured if each.limits and request.cones == "tilted"]
         upgrades += [MIXED for each in upgrades if each.family == MIXED.family]
         return FreeRequest(
             request.friction, request.theta, request.seed,
-            max_parts or request.max_parts, upgrades, self.owners,
+            max_face_parts or request.max_face_parts, upgrades, self.owners,
         )  # fmt: skip
 
     def _reach(self, found: Certified) -> Reach:

@@ -38,7 +38,9 @@ def _knows_old_name(planner: Callable[Given, Result]) -> Callable[Given, Result]
     @wraps(planner)
     def checked(*args: Given.args, **options: Given.kwargs) -> Result:
         if "cells" in options:
-            raise InputError("the keyword cells is called max_parts now; write max_parts instead")
+            raise InputError(
+                "the keyword cells is called max_face_parts now; write max_face_parts instead"
+            )
         return planner(*args, **options)
 
     return checked
@@ -55,7 +57,7 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     limit: int | None = None,
     rank_by: RankBy = "radius",
     seed: int = 0,
-    max_parts: int = 1,
+    max_face_parts: int = 1,
     complete: bool = False,
     finger: Finger | None = None,
     clearance: float = 0.0,
@@ -80,7 +82,7 @@ def plan(  # noqa: PLR0913 - the contract's keywords
             friction), `ferrari-canny` (the largest quality) and `diverse` (each next one is the
             farthest from those before it) all grasps that are found compete.
         seed: Seed of the free method's restarts.
-        max_parts: Most parts into which the free method may cut the faces of one quadruple.
+        max_face_parts: Most parts into which the free method may cut the faces of one quadruple.
         complete: Decide the quadruples that would stay undecided, with up to 20,000 parts each.
         finger: Keep only grasps that such fingers reach on straight free lines.
         clearance: Distance of contacts and their regions from all edges of their faces [m]. Faces
@@ -98,7 +100,7 @@ def plan(  # noqa: PLR0913 - the contract's keywords
         SolverError: A program was neither solved nor proved infeasible.
     """
     request = PlanRequest(
-        friction, _listed(families), theta_deg, cones, limit, rank_by, seed, max_parts,
+        friction, _listed(families), theta_deg, cones, limit, rank_by, seed, max_face_parts,
         complete, finger, clearance, share_faces,
     )  # fmt: skip
     check_request(body, request)
@@ -119,7 +121,7 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
     theta_deg: float | None = None,
     cones: ConeKind = "tilted",
     seed: int = 0,
-    max_parts: int = 1,
+    max_face_parts: int = 1,
     finger: Finger | None = None,
     clearance: float = 0.0,
     share_faces: float | None = None,
@@ -131,7 +133,7 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
         SolverError: A program was neither solved nor proved infeasible.
     """
     request = PlanRequest(
-        friction, _listed(families), theta_deg, cones, seed=seed, max_parts=max_parts,
+        friction, _listed(families), theta_deg, cones, seed=seed, max_face_parts=max_face_parts,
         finger=finger, clearance=clearance, share_faces=share_faces,
     )  # fmt: skip
     check_request(body, request)

@@ -51,7 +51,7 @@ class PlanRequest:
     limit: int | None = None
     rank_by: RankBy = "radius"
     seed: int = 0
-    max_parts: int = 1
+    max_face_parts: int = 1
     complete: bool = False
     finger: Finger | None = None
     clearance: float = 0.0
@@ -92,7 +92,7 @@ def check_request(body: Polyhedron, request: PlanRequest) -> None:
 def _check_counts(request: PlanRequest) -> None:
     if request.limit is not None:
         whole(request.limit, "limit", least=1)
-    whole(request.max_parts, "max_parts", least=1)
+    whole(request.max_face_parts, "max_face_parts", least=1)
     seed_of(request.seed)
     switch(request.complete, "complete")
 

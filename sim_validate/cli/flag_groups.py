@@ -111,7 +111,7 @@ class Planning:
     """Which grasps are best: those with the largest discs, of each family in turn; with the least
     critical friction; with the largest quality; or each next one the farthest from those before
     it."""
-    max_parts: Count = 1
+    max_face_parts: Count = 1
     """Number of parts into which the family `free` may divide the four faces while it is undecided.
     """
     complete: bool = False

@@ -45,7 +45,7 @@ def plan_object(
             limit=planning.limit,
             rank_by=planning.rank_by,
             seed=planning.seed,
-            max_parts=planning.max_parts,
+            max_face_parts=planning.max_face_parts,
             complete=planning.complete,
             finger=asked_finger(planning),
             clearance=planning.edge_clearance_m,

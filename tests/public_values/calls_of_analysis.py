@@ -37,7 +37,7 @@ PLANNED = {
     "theta_deg": optional(POSITIVE) | {"wider than friction": 80.0},
     "cones": WORD,
     "seed": SEED,
-    "max_parts": AT_LEAST_ONE,
+    "max_face_parts": AT_LEAST_ONE,
     "finger": optional(VALUE) | {"radius": 0.006},
     "clearance": NOT_NEGATIVE | {"larger than the object": 1.0},
     "share_faces": optional(NOT_NEGATIVE) | {"larger than the object": 1.0},

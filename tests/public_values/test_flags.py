@@ -23,7 +23,7 @@ OTHERS = [
     ["plan", "tetrahedron", "--limit", "0"],
     ["plan", "tetrahedron", "--limit", "2.5"],
     ["plan", "tetrahedron", "--limit", f"{10**30}"],
-    ["plan", "tetrahedron", "--max-parts", "-1"],
+    ["plan", "tetrahedron", "--max-face-parts", "-1"],
     ["plan", "tetrahedron", "--theta-deg", "nan"],
     ["plan", "tetrahedron", "--edge-clearance-m", "inf"],
     ["plan", "tetrahedron", "--share-faces-m", "-1"],
