@@ -14,7 +14,7 @@ from pathlib import Path
 from sim_validate.main import main as graspproof
 from sim_validate.parallel.processes import available_cores
 from sim_validate.reports.report import write_report
-from tests.sim_validate.reports.test_in_a_browser import BROWSER, DRIVER, headless
+from tests.browser import BROWSER, DRIVER, headless
 
 LOADED = """
 const entry = performance.getEntriesByType("navigation")[0];

@@ -8,14 +8,10 @@ import pytest
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.reports.report import write_report
+from tests.browser import headless, needs_browser, opened
 from tests.sim_validate.reports.test_report import EVIL, changed
 
-pytest.importorskip("selenium")
-BROWSER, DRIVER = (shutil.which(name) for name in ("chromium", "chromedriver"))
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not (BROWSER and DRIVER), reason="there is no chromium with its driver"),
-]
+pytestmark = [pytest.mark.slow, needs_browser]
 READABLE = 4.5
 """Contrast of text that anyone can read, after WCAG 2.1."""
 CONTRASTS = """
@@ -40,22 +36,6 @@ return [...document.querySelectorAll("h1, h2, p, a, th, td, label, summary, .ver
 """
 
 
-def headless(profile):
-    """A browser without a window that tells of every request, and of what its console says."""
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = BROWSER
-    flags = ("headless", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run",
-             "disable-background-networking", "disable-component-update", "disable-sync",
-             "disable-dev-shm-usage", f"user-data-dir={profile}")  # fmt: skip
-    for flag in flags:
-        options.add_argument(f"--{flag}")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    return webdriver.Chrome(options=options, service=Service(DRIVER))
-
-
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
     driver = headless(tmp_path_factory.mktemp("profile"))
@@ -69,17 +49,6 @@ def evil_report(small_run, tmp_path_factory):
     folder = shutil.copytree(small_run, tmp_path_factory.mktemp("evil") / "run")
     changed(folder / "grasps.json", lambda each: each["object"].update(name=EVIL))
     return write_report(folder, jobs=1).index.parent
-
-
-def opened(browser, path, *, width=1200, dark=False, touch=False):
-    """Open a file; what was asked for, and said on the console, since."""
-    for log in ("browser", "performance"):
-        browser.get_log(log)
-    scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [scheme]})
-    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": touch}
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-    browser.get(path.as_uri())
 
 
 def errors_of(browser):

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from sim_validate.reports.stability_page import write_report
-from tests.sim_validate.reports.test_in_a_browser import BROWSER, DRIVER, headless, opened
+from tests.browser import headless, needs_browser, opened
 
 WHY = "c-0-1-2-7: regressed\n" + "\n".join(f"  {'a reason, ' * 9}{i}" for i in range(25))
 ENTRY = {
@@ -54,7 +54,7 @@ def test_each_row_has_a_cell_for_each_column(report):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not (BROWSER and DRIVER), reason="there is no chromium with its driver")
+@needs_browser
 @pytest.mark.parametrize("width", [360, 1200])
 def test_reasons_are_on_the_screen_and_rows_are_low(report, tmp_path, width):
     browser = headless(tmp_path)
