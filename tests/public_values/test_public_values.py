@@ -51,7 +51,7 @@ NAMED_OTHERWISE = {
     ("gc.Polyhedron.from_mesh", "vertices"): "vert|object",
     ("gc.Polyhedron.from_mesh", "triangles"): "triangle",
     ("scenes.example_object", "name"): "name|object",
-    ("scenes.write_picture", "path"): "path|pictures",
+    ("scenes.write_picture", "path"): "path|picture's name",
     ("sv.read_regions", "path"): "path|no/such",
     ("sv.load_dataset", "folder"): "folder|no/such",
     ("sv.write_report", "folder"): "folder|no/such",

@@ -96,7 +96,7 @@ def test_two_fingers_have_no_stiffness_about_their_line():
         ({"friction": -0.1}, "friction must not be negative"),
         ({"contacts": opposed()[:1]}, "at least two are needed, got 1"),
         ({"contacts": [1, 2]}, "contacts must be a Contact, got 1"),
-        ({"contacts": 5}, "contacts must be several Contact values"),
+        ({"contacts": 5}, "contacts must be a sequence of Contact values"),
         ({"body": None}, "body must be a Polyhedron"),
     ],
 )

@@ -271,5 +271,5 @@ def test_a_grasp_of_two_parallel_slabs_is_not_along_one_line():
 
 def test_friction_must_be_positive():
     """Four normals span at most four dimensions of wrenches; the corners of a face span more."""
-    with pytest.raises(gc.InputError, match="positive"):
+    with pytest.raises(gc.InputError, match="greater than 0"):
         place(quadruple("tetrahedron", range(4)), 0.0)

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from grasp_core.planning.ranking import outlook
 
 import grasp_core as gc
 from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS
@@ -87,16 +86,15 @@ def test_radii_stay_below_the_bounds_that_prune():
     blocks, tested = all_blocks(cones, len(body.faces), np.empty((0, 4), dtype=int)), 0
     (room,) = blocks.rooms
     for family in DISCS:
-        listed = outlook(blocks.make(0), CONSTRUCTIONS[family], LEAST_RADIUS)
-        ranking = listed.ranking(slice(None))
-        coarse = dict(zip(map(tuple, listed.prospects.faces.tolist()), listed.bounds, strict=True))
-        faces = ranking.candidates.faces[ranking.places].tolist()
-        limits = [coarse[tuple(each)] for each in faces]
-        assert (ranking.bounds.max(axis=(1, 2)) <= limits).all()
-        ordered = (ranking.quadruple(row, ranking.bounds[row]) for row in range(len(ranking)))
+        wide, loose = blocks.make(0).ranked(CONSTRUCTIONS[family], LEAST_RADIUS)
+        coned, tight = wide.coned(slice(None)).ranked(CONSTRUCTIONS[family])
+        coarse = dict(zip(map(tuple, wide.faces.tolist()), loose, strict=True))
+        limits = [coarse[tuple(each)] for each in coned.faces.tolist()]
+        best = tight.max(axis=(1, 2))
+        assert (best <= limits).all()
         bounds = {
-            tuple(sorted(planned.faces[face] for face in each.faces)): each.bound
-            for each in ordered
+            tuple(sorted(planned.faces[face] for face in faces)): bound
+            for faces, bound in zip(coned.faces.tolist(), best, strict=True)
         }
         assert max(bounds.values()) <= room
         for grasp in gc.plan(given, 1.0, theta_deg=8.0, families=family, cones="tilted").grasps:

@@ -5,11 +5,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS
-from grasp_core.objects.face_pieces import face_shapes
-from grasp_core.objects.standard_order import standard
-from grasp_core.planning.blocks import all_blocks
-from grasp_core.planning.planned_cones import PlannedCones
+from grasp_core.families.constructions import LEAST_RADIUS
 from grasp_core.planning.request import METHODS
 from scenes.example_objects import example_object
 from tests.benchmarks.planning import sphere_hull
@@ -286,69 +282,6 @@ def test_the_old_name_of_max_face_parts_is_refused_with_the_new_one():
     for planner in (gc.plan, gc.iter_grasps):
         with pytest.raises(gc.InputError, match="max_face_parts"):
             planner(example_object("tetrahedron"), cells=2)
-
-
-def test_radii_stay_below_the_bounds_that_prune():
-    given, theta = example_object("random-12-1"), math.radians(8.0)
-    planned = standard(given)
-    body = planned.body
-    cones = PlannedCones(body, face_shapes(body), theta, tilted=True)
-    blocks, tested = all_blocks(cones, len(body.faces), np.empty((0, 4), dtype=int)), 0
-    (room,) = blocks.rooms
-    for family in DISCS:
-        wide, loose = blocks.make(0).ranked(CONSTRUCTIONS[family], LEAST_RADIUS)
-        coned, tight = wide.coned(slice(None)).ranked(CONSTRUCTIONS[family])
-        coarse = dict(zip(map(tuple, wide.faces.tolist()), loose, strict=True))
-        limits = [coarse[tuple(each)] for each in coned.faces.tolist()]
-        best = tight.max(axis=(1, 2))
-        assert (best <= limits).all()
-        bounds = {
-            tuple(sorted(planned.faces[face] for face in faces)): bound
-            for faces, bound in zip(coned.faces.tolist(), best, strict=True)
-        }
-        assert max(bounds.values()) <= room
-        for grasp in gc.plan(given, 1.0, theta_deg=8.0, families=family, cones="tilted").grasps:
-            assert grasp.radius <= bounds[tuple(sorted(grasp.faces))] * body.radius * (1 + 1e-6)
-            tested += 1
-    assert tested >= 80
-
-
-def test_tilted_cones_never_make_discs_smaller():
-    tested = larger = 0
-    for name in ("wedge", "random-10-1"):
-        body = example_object(name)
-        paper, ours = (
-            {g.id: g.radius for g in gc.plan(body, 0.3, families="concurrent", cones=cones).grasps}
-            for cones in ("normal", "tilted")
-        )
-        assert set(paper) <= set(ours)
-        for name_, radius in paper.items():
-            assert ours[name_] >= 0.8 * radius
-            larger += ours[name_] > 1.01 * radius
-            tested += 1
-    assert tested >= 30
-    assert larger > 0.5 * tested
-
-
-def test_a_focus_before_some_fingers_and_behind_others_gives_regions_where_nothing_else_does():
-    body, mixed = example_object("l-bracket"), 0
-    for grasp in gc.plan(body, 0.5).grasps:
-        if grasp.family != "concurrent":
-            continue
-        heights = np.einsum(
-            "ki,ki->k", grasp.focus_points[0] - grasp.positions,
-            np.array([cone.axis for cone in grasp.force_cones]),
-        )  # fmt: skip
-        if heights.min() < 0.0 < heights.max():
-            rng = np.random.default_rng(0)
-            for _ in range(20):
-                points = [
-                    rng.dirichlet(np.full(len(region.polygon), 0.3)) @ region.polygon
-                    for region in grasp.regions
-                ]
-                assert gc.force_closure(np.array(points), grasp.normals, 0.5).closed
-            mixed += 1
-    assert mixed >= 4
 
 
 @pytest.mark.parametrize("name", ["hexagonal-pyramid", *more("l-bracket")])

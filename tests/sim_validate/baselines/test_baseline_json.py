@@ -46,10 +46,10 @@ def with_entry(**changed):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "not JSON"),
-        ("[]", "expected an object, as a baseline is, got a list"),
+        ("", "not complete JSON"),
+        ("[]", "a baseline must hold one JSON object, got a list"),
         ("{}", "expected a baseline, as"),
-        (spoiled(lambda r: r.update(schema=2)), "schema: .* by a newer graspproof"),
+        (spoiled(lambda r: r.update(schema=2)), "schema: .* a newer graspproof wrote"),
         (spoiled(lambda r: r.pop("friction")), "friction: missing"),
         (spoiled(lambda r: r.update(friction="x")), "friction: expected a number, got"),
         (spoiled(lambda r: r.update(grasps_file=3)), "grasps_file: expected text, got 3"),

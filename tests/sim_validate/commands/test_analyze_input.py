@@ -80,32 +80,32 @@ ONE = TETRAHEDRON["contacts"][0]
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("", "not JSON"),
-        ("[1]", "expected an object, as a contacts file is, got a list"),
-        ('{"contacts": ' * 100_000, "deep inside each other"),
-        (changed(["friction"], None), "friction: null; give a value, or leave the key out"),
-        ("{}", '"contacts" (one grasp) and "grasps" (several)'),
+        ("", "not complete JSON"),
+        ("[1]", "a contacts file must hold one JSON object, got a list"),
+        ('{"contacts": ' * 100_000, "nested more than 64 deep"),
+        (changed(["friction"], None), "friction: null is not allowed; give a value, or leave the"),
+        ("{}", '"contacts" (one grasp) or "grasps" (several)'),
         (TETRAHEDRON | {"grasps": [{"contacts": [ONE, ONE]}]}, '"contacts" (one grasp)'),
         ({"grasps": [], "friction": 1}, "grasps: expected at least 1"),
-        (changed(["friction"], ...), 'contacts[0].friction: missing; give it there, as a key "fri'),
+        (changed(["friction"], ...), 'contacts[0].friction: the key is missing; give it there'),
         (changed(["friction"], -0.1), "friction: expected at least 0.0, got -0.1"),
         (changed(["friction"], 1e4), "friction: expected at most 1000"),
         (changed(["friction"], "0.5"), 'friction: expected a number, got "0.5"'),
-        (changed(["mu"], 0.5), "mu: unknown key; expected are contacts, grasps, friction"),
+        (changed(["mu"], 0.5), "mu: unknown key; known keys are contacts, grasps, friction"),
         (changed(["schema"], 1), "schema: unknown key"),
         (changed(["torque_scale_m"], 0), "torque_scale_m: expected more than 0.0, got 0"),
         (changed(["center_m"], [0, 0]), "center_m[2]: missing"),
         (changed(["contacts"], [ONE]), "contacts: expected at least 2 items, got 1"),
         (changed(["contacts"], [ONE] * 101), "contacts: expected at most 100 items, got 101"),
-        (changed(["contacts"], [ONE] * 3), "contacts: all lie within"),
+        (changed(["contacts"], [ONE] * 3), "all contacts lie within"),
         (changed(["contacts", 1, "normal"], ...), "contacts[1].normal: missing"),
         (changed(["contacts", 2, "normal"], [0, 0, 1.01]), "contacts[2].normal: its length must"),
         (changed(["contacts", 2, "normal"], [0, 0, 1.01]), "got 1.01; divide it"),
         (changed(["contacts", 3, "normal", 0], float("nan")), "contacts[3].normal[0]: expected a"),
         (changed(["contacts", 3, "position_m", 2], 1e7), "contacts[3].position_m[2]: expected at"),
-        (changed(["contacts", 3, "pos"], 1), "contacts[3].pos: unknown key; expected are position"),
+        (changed(["contacts", 3, "pos"], 1), "contacts[3].pos: unknown key; known keys are pos"),
         ({"grasps": [{"contacts": [ONE, ONE | {"normal": 1}]}]}, "grasps[0].contacts[1].normal: "),
-        ({"grasps": [{"contacts": [ONE, ONE], "name": "a"}]}, "expected are id, contacts"),
+        ({"grasps": [{"contacts": [ONE, ONE], "name": "a"}]}, "known keys are id, contacts"),
         ({"grasps": [TETRAHEDRON | {"friction": 1}]}, "grasps[0].friction: unknown key"),
         ({"grasps": [{"id": "1", "contacts": [ONE, ONE]}, {"contacts": [ONE, ONE]}]},
          "grasps[1].id: '1' is also that of grasps[0]"),
@@ -119,7 +119,7 @@ def test_a_file_is_refused_by_name_and_field(tmp_path, monkeypatch, capsys, cont
 def test_a_file_that_is_missing_or_asks_too_much_is_refused(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["analyze", "none.json"]) == Exit.INPUT
-    assert "none.json: cannot be read" in capsys.readouterr().err
+    assert "none.json: the file cannot be read" in capsys.readouterr().err
     Path("contacts.json").write_text(json.dumps(TETRAHEDRON))
     assert main(["analyze", "contacts.json", "--edges", "2501"]) == Exit.INPUT
     assert "--edges 2500 or less" in capsys.readouterr().err
