@@ -126,9 +126,9 @@ def _check_size(body: Polyhedron, request: PlanRequest) -> None:
     missing = [what for what, lacks in needed.items() if lacks]
     if faces > MAX_FACES and missing:
         raise InputError(
-            f"{body.name} has {faces} planar faces, and on more than {MAX_FACES} only grasps of "
-            f"the families {', '.join(FAMILIES)} with the largest discs are planned. Give "
-            f"{' and '.join(missing)}, or load it with patches for faces (--faces patches)"
+            f"{body.name} has {faces} planar faces, and objects with more than {MAX_FACES} need "
+            f"simpler plans: give {' and '.join(missing)}; or load the object with patches for "
+            "faces (--faces patches)"
         )
 
 

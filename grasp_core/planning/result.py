@@ -144,7 +144,8 @@ class Plan:
     a proof for their convex hulls, or for each choice of one convex piece per face. Pieces too
     small for a contact, a millionth of the object, are left out."""
     finger: Finger | None = None
-    """The finger that was to get to the contacts; None if reach was not asked for."""
+    """The size of the fingers for which free straight paths to the contacts were sought; None if no
+    paths were asked for."""
     undecided: Mapping[FaceQuadruple, float] = field(default_factory=dict[FaceQuadruple, float])
     """Face quadruples on which the free method found neither a grasp nor a proof, with the share of
     the choices of contacts that is open, where each cut counts for half."""

@@ -173,8 +173,8 @@ def _check_sizes(loads: Array, name: str) -> None:
     if len(loads) and not SMALLEST <= float(sizes.min()) <= float(sizes.max()) <= LARGEST:
         wrong = sizes[(sizes < SMALLEST) | (sizes > LARGEST)][0]
         raise InputError(
-            f"{name} must not be zero: its largest component is {SMALLEST:g} to {LARGEST:g}, got "
-            f"{float(wrong):.6g}"
+            f"{name} must not be zero nor huge: its largest component must be from {SMALLEST:g} to "
+            f"{LARGEST:g}, got {float(wrong):.6g}"
         )
 
 

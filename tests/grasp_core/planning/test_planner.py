@@ -240,7 +240,7 @@ def test_an_object_with_too_many_faces_is_refused_at_once():
 def test_of_more_than_200_faces_only_the_largest_grasps_of_the_paper_s_families_are_planned():
     body = sphere_hull(240)
     for options in ({}, {"limit": 4}, {"families": FAMILIES}):
-        with pytest.raises(gc.InputError, match="on more than 200 only grasps of "):
+        with pytest.raises(gc.InputError, match="with more than 200 need simpler plans"):
             gc.plan(body, 0.2, **options)
     every = gc.plan(body, 0.2, families=FAMILIES, limit=9).grasps
     assert {grasp.family for grasp in every} == set(FAMILIES)
