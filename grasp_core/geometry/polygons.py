@@ -19,8 +19,8 @@ CONVEX_SLACK = 1e-9
 edges' lengths: well above the rounding of coordinates, well below a visible notch."""
 
 SAME_PART = 1e-3
-"""Corners whose heights above a line differ by less than this share of the slack of straight corners
-are equally high."""
+"""Corners whose heights above a line differ by less than this share of the slack of straight
+corners are equally high."""
 SAME_CORNER = 1e-9
 """Distance below which two corners count as one, at unit size."""
 ON_LINE = 1e-12
