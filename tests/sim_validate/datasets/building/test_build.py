@@ -184,7 +184,7 @@ def test_folders_of_something_else_are_refused(copy, tmp_path):
         build(dataclasses.replace(CONFIG, limit=3), copy, Here(), silent)
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("all my work")
-    with pytest.raises(gc.InputError, match=r"thesis\.tex: exists"):
+    with pytest.raises(gc.InputError, match=r"thesis\.tex: this file is not part of the dataset"):
         build(CONFIG, tmp_path / "mine", Here(), silent)
     with pytest.raises(gc.InputError, match="expected a finished dataset"):
         verify(tmp_path / "mine")

@@ -238,7 +238,7 @@ def rewritten(folder, change):
         (lambda r: r["files"][0].update(path="../x"), r"files\[0\].path: expected a relative path"),
         (lambda r: r["files"][0].update(path="/etc/passwd"), r"files\[0\].path: expected a rel"),
         (lambda r: r["files"][0].update(rows=-1), r"files\[0\].rows: expected at least 0, got -1"),
-        (lambda r: r.update(schema=2), "schema: expected 1, got 2: written by a newer graspproof"),
+        (lambda r: r.update(schema=2), "schema: expected 1, got 2: a newer graspproof wrote"),
         (lambda r: r["files"].append(r["files"][0]), "expected every path only once"),
         (lambda r: r.update(units="4"), 'units: expected a whole number, got "4"'),
         (lambda r: r.update(taste=1), "taste: unknown key; known keys are config_sha256"),
