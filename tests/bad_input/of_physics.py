@@ -34,7 +34,7 @@ VECTORS = {
     "run box --approach nan 0 0": "--approach",
     "run box --weight-n 1 --down 0 0 0": "--down",
     "run box --down 0 0 1": "--weight-n",
-    "run box --center-of-mass-m 0 0 0": "built in",
+    "run box --center-of-mass-m 0 0 0": "built-in",
     "analyze contacts.json --wrench 0 0 0 0 0 0": "--wrench|zero",
     "analyze contacts.json --wrench nan 0 0 0 0 0": "--wrench",
     "analyze contacts.json --wrench 1e14 0 0 0 0 0": "--wrench",
@@ -122,7 +122,7 @@ def cases() -> list[Case]:
         for value in values
     ]
     found += [
-        flag_case(GROUP, line, says, 4 if "built in" in says else 2)
+        flag_case(GROUP, line, says, 4 if "built-in" in says else 2)
         for line, says in VECTORS.items()
     ]
     found += [

@@ -118,7 +118,7 @@ FLAGS = {
         _grid(60), "--faces planar", "GP-MESH-TOO-MANY|planar faces|patches"),
     "patches of a box that is open in all": (
         ([*CORNERS], [(0, 1, 2)]), "--faces patches", "GP-MESH-NOT-FLAT|four"),
-    "a centre of mass far off": (BOX, "--center-of-mass-m 9 9 9", "center_of_mass|outside"),
+    "a centre of mass far off": (BOX, "--center-of-mass-m 9 9 9", "center_of_mass"),
     "in inches by mistake": (boxes(((0, 0, 0), 1000.0)), "--unit in", "GP-MESH-SIZE|unit"),
 }  # fmt: skip
 GOOD = {
