@@ -53,7 +53,7 @@ PLYS = {
         ply(form="binary_little_endian",
             body=ply_binary()[:61] + b"\4" + struct.pack("<4i", 0, 1, 3, 2) + BODY[74:-1]), "face"),
     "a coordinate that its type cannot hold": (
-        ply().replace(b"float x", b"uchar x"), "vertex 1|whole number"),
+        ply().replace(b"float x", b"uchar x"), "vertex 1|whole-number"),
     "nan": (ply(form="binary_little_endian", body=NAN + BODY[4:]), "vertex 0|finite"),
     "text nan": (ply().replace(b"0.1", b"nan", 1), "finite"),
     "beyond single precision": (ply().replace(b"0.1", b"1e39", 1), "finite|precision"),
@@ -190,12 +190,12 @@ GLBS = {
         changed("meshes.0.primitives.0.extensions", {"KHR_draco_mesh_compression": {}}), "plain"),
     "a skin": (changed("nodes.0.skin", 0), "skin|in its final shape"),
     "morphs": (changed("meshes.0.primitives.0.targets", [{"POSITION": 0}]), "morph"),
-    "numbers behind http": (changed("buffers.0.uri", "http://localhost/a.bin"), "outside the binary chunk"),
-    "numbers in ../": (changed("buffers.0.uri", "../a.bin"), "outside the binary chunk"),
-    "numbers in /etc/passwd": (changed("buffers.0.uri", "/etc/passwd"), "outside the binary chunk"),
+    "numbers behind http": (changed("buffers.0.uri", "http://localhost/a.bin"), "outside"),
+    "numbers in ../": (changed("buffers.0.uri", "../a.bin"), "outside the binary"),
+    "numbers in /etc/passwd": (changed("buffers.0.uri", "/etc/passwd"), "outside the binary"),
     "numbers in base64": (
-        changed("buffers.0.uri", "data:;base64," + "A" * 10_000_000), "outside the binary chunk"),
-    "two buffers": (changed("buffers", [{"byteLength": 60}] * 2), "outside the binary chunk"),
+        changed("buffers.0.uri", "data:;base64," + "A" * 10_000_000), "outside the binary"),
+    "two buffers": (changed("buffers", [{"byteLength": 60}] * 2), "outside the binary"),
     "no meshes": (glb({"asset": {"version": "2.0"}}), "no triangles"),
     "meshes of no scene": (changed("scenes.0.nodes", []), "no triangles"),
     "10^5 deep nodes": (
