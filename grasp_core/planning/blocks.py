@@ -44,7 +44,7 @@ class Blocks:
         return Blocks(self.rooms[first : first + count], lambda place: self.make(first + place))
 
     def keeping(self, count: int) -> "Blocks":
-        """The same blocks; the first `count` are kept once they are made."""
+        """Return these blocks with a memory: the first `count` are made once and then kept."""
         kept = cache(self.make)
         return Blocks(self.rooms, lambda place: (kept if place < count else self.make)(place))
 

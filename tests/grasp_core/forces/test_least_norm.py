@@ -69,7 +69,7 @@ def kkt_residual(program, wrench, forces):
 
 
 def clarabel_least_norm(program, wrench):
-    """The same program by an interior-point method."""
+    """Forces of least norm, solved by an interior-point method instead of ours."""
     A, rows, bounds = program
     n = A.shape[1]
     settings = clarabel.DefaultSettings()
@@ -137,7 +137,7 @@ def test_least_norm_agrees_with_an_interior_point_method():
 
 
 def test_balanced_wrenches_of_any_size_get_forces_at_any_friction():
-    """Of least norm, though some of these programs are nearly without interior."""
+    """Forces are of least norm, also where the program has nearly no interior."""
     rng = np.random.default_rng(4)
     tested = 0
     for friction in (0.0, 1e-6, 1e-3, 0.1, 1.0, 10.0):
