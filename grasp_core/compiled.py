@@ -1,4 +1,4 @@
-"""Declares, compiles, keeps and loads inner loops; only this module handles numba.
+"""Declares, compiles, keeps and loads inner loops; only this module compiles with numba.
 
 A kernel, `NAME_kernel.py` beside the module `NAME.py`, is plain arithmetic on arrays of programs,
 directions or contacts. Kernels are loaded on first use, since numba takes half a second to import.
@@ -64,7 +64,7 @@ def compiled(name: str) -> Any:
 
 
 def state_of(function: Any) -> Literal["kept", "not kept", "interpreted"]:
-    """Tell how a function of a kernel runs.
+    """Return whether a function runs compiled by numba, kept on disk or not, or interpreted.
 
     Returns:
         Whether later processes find it compiled, or no folder keeps it, or Python runs it because

@@ -177,7 +177,7 @@ class Grasp:
         )
         if len(bounds) != len(("lower", "upper")) or bounds[0] > bounds[1]:
             raise InputError(
-                f"ferrari_canny must be a lower and an upper bound, got {shown(bounds)}"
+                f"ferrari_canny must be a pair, lower bound then upper bound, got {shown(bounds)}"
             )
         instance(self.witness, Witness, "witness")
 
@@ -217,5 +217,5 @@ def four(items: Iterable[Item]) -> tuple[Item, Item, Item, Item]:
     """
     listed = tuple(items)
     if len(listed) != FINGERS:
-        raise InputError(f"expected {FINGERS} items, one per finger, got {len(listed)}")
+        raise InputError(f"a grasp needs {FINGERS} items, one per finger, got {len(listed)}")
     return listed

@@ -51,7 +51,7 @@ NEWTON_STEPS = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """The margin program's answer, and the verdict that it proves."""
+    """The margin program's solution, and the verdict on force closure that it proves."""
 
     margin: float
     """Optimum of the program as the solver found it, dimensionless; only `closed` is proved."""

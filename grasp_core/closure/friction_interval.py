@@ -31,7 +31,7 @@ need slightly more than `FRICTIONLESS` on one machine and not on another."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrictionInterval:
-    """Friction up to `lower`, at which contacts are open, and from `upper` on, closed.
+    """Friction up to `lower`, without force closure, and from `upper` on, with force closure.
 
     Open means not in force closure. Where wrenches are dependent except for rounding, the proof
     that the contacts are open holds for contacts moved by at most 1e-12 of their size; the proof

@@ -56,7 +56,7 @@ def supports(twist: Array, arms: Array, normals: Array, friction: Array) -> Arra
 
 
 def generators_of(arms: Array, normals: Array, friction: Array) -> Array:
-    """Return wrenches that span those of all contacts.
+    """Return wrenches that span the space of all wrenches that the contacts can apply.
 
     There are three for each contact, or one without friction.
     """
@@ -160,7 +160,11 @@ def proved_margin(
 def margin_ceiling(
     twist: Array, arms: Array, normals: Array, friction: Array, caution: float = 1.0
 ) -> float:
-    """Compute an upper bound (3) of the margin from a twist on which no support is positive.
+    """Bound the margin of closure from above by (3), with a twist that separates the contacts.
+
+    No contact force does positive work on such a twist, within rounding. The margin is how
+    deep in their cones balanced forces can lie, relative to the sum of their normal parts; without
+    closure it is negative.
 
     Args:
         twist: Velocity at the mean contact and angular velocity, (6,).
@@ -170,8 +174,8 @@ def margin_ceiling(
         caution: Factor on the rounding that is allowed for.
 
     Returns:
-        An upper bound; zero, which bounds nothing but says that there is no closure, where the
-        largest support M is zero to within rounding; infinity where M is more.
+        The bound, below zero; zero where the largest work M that a force does on the twist is zero
+        to within rounding; infinity where M is more, and the twist proves nothing.
     """
     if not refutes_closure(twist, arms, normals, friction):
         return math.inf

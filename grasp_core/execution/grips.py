@@ -53,7 +53,7 @@ from grasp_core.closure.wrenches import WRENCH, contact_frames, cross_matrix, gr
 from grasp_core.errors import InputError
 from grasp_core.execution.springs import are_springs, springs
 from grasp_core.fields import are_frictions, are_units, is_array
-from grasp_core.objects.on_faces import check_body
+from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 
@@ -258,6 +258,7 @@ def unsqueezed(
     """
     check_body(body)
     if isinstance(contacts, Grasp):
+        check_on_faces(body, contacts)
         points, units = contact_arrays(contacts, None)
     else:
         each = partial(instance, kind=Contact, name="contacts", remedy="or give a Grasp")

@@ -1,4 +1,4 @@
-"""Shares rows, cone facets and checked bounds between the disc programs in compiled code.
+"""Holds what the linear programs for concurrent and pencil discs share, in compiled code.
 
 The programs of `concurrent` and `pencil` grow four discs and maximise the smallest radius. Its
 optimum alone is found with all four radii equal, since rows only get tighter as a radius grows.
@@ -63,7 +63,7 @@ def vertex_of(n: int) -> Vertex:
 
 @loop()
 def measure(rows: Rows) -> None:
-    """Compute the lengths of the rows, by which the solver measures violations."""
+    """Compute the norm of each row of a linear program; the solver divides violations by it."""
     rows.norms[:] = 0.0
     for i in range(len(rows.At)):
         for k in range(len(rows.norms)):

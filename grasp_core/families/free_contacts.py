@@ -1,4 +1,4 @@
-"""A closed patch becomes a grasp: its forces, added up face by face, say where contacts balance.
+"""Finds four balanced contacts from forces at the corners of four faces, added up face by face.
 
 Solved: given contacts at all corners of four convex faces (the patch, see `free`) in force closure,
 four contacts on these faces, one on each, that are in force closure as well.
@@ -68,7 +68,7 @@ LEAST_SPREAD = 1e-3
 def grasp_from_patch(
     pieces: Sequence[FacePiece], part: Corners, patch: ClosureCertificate, friction: float
 ) -> Placement | None:
-    """Make a placement from the forces of a closed patch; None if no attempt holds."""
+    """Find a grasp from balanced forces at the corners of faces; None if all attempts fail."""
     if patch.forces is None:
         return None
     owner = np.repeat(np.arange(FINGERS), [len(corners) for corners in part])
@@ -96,7 +96,7 @@ def grasp_from_patch(
 def smallest_forces(
     pieces: Sequence[FacePiece], points: Array, normals: Array, friction: float, depth: float
 ) -> Array | None:
-    """The smallest balanced forces at points of pieces, (k, 3), or None if there are none.
+    """Find the smallest balanced forces at points of pieces, (k, 3), or None if there are none.
 
     Args:
         pieces: The piece of each point, k of them.
@@ -167,7 +167,7 @@ def place_by_forces(pieces: Sequence[FacePiece], forces: Array) -> Placement | N
 def _nearest_to_middles(
     pieces: Sequence[FacePiece], start: Array, A_eq: Array, rows: Array, limits: Array
 ) -> Array:
-    """Balanced contacts with rows @ y <= limits that are nearest to the pieces' middles, (8,).
+    """Find balanced contacts with rows @ y <= limits that are nearest to the pieces' middles, (8,).
 
     They are unique, unlike the contacts farthest from the edges, so they turn with the object.
     """
@@ -203,7 +203,7 @@ def closed_at(
 
 
 def _on_one_line(positions: Array) -> bool:
-    """Whether contacts are so near one line that they hardly resist turning about it."""
+    """Return whether contacts are so near one line that they hardly resist turning about it."""
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
     return bool(spread[1] < LEAST_SPREAD)
 

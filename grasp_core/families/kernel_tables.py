@@ -72,7 +72,7 @@ class RegulusTerms(NamedTuple):
 
 
 def face_table(pieces: Sequence[FacePiece | None]) -> FaceTable:
-    """A table with one row per piece; rows of faces without room stay zero."""
+    """Make a table with one row per piece; rows of faces too small for a contact stay zero."""
     count, most = len(pieces), max((len(piece.E) for piece in pieces if piece), default=0)
     table = FaceTable(
         normals=np.zeros((count, 3)),

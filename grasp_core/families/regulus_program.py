@@ -67,7 +67,7 @@ RESULTANTS = np.array([1.0, 1.0, -1.0, -1.0])
 
 
 def nearly_symmetric(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
-    """Whether both pairs of each quadruple leave their slopes an interval (3), (q,).
+    """Return whether both pairs of each quadruple leave their slopes an interval (3), (q,).
 
     Args:
         axes: Axes of the force cones in finger order, (q, 4, 3).
@@ -78,7 +78,7 @@ def nearly_symmetric(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
 
 
 def _slope_angles(axes: Array, half_angles: Array) -> tuple[Array, Array]:
-    """The ends of (3): least and largest angle of each pair's forces from its resultant [rad].
+    """Return the ends of (3): the least and largest angle of each pair's forces [rad].
 
     Args:
         axes: Axes of the force cones in finger order, (..., 4, 3).
@@ -137,7 +137,7 @@ def frames_of_pairs(cones: Sequence[ForceCone]) -> list[Pair]:
 
 
 def slope_at(pair: Pair, share: float) -> float:
-    """The slope y / x at a share of its interval (3), with the sign of x."""
+    """Return the slope y / x at a share of its interval (3), with the sign of x."""
     width = pair.largest_angle - pair.least_angle
     return pair.resultant * math.tan(pair.least_angle + share * width)
 
@@ -164,7 +164,7 @@ def regulus_program(
     slopes: Sequence[float],
     side: float,
 ) -> LinearProgram:
-    """The least offset t for given slopes, with the lines on one side of the focus line."""
+    """Build the program for the least offset t, for given slopes and side of the focus line."""
     offset = np.eye(VARIABLES)[T]
     gap = -side * np.eye(VARIABLES)[P]
     # (8), for both pairs: l_i is p times the slope of the other

@@ -1,5 +1,6 @@
 """Turns what pydantic finds wrong with a file into a sentence: field, expected, found value."""
 
+import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
@@ -48,7 +49,30 @@ def record_of(
         raise InputError(complaint(error, kind)) from error
 
 
-def complaint(error: "ValidationError", kind: Any, inside: Sequence[str] = ()) -> str:
+def settings_of(
+    kind: type[Record], given: Mapping[str, Any], inside: Sequence[str | int]
+) -> Record:
+    """Make settings of a class from a part of a file, with every field checked.
+
+    Args:
+        kind: Class of the settings: a dataclass that checks its own fields.
+        given: The fields, as JSON or TOML gives them.
+        inside: Keys that lead to this part of its file.
+
+    Raises:
+        InputError: A field has the wrong type, or the settings refuse it; the message names it.
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    try:
+        return TypeAdapter(kind).validate_json(json.dumps(given), strict=True)
+    except ValidationError as error:
+        raise InputError(complaint(error, kind, inside)) from error
+    except InputError as error:  # raised by the settings' own checks
+        raise InputError(f"{place(inside)}: {error}") from error
+
+
+def complaint(error: "ValidationError", kind: Any, inside: Sequence[str | int] = ()) -> str:
     """Describe the first thing that is wrong with a record.
 
     Args:
@@ -62,7 +86,7 @@ def complaint(error: "ValidationError", kind: Any, inside: Sequence[str] = ()) -
     if fault in UNKNOWN:
         return f"{where}: unknown key; known keys are {', '.join(_fields_at(kind, loc[:-1]))}"
     if fault == "missing":
-        return f"{where}: missing"
+        return f"{where}: missing; add it"
     limits: Mapping[str, Any] = first.get("ctx", {})
     if fault in BOUNDS:
         side, key = BOUNDS[fault]

@@ -24,6 +24,7 @@ KINDS: Mapping[str, Collection[str]] = {
     "baseline": {"grasps_file"},
     "verdicts.json": {"verdicts"},
     "regions.json": {"edge_clearance_m", "grasps"},
+    "executions.json": {"executions"},
     "manifest.json": {"units_sha256", "files"},
     "grasps.json": {"object", "grasps"},
     "wrench file": {"wrenches"},
@@ -31,7 +32,7 @@ KINDS: Mapping[str, Collection[str]] = {
 }
 """The JSON files of graspproof, and for each the keys that tell it from the files listed after it.
 """
-BESIDE = ("verdicts.json", "regions.json")
+BESIDE = ("verdicts.json", "regions.json", "executions.json")
 """Files that are kept in the same folder as the grasps.json that they belong to."""
 
 
@@ -51,7 +52,7 @@ def object_of(
     """
     found = value_of(text, nulls=nulls)
     if not isinstance(found, dict):
-        raise InputError(f"a {wanted} must hold one JSON object, got {shown(found)}")
+        raise InputError(f"{_with_article(wanted)} must hold one JSON object, got {shown(found)}")
     record = cast("dict[str, Any]", found)
     check_kind(record, wanted)
     if schema is not None:
@@ -131,7 +132,14 @@ def check_kind(found: Mapping[str, Any], wanted: str) -> None:
     for kind, keys in KINDS.items():
         if kind != wanted and set(keys) <= found.keys():
             beside = " beside it" if wanted == "grasps.json" and kind in BESIDE else ""
-            raise InputError(f"this is a {kind}, not a {wanted}; give the {wanted}{beside}")
+            raise InputError(
+                f"this is {_with_article(kind)}, not {_with_article(wanted)}; "
+                f"give the {wanted}{beside}"
+            )
+
+
+def _with_article(kind: str) -> str:
+    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
 
 
 def check_schema(found: Mapping[str, Any], schema: int) -> None:

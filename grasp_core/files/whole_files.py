@@ -83,9 +83,7 @@ def bounded_bytes(path: Path, most: int) -> bytes:
         raise OSError(None, f"the path is not a valid file name ({error})", str(path)) from error
     try:
         if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise OSError(
-                None, "the path is a folder, a pipe or a device; give a regular file", str(path)
-            )
+            raise OSError(None, "the path is a folder, a pipe or a device", str(path))
         with os.fdopen(handle, "rb", closefd=False) as stream:
             return stream.read(most + 1)
     finally:

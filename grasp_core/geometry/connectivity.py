@@ -58,7 +58,8 @@ def _pairs_of_tree(points: Array, reach: float) -> Indices:
     pairs = (int(tree.count_neighbors(tree, reach)) - len(points)) // 2
     if pairs > MOST_LINKS * len(points):
         raise InputError(
-            f"{pairs} pairs of points are within {reach:.3g} of each other; weld them first"
+            f"{pairs} pairs of points are within {reach:.3g} of each other, more than {MOST_LINKS} "
+            "per point; merge points that coincide first"
         )
     return np.asarray(tree.query_pairs(reach, output_type="ndarray"), dtype=np.int64)
 

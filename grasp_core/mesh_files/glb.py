@@ -48,17 +48,18 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
             return _scene(tree, binary, most)
     except WRONG_TREE as error:
-        message = f"the JSON part is no glTF ({type(error).__name__}: {shown(error)})"
+        message = f"the JSON part of the file is not glTF ({type(error).__name__}: {shown(error)})"
         raise MeshError(MeshRefusal.UNREADABLE, f"{message}; export it again") from error
 
 
 def _chunks(data: bytes) -> tuple[Tree, bytes]:
     """Split a GLB file into its JSON tree and its binary chunk, which may be empty."""
     if len(data) < HEAD:
-        broken("the head", f"expected {HEAD} bytes")
+        broken("the header", f"expected {HEAD} bytes, got {len(data)}")
     magic, version, length = struct.unpack_from("<4sII", data)
     if magic != MAGIC or version != VERSION or length != len(data):
-        broken("the head", f"expected glTF 2 of {len(data)} bytes, got {version} of {length}")
+        got = f"got glTF {version} and {length} bytes"
+        broken("the header", f"expected glTF 2 and a length of {len(data)} bytes, {got}")
     chunks, place = list[tuple[int, bytes]](), HEAD
     while place < len(data):
         if place + CHUNK_HEAD > len(data):
@@ -103,7 +104,7 @@ def _scene(tree: Tree, binary: bytes, most: int) -> tuple[Array, Indices]:
             before += len(local)
     moved = np.vstack(points)
     if not np.isfinite(moved).all():
-        message = "a coordinate of the scene is not finite; repair it"
+        message = "a coordinate of the scene is infinite or not a number; repair the mesh"
         raise MeshError(MeshRefusal.NON_FINITE, message)
     return moved, np.vstack(triangles)
 
@@ -137,7 +138,7 @@ def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
         parent, number = waiting.pop()
         check_place(number, tree["nodes"])
         if number in seen or len(seen) >= MOST_NODES:
-            broken(f"node {number}", f"nodes must form a tree, of {MOST_NODES} at most")
+            broken(f"node {number}", f"nodes must form a tree of at most {MOST_NODES} nodes")
         seen.add(number)
         node = tree["nodes"][number]
         matrix = parent @ _matrix(node)
@@ -151,7 +152,7 @@ def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
 
 def _await(waiting: list[tuple[Array, int]], matrix: Array, nodes: list[int]) -> None:
     if len(waiting) + len(nodes) > MOST_NODES:
-        broken("the JSON part", f"nodes must form a tree, of {MOST_NODES} at most")
+        broken("the JSON part", f"nodes must form a tree of at most {MOST_NODES} nodes")
     waiting += [(matrix, number) for number in nodes]
 
 
@@ -159,7 +160,7 @@ def _matrix(node: Tree) -> Array:
     matrix = np.eye(4)
     if "matrix" in node:
         if {"translation", "rotation", "scale"} & node.keys():
-            broken("a node", "has a matrix as well as a translation, rotation or scale")
+            broken("a node", "it has a matrix as well as a translation, rotation or scale")
         # glTF lists matrices by columns
         matrix = _floats(node, "matrix", 16).reshape(4, 4).T
         if (matrix[3] != (0.0, 0.0, 0.0, 1.0)).any():

@@ -98,7 +98,7 @@ def _stored(tree: Tree, binary: bytes, number: int, shape: str) -> _Stored:
     if any(type(size) is not int or size < 0 for size in sizes) or stride < row:
         broken(
             f"accessor {number}",
-            f"sizes must be whole numbers from 0 on, byteStride at least {row}",
+            f"sizes must be whole numbers from 0 on, and byteStride at least {row}",
         )
     length = (count - 1) * stride + row if count else 0
     if inside + length > view["byteLength"] or start + view["byteLength"] > len(binary):
@@ -118,4 +118,4 @@ def check_place(place: object, listed: list[Any]) -> None:
         MeshError: The place is no whole number, or outside the list.
     """
     if type(place) is not int or not 0 <= place < len(listed):
-        broken("the JSON part", f"refers to item {shown(place)} of a list of {len(listed)}")
+        broken("the JSON part", f"it refers to item {shown(place)} of a list of {len(listed)}")

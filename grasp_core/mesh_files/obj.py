@@ -45,9 +45,7 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
         elif keyword == b"f":
             polygons.add(_corners(words, len(points) // FLOATS, where), where)
         elif keyword not in PASSED_OVER:
-            unsupported(
-                f"{where}: the keyword {shown(keyword)!r} is not read", "export polygons only"
-            )
+            unsupported(f"{where}: keyword {shown(keyword)!r}", "export polygons only")
     return polygons.on(points_of(points))
 
 

@@ -41,7 +41,7 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     if (after := next(lines, None)) is not None:
         broken(
             f"line {after[0]}",
-            f"more lines than the {vertices} vertices and {faces} faces announced",
+            f"the file has more lines than its {vertices} vertices and {faces} faces",
         )
     return polygons.on(points_of(points))
 

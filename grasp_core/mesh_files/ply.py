@@ -56,7 +56,9 @@ def _text_points(header: Header, data: bytes, polygons: Polygons) -> Array:
                 listed = _text_corners(corners, numbers(cells[corners.name], where), where)
                 polygons.add(listed, where)
     if (after := next(lines, None)) is not None:
-        broken(f"line {after[0]} after the header", "more lines than the header announces")
+        broken(
+            f"line {after[0]} after the header", "the file has more lines than its header announces"
+        )
     return points
 
 
@@ -203,7 +205,7 @@ def _add_faces(corners: NDArray[np.generic], polygons: Polygons) -> None:
     """Add faces that all have the same number of corners k, given as vertex numbers (n, k)."""
     count, sides = corners.shape
     if count and sides < CORNERS:
-        broken("face 0", f"a face needs three corners, got {sides}")
+        broken("face 0", f"a face needs at least three corners, got {sides}")
     if count * (sides - 2) > polygons.most:
         too_many(count * (sides - 2), polygons.most)
     for row, listed in enumerate(corners.tolist()):

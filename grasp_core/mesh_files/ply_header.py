@@ -46,7 +46,7 @@ class Element:
         """
         found = [each for each in self.properties if each.name in names]
         if len(found) != 1:
-            broken("header", f"element {self.name} needs one property {' or '.join(names)}")
+            broken("the header", f"element {self.name} needs one property {' or '.join(names)}")
         return found[0]
 
     @property
@@ -78,15 +78,17 @@ def read_header(data: bytes) -> Header:
     """
     found = END.search(data[:LONGEST_HEADER])
     if not found:
-        broken("header", "expected `end_header`")
+        broken("the header", "expected `end_header`")
     order, elements = _lines(data[: found.start()])
     if not order:
-        broken("header", "expected a line such as `format ascii 1.0`")
+        broken("the header", "expected a line such as `format ascii 1.0`")
     for element in elements:
         _check_element(element)
     tables = {each.name: each for each in elements}
     if len(tables) < len(elements) or not {"vertex", "face"} <= tables.keys():
-        broken("header", f"expected elements vertex and face, once each, got {shown(list(tables))}")
+        broken(
+            "the header", f"expected elements vertex and face, once each, got {shown(list(tables))}"
+        )
     _check_properties(tables["vertex"], tables["face"])
     return Header(order, elements, found.end())
 
@@ -95,7 +97,7 @@ def _lines(text: bytes) -> tuple[str, list[Element]]:
     first, *lines = [line.split() for line in text.decode("ascii", "replace").splitlines()]
     order, elements = "", list[Element]()
     if first != ["ply"]:
-        broken("header", "expected the first line `ply`")
+        broken("the header", "expected the first line `ply`")
     for number, words in enumerate(lines, 2):
         where = f"header line {number}"
         match words:
@@ -117,17 +119,17 @@ def _lines(text: bytes) -> tuple[str, list[Element]]:
 def _check_properties(vertex: Element, face: Element) -> None:
     for name in POINT:
         if vertex.place((name,)).count_kind is not None:
-            broken("header", f"property {name} must be a number, not a list")
+            broken("the header", f"property {name} must be a number, not a list")
     if face.place(LISTS).count_kind is None:
-        broken("header", "the corners of faces must be a list")
+        broken("the header", "the corners of faces must be a list")
 
 
 def _check_element(element: Element) -> None:
     names = [element.name, *(each.name for each in element.properties)]
     if not all(NAME.fullmatch(name) for name in names) or len(names[1:]) > len(set(names[1:])):
-        broken("header", "names must be letters, digits and _, and differ within an element")
+        broken("the header", "names must consist of letters, digits and _, and must not repeat")
     if element.rows < 0 or not element.properties:
-        broken("header", f"element {element.name} needs properties and a count from 0 on")
+        broken("the header", f"element {element.name} needs properties and a count from 0 on")
 
 
 def _property(said: list[str], where: str) -> Property:

@@ -47,7 +47,7 @@ class Polygons:
             MeshError: The polygon has fewer than three corners, or there are too many triangles.
         """
         if len(corners) < CORNERS:
-            broken(where, f"a face needs three corners, got {len(corners)}")
+            broken(where, f"a face needs at least three corners, got {len(corners)}")
         triangles = len(self.triangles) // CORNERS + len(corners) - 2
         if triangles > self.most:
             too_many(triangles, self.most)
@@ -93,7 +93,7 @@ def too_many(triangles: int, most: int) -> None:
     Raises:
         MeshError: Always.
     """
-    message = f"the mesh has {triangles} or more triangles, the limit is {most}; simplify the mesh"
+    message = f"the mesh has {triangles} or more triangles, the limit is {most}; simplify it"
     raise MeshError(MeshRefusal.TOO_MANY, message)
 
 

@@ -76,7 +76,7 @@ def _bytes_of(path: Path, limits: MeshLimits) -> bytes:
     try:
         data = bounded_bytes(path, limits.max_bytes)
     except OSError as error:
-        message = f"cannot be read ({error.strerror}); check the path and its permissions"
+        message = f"the file cannot be read ({error.strerror}); check the path and its permissions"
         raise MeshError(MeshRefusal.UNREADABLE, message) from error
     if len(data) > limits.max_bytes:
         message = f"the file is over the limit of {limits.max_bytes} bytes; simplify the mesh"
@@ -94,17 +94,20 @@ def check_beginning(kind: str, data: bytes) -> None:
     """
     for beginning, other in OTHER_FILES.items():
         if data.startswith(beginning):
-            message = f"is {other}, expected {kind.upper()}; unpack or convert it first"
+            message = f"the file is {other}, expected {kind.upper()}; unpack or convert it first"
             raise MeshError(MeshRefusal.FORMAT, message)
     for other, beginning in MAGIC.items():
         if other != kind and data.startswith(beginning):
-            message = f"is a {other.upper()} file by its beginning; rename it to .{other}"
+            message = (
+                f"the file is {other.upper()} by its first bytes; rename it to end in .{other}"
+            )
             raise MeshError(MeshRefusal.FORMAT, message)
     if kind == "stl" and not stl.is_text(data) and not stl.is_binary(data):
         counted = int.from_bytes(data[stl.HEADER : stl.HEADER + 4], "little")
         message = (
-            f"is neither a text nor a binary STL file: its count of {counted} triangles would be "
-            f"{stl.HEADER + 4 + stl.TRIANGLE * counted} bytes, but it has {len(data)}; "
+            "the file is neither a text nor a binary STL file: its count of "
+            f"{counted} triangles would be {stl.HEADER + 4 + stl.TRIANGLE * counted} bytes, "
+            f"but it has {len(data)}; "
             "export it again"
         )
         raise MeshError(MeshRefusal.UNREADABLE, message)

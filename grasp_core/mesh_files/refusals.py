@@ -20,7 +20,8 @@ def broken(where: str, said: str) -> NoReturn:
     Raises:
         MeshError: Always.
     """
-    raise MeshError(MeshRefusal.UNREADABLE, f"{where}: {said}; export it again")
+    message = f"the file breaks its format at {where}: {said}; export it again"
+    raise MeshError(MeshRefusal.UNREADABLE, message)
 
 
 def unsupported(said: str, remedy: str) -> NoReturn:
@@ -29,7 +30,8 @@ def unsupported(said: str, remedy: str) -> NoReturn:
     Raises:
         MeshError: Always.
     """
-    raise MeshError(MeshRefusal.UNSUPPORTED, f"{said}; {remedy}")
+    message = f"the file has a feature that is not read: {said}; {remedy}"
+    raise MeshError(MeshRefusal.UNSUPPORTED, message)
 
 
 def not_finite(where: str, said: str, got: object) -> NoReturn:
@@ -38,7 +40,7 @@ def not_finite(where: str, said: str, got: object) -> NoReturn:
     Raises:
         MeshError: Always.
     """
-    raise MeshError(MeshRefusal.NON_FINITE, f"{where}: {said}, got {got}; repair it")
+    raise MeshError(MeshRefusal.NON_FINITE, f"{where}: {said}, got {got}; repair the mesh")
 
 
 def outside(where: str, corner: int, vertices: int) -> NoReturn:
@@ -47,5 +49,6 @@ def outside(where: str, corner: int, vertices: int) -> NoReturn:
     Raises:
         MeshError: Always.
     """
-    message = f"{where}: refers to vertex {corner}, but the file has {vertices}; export it again"
+    there = f"but the file has {vertices} vertices"
+    message = f"{where} refers to vertex {corner}, {there}; export it again"
     raise MeshError(MeshRefusal.INDEX, message)

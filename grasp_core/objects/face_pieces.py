@@ -99,11 +99,11 @@ class FacePiece:
         return self.origin + self.frame @ y
 
     def in_plane(self, point: Array) -> Array:
-        """The plane coordinates, (2,), of a point of the plane, (3,)."""
+        """Return the plane coordinates, (2,), of a point of the plane, (3,)."""
         return self.frame.T @ (point - self.origin)
 
     def inset(self, point: Array) -> float:
-        """Distance of a point inside the piece from its nearest edge line; negative outside."""
+        """Return the distance of a point from the nearest edge line; negative outside the piece."""
         return float((self.b - self.E @ self.in_plane(point)).min())
 
 
@@ -124,7 +124,7 @@ Shapes: TypeAlias = Sequence[FaceShape | None]
 
 
 def face_shapes(body: Polyhedron) -> tuple[FaceShape | None, ...]:
-    """The faces of an object as the programs use them; None for faces without room."""
+    """Split each face of an object into convex pieces; None for a face too small for a contact."""
     corners = (body.vertices - body.center_of_mass)[body.triangles[:, ::-1]] / body.radius
     return tuple(
         replace(shape_of(pieces), facets=corners[face.facets] if len(face.facets) else None)
@@ -202,7 +202,7 @@ def unit_pieces(body: Polyhedron) -> tuple[FacePiece, ...]:
 
 
 def pieces_by_face(body: Polyhedron) -> tuple[tuple[FacePiece, ...], ...]:
-    """The convex pieces of each face with room for a contact, in the order of the faces."""
+    """List the convex pieces of each face with room for a contact, in the order of the faces."""
     by_face: list[list[FacePiece]] = [[] for _ in body.faces]
     for piece in unit_pieces(body):
         by_face[piece.face].append(piece)

@@ -9,8 +9,18 @@ from typing import Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices
-from grasp_core.checked import LARGEST, instance, number, one_of, path_of, several, shown, text
+from grasp_core.arrays import Array, Indices, frozen, frozen_indices, to_digits
+from grasp_core.checked import (
+    LARGEST,
+    instance,
+    number,
+    one_of,
+    path_of,
+    positive,
+    several,
+    shown,
+    text,
+)
 from grasp_core.errors import InputError, MeshError
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles
@@ -100,6 +110,18 @@ class Polyhedron:
     def radius(self) -> float:
         """Return the largest distance of a vertex from the centre of mass [m]."""
         return float(np.linalg.norm(self.vertices - self.center_of_mass, axis=1).max())
+
+    def mass_at(self, density_kg_m3: float) -> float:
+        """Return the mass of the object at a uniform density [kg], to nine digits.
+
+        Args:
+            density_kg_m3: Density, such as 1000 for water [kg/m^3].
+
+        Raises:
+            InputError: The density is out of range.
+        """
+        density = positive(density_kg_m3, "density_kg_m3")
+        return float(to_digits(np.array(self.volume * density)))
 
     @property
     def normals(self) -> Array:

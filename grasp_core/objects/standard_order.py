@@ -15,19 +15,24 @@ of them counts: the first in the order of the file does.
 Only flags on the rarest kind of face, at its rarest kind of corner, are compared.
 """
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Indices
 from grasp_core.objects.booleans import triangulate
 from grasp_core.objects.face import Face
+from grasp_core.objects.face_pieces import Shapes, face_shapes
 from grasp_core.objects.planar_faces import FlatnessLimits, convex_pieces
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.trimmed_faces import shared_quadruples
 from grasp_core.solvers.ties import graded
+from grasp_core.values import FINGERS
 
 FLIP = np.array([1.0, 1.0, -1.0])
 """Signs of the coordinates in the mirror image: only z changes its sign, which is exact."""
@@ -40,15 +45,33 @@ direction, in object radii."""
 Cells: TypeAlias = tuple[float, ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Standard:
     """An object in standard order, and the numbers that its faces have on the given object."""
 
     body: Polyhedron
-    """The object with its faces in standard order; it may be the mirror image."""
+    """The object with its faces in standard order; it may be the mirror image. Halves of faces,
+    for two fingers on one face, come after all whole faces."""
     faces: tuple[int, ...]
-    """For each face of `body`, its number on the object as given."""
+    """For each whole face of `body`, its number on the object as given."""
     mirrored: bool
+    owners: tuple[int, ...]
+    """For each face of `body`, the whole face that it is or is a half of."""
+
+    @cached_property
+    def shapes(self) -> Shapes:
+        """The shape of each face of `body`."""
+        return face_shapes(self.body)
+
+    @cached_property
+    def shared(self) -> Indices:
+        """Quadruples with both halves of one face, or of two faces, (s, 4)."""
+        return shared_quadruples(self.owners)
+
+    @property
+    def quadruples(self) -> int:
+        """Number of quadruples of whole faces, and of those with both halves of a face."""
+        return math.comb(len(self.faces), FINGERS) + len(self.shared)
 
 
 def standard(body: Polyhedron) -> Standard:
@@ -58,12 +81,14 @@ def standard(body: Polyhedron) -> Standard:
     first = min(((_looks(image, frame), image, frame) for image, frame in views), default=None,
                 key=lambda view: view[0])  # fmt: skip
     if first is None:
-        return Standard(body, tuple(range(len(body.faces))), mirrored=False)
+        faces = tuple(range(len(body.faces)))
+        return Standard(body, faces, mirrored=False, owners=faces)
     _, image, frame = first
     order: list[int] = np.lexsort(_cells(image, frame).T[::-1]).tolist()
     slack = FlatnessLimits().distance * float(np.ptp(body.vertices, axis=0).max())
     faces = tuple(_relisted(image.faces[face], image, frame, slack) for face in order)
-    return Standard(replace(image, faces=faces), tuple(order), mirrored=image is not body)
+    owners, body_in_order = tuple(range(len(faces))), replace(image, faces=faces)
+    return Standard(body_in_order, tuple(order), mirrored=image is not body, owners=owners)
 
 
 def mirror_image(body: Polyhedron) -> Polyhedron:

@@ -71,7 +71,7 @@ class ContactFaces:
 
     @property
     def normals(self) -> Array:
-        """Inward unit normals of the pieces, (k, 3)."""
+        """Return the inward unit normals of the pieces, (k, 3)."""
         return np.array([piece.normal for piece in self.pieces])
 
     def positions(self, y: Array) -> Array:

@@ -1,6 +1,6 @@
 """Which grasps does a polyhedron have at a friction coefficient?
 
-A request comes in: an object, a friction, methods and a limit. It becomes face quadruples, best
-first, then placements, then certified grasps. A plan goes out: grasps with counts, or the reason
-why there are none.
+The request names an object, a friction, methods and a limit. The planner ranks sets of four faces
+by the grasps they may hold, places contacts on the most promising ones first, and certifies each
+grasp exactly. The plan lists the grasps with counts, or the reason why there are none.
 """

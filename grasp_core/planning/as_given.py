@@ -1,13 +1,15 @@
-"""Translates what was found on an object in standard order back to the object as it was given.
+"""Translates grasps and proofs from the planner's reordered copy of an object to the original.
 
-Faces get their original numbers back, and fingers are listed by face number. A grasp found on a
-mirror image is mirrored: a reflection D keeps forces in their cones and turns the torque x x f into
--(D x) x (D f), so balance, closure and regions are preserved. A separating twist (a, b) becomes
-(D a, -D b).
+The planner works on a copy in standard order: its faces are renumbered, and it may be mirrored, so
+that results do not depend on the mesh file (see `standard_order`). Here faces get their original
+numbers back, and fingers are listed by face number. A grasp found on a mirror image is mirrored: a
+reflection D keeps forces in their cones and turns the torque x x f into -(D x) x (D f), so balance,
+closure and regions are preserved. A separating twist (a, b) becomes (D a, -D b).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -18,53 +20,56 @@ from grasp_core.families.placements import Placement
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.objects.standard_order import FLIP, Standard
 from grasp_core.planning.certify import Certified
-from grasp_core.values import ContactRegion, ForceCone, four
+from grasp_core.values import ContactRegion, FaceQuadruple, ForceCone, four
 
 PAIRED = ("p", "r")
-"""Letters of the constructions whose fingers (0, 1) and (2, 3) are pairs: pencil and regulus."""
+"""Letters with which the ids of pencil and regulus grasps begin: their fingers (0, 1) and (2, 3)
+form pairs."""
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Place:
-    """The face, or half of a face, on which a finger stands."""
-
-    face: int
-    """The face's number on the object as it was given."""
-    half: str
-    """Half of the face, `a` or `b`; empty for a whole face."""
-
-    @property
-    def name(self) -> str:
-        """Face number and half, as the id of a grasp spells them."""
-        return f"{self.face}{self.half}"
+Place: TypeAlias = tuple[int, str]
+"""The face on which a finger stands, by its number on the object as it was given, and the half of
+the face, `a` or `b`; empty for a whole face."""
 
 
-def as_given(found: Certified, places: Sequence[Place], *, mirrored: bool) -> Certified:
+def as_given(found: Certified, on: Standard) -> Certified:
     """Translate a grasp to the object as given, fingers in the order of their faces.
 
     Args:
         found: The grasp in standard order.
-        places: Where its four fingers stand, in finger order.
-        mirrored: Whether the grasp was found on the mirror image.
+        on: The object in standard order.
     """
+    places = [_place(on, face) for face in found.faces]
     order = _finger_order(found.id[0], places)
-    named = "-".join([found.id[0], *(places[finger].name for finger in order)])
     swapped = found.id[0] in PAIRED and order[0] > 1
     grasp = replace(
         found,
-        id=named,
-        faces=four(places[finger].face for finger in order),
+        id="-".join([found.id[0], *("{}{}".format(*places[finger]) for finger in order)]),
+        faces=four(places[finger][0] for finger in order),
         pieces=tuple(found.pieces[finger] for finger in order),
         cones=tuple(found.cones[finger] for finger in order),
         regions=tuple(found.regions[finger] for finger in order),
         placement=_reordered(found.placement, order, swapped=swapped),
         ways_out=None if found.ways_out is None else found.ways_out[order],
     )
-    return _mirrored_grasp(grasp) if mirrored else grasp
+    return _mirrored_grasp(grasp) if on.mirrored else grasp
+
+
+def _place(on: Standard, face: int) -> Place:
+    owner = on.owners[face]
+    if face == owner:
+        return on.faces[owner], ""
+    first = on.owners.index(owner, len(on.faces))
+    return on.faces[owner], "a" if face == first else "b"
+
+
+def faces_as_given(faces: FaceQuadruple, on: Standard) -> FaceQuadruple:
+    """Ascending faces of the object as given, where halves count as their whole faces."""
+    return four(sorted(on.faces[on.owners[face]] for face in faces))
 
 
 def _finger_order(letter: str, places: Sequence[Place]) -> list[int]:
-    """Finger order by face: within pairs, then the pairs; all four where there are no pairs."""
+    """Return the fingers sorted by face: within pairs, then the pairs; else all four at once."""
     if letter not in PAIRED:
         return sorted(range(len(places)), key=places.__getitem__)
     pairs = [sorted(pair, key=places.__getitem__) for pair in ((0, 1), (2, 3))]
@@ -105,7 +110,7 @@ def _mirrored_grasp(found: Certified) -> Certified:
 
 
 def _mirrored_piece(piece: FacePiece) -> FacePiece:
-    """Mirror image of a piece: its frame is mirrored, so its plane coordinates stay the same."""
+    """Mirror a convex piece of a face; its frame is mirrored too, so plane coordinates stay."""
     return replace(
         piece,
         normal=piece.normal * FLIP,
@@ -114,16 +119,15 @@ def _mirrored_piece(piece: FacePiece) -> FacePiece:
     )
 
 
-def absence_as_given(proof: Absence, standard: Standard, owners: Sequence[int]) -> Absence:
+def absence_as_given(proof: Absence, on: Standard) -> Absence:
     """Translate a proof of absence to the faces of the object as it was given.
 
     Args:
         proof: Proof about pieces of the standard object's faces.
-        standard: The object in standard order.
-        owners: For each face index, the whole face it is or is a half of.
+        on: The object in standard order.
     """
-    pieces = [replace(piece, face=standard.faces[owners[piece.face]]) for piece in proof.pieces]
-    if not standard.mirrored:
+    pieces = [replace(piece, face=on.faces[on.owners[piece.face]]) for piece in proof.pieces]
+    if not on.mirrored:
         return replace(proof, pieces=tuple(pieces))
     return replace(
         proof,

@@ -1,11 +1,13 @@
 """Best-first search over face quadruples, tightening bounds only at the head of one queue.
 
-Four kinds of items wait in the queue: blocks not made yet, bounded by the room of their faces; made
-blocks, bounded by how wide their cones can be; quadruples with chosen cones, bounded by their
-corners; and single quadruples, bounded by small programs. The item with the largest bound comes
-first: a block is made, cones are chosen for some dozens of quadruples, their bounds are tightened,
-or a quadruple is handed out. So no later quadruple has larger discs than one handed out, and few
-cones are tilted and few programs solved that were not needed to know this.
+A grasp is ranked by its disc radius: how far each contact may move while the grasp stays good. Four
+kinds of items wait in the queue, each with an upper bound on that radius: blocks of quadruples not
+listed yet, bounded by the largest discs in their faces; listed blocks, bounded by how wide their
+force cones can be; quadruples with chosen cones, bounded by the corners of their faces; and single
+quadruples, bounded by small linear programs. The item with the largest bound comes first: a block
+is listed, cones are chosen for some dozens of quadruples, their bounds are tightened, or a
+quadruple is yielded. So no quadruple can have larger discs than the bound of one yielded before it,
+and few cones are tilted and few programs solved that were not needed to know this.
 """
 
 from collections.abc import Callable, Iterator
@@ -30,23 +32,23 @@ SMALLEST_CHUNK, LARGEST_CHUNK = 32, 2048
 SMALLEST_TILT = 512
 """Fewest quadruples whose cones are chosen together: smaller groups take hardly less time."""
 BLOCK, TABLE, QUADRUPLE = range(3)
-"""Kinds of items, in the order in which equal bounds come first."""
+"""Kinds of items in the queue; of items with equal bounds the smaller kind comes first."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Waiting:
-    """One item of the queue; items are ordered by their keys alone."""
+    """One item of the search's queue; items are ordered by their keys alone."""
 
     key: tuple[float, int, tuple[int, ...]]
-    """Minus the coarse bound; then the kind, and places or faces, which break ties."""
+    """Minus the rounded upper bound; then the kind, and places or faces, which break ties."""
     expand: "Callable[[float, float], Iterator[Waiting]] | None" = field(compare=False)
-    """Replaces the item by closer ones, given the threshold and the next item's bound."""
+    """Yields the items that replace this one, given the threshold and the next item's bound."""
     attempts: Callable[[], tuple[Attempt, ...]] = field(compare=False, default=tuple)
-    """Lists the attempts on a single quadruple, which cannot be expanded."""
+    """Lists the attempts on a single quadruple; empty for items that can be expanded."""
 
     @property
     def bound(self) -> float:
-        """Upper bound on the discs of the item [object radii]; equal bounds are equal numbers."""
+        """Return the upper bound on the disc radius of grasps in this item [object radii]."""
         return -self.key[0]
 
 
@@ -55,26 +57,28 @@ Expanded: TypeAlias = Iterator[Waiting]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BestFirst:
-    """A search for the largest discs of one construction on one object."""
+    """A search over one object's face quadruples for the largest discs of one construction."""
 
     construction: Construction
     bounded: AttemptBounds
-    """Bounds attempts on the object's faces by small programs."""
+    """Bounds the disc radii of attempts on the object's faces by small linear programs."""
     tally: Tally
     """Counts quadruples whose bounds prove that they have no grasp at all."""
 
     def over(
-        self, blocks: Blocks, least: Callable[[Construction], float]
+        self, blocks: Blocks, places: range, least: Callable[[Construction], float]
     ) -> Iterator[tuple[Attempt, ...]]:
-        """Yield the attempts on each quadruple with a bound above the threshold, best first.
+        """Yield the attempts on each quadruple whose bound exceeds the threshold, best first.
 
         Args:
             blocks: Blocks of quadruples. The construction needs discs; see `in_rows`.
+            places: Places of the blocks to search.
             least: Returns the radius that discs must exceed at present.
         """
+        rooms, make = blocks
         queue = [
-            Waiting((-room, BLOCK, (place,)), partial(self._made, blocks, place))
-            for place, room in enumerate(blocks.rooms.tolist())
+            Waiting((-float(rooms[place]), BLOCK, (place,)), partial(self._made, make, place))
+            for place in places
         ]
         heapify(queue)
         while queue:
@@ -90,7 +94,7 @@ class BestFirst:
                 heappush(queue, item)
 
     def in_rows(self, wide: WideQuadruples, worth: float) -> Iterator[tuple[Attempt, ...]]:
-        """Yield the attempts on quadruples with bounds above the threshold, in the table's order.
+        """Yield the attempts on quadruples whose bound exceeds `worth`, in the table's order.
 
         Args:
             wide: Ranked quadruples.
@@ -102,14 +106,16 @@ class BestFirst:
             for item in self._tightened(coned, bounds, slice(0, len(coned)), worth):
                 yield item.attempts()
 
-    def _made(self, blocks: Blocks, place: int, worth: float, _: float) -> Expanded:
-        wide, bounds = blocks.make(place).ranked(self.construction, worth)
+    def _made(
+        self, make: Callable[[int], WideQuadruples], place: int, worth: float, _: float
+    ) -> Expanded:
+        wide, bounds = make(place).ranked(self.construction, worth)
         yield from self._wide_rows(wide, coarse(bounds), (place,), 0)
 
     def _wide_rows(
         self, wide: WideQuadruples, best: Array, place: tuple[int, ...], start: int
     ) -> Expanded:
-        """The rows from `start` on as one item: cones are chosen for the first of them."""
+        """Yield one item for the rows from `start` on; expanding it chooses cones for some."""
 
         def expand(worth: float, beyond: float) -> Expanded:
             rows = _until(best, start, beyond, SMALLEST_TILT)
@@ -126,7 +132,7 @@ class BestFirst:
     def _coned_rows(
         self, coned: ConedQuadruples, bounds: Array, best: Array, place: tuple[int, ...], start: int
     ) -> Expanded:
-        """The rows from `start` on as one item: the bounds of the first of them are tightened."""
+        """Yield one item for the rows from `start` on; expanding it tightens some bounds."""
 
         def expand(worth: float, beyond: float) -> Expanded:
             rows = _until(best, start, beyond, SMALLEST_CHUNK)
@@ -167,7 +173,7 @@ class BestFirst:
 
 
 def _until(best: Array, start: int, beyond: float, least: int) -> slice:
-    """Rows to look at more closely next: the ones with bounds above the rest of the queue."""
+    """Return the next rows to refine: those with bounds above `beyond`, within a chunk's size."""
     larger = int(np.searchsorted(-best[start:], -beyond))
     count = min(max(larger, least), LARGEST_CHUNK)
     return slice(start, min(start + count, len(best)))

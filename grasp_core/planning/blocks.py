@@ -1,15 +1,15 @@
-"""Face quadruples in blocks, faces with more room first, before cones are chosen for them.
+"""Splits all sets of four faces (quadruples) into blocks, those with room for large discs first.
 
-Faces are numbered by falling room. Quadruples i < j < k < l are counted with the smallest l first,
-then by k, then j, then i. So the quadruple has number C(l, 4) + C(k, 3) + C(j, 2) + i, a block is
-a range of numbers, and no disc of this block or a later one is larger than the room of the block's
-first l.
+The room of a face is the radius of the largest disc in it. Faces are numbered by falling room.
+Quadruples i < j < k < l are counted with the smallest l first, then by k, then j, then i. So the
+quadruple has number C(l, 4) + C(k, 3) + C(j, 2) + i, a block is a range of numbers, and no disc of
+this block or a later one is larger than the room of the block's first l.
 """
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache
+from typing import TypeAlias
 
 import numpy as np
 
@@ -25,35 +25,26 @@ FIRST_FACES = 14
 LARGEST_BLOCK = 30_000
 """Most quadruples in one block."""
 SPANNING_SHARE = 0.125
-"""Share of quadruples of random directions that positively span."""
+"""Share of quadruples of random directions that positively span space."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Blocks:
-    """Blocks of quadruples that are made on request."""
+Blocks: TypeAlias = tuple[Array, Callable[[int], WideQuadruples]]
+"""Upper bound on the discs of each block, (blocks,) [object radii], and the function that makes the
+block at a place."""
 
-    rooms: Array
-    """Upper bound on the discs of each block, (blocks,) [object radii]."""
-    make: Callable[[int], WideQuadruples]
 
-    def __len__(self) -> int:
-        return len(self.rooms)
-
-    def from_place(self, first: int, count: int) -> "Blocks":
-        """At most `count` blocks, beginning with the one at the place `first`."""
-        return Blocks(self.rooms[first : first + count], lambda place: self.make(first + place))
-
-    def keeping(self, count: int) -> "Blocks":
-        """Return these blocks with a memory: the first `count` are made once and then kept."""
-        kept = cache(self.make)
-        return Blocks(self.rooms, lambda place: (kept if place < count else self.make)(place))
+def kept(blocks: Blocks, count: int) -> Blocks:
+    """Give blocks a memory: the first `count` are made once and then kept."""
+    rooms, make = blocks
+    once = cache(make)
+    return rooms, lambda place: (once if place < count else make)(place)
 
 
 def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
-    """Put all quadruples of an object into blocks.
+    """Split all face quadruples of an object into blocks.
 
     Args:
-        cones: How force cones are chosen.
+        cones: Chooses force cones on the object's faces.
         whole: Number of whole faces; faces after them are parts of whole ones.
         shared: Quadruples with such parts, (s, 4); their blocks come last.
     """
@@ -74,11 +65,11 @@ def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
         numbers = np.arange(int(starts[place]), int(ends[place]), dtype=np.int64)
         return _quadruples(cones, order[_unranked(numbers, len(order))])
 
-    return Blocks(np.concatenate(rooms), make)
+    return np.concatenate(rooms), make
 
 
 def spanning_blocks(cones: PlannedCones, whole: int) -> Blocks:
-    """Blocks of quadruples whose normals positively span (P3), with room on their faces or not."""
+    """Split the quadruples whose normals positively span space (P3) into blocks, roomy or not."""
     order = _by_room(cones, whole)
     table = SpanningTable(cones.body.normals[order], LEAST_SPAN_ANGLE)
     cuts = _face_ends(len(order), int(LARGEST_BLOCK / SPANNING_SHARE))
@@ -88,7 +79,7 @@ def spanning_blocks(cones: PlannedCones, whole: int) -> Blocks:
     def make(place: int) -> WideQuadruples:
         return _quadruples(cones, order[table.quadruples(*pairs[place]).indices])
 
-    return Blocks(coarse(cones.rooms)[order][firsts], make)
+    return coarse(cones.rooms)[order][firsts], make
 
 
 def _by_room(cones: PlannedCones, whole: int) -> Indices:
@@ -102,7 +93,7 @@ def _quadruples(cones: PlannedCones, quads: Indices) -> WideQuadruples:
 
 
 def _range_ends(count: int) -> Indices:
-    """Ends of the blocks of `count` quadruples: each is as large as all before, up to a size."""
+    """Return where blocks of `count` quadruples end: each doubles the total, up to a size."""
     ends = [min(math.comb(FIRST_FACES, FINGERS), count)]
     while ends[-1] < min(LARGEST_BLOCK, count):
         ends.append(min(2 * ends[-1], count))
@@ -111,7 +102,7 @@ def _range_ends(count: int) -> Indices:
 
 
 def _unranked(numbers: Indices, count: int) -> Indices:
-    """Quadruples of faces with the given numbers, each ascending, (q, 4)."""
+    """Return the face quadruples with the given numbers, faces ascending, (q, 4)."""
     found = np.empty((len(numbers), FINGERS), dtype=np.int64)
     left = numbers.copy()
     # greedy: the largest C(face, size) that fits gives the face, as in the module docstring
@@ -123,7 +114,7 @@ def _unranked(numbers: Indices, count: int) -> Indices:
 
 
 def _face_ends(count: int, largest: int) -> Sequence[int]:
-    """Numbers of faces that blocks reach to: each as large as all before, up to a size."""
+    """Return the face counts at which blocks end: each doubles the total, up to a size."""
     ends = [min(FIRST_FACES, count)]
     while ends[-1] < count:
         before = math.comb(ends[-1], FINGERS)

@@ -1,4 +1,8 @@
-"""Turns a placement into a grasp if its witness and exact force closure both confirm it."""
+"""Certifies placed contacts as a grasp if an exact test and their witness both confirm it.
+
+The exact test decides force closure. The witness is four contact forces that balance inside the
+friction cones and whose lines form the claimed family.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,13 +33,13 @@ from grasp_core.values import (
 )
 
 BALANCED = 1e-6
-"""Largest wrench that witness forces may leave, for normal parts that sum to one and an object
-of size one: six digits in a file keep this much."""
+"""Largest wrench by which witness forces may miss balance, for normal parts that sum to one and an
+object of size one: forces written with six digits meet it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Certified:
-    """A confirmed placement, before it is converted to a grasp in the object's frame."""
+    """A certified grasp at unit object size, before it is converted to the object's frame."""
 
     id: str
     faces: FaceQuadruple
@@ -50,16 +54,16 @@ class Certified:
     method: Method
     """The method whose search found it: `free` may find grasps of any family."""
     ways_out: Array | None = None
-    """Unit vectors along the fingers' free lines, away from the tips, (4, 3), if sought."""
+    """Unit vectors along which fingers can leave, (4, 3); None if no free lines were sought."""
 
     @property
     def normals(self) -> Array:
-        """Inward normals at the contacts, (4, 3)."""
+        """Return the inward unit normals at the contacts, (4, 3)."""
         return np.array([piece.normal for piece in self.pieces])
 
 
 def named(letter: str, faces: FaceQuadruple) -> str:
-    """The id of a grasp: the method's letter and the faces in finger order, as in `p-0-3-1-2`."""
+    """Return a grasp's id: the method's letter and the faces by finger, as in `p-0-3-1-2`."""
     return f"{letter}-" + "-".join(str(face) for face in faces)
 
 
@@ -73,7 +77,7 @@ def certify(  # noqa: PLR0913, PLR0917 - everything a grasp is made of
     friction: float,
     regions: tuple[ContactRegion, ...],
 ) -> Certified | None:
-    """Certify a placement; None if its witness or the exact closure test does not confirm it."""
+    """Certify placed contacts; None if the witness or the exact closure test rejects them."""
     normals = np.array([piece.normal for piece in pieces])
     margin = closure_margin(pieces, placement, friction)
     fault = witness_fault(placement.positions, normals, placement.forces, friction, family)
@@ -88,7 +92,7 @@ def certify(  # noqa: PLR0913, PLR0917 - everything a grasp is made of
 def closure_margin(
     pieces: Sequence[FacePiece], placement: Placement, friction: float
 ) -> float | None:
-    """Margin of the exact closure test; None unless the test certifies the contacts."""
+    """Return the margin of the exact force-closure test; None unless it finds closure."""
     normals = np.array([piece.normal for piece in pieces])
     try:
         certificate = force_closure(placement.positions, normals, friction)
@@ -100,14 +104,14 @@ def closure_margin(
 def witness_fault(
     points: Array, normals: Array, forces: Array, friction: float, family: Family
 ) -> str | None:
-    """Why a witness is wrong (unbalanced, outside a cone, of another class); None if it is right.
+    """Return why witness forces are wrong (unbalanced, outside a cone, another family), or None.
 
     Args:
         points: Contacts on an object of size one, (4, 3).
         normals: Inward unit normals at the contacts, (4, 3).
         forces: Contact forces whose normal parts sum to one, (4, 3).
         friction: Coulomb coefficient.
-        family: The class that the lines of force should form.
+        family: The family of grasps to which the lines of force should belong.
     """
     along, across = normal_and_tangential(forces, normals)
     if abs(float(along.sum()) - 1.0) > BALANCED:
@@ -135,11 +139,11 @@ def check_witness(body: Polyhedron, grasp: Grasp, friction: float) -> None:
     if grasp.family != "regulus" and _beside_foci(body, grasp):
         fault = "the witness lines do not pass through the focus points"
     if fault:
-        raise InputError(f"grasp {grasp.id}: {fault}")
+        raise InputError(f"grasp {grasp.id}: {fault}; plan the grasp again")
 
 
 def _beside_foci(body: Polyhedron, grasp: Grasp) -> bool:
-    """Whether a line of force misses its focus: the only focus, or the focus of its pair."""
+    """Check whether a line of force misses its focus: the only one, or that of its pair."""
     count = 1 if grasp.family == "concurrent" else 2
     if len(grasp.focus_points) != count:
         return True
@@ -177,7 +181,7 @@ def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:
 
 
 def _at(body: Polyhedron, unit_points: Array) -> Array:
-    """Convert points from the pieces' units to the object's frame, (k, 3) [m]."""
+    """Convert points from unit object size to the object's frame, (k, 3) [m]."""
     return body.center_of_mass + body.radius * unit_points
 
 
@@ -187,5 +191,5 @@ def _quality(placement: Placement, normals: Array, friction: float) -> tuple[flo
 
 
 def _critical(placement: Placement, normals: Array, friction: float) -> float:
-    """Critical friction, at most the friction that is already proved enough."""
+    """Compute the least friction of force closure, at most `friction`, which is proved enough."""
     return min(critical_friction(placement.positions, normals), friction)

@@ -1,4 +1,4 @@
-"""Runs one method over the face quadruples of one object, keeping its best grasps and counts."""
+"""Searches one object's face quadruples with one construction, keeping its best grasps."""
 
 import math
 from bisect import insort
@@ -28,18 +28,18 @@ from grasp_core.solvers.ties import graded, surpassing
 from grasp_core.values import ContactRegion, FaceQuadruple, Method, four
 
 Found: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement]
-"""Pieces, force cones and the placement on them."""
+"""Convex pieces of four faces, their force cones, and the contacts placed on them."""
 
 MOST_CHOICES = 8
 """Most choices of pieces tried on faces that are not convex; the free method multiplies it by
 `max_face_parts`."""
 TOGETHER = 32
-"""Blocks that are open at once: a million quadruples take some hundred megabytes."""
+"""Number of blocks of quadruples searched at once: a million take some hundred megabytes."""
 SAME_MERIT = 1e-5
-"""A placement must beat the worst grasp kept by this share: symmetric objects hold thousands of
+"""Share by which a new grasp must beat the worst one kept: symmetric objects hold thousands of
 equal grasps."""
 SAME_CONTACTS = 1e-6
-"""Contacts closer than this, in object radii, count as one grasp found twice."""
+"""Distance between contacts below which two grasps count as one, in object radii."""
 
 
 @dataclass(slots=True, eq=False)
@@ -49,7 +49,7 @@ class MethodSearch:
     method: Method
     limit: int | None
     reach: Callable[[Certified], Reach]
-    """Returns how fingers get to the contacts of a grasp, or why they do not."""
+    """Function that returns how fingers reach the contacts of a grasp, or why they cannot."""
     best: list[Certified] = field(default_factory=list[Certified])
     """At most `limit` grasps, best first."""
     held: set[FaceQuadruple] = field(default_factory=set[FaceQuadruple])
@@ -64,28 +64,28 @@ class MethodSearch:
 
     @property
     def counts(self) -> MethodCounts:
-        """The tally as a frozen value, with the quadruples that are undecided so far."""
+        """Return the counts so far, with the quadruples that are still undecided."""
         counts = self.tally.counts
         return replace(counts, undecided=counts.undecided + len(self.undecided))
 
     @property
     def full(self) -> bool:
-        """Whether keeping another grasp would drop one."""
+        """Return whether `limit` grasps are kept, so that another one would replace one."""
         return self.limit is not None and len(self.best) == self.limit
 
     def least(self, construction: Construction) -> float:
-        """The merit that a placement must exceed to count and to enter the best."""
+        """Return the merit (disc radius) that a grasp must exceed to enter the best ones."""
         if self.full and (construction.limits is None or not self.best):
             return math.inf
         worst = self.best[-1].placement.merit if self.full else -math.inf
         return max(worst * (1.0 + SAME_MERIT), construction.least)
 
     def may_gain(self, construction: Construction, room: float) -> bool:
-        """Whether discs up to the radius `room` may still enter the best."""
+        """Return whether a grasp with discs of radius `room` could enter the best ones."""
         return room > self.least(construction)
 
     def keep(self, found: Certified) -> list[Certified]:
-        """Count a grasp and sort it in if fingers reach it; return it as kept, or an empty list."""
+        """Count a grasp and keep it if fingers reach it; return it in a list, or an empty list."""
         faces = four(sorted(found.faces))
         way = self.reach(found)
         if way.reason:
@@ -102,7 +102,7 @@ class MethodSearch:
 
 
 def best_first(found: Certified) -> tuple[float, FaceQuadruple, FaceQuadruple]:
-    """Sort key: largest merit first; ties are broken by faces, then by fingers, not by rounding."""
+    """Return a sort key: largest merit first, equal merits by faces, then by finger order."""
     return -graded(found.placement.merit), four(sorted(found.faces)), found.faces
 
 
@@ -113,9 +113,9 @@ def search_construction(
     blocks: Blocks,
     search: MethodSearch,
 ) -> Iterator[list[Certified]]:
-    """Go through blocks of quadruples, yielding the grasps kept from each promising quadruple.
+    """Try a construction on blocks of quadruples; yield the grasps kept from each quadruple.
 
-    With a limit the search ends when no bound exceeds the worst grasp kept. A construction
+    With a limit the search ends when no upper bound exceeds the worst grasp kept. A construction
     without bounds ends as soon as the limit is reached.
     """
     for attempts in _in_order(construction, AttemptBounds(shapes), blocks, search):
@@ -138,25 +138,27 @@ def search_construction(
 def _in_order(
     construction: Construction, bounded: AttemptBounds, blocks: Blocks, search: MethodSearch
 ) -> Iterator[tuple[Attempt, ...]]:
-    """Attempts to make, by quadruple: over many blocks if there is a limit, else block by block."""
+    """Yield the attempts on each quadruple: over many blocks with a limit, else block by block."""
     best_first = BestFirst(construction, bounded, search.tally)
+    rooms, make = blocks
+    places = range(len(rooms))
     if construction.limits is not None:
         size = 1 if search.limit is None else TOGETHER
-        for start in range(0, len(blocks), size):
-            some = blocks.from_place(start, size)
-            if search.may_gain(construction, float(some.rooms.max())):
-                yield from best_first.over(some, search.least)
+        for start in places[::size]:
+            some = places[start : start + size]
+            if search.may_gain(construction, float(rooms[some].max())):
+                yield from best_first.over(blocks, some, search.least)
         return
-    for place in range(len(blocks)):
+    for place in places:
         if search.full:
             return
-        wide, _ = blocks.make(place).ranked(construction, construction.least)
+        wide, _ = make(place).ranked(construction, construction.least)
         some = best_first.in_rows(wide, construction.least)
         yield from takewhile(lambda _: not search.full, some)
 
 
 def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]:
-    """The shapes of those of four faces that have room for a contact."""
+    """Return the shapes of the faces that have room for a contact, in finger order."""
     return tuple(shape for face in faces if (shape := shapes[face]) is not None)
 
 
@@ -167,7 +169,7 @@ def tried(
     friction: float,
     least: float,
 ) -> tuple[Certified | None, Tally]:
-    """Try a construction on four faces in one order of the fingers.
+    """Try to construct and certify a grasp on four faces in one order of the fingers.
 
     Args:
         construction: The construction to try.
@@ -207,7 +209,7 @@ def _settled(
     tally: Tally,
     least: float,
 ) -> tuple[tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...]] | None:
-    """The best placement over the choices of cones, with its regions, on the true surface."""
+    """Place contacts with the best choice of cones, add regions, move them to the true surface."""
     placed = None
     for cones, bound in zip(attempt.cones, attempt.bounds, strict=True):
         # choices come with falling bounds: the later ones cannot be better either
@@ -228,7 +230,7 @@ def _settled(
 def _placed_on(
     construction: Construction, cones: Cones, pieces: tuple[FacePiece, ...]
 ) -> Placement | None:
-    """A placement on the pieces, however small its discs, or None."""
+    """Place contacts on convex pieces, with discs however small; None if it is impossible."""
     placed = construction.place(pieces, cones, 0.0 if construction.limits else -math.inf)
     return placed if isinstance(placed, Placement) else None
 
@@ -240,10 +242,10 @@ def _best_placement(
     least: float,
     tally: Tally,
 ) -> Found | None:
-    """The best placement over choices of one convex piece per face, None unless above `least`.
+    """Place contacts on the best choice of one convex piece per face; None unless above `least`.
 
-    Where faces have several pieces, their hulls are tried first: what hulls do not offer, no piece
-    does, and the contacts on the hulls show which pieces are likely to be best.
+    Where faces have several pieces, their hulls are tried first: a grasp that the hulls do not hold
+    no piece holds, and the contacts on the hulls show which pieces are likely to be best.
     """
     hulls = tuple(shape.hull for shape in shapes)
     tally.count("solved")
@@ -264,7 +266,7 @@ def _best_placement(
 
 
 def _without_duplicates(found: list[Certified]) -> list[Certified]:
-    """Drop grasps with the contacts of a better one; all are on the same faces."""
+    """Drop each grasp whose contacts are those of a better one; all are on the same faces."""
     kept: list[Certified] = []
     for one in sorted(found, key=best_first):
         here = one.placement.positions[np.argsort(one.faces)]

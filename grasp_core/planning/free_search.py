@@ -1,25 +1,33 @@
-"""Runs the free method over the face quadruples of one object that no construction holds.
+"""Searches the face quadruples on which no construction found a grasp, by the free method.
 
-Grasps of the free method have no regions. But forces that balance strictly inside the friction
+The free method places contacts on four faces without a fixed type of grasp, or proves that there
+are none. Its grasps have no contact regions. But forces that balance strictly inside the friction
 cones are good axes for tilted force cones, so the constructions are tried once more around them.
 """
 
 import math
 from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
-from itertools import islice, product
+from dataclasses import replace
+from itertools import combinations, islice, product
 from typing import TypeAlias
 
 import numpy as np
 
 from grasp_core.cones.tilting import toward, widened
 from grasp_core.errors import SolverError
-from grasp_core.families.constructions import Construction, point_region, regions_of
+from grasp_core.families.constructions import (
+    CONSTRUCTIONS,
+    MIXED,
+    Construction,
+    point_region,
+    regions_of,
+)
 from grasp_core.families.free import RESTARTS, Absence, Undecided, place_free
 from grasp_core.families.placements import Placement
 from grasp_core.families.true_surface import on_true_surface
-from grasp_core.objects.face_pieces import FacePiece, FaceShape, Shapes, choices_near
+from grasp_core.objects.face_pieces import FacePiece, FaceShape, choices_near
+from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.certify import Certified, certify, named
 from grasp_core.planning.family_search import (
     MOST_CHOICES,
@@ -30,101 +38,85 @@ from grasp_core.planning.family_search import (
 )
 from grasp_core.planning.planned_cones import BELOW_SPAN_ANGLE, LEAST_SPAN_ANGLE, usable_half_angles
 from grasp_core.planning.quadruples import Attempt, Cones
+from grasp_core.planning.request import COMPLETE_PARTS, FAMILIES, PlanRequest
 from grasp_core.values import FINGERS, FaceQuadruple, ForceCone, four
 
 BATCH = 64
-"""Number of quadruples whose force cones are sought together."""
+"""Number of face quadruples whose force cones are computed together."""
 
 Pieces: TypeAlias = tuple[FacePiece, ...]
 Answer: TypeAlias = tuple[Pieces, Placement | Absence | Undecided]
 """Convex pieces of four faces, and what the free method says about them."""
-
-
-@dataclass(frozen=True, slots=True)
-class FreeRequest:
-    """Settings of the free method."""
-
-    friction: float
-    theta: float
-    """Half-angle of the friction cones to plan with [rad]."""
-    seed: int
-    max_face_parts: int
-    """Most parts into which the faces of one quadruple may be cut."""
-    upgrades: Sequence[Construction]
-    """Constructions to try with force cones around the forces of each free grasp."""
-    owners: Sequence[int]
-    """For each face index, the whole face it is or is a half of."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Placed:
-    """Contacts on one choice of pieces of four faces."""
-
-    faces: FaceQuadruple
-    pieces: Pieces
-    placement: Placement
-
-    @property
-    def normals(self) -> list[np.ndarray]:
-        """Inward unit normals of the four pieces, four arrays (3,)."""
-        return [piece.normal for piece in self.pieces]
+Placed: TypeAlias = tuple[Pieces, Placement]
+"""Convex pieces of four faces, and contacts on them."""
 
 
 def search_free(
-    shapes: Shapes,
-    quadruples: Iterator[FaceQuadruple],
-    request: FreeRequest,
-    search: MethodSearch,
-    held: AbstractSet[FaceQuadruple],
+    on: Standard, request: PlanRequest, search: MethodSearch, held: AbstractSet[FaceQuadruple]
 ) -> Iterator[list[Certified]]:
     """Go through the quadruples that no family holds, until the limit is reached."""
+    quadruples = _every_quadruple(on)
     while batch := list(islice(quadruples, BATCH)):
         if search.full:
             return
         tried_now = [
-            faces not in held and len(chosen_shapes(shapes, faces)) == FINGERS for faces in batch
+            faces not in held and len(chosen_shapes(on.shapes, faces)) == FINGERS for faces in batch
         ]
         search.tally.count("tried", sum(tried_now))
         placed = [
-            _decide(shapes, faces, request, search) if now else None
+            _decide(on, faces, request, search) if now else None
             for faces, now in zip(batch, tried_now, strict=True)
         ]
         choices = iter(_cone_choices([each for each in placed if each], request))
-        for each in placed:
-            found = _certified(each, next(choices), request, search) if each else None
+        for faces, each in zip(batch, placed, strict=True):
+            found = _certified(faces, each, next(choices), request, search) if each else None
             yield search.keep(found) if found else []
 
 
 def search_undecided(
-    shapes: Shapes, request: FreeRequest, search: MethodSearch
+    on: Standard, request: PlanRequest, search: MethodSearch
 ) -> Iterator[list[Certified]]:
     """Go once more, with more parts, through the quadruples that were left undecided."""
+    request = replace(request, max_face_parts=COMPLETE_PARTS)
     for faces in tuple(search.undecided):
         del search.undecided[faces]
-        placed = _decide(shapes, faces, request, search)
+        placed = _decide(on, faces, request, search)
         found = None
         if placed is not None:
             (choices,) = _cone_choices([placed], request)
-            found = _certified(placed, choices, request, search)
+            found = _certified(faces, placed, choices, request, search)
         yield search.keep(found) if found else []
 
 
+def _every_quadruple(on: Standard) -> Iterator[FaceQuadruple]:
+    """All quadruples of faces; the ones with two halves of a face come last."""
+    yield from combinations(range(len(on.faces)), FINGERS)
+    for faces in on.shared.tolist():
+        yield four(faces)
+
+
+def _upgrades(request: PlanRequest) -> list[Construction]:
+    """Constructions to try with force cones around the forces of each free grasp."""
+    if request.cones != "tilted":
+        return []
+    asked = [CONSTRUCTIONS[family] for family in FAMILIES if family in request.families]
+    discs = [each for each in asked if each.limits]
+    return discs + [MIXED for each in discs if each.family == MIXED.family]
+
+
 def _decide(
-    shapes: Shapes,
-    faces: FaceQuadruple,
-    request: FreeRequest,
-    search: MethodSearch,
-) -> _Placed | None:
+    on: Standard, faces: FaceQuadruple, request: PlanRequest, search: MethodSearch
+) -> Placed | None:
     """Find contacts on four faces; if there are none, record the proof or that it is undecided."""
-    chosen = chosen_shapes(shapes, faces)
+    chosen = chosen_shapes(on.shapes, faces)
     answers = _answers(faces, chosen, request, search)
     pieces, last = answers[-1]
     if any(shape.facets is not None for shape in chosen):
         return _on_triangles(faces, chosen, pieces, last, request, search)
     if isinstance(last, Placement):
-        return _Placed(faces, pieces, last)
-    if any(request.owners[face] != face for face in faces):
-        answers = [_whole(shapes, faces, request, search)]
+        return pieces, last
+    if any(on.owners[face] != face for face in faces):
+        answers = [_whole(on, faces, request, search)]
     proofs = tuple(proof for _, proof in answers if isinstance(proof, Absence))
     if len(proofs) == len(answers):
         search.tally.count("infeasible")
@@ -137,23 +129,24 @@ def _decide(
 
 
 def _whole(
-    shapes: Shapes, faces: FaceQuadruple, request: FreeRequest, search: MethodSearch
+    on: Standard, faces: FaceQuadruple, request: PlanRequest, search: MethodSearch
 ) -> Answer:
     """Ask whether whole faces hold no grasp, where choices of their halves gave none."""
-    whole = four(request.owners[face] for face in faces)
-    hulls = tuple(shape.hull for shape in chosen_shapes(shapes, whole))
+    whole = four(on.owners[face] for face in faces)
+    hulls = tuple(shape.hull for shape in chosen_shapes(on.shapes, whole))
     search.tally.count("solved")
     answer = _place(hulls, request, np.random.default_rng([request.seed, *faces]), restarts=0)
     return hulls, answer if isinstance(answer, Absence) else Undecided(1, 1.0)
 
 
 def _answers(
-    faces: FaceQuadruple, shapes: Sequence[FaceShape], request: FreeRequest, search: MethodSearch
+    faces: FaceQuadruple, shapes: Sequence[FaceShape], request: PlanRequest, search: MethodSearch
 ) -> list[Answer]:
-    """Answers that together decide four faces unless one is undecided; a placement comes last.
+    """Collect answers for the convex pieces of four faces; a placement can only be the last.
 
-    The hulls come first: if they hold no grasp, no pieces do. Choices of pieces follow until one
-    holds a grasp, and last the most likely choice with more effort.
+    Together the answers decide the faces, unless one is `Undecided`. The convex hulls come first:
+    if they hold no grasp, no pieces do. Choices of one piece per face follow until one holds a
+    grasp, and last the most likely choice with more effort.
     """
     rng = np.random.default_rng([request.seed, *faces])
     hulls = tuple(shape.hull for shape in shapes)
@@ -185,9 +178,9 @@ def _on_triangles(
     shapes: Sequence[FaceShape],
     pieces: Pieces,
     answer: Placement | Absence | Undecided,
-    request: FreeRequest,
+    request: PlanRequest,
     search: MethodSearch,
-) -> _Placed | None:
+) -> Placed | None:
     """Contacts on the triangles of curved patches; planes without a grasp prove nothing here."""
     if isinstance(answer, Placement):
         cones = [ForceCone(piece.normal, 0.0) for piece in pieces]
@@ -200,13 +193,13 @@ def _on_triangles(
 
         settled = on_true_surface(shapes, pieces, cones, answer, points, place)
         if settled is not None:
-            return _Placed(faces, *settled)
+            return settled
     search.undecided[faces] = 1.0
     return None
 
 
 def _place(
-    pieces: Pieces, request: FreeRequest, rng: np.random.Generator, restarts: int = RESTARTS
+    pieces: Pieces, request: PlanRequest, rng: np.random.Generator, restarts: int = RESTARTS
 ) -> Placement | Absence | Undecided:
     spread = max(piece.spread for piece in pieces)
     theta = request.theta - spread if spread < request.theta else LEAST_SPAN_ANGLE
@@ -218,18 +211,17 @@ def _place(
         return Undecided(1, 1.0)
 
 
-def _cone_choices(placed: Sequence[_Placed], request: FreeRequest) -> list[tuple[Cones, ...]]:
+def _cone_choices(placed: Sequence[Placed], request: PlanRequest) -> list[tuple[Cones, ...]]:
     """Tilted force cones: towards the faces' or the object's middle, or around the forces."""
-    if not (placed and request.upgrades):
+    if not (placed and _upgrades(request)):
         return [()] * len(placed)
-    normals = np.array([each.normals for each in placed])
-    spreads = np.array([[piece.spread for piece in each.pieces] for each in placed])
+    normals = np.array([[piece.normal for piece in pieces] for pieces, _ in placed])
+    spreads = np.array([[piece.spread for piece in pieces] for pieces, _ in placed])
     thetas = usable_half_angles(request.theta, spreads)
     middles = np.array(
-        [[piece.point(piece.corners.mean(axis=0)) for piece in each.pieces] for each in placed]
+        [[piece.point(piece.corners.mean(axis=0)) for piece in pieces] for pieces, _ in placed]
     )
-    placements = [each.placement for each in placed]
-    forces = np.array([p.forces if p.planned is None else p.planned for p in placements])
+    forces = np.array([at.forces if at.planned is None else at.planned for _, at in placed])
     kinds = (
         toward(middles.mean(axis=1), middles, normals, thetas),
         toward(np.zeros((len(placed), 3)), middles, normals, thetas),
@@ -246,16 +238,21 @@ def _cone_choices(placed: Sequence[_Placed], request: FreeRequest) -> list[tuple
 
 
 def _certified(
-    placed: _Placed, choices: tuple[Cones, ...], request: FreeRequest, search: MethodSearch
+    faces: FaceQuadruple,
+    placed: Placed,
+    choices: tuple[Cones, ...],
+    request: PlanRequest,
+    search: MethodSearch,
 ) -> Certified | None:
     """Certify contacts, with regions if a construction offers them around these forces."""
-    for construction, cones in product(request.upgrades, choices):
-        if better := _upgraded(placed, construction, cones, request.friction):
+    pieces, placement = placed
+    for construction, cones in product(_upgrades(request), choices):
+        if better := _upgraded(faces, pieces, construction, cones, request.friction):
             return better
-    cones = four(ForceCone(piece.normal, request.theta) for piece in placed.pieces)
+    cones = four(ForceCone(piece.normal, request.theta) for piece in pieces)
     certified = certify(
-        named("f", placed.faces), placed.faces, "regulus", placed.pieces, cones, placed.placement,
-        request.friction, regions_of(point_region, placed.pieces, cones, placed.placement),
+        named("f", faces), faces, "regulus", pieces, cones, placement, request.friction,
+        regions_of(point_region, pieces, cones, placement),
     )  # fmt: skip
     if certified is None:
         search.tally.count("rejected")
@@ -263,16 +260,14 @@ def _certified(
 
 
 def _upgraded(
-    placed: _Placed, construction: Construction, cones: Cones, friction: float
+    faces: FaceQuadruple, pieces: Pieces, construction: Construction, cones: Cones, friction: float
 ) -> Certified | None:
-    """The best grasp that a construction offers on the same pieces, or None."""
+    """Find the best grasp of a construction on the same pieces with given cones, or None."""
     found: list[Certified] = []
     for order in construction.orders:
-        faces = four(placed.faces[finger] for finger in order)
         around = four(cones[finger] for finger in order)
-        pieces = [placed.pieces[finger] for finger in order]
-        shapes = [FaceShape((piece,), piece) for piece in pieces]
-        attempt = Attempt(faces, (around,), (math.inf,))
+        shapes = [FaceShape((pieces[finger],), pieces[finger]) for finger in order]
+        attempt = Attempt(four(faces[finger] for finger in order), (around,), (math.inf,))
         one, _ = tried(construction, attempt, shapes, friction, construction.least)
         found += [one] if one else []
     return min(found, key=best_first, default=None)

@@ -1,7 +1,7 @@
-"""Puts contacts from elsewhere on an object's faces, and makes a grasp of closed ones.
+"""Moves contacts that another tool found onto an object's faces, and makes a grasp of them.
 
-Contacts of other tools lie beside the surface by as much as rounding, sampling or a simulator's
-give leaves. Each is moved to the nearest point of the surface whose normal leans little from the
+Such contacts lie beside the surface: by rounding, sampling, or because a simulator lets bodies
+overlap. Each is moved to the nearest point of the surface whose normal leans little from the
 given one, and takes the surface's normal there, so what is judged is what fingers touch. On planar
 faces that is a face of the object; a curved surface gets a new face around each contact, as its
 patches need not cover it.
@@ -43,15 +43,15 @@ SURROUNDINGS = 0.05
 CORNERS = 16
 """Corners of the face around a contact on a curved surface."""
 NEARER = 1e-9
-"""A face replaces an earlier one as the nearest only if it is nearer by this much, relative to the
-object's size: a contact on an edge goes to the first of its faces with a fitting normal."""
+"""Distance, relative to the object's size, by which a face must be nearer than an earlier one to
+replace it: a contact on an edge goes to the first of its faces with a fitting normal."""
 LARGEST_MOVE = 0.02
 """Largest distance of a given contact from the surface, relative to the object's size."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seated:
-    """Four contacts on the faces of an object."""
+    """Four contacts that were moved onto the faces of an object."""
 
     body: Polyhedron
     """The object; a curved one with four more faces, one around each contact."""
@@ -62,7 +62,7 @@ class Seated:
 
 
 def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
-    """Put four contacts on the faces of an object.
+    """Move four contacts to the nearest faces of an object with fitting normals.
 
     Args:
         body: The object.
@@ -70,7 +70,7 @@ def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
         normals: Unit vectors into the object, (4, 3).
 
     Raises:
-        InputError: The arrays are not those of four contacts, or a contact is near no face.
+        InputError: An array does not have shape (4, 3), or a contact is near no face.
     """
     points = frozen(positions, (FINGERS, 3), "positions")
     inward = frozen_units(normals, (FINGERS, 3), "normals")
@@ -89,9 +89,9 @@ def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
 
 
 def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCertificate:
-    """Turn four contacts into a grasp, or prove that they are not in force closure.
+    """Make a grasp of four contacts, or prove that they are not in force closure.
 
-    The grasp claims no regions, and for its lines of force only the general class.
+    The grasp has no contact regions, and its family is `regulus`, the most general one.
 
     Args:
         seated: Contacts on an object's faces.
@@ -144,7 +144,7 @@ class _Part:
 
 
 def _parts(body: Polyhedron) -> tuple[_Part, ...]:
-    """The flat convex parts that make up the surface of an object."""
+    """List the flat convex parts that make up the surface of an object."""
     if body.patches is None:
         return tuple(
             _Part(index, face.normal, piece)
@@ -163,7 +163,7 @@ def _parts(body: Polyhedron) -> tuple[_Part, ...]:
 def _nearest(
     body: Polyhedron, parts: Sequence[_Part], finger: int, point: Array, normal: Array
 ) -> tuple[_Part, Contact, float]:
-    """The nearest part with a fitting normal, the contact on it, and the distance moved [m].
+    """Find the nearest part with a fitting normal, the contact on it, and the distance [m].
 
     Raises:
         InputError: No part with a fitting normal is near.
@@ -192,7 +192,7 @@ def _nearest(
 
 
 def _around(body: Polyhedron, part: _Part, contact: Contact) -> Face:
-    """A round face about a contact on a triangle, in the triangle's plane."""
+    """Make a round face around a contact on a triangle, in the triangle's plane."""
     turns = np.linspace(0.0, 2.0 * math.pi, CORNERS, endpoint=False)
     radius = SURROUNDINGS * body.radius
     ring = radius * np.column_stack([np.cos(turns), np.sin(turns)])
@@ -209,7 +209,7 @@ def _around(body: Polyhedron, part: _Part, contact: Contact) -> Face:
 
 
 def _nearest_in(polygon: Array, normal: Array, point: Array) -> Array:
-    """The point of a convex polygon that is nearest to a given point, (3,) [m]."""
+    """Compute the point of a convex polygon that is nearest to a given point, (3,) [m]."""
     flat = point - float(normal @ (point - polygon[0])) * normal
     if within(flat, polygon, normal, 0.0):
         return flat

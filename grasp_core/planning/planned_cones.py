@@ -1,4 +1,7 @@
-"""Force cones for the face quadruples of one object, and upper bounds on their discs.
+"""Chooses force cones for sets of four faces, and bounds the discs that such cones allow.
+
+A force cone holds the directions in which a finger may push, inside its friction cone. A disc is
+the region around a contact in which it may move while the grasp stays good.
 
 Cones around the normals, as in the paper, are planned at theta_plan = min(theta, just below the
 span angle theta*): these smaller cones lie inside the real ones, so what holds for them holds at
@@ -30,7 +33,7 @@ LEAST_SPAN_ANGLE = math.atan(LEAST_RADIUS)
 """Least half-angle to plan with [rad]: narrower cones hold no disc that counts at a depth of one
 object radius."""
 BELOW_SPAN_ANGLE = 0.999
-"""Share of theta* to plan with: P3 is a strict inequality."""
+"""Share of the span angle theta* to plan with: P3 is a strict inequality."""
 INSIDE_FRICTION = 1.0 - 1e-6
 """Share of the friction angle to plan with, so that equilibrium is not marginal."""
 NORMAL, TILTED = 0, 1
@@ -39,7 +42,7 @@ NORMAL, TILTED = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class PlannedCones:
-    """Chooses force cones for the quadruples of one object."""
+    """Chooses force cones for the face quadruples of one object."""
 
     body: Polyhedron
     shapes: Shapes
@@ -50,13 +53,13 @@ class PlannedCones:
 
     @cached_property
     def rooms(self) -> Array:
-        """Radius of the largest disc in each face, zero where none fits, (f,) [object radii]."""
+        """Return the radius of the largest disc in each face, or zero, (f,) [object radii]."""
         return np.array(
             [max(p.inradius for p in shape.pieces) if shape else 0.0 for shape in self.shapes]
         )
 
     def widest(self, quads: Indices) -> Array:
-        """Upper bounds on the half-angles of any choice of cones, (q,) [rad].
+        """Return upper bounds on the half-angles of any choice of force cones, (q,) [rad].
 
         Args:
             quads: Faces of each quadruple, (q, 4).
@@ -69,7 +72,7 @@ class PlannedCones:
         return np.maximum(around, widest_half_angles(normals, thetas, sines))
 
     def limits(self, quads: Indices, widest: Array) -> Array:
-        """Upper bounds on discs whose cones are no wider than `widest` (see `disc_limits`), (q, 4).
+        """Return upper bounds on discs for cones no wider than `widest`, (q, 4), see `disc_limits`.
 
         With psi the half-angle, theta the friction angle and h half the angle between two normals,
         narrower cones may lean more, so the bound tan(psi / 2) / sin(h - theta + psi) of a pair has
@@ -110,7 +113,7 @@ class PlannedCones:
         return np.stack(axes, axis=1), np.stack(half_angles, axis=1)
 
     def limits_of(self, quads: Indices, axes: Array, half_angles: Array) -> Array:
-        """Upper bounds on the discs of chosen cones (see `disc_limits`), (q, 2, 4).
+        """Return upper bounds on the discs for chosen cones, (q, 2, 4), see `disc_limits`.
 
         Args:
             quads: Faces of each quadruple, (q, 4).
@@ -128,7 +131,7 @@ class PlannedCones:
 
     @cached_property
     def normals(self) -> Array:
-        """Inward unit normals of all faces, (f, 3)."""
+        """Return the inward unit normals of all faces, (f, 3)."""
         return self.body.normals
 
     @cached_property
@@ -137,7 +140,7 @@ class PlannedCones:
 
     @cached_property
     def _halves(self) -> Array:
-        """Half the angle between every two normals, (f, f) [rad]."""
+        """Return half the angle between every two face normals, (f, f) [rad]."""
         apart = np.linalg.norm(self.normals[:, None] - self.normals, axis=-1)
         return np.arcsin(np.minimum(0.5 * apart, 1.0))
 
@@ -152,20 +155,20 @@ class PlannedCones:
 
 
 def usable_half_angles(theta: float, spreads: Array) -> Array:
-    """Half-angles that fit inside the friction cones wherever a curved patch leans to [rad].
+    """Compute half-angles that stay inside the friction cones all over a curved patch [rad].
 
     Args:
         theta: Half-angle of the friction cones to plan with [rad].
-        spreads: How far each patch leans from its plane, any shape [rad].
+        spreads: Largest angle of each patch to its plane, any shape [rad].
 
     Returns:
-        Half-angles shaped like `spreads`; where nothing is left, a positive one too small for any
-        construction.
+        Half-angles shaped like `spreads`; where the patch leans too far, a positive one too small
+        for any construction.
     """
     return np.maximum(INSIDE_FRICTION * theta - spreads, 0.5 * LEAST_SPAN_ANGLE)
 
 
 def _around(sines: Array, thetas: Array) -> Array:
-    """Half-angles of cones around normals, (q,) [rad], from the sines of the span angles."""
+    """Compute half-angles of cones around normals from sines of span angles, (q,) [rad]."""
     spanned = BELOW_SPAN_ANGLE * np.arcsin(np.maximum(sines, 0.0))
     return np.minimum(thetas.min(axis=1, initial=np.inf), spanned)

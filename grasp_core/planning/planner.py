@@ -1,4 +1,4 @@
-"""The planner: from an object and a friction coefficient to certified grasps.
+"""Plans certified four-finger grasps for an object and a friction coefficient.
 
 The three constructions of the paper work on quadruples with force cones that positively span (P3),
 around the normals or tilted, in the order of an upper bound on their radius. With a `limit`, a
@@ -19,8 +19,10 @@ from grasp_core.errors import InputError
 from grasp_core.families.constructions import LEAST_RADIUS
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.standard_order import Standard
+from grasp_core.planning.as_given import absence_as_given, as_given, faces_as_given
 from grasp_core.planning.certify import to_grasp
-from grasp_core.planning.methods import Progress, Searches
+from grasp_core.planning.methods import Progress, Searches, outcomes, prepared, run, unreached
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.request import METHODS, ConeKind, PlanRequest, RankBy, check_request
@@ -33,7 +35,7 @@ Result = TypeVar("Result")
 
 
 def _knows_old_name(planner: Callable[Given, Result]) -> Callable[Given, Result]:
-    """Refuse the old name of a keyword with an error that says the new one."""
+    """Refuse the old keyword `cells` with an error that gives its new name."""
 
     @wraps(planner)
     def checked(*args: Given.args, **options: Given.kwargs) -> Result:
@@ -79,8 +81,12 @@ def plan(  # noqa: PLR0913 - the contract's keywords
         rank_by: What makes a grasp better. By `radius`, families take turns, each with its largest
             discs first. Reguli and free grasps have no discs: the first ones found count, and free
             ones only if the others are too few. By `friction-margin` (the least critical
-            friction), `ferrari-canny` (the largest quality) and `diverse` (each next one is the
-            farthest from those before it) all grasps that are found compete.
+            friction), `ferrari-canny` (the largest quality), `payload` (the largest mass in any
+            orientation under one squeeze with pushes up to 10 N), `first-slip` (the largest
+            multiple of the weight, at a density of 1,000 kg/m^3, at which that squeeze first slips:
+            the payload over the mass, hence the same order) and `diverse` (each next one is the
+            farthest from those before it) all grasps that are found compete. Grasps that no
+            such squeeze holds come last.
         seed: Seed of the free method's restarts.
         max_face_parts: Most parts into which the free method may cut the faces of one quadruple.
         complete: Decide the quadruples that would stay undecided, with up to 20,000 parts each.
@@ -106,10 +112,10 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     check_request(body, request)
     if progress is not None:
         function(progress, "progress")
-    searches = Searches(body, request)
-    for _ in searches.run(progress):
+    on, searches = prepared(body, request)
+    for _ in run(on, request, searches, progress):
         pass
-    return _planned(body, request, searches)
+    return _planned(body, request, on, searches)
 
 
 @_knows_old_name
@@ -137,8 +143,9 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
         finger=finger, clearance=clearance, share_faces=share_faces,
     )  # fmt: skip
     check_request(body, request)
-    searches = Searches(body, request)
-    return (to_grasp(body, friction, searches.as_found(each)) for each in searches.run(None))
+    on, searches = prepared(body, request)
+    every = run(on, request, searches, None)
+    return (to_grasp(body, friction, as_given(each, on)) for each in every)
 
 
 def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
@@ -148,43 +155,47 @@ def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
     return cast("tuple[Method, ...]", names)  # those that there are, see `check_request`
 
 
-def _planned(body: Polyhedron, request: PlanRequest, searches: Searches) -> Plan:
+def _planned(body: Polyhedron, request: PlanRequest, on: Standard, searches: Searches) -> Plan:
     """Put together a plan from what the searches found, with the best grasps."""
     grasps: list[Grasp] = []
-    for found in chosen([search.best for search in searches.by_method.values()], request):
+    for found in chosen(body, [search.best for search in searches.values()], request):
         start = time.process_time()
-        grasps.append(to_grasp(body, request.friction, searches.as_found(found)))
-        searches.by_method[found.method].seconds += time.process_time() - start
+        grasps.append(to_grasp(body, request.friction, as_given(found, on)))
+        searches[found.method].seconds += time.process_time() - start
     counts = PlanCounts(
         len(body.faces),
-        searches.quadruples,
+        on.quadruples,
         count_spanning(body.normals, LEAST_SPAN_ANGLE) if len(body.faces) <= MAX_FACES else None,
-        {method: search.counts for method, search in searches.by_method.items()},
+        {method: search.counts for method, search in searches.items()},
     )
-    outcomes, whole = searches.outcomes(), searches.whole_faces
-    every = searches.by_method.values()
+    known, every = outcomes(on, searches), searches.values()
+    given = partial(faces_as_given, on=on)
     return Plan(
         grasps=tuple(grasps),
         friction=request.friction,
         theta=request.theta,
         seed=request.seed,
         counts=counts,
-        outcomes=outcomes,
-        absence=None if grasps else _absence(body, request, counts, outcomes),
-        absences={faces: proofs for s in every for faces, proofs in searches.absences(s).items()},
+        outcomes=known,
+        absence=None if grasps else _absence(body, request, counts, known),
+        absences={
+            given(faces): tuple(absence_as_given(proof, on) for proof in proofs)
+            for s in every
+            for faces, proofs in s.absences.items()
+        },
         finger=request.finger,
-        undecided={whole(faces): share for s in every for faces, share in s.undecided.items()},
-        unreached={whole(faces): why for faces, why in searches.unreached().items()},
-        seconds={method: search.seconds for method, search in searches.by_method.items()},
+        undecided={given(faces): share for s in every for faces, share in s.undecided.items()},
+        unreached={given(faces): why for faces, why in unreached(searches).items()},
+        seconds={method: search.seconds for method, search in searches.items()},
     )
 
 
-def _absence(body: Polyhedron, request: PlanRequest, counts: PlanCounts, outcomes: Outcomes) -> str:
+def _absence(body: Polyhedron, request: PlanRequest, counts: PlanCounts, known: Outcomes) -> str:
     """Why there is no grasp, as a sentence with the object's name."""
     name = body.name
-    if outcomes.out_of_reach:
+    if known.out_of_reach:
         return (
-            f"{name}: no grasp was found that the fingers reach, on {outcomes.out_of_reach} of "
+            f"{name}: no grasp was found that the fingers reach, on {known.out_of_reach} of "
             f"{counts.quadruples} face quadruples for want of room; try a smaller fingertip radius "
             "or a shorter approach"
         )
@@ -194,9 +205,9 @@ def _absence(body: Polyhedron, request: PlanRequest, counts: PlanCounts, outcome
         limits = f" at friction {math.tan(request.theta):.4g}"
         if request.clearance:
             limits += f" on faces cut back by {request.clearance:g} m from their edges"
-        if outcomes.open:
+        if known.open:
             return (
-                f"{name}: no grasp was found; {outcomes.open} of {counts.quadruples} face "
+                f"{name}: no grasp was found; {known.open} of {counts.quadruples} face "
                 f"quadruples are undecided, all others are proved to hold none{limits}; try "
                 "--complete"
             )

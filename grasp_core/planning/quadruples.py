@@ -1,8 +1,8 @@
-"""Tables of face quadruples, and the attempts that are worth a program on them.
+"""Ranks sets of four faces (quadruples) by how large the discs of a grasp on them can be.
 
-A table of wide quadruples knows how wide cones can be at most, a table of coned quadruples which
-cones were chosen. Both can be ranked for a construction: the rows are ordered by an upper bound on
-their discs, and rows that are not worth a program are dropped.
+There are two tables: one gives the widest possible force cones of each quadruple, the other the
+force cones that were chosen. Both can be ranked for a construction: the rows are ordered by an
+upper bound on the radius of their discs, and rows that are not worth a linear program are dropped.
 """
 
 from dataclasses import dataclass, fields
@@ -22,7 +22,7 @@ Cones: TypeAlias = tuple[ForceCone, ForceCone, ForceCone, ForceCone]
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """One order of the fingers on four faces, with force cones to try."""
+    """One order of the fingers on four faces, with the force cones to try in a construction."""
 
     faces: FaceQuadruple
     """The face that each finger touches."""
@@ -35,7 +35,7 @@ class Attempt:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConedQuadruples:
-    """Face quadruples with two choices of force cones each, and upper bounds on their grasps."""
+    """A table of face quadruples with two choices of force cones each, and bounds on discs."""
 
     faces: Indices
     """Faces of each quadruple, (q, 4)."""
@@ -58,7 +58,7 @@ class ConedQuadruples:
         return ConedQuadruples(*(getattr(self, each.name)[rows] for each in fields(self)))
 
     def ranked(self, construction: Construction) -> tuple["ConedQuadruples", Array]:
-        """Order quadruples by their bounds; for reguli, by the width of the cones.
+        """Order the rows by their upper bounds on discs; for reguli, by the width of the cones.
 
         Returns:
             The quadruples worth a program, and a bound for each choice of cones and finger order,
@@ -92,13 +92,13 @@ class ConedQuadruples:
         return np.where(usable[:, :, None] & (bounds >= LEAST_RADIUS), bounds, -np.inf)
 
     def attempts(self, row: int, construction: Construction, bounds: Array) -> tuple[Attempt, ...]:
-        """The attempts on the quadruple in a row.
+        """List the attempts to make on the quadruple in one row.
 
         Args:
             row: Row of the table.
             construction: Gives the orders of the fingers.
-            bounds: Bound of each choice of cones and finger order, (2, orders); attempts with a
-                bound of minus infinity are left out.
+            bounds: Upper bound for each choice of cones and finger order, (2, orders); attempts
+                with a bound of minus infinity are left out.
         """
         found: list[Attempt] = []
         for column, order in enumerate(construction.orders):
@@ -118,7 +118,7 @@ class ConedQuadruples:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WideQuadruples:
-    """Face quadruples with upper bounds on their cones, before cones are chosen."""
+    """A table of face quadruples with upper bounds on their force cones, not chosen yet."""
 
     cones: PlannedCones
     faces: Indices
@@ -131,7 +131,7 @@ class WideQuadruples:
 
     @property
     def rooms(self) -> Array:
-        """Radius of the largest disc that fits in each of the four faces, (q,)."""
+        """Return the radius of the largest disc that fits in each of the four faces, (q,)."""
         return self.cones.rooms[self.faces].min(axis=1, initial=np.inf)
 
     def some(self, rows: Indices) -> "WideQuadruples":
@@ -139,7 +139,7 @@ class WideQuadruples:
         return WideQuadruples(self.cones, self.faces[rows], self.widest[rows])
 
     def coned(self, rows: slice) -> ConedQuadruples:
-        """Choose force cones for the quadruples in the given rows."""
+        """Choose force cones for the face quadruples in the given rows."""
         faces = self.faces[rows]
         axes, half_angles = self.cones.chosen(faces)
         return ConedQuadruples(
@@ -152,7 +152,7 @@ class WideQuadruples:
         )
 
     def ranked(self, construction: Construction, worth: float) -> tuple["WideQuadruples", Array]:
-        """Order quadruples by what their widest cones allow, dropping those not above `worth`.
+        """Order the rows by the discs that their widest cones allow; drop those below `worth`.
 
         Args:
             construction: The construction to be tried on them.

@@ -1,4 +1,4 @@
-"""Whether four fingers can get to their contacts on straight free lines.
+"""Finds straight lines on which four fingers reach their contacts without touching anything.
 
 Solved: for each finger, a direction in which a ball of radius r and the rod behind it reach the
 place p - r n, where the ball touches at p, from a given distance without touching anything else.
@@ -28,16 +28,16 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import FaceQuadruple
 
 TOUCHING = 1e-6
-"""Overlap that does not count, in object radii: what six digits in a file keep."""
+"""Overlap that is ignored, in object radii: the rounding of six digits in a file."""
 RINGS_DEG = (30.0, 60.0)
-"""Angles from the normal at which fingers may come, besides straight along it [deg]."""
+"""Angles to the normal at which fingers may approach, besides straight along it [deg]."""
 RING_DIRECTIONS = 6
-"""Directions tried on each ring."""
+"""Number of approach directions tried on each ring around the normal."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finger:
-    """A finger's size and the length of its way to a contact.
+    """A finger's radius and the length of its straight way to a contact.
 
     Raises:
         InputError: A length is not positive.
@@ -55,18 +55,18 @@ class Finger:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reach:
-    """How fingers get to their contacts, or why they do not."""
+    """Directions in which fingers reach their contacts, or the reason why they cannot."""
 
     directions: Array | None
-    """Unit vectors from each tip along its rod, (k, 3); None if no choice is free, or none was
-    sought."""
+    """Unit vectors from each tip along its rod, (k, 3); None if none were sought or found."""
     reason: str = ""
+    """Why the fingers cannot get to their contacts; empty where they can or none was sought."""
 
 
 def reach(
     body: Polyhedron, faces: FaceQuadruple, positions: Array, normals: Array, finger: Finger
 ) -> Reach:
-    """Find free straight lines for all fingers.
+    """Find straight lines on which all fingers reach their contacts without a collision.
 
     Args:
         body: The object.
@@ -108,7 +108,7 @@ def reach(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Surroundings:
-    """Triangles that a finger may meet, each with a ball around it."""
+    """Triangles that a finger may collide with, each with a ball around it."""
 
     corners: Array
     """Corners, (t, 3, 3) [m]."""
@@ -119,7 +119,7 @@ class _Surroundings:
 
     @classmethod
     def of(cls, body: Polyhedron, face: int) -> "_Surroundings":
-        """All triangles of an object but those of the curved patch that is touched."""
+        """Collect all triangles of an object except those of the curved patch that is touched."""
         keep = np.ones(len(body.triangles), dtype=np.bool_)
         keep[body.faces[face].facets] = False
         corners = body.vertices[body.triangles[keep]]
@@ -128,7 +128,7 @@ class _Surroundings:
         return cls(corners, middles, extents)
 
     def distance(self, start: Array, end: Array, within: float) -> float:
-        """Distance of a segment from the nearest triangle [m]; something larger beyond `within`."""
+        """Return a segment's distance to the nearest triangle [m], exact only below `within`."""
         along = end - start
         squared = float(along @ along)
         # only triangles whose balls come near enough need the exact distance
@@ -174,7 +174,7 @@ def _apart(tips: Array, ways: list[list[Array]], finger: Finger, slack: float) -
 
 
 def segment_distances(start: Array, end: Array, triangles: Array) -> Array:
-    """Distances of a segment from triangles, (t,) [m].
+    """Compute the distance of a segment from each triangle, (t,) [m].
 
     Args:
         start: One end of the segment, (3,) [m].
@@ -204,7 +204,7 @@ def _inside(points: Array, triangles: Array, after: Array, normals: Array) -> ND
 
 
 def _between(start: Array, end: Array, tails: Array, heads: Array) -> Array:
-    """Distances of one segment from others, (t,) [m]: the least over the points of both."""
+    """Compute the least distance of one segment from each of others, (t,) [m]."""
     one, others, apart = end - start, heads - tails, start - tails
     a, e = float(one @ one), np.einsum("ti,ti->t", others, others)
     b, c, f = others @ one, apart @ one, np.einsum("ti,ti->t", others, apart)

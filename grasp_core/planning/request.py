@@ -1,4 +1,4 @@
-"""The keywords of `plan` as one value, and their checks."""
+"""Holds the keywords of `plan` as one value, and checks them against the object."""
 
 import math
 from dataclasses import dataclass
@@ -24,11 +24,13 @@ from grasp_core.planning.reach import Finger
 from grasp_core.values import Family, Method
 
 FAMILIES: tuple[Family, ...] = get_args(Family)
-"""The families of the paper, each with its construction."""
+"""The three families of grasps in the paper, each with its construction."""
 METHODS: tuple[Method, ...] = get_args(Method)
 """Everything that `families` may name: the three constructions and `free`."""
 ConeKind: TypeAlias = Literal["tilted", "normal"]
-RankBy: TypeAlias = Literal["radius", "friction-margin", "ferrari-canny", "diverse"]
+RankBy: TypeAlias = Literal[
+    "radius", "friction-margin", "ferrari-canny", "payload", "first-slip", "diverse"
+]
 """What makes one grasp better than another (see `plan`)."""
 ITS_RADIUS = ", the object's radius in m"
 FARTHEST_APPROACH = 1e3
@@ -42,7 +44,7 @@ take some hundred megabytes."""
 
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
-    """The keywords of `plan`."""
+    """What is to be planned: the friction and the other keywords of `plan`."""
 
     friction: float
     families: tuple[Method, ...]
@@ -65,17 +67,17 @@ class PlanRequest:
 
     @property
     def searched(self) -> int | None:
-        """How many grasps of each family need to be kept while searching."""
+        """Return how many grasps each family keeps while searching; None keeps all."""
         return self.limit if self.rank_by == "radius" and not self.complete else None
 
 
 def methods_for(body: Polyhedron) -> tuple[Method, ...]:
-    """The methods that commands try by default: the three families, and on few faces `free`."""
+    """Return the methods that commands try by default: all; without `free` on many faces."""
     return METHODS if len(body.faces) <= MAX_FACES else FAMILIES
 
 
 def check_request(body: Polyhedron, request: PlanRequest) -> None:
-    """Refuse a request that cannot be planned.
+    """Refuse keywords out of range, and objects with too many faces for the request.
 
     Raises:
         InputError: A keyword is out of range, or the object has too many faces.
@@ -139,7 +141,7 @@ def _check_kinds(request: PlanRequest) -> None:
         raise InputError(f"families must be among {', '.join(METHODS)}; got {shown(families)}")
     if request.complete and "free" not in request.families:
         raise InputError(
-            "complete takes the free method, which decides all faces; add free to families"
+            "complete needs the free method, which decides all faces; add free to families"
         )
     one_of(request.cones, get_args(ConeKind), "cones")
     one_of(request.rank_by, get_args(RankBy), "rank_by")

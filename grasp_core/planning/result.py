@@ -1,4 +1,4 @@
-"""A plan: the grasps found on one object, what was tried, and what was proved absent."""
+"""Holds a plan: the grasps found on one object, what was tried, and what was ruled out."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -11,20 +11,20 @@ from grasp_core.short_text import counted, summary
 from grasp_core.values import FaceQuadruple, Grasp
 
 LONGEST_REASON = 160
-"""Most characters of a reason in the `repr` of a plan, which is to take two lines at most."""
+"""Most characters of a reason in the `repr` of a plan, so that it takes two lines at most."""
 
 
 class Proof(Protocol):
-    """A claim that can be re-checked without any solver."""
+    """A mathematical claim that can be re-checked without any solver."""
 
     def verify(self) -> bool:
-        """Whether plain arithmetic confirms the claim."""
+        """Return whether plain arithmetic confirms the claim."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class MethodCounts:
-    """Counts of what became of the candidates of one method.
+    """Counts of how the candidates of one planning method ended.
 
     A candidate is a set of four faces; for pencils and reguli, with one of the three ways to pair
     them. Tried candidates end in one of the last six counts.
@@ -50,7 +50,7 @@ class MethodCounts:
     found: int = 0
     """Grasps whose witness is of the method's family and which exact force closure certified."""
     unreachable: int = 0
-    """Certified grasps that the fingers asked for do not reach."""
+    """Certified grasps that fingers of the given size cannot reach."""
     rejected: int = 0
     """Placements that the witness or the exact closure test did not confirm: not 0 means a bug."""
 
@@ -62,13 +62,13 @@ Counted: TypeAlias = Literal[
 
 
 class Tally:
-    """The counts of one method or of one attempt; only the owner changes them."""
+    """Counters of candidates, for one method or one attempt on four faces, while it runs."""
 
     def __init__(self) -> None:
         self._counts = Counter[str]()
 
     def count(self, what: Counted, number: int = 1) -> None:
-        """Raise one of the counts."""
+        """Raise one of the counters by `number`."""
         self._counts[what] += number
 
     def exclude(self, candidates: int, choices: int) -> None:
@@ -83,31 +83,31 @@ class Tally:
         self.count("solved", choices)
 
     def add(self, other: "Tally") -> None:
-        """Add the counts of an attempt."""
+        """Add the counts of another tally, such as one attempt's."""
         self._counts.update(other._counts)
 
     def prune(self, every: int) -> None:
-        """Count as pruned what was not tried of `every` candidate."""
+        """Set `pruned` to the number of candidates not tried, out of `every` in all."""
         self._counts["pruned"] = every - self._counts["tried"]
 
     @property
     def counts(self) -> MethodCounts:
-        """The counts as a frozen value."""
+        """Return the counts as a frozen value."""
         return MethodCounts(**self._counts)
 
 
 @dataclass(frozen=True, slots=True)
 class Outcomes:
-    """Counts of what is known about all sets of four faces."""
+    """Counts of an object's sets of four faces: with a grasp, without, open, out of reach."""
 
     held: int
-    """Sets with a certified grasp."""
+    """Sets of four faces with a certified grasp."""
     absent: int
-    """Sets proved to hold no grasp, or with a face that has no room for a contact."""
+    """Sets of four faces proved to hold no grasp, or with a face too small for a contact."""
     open: int
-    """Sets that are neither: the free method left them undecided or, with a limit, untried."""
+    """Sets of four faces with neither a grasp nor a proof: undecided or, with a limit, untried."""
     out_of_reach: int = 0
-    """Sets with certified contacts, none of which the fingers asked for reached."""
+    """Sets of four faces with certified grasps that fingers of the given size cannot reach."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,12 +150,12 @@ class Plan:
     """Face quadruples on which the free method found neither a grasp nor a proof, with the share of
     the choices of contacts that is open, where each cut counts for half."""
     unreached: Mapping[FaceQuadruple, str] = field(default_factory=dict[FaceQuadruple, str])
-    """Face quadruples with contacts that fingers do not reach, and why not."""
+    """Face quadruples whose grasps the fingers cannot reach, with the reason."""
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
     """Processor time of each method [s], from its first program to the last critical friction."""
 
     def __repr__(self) -> str:
-        """Number of grasps, their largest radius, and what is known about all quadruples."""
+        """Return a summary: number of grasps, largest radius, and outcomes of all quadruples."""
         of, known = self.counts.quadruples, self.outcomes
         sets = f"of {counted(of, 'face quadruple')} {known.held} held, {known.absent} absent"
         sets += f", {known.open} open, {known.out_of_reach} out of reach"

@@ -1,4 +1,4 @@
-"""Selects which of the grasps found are returned, and in which order."""
+"""Selects which of the grasps found are returned, and puts them in order."""
 
 from collections.abc import Callable, Iterable, Sequence
 from itertools import chain, zip_longest
@@ -6,13 +6,28 @@ from itertools import chain, zip_longest
 import numpy as np
 
 from grasp_core.closure.critical_friction import critical_friction
+from grasp_core.errors import NoForcesError
+from grasp_core.execution.best_squeeze import GAP, searched
+from grasp_core.execution.grips import STIFFNESS_N_PER_M, Grip
+from grasp_core.execution.loads import any_direction
+from grasp_core.execution.springs import springs
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.certify import Certified
 from grasp_core.planning.request import FAMILIES, PlanRequest
 from grasp_core.quality.ferrari_canny import ferrari_canny
-from grasp_core.solvers.ties import first_best, smallest_first
+from grasp_core.solvers.ties import SAME_SHARE, first_best, ranks
+
+PUSH_N = 10.0
+"""Largest push of a finger under which payloads and first slips are compared [N]."""
+TIP_RADIUS = 0.1
+"""Radius of fingertips whose size is not given, in object radii: that of scenes."""
+DENSITY_KG_PER_M3 = 1000.0
+"""Density of the object whose weight grows until a contact slips."""
 
 
-def chosen(lists: Sequence[Sequence[Certified]], request: PlanRequest) -> list[Certified]:
+def chosen(
+    body: Polyhedron, lists: Sequence[Sequence[Certified]], request: PlanRequest
+) -> list[Certified]:
     """Select the grasps to return, the best first.
 
     By radius, families take turns: the best of each, then the second of each, and so on. By another
@@ -20,6 +35,7 @@ def chosen(lists: Sequence[Sequence[Certified]], request: PlanRequest) -> list[C
     that is farthest from all before it.
 
     Args:
+        body: The object.
         lists: Grasps of each method, the best first.
         request: How many are wanted, and what makes one better.
     """
@@ -30,8 +46,19 @@ def chosen(lists: Sequence[Sequence[Certified]], request: PlanRequest) -> list[C
         return _largest_first(turns[: request.limit])
     if request.rank_by == "diverse":
         return _far_apart(every, request.limit)
-    measure = _critical if request.rank_by == "friction-margin" else _weakness(request.friction)
-    return _in_order(every, [measure(found) for found in every])[: request.limit]
+    measure, same = _measure(body, request)
+    return _in_order(every, [measure(found) for found in every], same)[: request.limit]
+
+
+def _measure(body: Polyhedron, request: PlanRequest) -> tuple[Callable[[Certified], float], float]:
+    """Return what makes grasps better the smaller it is, and the share of it that is none."""
+    if request.rank_by == "friction-margin":
+        return _critical, SAME_SHARE
+    if request.rank_by == "ferrari-canny":
+        return _weakness(request.friction), SAME_SHARE
+    # the best squeeze is searched to a gap, so equal grasps may come out as far apart
+    mass = 1.0 if request.rank_by == "payload" else DENSITY_KG_PER_M3 * body.volume
+    return _looseness(body, request, mass), 2.0 * GAP
 
 
 def _largest_first(found: Iterable[Certified]) -> list[Certified]:
@@ -43,22 +70,50 @@ def _largest_first(found: Iterable[Certified]) -> list[Certified]:
     )
 
 
-def _in_order(found: Sequence[Certified], figures: Sequence[float]) -> list[Certified]:
+def _in_order(
+    found: Sequence[Certified], figures: Sequence[float], same: float = SAME_SHARE
+) -> list[Certified]:
     """Order grasps by a figure, the smallest first; equal ones stay in the order given."""
-    return [found[place] for place in smallest_first(figures)]
+    return [found[place] for place in np.argsort(ranks(figures, same), kind="stable")]
 
 
 def _critical(found: Certified) -> float:
-    """The least friction at which the contacts are in force closure."""
+    """Return the least friction at which the contacts are in force closure."""
     return critical_friction(found.placement.positions, found.normals)
 
 
 def _weakness(friction: float) -> Callable[[Certified], float]:
-    """Return a measure of grasps: minus the Ferrari-Canny quality at this friction."""
+    """Return a function that gives minus the Ferrari-Canny quality of a grasp."""
 
     def measure(found: Certified) -> float:
         contacts = found.placement.positions, found.normals
         return -ferrari_canny(*contacts, friction, torque_scale=1.0).lower
+
+    return measure
+
+
+def _looseness(
+    body: Polyhedron, request: PlanRequest, mass_kg: float
+) -> Callable[[Certified], float]:
+    """Return a measure of grasps: minus the multiple of a weight that the best squeeze survives.
+
+    The weight is that of the mass, in any direction, and the multiple is certified in the linear
+    model. A grasp that no squeeze holds stably has the largest value, zero.
+    """
+    loads, finger = any_direction(mass_kg), request.finger
+    tip = TIP_RADIUS * body.radius if finger is None else finger.radius_m
+
+    def measure(found: Certified) -> float:
+        count = len(found.normals)
+        start = Grip(
+            body.radius * found.placement.positions, found.normals,
+            np.full(count, request.friction), np.zeros((count, 3)),
+            springs(STIFFNESS_N_PER_M, count), np.full(count, tip),
+        )  # fmt: skip
+        try:
+            return -searched(start, loads, PUSH_N).scale
+        except NoForcesError:
+            return 0.0
 
     return measure
 

@@ -145,7 +145,7 @@ class CertifiedRegions:
         return arm @ plane_frame(self.normals[i])
 
     def _is_open(self) -> bool:
-        """Return whether `open_choice` is on the borders, at radius `limit`, and not closed."""
+        """Return whether `open_choice` lies on the borders at radius `limit`, without closure."""
         choice, wrench = self.open_choice, self.open_wrench
         if choice is None:
             return wrench is None and self.limit == math.inf
@@ -177,8 +177,8 @@ def _check_parts(found: CertifiedRegions) -> None:
     each = partial(instance, kind=ContactRegion, name="regions")
     count = len(several(found.regions, each, "regions", "ContactRegion values"))
     if not count == len(found.borders) == FINGERS:
-        got = f"{count} and {len(found.borders)}"
-        raise InputError(f"regions and borders must be {FINGERS}, one per finger, got {got}")
+        got = f"{count} regions and {len(found.borders)} borders"
+        raise InputError(f"regions and borders must be {FINGERS} each, one per finger, got {got}")
     instance(found.cover, TwistCover, "cover")
     positive(found.scale, "scale")
     number(found.radius, "radius", least=0.0)

@@ -274,7 +274,7 @@ def _trimmed(polygon: Array, y: Array) -> Array:
 
 
 def _open_choice(grounds: Grounds, proved: Proved, unit: _Unit) -> ClosureCertificate | None:
-    """Return the proof, in the object's frame, that the contacts found are not closed.
+    """Return the proof, in the object's frame, that contacts are not in force closure.
 
     The result is None unless the exact test agrees and the contacts are on the pieces. Nothing is
     claimed about patches, as curved surfaces are not planes.

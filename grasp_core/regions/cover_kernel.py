@@ -52,7 +52,7 @@ def pivot(ids: Indices, weights: Array, motions: Array, i: int, most: float) -> 
 def answer(
     ids: Indices, weights: Array, motions: Array, sites: Sites, i: int
 ) -> tuple[float, float, float]:
-    """The sum of a contact's least powers on weighted rays for a good force, and that force."""
+    """Find a contact's summed least power on weighted rays for a good force, and that force."""
     most = sites.friction[i] * (1.0 - CLEAR_OF_CONE)
     best, best_f, best_g = -np.inf, 0.0, 0.0
     f, g = pivot(ids, weights, motions, i, most)

@@ -20,7 +20,7 @@ KERNEL = "grasp_core.regions.cover_kernel"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Searched:
-    """How a search ended: with a cover, with contacts that are not closed, or with neither."""
+    """How a search ended: with a proof, with contacts not in force closure, or with neither."""
 
     cover: TwistCover | None = None
     choice: Array | None = None

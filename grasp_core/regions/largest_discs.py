@@ -107,14 +107,14 @@ class Grounds:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proved:
-    """Discs proved to keep force closure, and larger discs with contacts that are not closed."""
+    """Discs proved to keep force closure, and larger discs that contain a counterexample."""
 
     ys: Array
     """Centres of the discs, in plane coordinates, (k, 2)."""
     radius: float
     cover: TwistCover
     limit: float
-    """Radius of discs that contain contacts that are not closed; infinite where none were found."""
+    """Radius of discs with contacts not in force closure; infinite where none were found."""
     choice: Array | None
     """Contacts that are not force-closed, in discs of radius `limit`, (k, 3)."""
 
@@ -183,7 +183,7 @@ class _Search:
                 radius = 0.5 * (self.lower + upper) if self.lower > 0.0 else 0.25 * upper
 
     def refute(self, cones: int) -> None:
-        """Look for an open choice in larger discs, then bisect."""
+        """Search larger discs for contacts not in force closure, then bisect the radius."""
         below, radius = self.lower, (1.0 + OPEN_NEAR) * self.lower
         while self.limit - below > OPEN_NEAR * self.lower and min(radius, self.reach) > below:
             radius = min(radius, self.reach)

@@ -24,7 +24,7 @@ rounding sites to a grid can change it."""
 EVEN = 0.02
 """Weight added to each ray in the choice of the edge to cut, so that all edges are cut in time."""
 CLEAR_OF_CONE = 1e-12
-"""Share of the friction that forces keep clear of, for rounding."""
+"""Share of the friction that contact forces leave unused, so that rounding does no harm."""
 
 
 class Sites(NamedTuple):
