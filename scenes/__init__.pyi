@@ -2,6 +2,10 @@ from scenes.drawing.pictures import grasp_figure as grasp_figure
 from scenes.drawing.pictures import write_picture as write_picture
 from scenes.example_objects import example_names as example_names
 from scenes.example_objects import example_object as example_object
+from scenes.execution.held import HeldSettings as HeldSettings
+from scenes.execution.held_mjcf import HeldScene as HeldScene
+from scenes.execution.held_mjcf import build_held_scene as build_held_scene
+from scenes.execution.held_mjcf import write_held_scene as write_held_scene
 from scenes.fingertips import FingerSettings as FingerSettings
 from scenes.layout import Layout as Layout
 from scenes.mjcf import Scene as Scene

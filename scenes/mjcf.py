@@ -11,8 +11,7 @@ Fingers are spheres on three slides along (normal, tangent, tangent), each with 
 limited to the largest normal force. Rigid fingers have neither slides nor servos.
 """
 
-import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -21,22 +20,27 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from grasp_core.arrays import Array, to_digits
+from grasp_core.arrays import to_digits
 from grasp_core.checked import instance, one_of, path_of, several
 from grasp_core.errors import InputError
 from grasp_core.files.whole_files import write_parts
 from grasp_core.objects.convexity import is_convex
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
+from scenes.mjcf_text import COMPILER, add_comment, add_element, printable, quaternion
 from scenes.physics import PhysicsSettings
 
 Surface = Literal["pads", "mesh"]
 """What fingertips touch: one pad (a small box) each, or the convex hull of the object's mesh."""
 FEWEST_CONTACTS = 2
+SCALED = (
+    "Masses and servos are scaled to suit the grasp: this scene is for tests of force closure. "
+    "`graspproof scene --mass-kg M` writes the object with its true mass, under gravity."
+)
+"""Comment at the top of every scene."""
 AXES = ("normal", "tangent1", "tangent2")
 
 
@@ -81,7 +85,8 @@ def build_scene(
             instance(value, kind, name)
     if surface == "mesh" and not is_convex(body):
         raise InputError(
-            f"surface must be 'pads' where the object is not convex, as {body.name} is"
+            f"surface must be 'pads' for an object that is not convex: {body.name} is not convex, "
+            "and MuJoCo would fill its hollows"
         )
     contacts = grasp if isinstance(grasp, Grasp) else _listed(grasp)
     layout = arrange(body, contacts, friction, fingers)
@@ -109,24 +114,25 @@ def write_scene(scene: Scene, path: str | Path) -> Path:
 
 def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads") -> str:
     """Write the MJCF text of a layout; equal layouts give equal texts."""
-    root = ElementTree.Element("mujoco", model=_plain(layout.name))
-    _add(root, "compiler", {"angle": "radian", "autolimits": "false", "inertiafromgeom": "false"})
-    option = _add(root, "option", physics.options())
-    _add(option, "flag", physics.flags())
-    _add(root, "statistic", {"extent": 3.0 * layout.radius_m, "center": (0.0, 0.0, 0.0)})
-    assets = _add(root, "asset", {})
+    root = ElementTree.Element("mujoco", model=printable(layout.name))
+    add_comment(root, SCALED)
+    add_element(root, "compiler", COMPILER)
+    option = add_element(root, "option", physics.options())
+    add_element(option, "flag", physics.flags())
+    add_element(root, "statistic", {"extent": 3.0 * layout.radius_m, "center": (0.0, 0.0, 0.0)})
+    assets = add_element(root, "asset", {})
     mesh = {"name": "object", "inertia": "shell"}
-    _add(
+    add_element(
         assets, "mesh", mesh | {"vertex": layout.vertices.ravel(), "face": layout.triangles.ravel()}
     )
-    world = _add(root, "worldbody", {})
+    world = add_element(root, "worldbody", {})
     light = {"pos": (0.0, 0.0, 8.0 * layout.radius_m), "dir": (0.0, 0.0, -1.0)}
-    _add(world, "light", light | {"type": "directional"})
+    add_element(world, "light", light | {"type": "directional"})
     _object(world, layout, physics, surface)
     for finger in range(len(layout.contacts)):
         _finger(world, layout, physics, finger)
     if not layout.drive.rigid:
-        actuators = _add(root, "actuator", {})
+        actuators = add_element(root, "actuator", {})
         for finger in range(len(layout.contacts)):
             _servos(actuators, layout, finger)
         _keyframes(root, layout)
@@ -137,10 +143,10 @@ def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads")
 def _object(
     world: ElementTree.Element, layout: Layout, physics: PhysicsSettings, surface: Surface
 ) -> None:
-    body = _add(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)})
-    _add(body, "freejoint", {"name": "object"})
+    body = add_element(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)})
+    add_element(body, "freejoint", {"name": "object"})
     inertia = layout.inertia_kg_m2[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    _add(
+    add_element(
         body,
         "inertial",
         {"pos": layout.center, "mass": layout.mass_kg, "fullinertia": inertia},
@@ -150,9 +156,9 @@ def _object(
     if surface == "mesh":
         touched = {"contype": (1 << len(layout.contacts)) - 1}
         friction = {"friction": (layout.friction, 0.0, 0.0)}
-        _add(body, "geom", hull | touched | friction | physics.contact())
+        add_element(body, "geom", hull | touched | friction | physics.contact())
         return
-    _add(body, "geom", hull | {"contype": 0})
+    add_element(body, "geom", hull | {"contype": 0})
     width, depth = PAD_HALF_WIDTH * layout.radius_m, PAD_DEPTH * layout.radius_m
     for finger, (point, frame) in enumerate(zip(layout.contacts, layout.frames, strict=True)):
         outward = np.column_stack([frame[:, 2], frame[:, 1], -frame[:, 0]])
@@ -169,7 +175,7 @@ def _object(
             "group": 3,
             "rgba": (0.9, 0.6, 0.2, 0.3),
         }
-        _add(body, "geom", pad | physics.contact())
+        add_element(body, "geom", pad | physics.contact())
 
 
 def _finger(
@@ -177,17 +183,17 @@ def _finger(
 ) -> None:
     drive = layout.drive
     pose = {"pos": layout.tip_centers[finger], "quat": quaternion(layout.frames[finger])}
-    body = _add(world, "body", {"name": f"finger{finger}", "gravcomp": 1.0} | pose)
+    body = add_element(world, "body", {"name": f"finger{finger}", "gravcomp": 1.0} | pose)
     slides = () if drive.rigid else tuple(zip(AXES, np.eye(3), strict=True))
     for axis, direction in slides:
-        _add(
+        add_element(
             body,
             "joint",
             {"name": f"finger{finger}_{axis}", "type": "slide", "axis": direction,
              "pos": (0.0, 0.0, 0.0), "limited": "false", "damping": 0.0, "stiffness": 0.0,
              "armature": 0.0, "frictionloss": 0.0},
         )  # fmt: skip
-    _add(
+    add_element(
         body,
         "inertial",
         {"pos": (0.0, 0.0, 0.0), "mass": drive.mass_kg,
@@ -204,7 +210,7 @@ def _finger(
         "group": 0,
         "rgba": (0.8, 0.25, 0.2, 1.0),
     }
-    _add(body, "geom", tip | physics.contact())
+    add_element(body, "geom", tip | physics.contact())
 
 
 def _servos(actuators: ElementTree.Element, layout: Layout, finger: int) -> None:
@@ -221,7 +227,7 @@ def _servos(actuators: ElementTree.Element, layout: Layout, finger: int) -> None
         }
         if axis == "normal":
             servo |= {"forcelimited": "true", "forcerange": (0.0, drive.max_normal_force_n)}
-        _add(actuators, "position", servo)
+        add_element(actuators, "position", servo)
 
 
 def _keyframes(root: ElementTree.Element, layout: Layout) -> None:
@@ -243,44 +249,6 @@ def _keyframes(root: ElementTree.Element, layout: Layout) -> None:
         "grasp": (home, push),
         "squeeze": (home, push / SQUEEZE),
     }
-    keys = _add(root, "keyframe", {})
+    keys = add_element(root, "keyframe", {})
     for name, (place, ctrl) in told.items():
-        _add(keys, "key", {"name": name, "qpos": place, "ctrl": ctrl})
-
-
-def quaternion(rotation: Array) -> Array:
-    """Convert a rotation matrix to a unit quaternion (w, x, y, z), its largest part positive.
-
-    The rows below are 4 q_i q for each component q_i of the quaternion q; the row of the largest
-    component has the most accurate digits.
-    """
-    (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
-    rows = np.array(
-        [
-            [1.0 + a + e + i, h - f, c - g, d - b],
-            [h - f, 1.0 + a - e - i, b + d, c + g],
-            [c - g, b + d, 1.0 - a + e - i, f + h],
-            [d - b, c + g, f + h, 1.0 - a - e + i],
-        ]
-    )
-    row = rows[first_best(np.diag(rows))]
-    return row / math.sqrt(sum(part * part for part in row.tolist()))
-
-
-def _add(
-    parent: ElementTree.Element, tag: str, attributes: Mapping[str, object]
-) -> ElementTree.Element:
-    text = {name: _text(value) for name, value in attributes.items()}
-    return ElementTree.SubElement(parent, tag, text)
-
-
-def _text(value: object) -> str:
-    """Write a number in full precision, or a sequence of them separated by blanks."""
-    if isinstance(value, str):
-        return value
-    return " ".join(repr(number) for number in np.asarray(value).ravel().tolist())
-
-
-def _plain(name: str) -> str:
-    """Replace the characters of a model's name that cannot be printed."""
-    return "".join(c if c.isprintable() else "_" for c in name) or "object"
+        add_element(keys, "key", {"name": name, "qpos": place, "ctrl": ctrl})

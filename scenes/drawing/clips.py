@@ -23,6 +23,7 @@ from grasp_core.arrays import Array
 from grasp_core.errors import GraspError, InputError
 from grasp_core.files.whole_files import write_parts
 from scenes.drawing.palette import FINGERS, rgb
+from scenes.execution.held_mjcf import HeldScene
 from scenes.mjcf import Scene
 
 FORMATS = (".gif", ".webp")
@@ -35,6 +36,7 @@ RATE = 25.0
 NEARER = 0.9
 """Share of the fingertips' farthest reach that the picture must show: fingertips may come nearer to
 the picture's border than the object."""
+UP = np.array([0.0, 0.0, 1.0])
 RIGID = 7
 """Length of each row of joint positions in a scene with rigid fingertips, which holds only the pose
 of the object."""
@@ -67,14 +69,62 @@ def write_clip(
         InputError: The file's name does not end in gif or webp.
         GraphicsError: No graphics library draws here; the message quotes it.
     """
+    shown = _reach(scene, joints)
+    return _written(path, xml=scene.xml, joints=joints, radius=shown, caption=caption,
+                    angles=np.broadcast_to(angles_deg, (len(joints), 2)))  # fmt: skip
+
+
+def write_held_clip(
+    scene: HeldScene, joints: Array, path: Path, caption: str, *,
+    table: tuple[Array, Array] | None = None, up: Array = UP,
+) -> Path:  # fmt: skip
+    """Draw the motion of a held object and its palm, one frame for each sample.
+
+    Args:
+        scene: The simulated scene.
+        joints: Positions of the object, the palm and the fingertips, as the scene's joints, (n, 13
+            + 3k).
+        path: File to write, gif or webp.
+        caption: Text written into the picture.
+        table: Position (3,) and quaternion (4,) of the table, if one is in the trial.
+        up: Unit direction that points up in the picture, (3,).
+
+    Raises:
+        InputError: The file's name does not end in gif or webp.
+        GraphicsError: No graphics library draws here; the message quotes it.
+    """
+    layout = scene.layout
+    rotation: Any = importlib.import_module("scipy.spatial.transform").Rotation
+    turn = rotation.align_vectors(UP[None], up[None])[0]
+    drawn = joints.copy()
+    drawn[:, :3] = turn.apply(joints[:, :3])
+    drawn[:, 3:RIGID] = _turned(turn, joints[:, 3:RIGID])
+    path_of_palm = turn.apply(joints[:, RIGID : RIGID + 3])
+    tips = np.linalg.norm(layout.tip_centers, axis=1) + layout.tip_radius_m
+    low, high = path_of_palm.min(axis=0), path_of_palm.max(axis=0)
+    shown = max(layout.radius_m, NEARER * float(tips.max()))
+    parts = {"middle": 0.5 * (low + high), "palm": turn.as_quat(scalar_first=True)}
+    if table is not None:
+        place, quaternion = table
+        parts["table"] = np.concatenate([turn.apply(place), _turned(turn, quaternion)])
+    radius = shown + 0.5 * float(np.linalg.norm(high - low))
+    return _written(path, xml=scene.xml, joints=drawn, radius=radius, caption=caption,
+                    angles=np.broadcast_to(ANGLES_DEG, (len(joints), 2)), **parts)  # fmt: skip
+
+
+def _turned(turn: Any, quaternions: Array) -> Array:
+    """Turn orientations, given as quaternions (w, x, y, z), (..., 4), by a rotation."""
+    rotation: Any = importlib.import_module("scipy.spatial.transform").Rotation
+    return (turn * rotation.from_quat(quaternions, scalar_first=True)).as_quat(scalar_first=True)
+
+
+def _written(path: Path, **job_parts: Any) -> Path:
+    """Draw a clip in another process, with the first graphics library that works."""
     require_clip(path)
     with tempfile.TemporaryDirectory() as folder:
         job, out = Path(folder) / "job.npz", Path(folder) / f"clip{path.suffix.lower()}"
-        np.savez(
-            job, xml=scene.xml, joints=joints, size=SIZE, radius=_reach(scene, joints), rate=RATE,
-            caption=caption, angles=np.broadcast_to(angles_deg, (len(joints), 2)),
-            colours=[rgb(colour) for colour in FINGERS],
-        )  # fmt: skip
+        colours = [rgb(colour) for colour in FINGERS]
+        np.savez(job, size=SIZE, rate=RATE, colours=colours, **job_parts)
         said = ""
         for graphics in _graphics():
             said = _drawn(job, out, graphics)

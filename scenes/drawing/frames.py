@@ -32,11 +32,15 @@ def main(job: str, out: str) -> None:
         for place in range(model.ngeom):
             if model.geom(place).name == f"finger{finger}":
                 model.geom_rgba[place, :3] = colour
+    if "palm" in given:
+        model.body("palm").quat[:] = given["palm"]
     data = mujoco.MjData(model)
     width, height = (int(size) for size in given["size"])
     model.vis.global_.offwidth, model.vis.global_.offheight = width, height
     camera = mujoco.MjvCamera()
-    camera.lookat[:] = 0.0
+    camera.lookat[:] = given.get("middle", 0.0)
+    if "table" in given:
+        data.mocap_pos[0], data.mocap_quat[0] = given["table"][:3], given["table"][3:]
     camera.distance = DISTANCE * float(given["radius"])
     frames = []
     with mujoco.Renderer(model, height, width) as renderer:

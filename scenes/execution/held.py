@@ -1,0 +1,190 @@
+"""What a scene of execution consists of: the object as it is, fingers on springs, and a palm.
+
+The world frame is the object's frame moved to the centre of mass, as the object rests in the hand.
+Nothing is scaled here: the object has its true mass, centre of mass and inertia, and gravity pulls.
+
+Each fingertip slides on three springs along axes in which its stiffness is diagonal. A damper goes
+with each spring. Its coefficient is that of an object of mass m between k equal springs K,
+
+    c = 2 zeta sqrt(K (m / k + m_t)),                                                     (1)
+
+with the damping ratio zeta and the tip's mass m_t. The springs' bases are fixed to the palm.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices, frozen, to_digits
+from grasp_core.checked import LARGEST, SMALLEST, instance, number, positive
+from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map
+from grasp_core.errors import InputError
+from grasp_core.execution.grips import Grip, check_grip
+from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from grasp_core.objects.on_faces import check_body
+from grasp_core.objects.polyhedron import Polyhedron
+from scenes.execution.surface import touched_solids
+
+TIP_MASS_KG = 0.05
+"""Mass of a fingertip with the part of its finger that moves with it, unless stated."""
+DAMPING_RATIO = 0.5
+"""Damping ratio of the held object, unless stated: it overshoots once, by a sixth."""
+UPRIGHT = (0.0, 0.0, -1.0)
+"""Direction of gravity in the frame of an object that stands upright."""
+REACH = 1.0
+"""How far from the contacts the surface is there to be touched, in object radii."""
+TOUCH = 1e-6
+"""Depth of fingertips in their faces at the start, in object radii. Meshes are stored in single
+precision by the simulator, and a fingertip that does not touch yet would arrive with speed."""
+ISOTROPIC = 1e-9
+"""Relative difference of a spring's stiffnesses that counts as none."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeldSettings:
+    """Masses and damping of what holds and is held, and the direction of gravity."""
+
+    tip_mass_kg: float = TIP_MASS_KG
+    damping_ratio: float = DAMPING_RATIO
+    down: tuple[float, float, float] = UPRIGHT
+    """Direction of gravity in the object's frame; its length does not matter."""
+
+    def __post_init__(self) -> None:
+        positive(self.tip_mass_kg, "tip_mass_kg")
+        number(self.damping_ratio, "damping_ratio", least=0.01, most=10.0)
+        down = frozen(self.down, (3,), "down")
+        if not SMALLEST <= float(np.linalg.norm(down)) <= LARGEST:
+            raise InputError(
+                f"down must be a direction, of length {SMALLEST:g} to {LARGEST:g}, got {self.down}"
+            )
+
+    @property
+    def gravity(self) -> Array:
+        """Acceleration of gravity in the object's frame, (3,) [m/s^2]."""
+        down = np.asarray(self.down, dtype=np.float64)
+        return to_digits(GRAVITY_M_PER_S2 * down / np.linalg.norm(down))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldLayout:
+    """Positions, masses and springs of everything in a scene of execution, in the world frame."""
+
+    name: str
+    vertices: Array
+    """Object mesh about its centre of mass, (n, 3) [m]."""
+    triangles: Indices
+    solids: tuple[Array, ...]
+    """Corners of each convex solid that fingertips can touch, (n, 3) each [m]."""
+    radius_m: float
+    """Largest distance of the object's surface from its centre of mass [m]."""
+    mass_kg: float
+    inertia_kg_m2: Array
+    """Inertia about the centre of mass, along the world axes, (3, 3) [kg m^2]."""
+    contacts: Array
+    """Contact points, (k, 3) [m]."""
+    frames: Array
+    """Columns (inward normal, tangent, tangent) of each contact, (k, 3, 3)."""
+    friction: Array
+    """Coulomb coefficients, (k,)."""
+    squeeze: Array
+    """Contact forces at rest, on the object, world axes, (k, 3) [N]."""
+    axes: Array
+    """Columns: directions of each fingertip's three springs, (k, 3, 3)."""
+    stiffness: Array
+    """Stiffness of each fingertip's three springs, (k, 3) [N/m]."""
+    damping: Array
+    """Coefficients of the dampers beside the springs, (k, 3) [N s/m]."""
+    tip_radius_m: Array
+    """Radii of the fingertips, (k,) [m]."""
+    tip_mass_kg: float
+    gravity: Array
+    """Acceleration of gravity, (3,) [m/s^2]."""
+
+    @property
+    def tip_centers(self) -> Array:
+        """Return the centres of the fingertips at their contacts, (k, 3) [m]."""
+        height = self.tip_radius_m - TOUCH * self.radius_m
+        return self.contacts - height[:, None] * self.frames[:, :, 0]
+
+    @property
+    def fastest_ring(self) -> float:
+        """Return a bound on the natural frequencies of the held object [rad/s].
+
+        It is the highest one of the springs and masses, or that of a cube of this mass held at the
+        middles of its faces if it is larger. The latter's square is k / (m_t + 2 m / (3 n)) for n
+        fingertips.
+        """
+        maps = grasp_map(self.contacts).reshape(WRENCH, -1, 3).transpose(1, 0, 2)
+        springs = (self.axes * self.stiffness[:, None]) @ self.axes.transpose(0, 2, 1)
+        stiff: Array = (maps @ springs @ maps.transpose(0, 2, 1)).sum(axis=0)
+        mass: Array = self.tip_mass_kg * (maps @ maps.transpose(0, 2, 1)).sum(axis=0)
+        mass[:3, :3] += self.mass_kg * np.eye(3)
+        mass[3:, 3:] += self.inertia_kg_m2
+        root = np.linalg.inv(np.linalg.cholesky(mass))
+        own = float(np.linalg.eigvalsh(root @ stiff @ root.T)[-1])
+        cube = self.tip_mass_kg + 2.0 * self.mass_kg / (3.0 * len(self.contacts))
+        return math.sqrt(max(own, float(self.stiffness.max()) / cube))
+
+    @property
+    def pushes(self) -> Array:
+        """Return the squeeze along the axes of the springs, (k, 3) [N]."""
+        return np.einsum("kij,ki->kj", self.axes, self.squeeze)
+
+
+def held_layout(
+    body: Polyhedron, grip: Grip, mass_kg: float, settings: HeldSettings | None = None
+) -> HeldLayout:
+    """Place an object of a given mass between the springs of a grip.
+
+    Args:
+        body: The object; its inertia is that of its shape with a uniform density.
+        grip: Contacts, squeeze and springs (see `gc.grip`), of this object.
+        mass_kg: Mass of the object [kg].
+        settings: Masses and damping of the fingers, and the direction of gravity.
+
+    Raises:
+        InputError: The mass is out of range, or a fingertip has no size.
+    """
+    check_body(body)
+    check_grip(grip)
+    mass = positive(mass_kg, "mass_kg")
+    settings = HeldSettings() if settings is None else instance(settings, HeldSettings, "settings")
+    if not (grip.tip_radius_m > 0.0).all():
+        raise InputError("tip_radius_m must be above zero: points cannot be simulated")
+    normals = to_digits(grip.normals)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    frames = contact_frames(normals)
+    contacts = to_digits(grip.arms, body.radius)
+    axes, stiffness = _spring_axes(grip.stiffness, frames)
+    share = mass / len(contacts) + settings.tip_mass_kg
+    return HeldLayout(
+        name=body.name,
+        vertices=to_digits(body.vertices - body.center_of_mass),
+        triangles=body.triangles,
+        solids=touched_solids(body, contacts, REACH * body.radius),
+        radius_m=body.radius,
+        mass_kg=mass,
+        inertia_kg_m2=to_digits(mass / body.volume * body.inertia),
+        contacts=contacts,
+        frames=frames,
+        friction=grip.friction,
+        squeeze=to_digits(grip.squeeze),
+        axes=axes,
+        stiffness=stiffness,
+        damping=2.0 * settings.damping_ratio * np.sqrt(stiffness * share),
+        tip_radius_m=grip.tip_radius_m,
+        tip_mass_kg=settings.tip_mass_kg,
+        gravity=settings.gravity,
+    )
+
+
+def _spring_axes(stiffness: Array, frames: Array) -> tuple[Array, Array]:
+    """Return axes in which each stiffness (k, 3, 3) is diagonal, and its diagonal, (k, 3).
+
+    They are the contact's own axes where the spring is as stiff in all directions.
+    """
+    values, vectors = np.linalg.eigh(stiffness)
+    vectors[:, :, 0] *= np.sign(np.linalg.det(vectors))[:, None]
+    alike = values[:, 2] - values[:, 0] <= ISOTROPIC * values[:, 2]
+    return np.where(alike[:, None, None], frames, vectors), values

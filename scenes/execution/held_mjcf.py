@@ -1,0 +1,251 @@
+"""Writes a scene of execution as MJCF text: a free object, fingers on springs, a palm, a table.
+
+The palm moves on three slides and three hinges whose armature is `PALM_ARMATURE` times the mass it
+carries, so a force of armature times acceleration moves it on any path, and what it holds hardly
+moves it. Fingers are its children: their bases accelerate with it. Fingertips touch the object's
+own surface (see `surface`). The table touches the object's convex hull, and is far away until a
+trial puts it under the object.
+
+The friction of a contact is that of its fingertip; the object's own is zero, of which MuJoCo takes
+the larger.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import instance, path_of
+from grasp_core.errors import InputError
+from grasp_core.execution.grips import Grip
+from grasp_core.files.whole_files import write_parts
+from grasp_core.objects.polyhedron import Polyhedron
+from scenes.execution.held import HeldLayout, HeldSettings, held_layout
+from scenes.mjcf_text import COMPILER, add_comment, add_element, printable, quaternion
+from scenes.physics import PhysicsSettings
+
+PALM_ARMATURE = 1e7
+"""Armature of the palm's joints, relative to what the palm carries."""
+PALM_SHARE = 1e-3
+"""Mass of the palm itself, relative to the object's: a moving body must have one."""
+FINGERTIPS, TABLE = 1, 2
+"""Bits of what may touch what: fingertips the surface, the table the hull."""
+AWAY = 100.0
+"""Distance of the table until it is needed, in object radii."""
+TRUE_MASS = (
+    "The object has its true mass and is under gravity. Start from the keyframe `squeeze`, whose "
+    "commands make the fingers hold it; with commands of zero they do not push."
+)
+"""Comment at the top of every scene."""
+SPRINGS = ("a", "b", "c")
+"""Endings of the names of a fingertip's three slides."""
+SAMPLE_S = 0.005
+"""Duration of a sample: what is applied changes, and motion is recorded, once per sample [s]."""
+FEWEST_STEPS, MOST_STEPS = 4, 128
+"""Least and largest number of steps in a sample."""
+STEP_RAD = 0.14
+"""Largest angle by which the held object rings in a step: frequencies are then off by two thirds of
+a percent at most."""
+ROUNDING = 1e-6
+"""Part of a step that rounding may add to the number that is needed."""
+CONTACT_STEPS = 4.0
+"""Time constant of contacts, in steps; the simulator takes no less than two."""
+FLAGS = {"midphase": "disable"}
+"""MuJoCo's search for pairs within two bodies misses contacts that are less deep than a
+ten-thousandth of the object, as all are here: objects on tables would fall, touch, and chatter."""
+PALM = ("x", "y", "z", "about_x", "about_y", "about_z")
+"""Endings of the names of the palm's slides and hinges, in the order of its joints."""
+
+
+def held_physics(layout: HeldLayout) -> PhysicsSettings:
+    """Return the settings of execution, in which contacts are harder than in closure tests.
+
+    A higher ratio of friction to normal impedance makes light fingertips chatter. Where a contact
+    is less than 2 micrometres deep, its impedance is less: a tip that slides on its springs while
+    the palm turns has an acceleration that the simulator's contacts do not know, and would leave a
+    surface that is as hard at once.
+
+    The integrator is implicit in the springs: a ring of frequency w appears slower by (w h)^2 / 3
+    with steps of h, and damped by w h / 2 more. For the fastest ring of the held object w h is
+    `STEP_RAD` at most. Contacts settle in `CONTACT_STEPS` steps: their stiffness goes with the
+    tip's mass over the square of that time, and so stays in proportion to the springs'. With the
+    impedance d they give by (1 - d) (`CONTACT_STEPS` w h)^2 of what the springs give, a hundredth
+    of a percent.
+    """
+    x, y, z = layout.gravity.tolist()
+    steps = math.ceil(SAMPLE_S * layout.fastest_ring / STEP_RAD - ROUNDING)
+    steps = min(max(steps, FEWEST_STEPS), MOST_STEPS)
+    step = SAMPLE_S / steps
+    return PhysicsSettings(
+        timestep=step, impratio=100.0, gravity=(x, y, z),
+        solimp=(0.99, 0.9995, 2e-6, 0.5, 1.0), solref=(CONTACT_STEPS * step, 1.0),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldScene:
+    """A held object as the text of a MuJoCo model, with the numbers it was made from."""
+
+    xml: str
+    layout: HeldLayout
+    physics: PhysicsSettings
+
+
+def build_held_scene(
+    body: Polyhedron,
+    grip: Grip,
+    mass_kg: float,
+    *,
+    settings: HeldSettings | None = None,
+    physics: PhysicsSettings | None = None,
+) -> HeldScene:
+    """Make a MuJoCo scene of an object with its true mass, held by a grip.
+
+    Args:
+        body: The object.
+        grip: Contacts on it, with springs and squeeze (see `gc.grip`).
+        mass_kg: Mass of the object [kg].
+        settings: Masses and damping of the fingers, and the direction of gravity.
+        physics: Simulation settings; None for those of `held_physics`.
+
+    Raises:
+        InputError: A number is out of range.
+    """
+    layout = held_layout(body, grip, mass_kg, settings)
+    if physics is None:
+        physics = held_physics(layout)
+    elif not np.array_equal(instance(physics, PhysicsSettings, "physics").gravity, layout.gravity):
+        raise InputError(
+            f"physics.gravity must be that of the settings, {layout.gravity.tolist()}, "
+            f"got {physics.gravity}"
+        )
+    return HeldScene(held_text(layout, physics), layout, physics)
+
+
+def write_held_scene(scene: HeldScene, path: str | Path) -> Path:
+    """Write the scene's text to a file and return its path.
+
+    Raises:
+        InputError: `scene` is not a scene, or `path` is not a path.
+    """
+    instance(scene, HeldScene, "scene", "build_held_scene makes one")
+    return write_parts(path_of(path, "path"), [scene.xml.encode()])
+
+
+def held_text(layout: HeldLayout, physics: PhysicsSettings) -> str:
+    """Write the MJCF text of a held object; equal layouts give equal texts."""
+    root = ElementTree.Element("mujoco", model=printable(layout.name))
+    add_comment(root, TRUE_MASS)
+    add_element(root, "compiler", COMPILER)
+    option = add_element(root, "option", physics.options())
+    add_element(option, "flag", {**physics.flags(), **FLAGS})
+    extent = {"extent": 3.0 * layout.radius_m, "center": (0.0, 0.0, 0.0)}
+    add_element(root, "statistic", extent)
+    assets = add_element(root, "asset", {})
+    seen = {"vertex": layout.vertices.ravel(), "face": layout.triangles.ravel()}
+    add_element(assets, "mesh", {"name": "object", "inertia": "shell"} | seen)
+    for place, corners in enumerate(layout.solids):
+        solid = {"name": f"surface{place}", "inertia": "shell", "vertex": corners.ravel()}
+        add_element(assets, "mesh", solid)
+    world = add_element(root, "worldbody", {})
+    light = {"pos": (0.0, 0.0, 8.0 * layout.radius_m), "dir": (0.0, 0.0, -1.0)}
+    add_element(world, "light", light | {"type": "directional"})
+    _object(world, layout, physics)
+    _table(world, layout, physics)
+    palm = _palm(world, layout)
+    for finger in range(len(layout.contacts)):
+        _finger(palm, layout, physics, finger)
+    actuators = add_element(root, "actuator", {})
+    for finger in range(len(layout.contacts)):
+        _springs(actuators, layout, finger)
+    home = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], np.zeros(6)])
+    rest = np.concatenate([home, np.zeros(layout.stiffness.size)])
+    keys = add_element(root, "keyframe", {})
+    commands = (layout.pushes / layout.stiffness).ravel()
+    add_element(keys, "key", {"name": "squeeze", "qpos": rest, "ctrl": commands})
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _object(world: ElementTree.Element, layout: HeldLayout, physics: PhysicsSettings) -> None:
+    body = add_element(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)})
+    add_element(body, "freejoint", {"name": "object"})
+    inertia = layout.inertia_kg_m2[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    origin = {"pos": (0.0, 0.0, 0.0), "mass": layout.mass_kg, "fullinertia": inertia}
+    add_element(body, "inertial", origin)
+    hull = {"name": "object", "type": "mesh", "mesh": "object", "contype": TABLE, "group": 1,
+            "rgba": (0.55, 0.62, 0.70, 0.6)}  # fmt: skip
+    add_element(body, "geom", {**hull, **_smooth(physics)})
+    for place in range(len(layout.solids)):
+        name = f"surface{place}"
+        solid = {"name": name, "type": "mesh", "mesh": name, "contype": FINGERTIPS, "group": 3,
+                 "rgba": (0.9, 0.6, 0.2, 0.3)}  # fmt: skip
+        add_element(body, "geom", {**solid, **_smooth(physics)})
+
+
+def _smooth(physics: PhysicsSettings) -> Mapping[str, object]:
+    """Return what geoms of the object have in common."""
+    return {"conaffinity": 0, "friction": (0.0, 0.0, 0.0), "mass": 0.0, **physics.contact()}
+
+
+def _table(world: ElementTree.Element, layout: HeldLayout, physics: PhysicsSettings) -> None:
+    away = AWAY * layout.radius_m * np.array([0.0, 0.0, -1.0])
+    body = add_element(world, "body", {"name": "table", "mocap": "true", "pos": away})
+    plane = {"name": "table", "type": "plane", "size": (10.0 * layout.radius_m,) * 2 + (0.01,),
+             "contype": 0, "conaffinity": TABLE, "friction": (layout.friction.max(), 0.0, 0.0),
+             "rgba": (0.8, 0.78, 0.74, 1.0)}  # fmt: skip
+    add_element(body, "geom", plane | physics.contact())
+
+
+def palm_armature(layout: HeldLayout) -> Array:
+    """Return the armature of the palm's slides and hinges, (6,) [kg, kg m^2]."""
+    carried = layout.mass_kg + len(layout.contacts) * layout.tip_mass_kg
+    slides = PALM_ARMATURE * carried
+    return np.repeat([slides, slides * layout.radius_m**2], 3)
+
+
+def _palm(world: ElementTree.Element, layout: HeldLayout) -> ElementTree.Element:
+    body = add_element(world, "body", {"name": "palm", "pos": (0.0, 0.0, 0.0), "gravcomp": 1.0})
+    for place, (name, armature) in enumerate(zip(PALM, palm_armature(layout), strict=True)):
+        kind, axis = ("slide", "hinge")[place // 3], np.eye(3)[place % 3]
+        _joint(body, {"name": f"palm_{name}", "type": kind, "axis": axis, "armature": armature})
+    mass = PALM_SHARE * layout.mass_kg
+    inertia = (mass * layout.radius_m**2,) * 3
+    own = {"pos": (0.0, 0.0, 0.0), "mass": mass, "diaginertia": inertia}
+    add_element(body, "inertial", own)
+    return body
+
+
+def _joint(body: ElementTree.Element, attributes: dict[str, object]) -> None:
+    plain = {"pos": (0.0, 0.0, 0.0), "limited": "false", "damping": 0.0, "stiffness": 0.0,
+             "armature": 0.0, "frictionloss": 0.0}  # fmt: skip
+    add_element(body, "joint", plain | attributes)
+
+
+def _finger(
+    palm: ElementTree.Element, layout: HeldLayout, physics: PhysicsSettings, finger: int
+) -> None:
+    name, radius = f"finger{finger}", layout.tip_radius_m[finger]
+    pose = {"pos": layout.tip_centers[finger], "quat": quaternion(layout.axes[finger])}
+    body = add_element(palm, "body", {"name": name, "gravcomp": 1.0} | pose)
+    for spring, axis in zip(SPRINGS, np.eye(3), strict=True):
+        _joint(body, {"name": f"{name}_{spring}", "type": "slide", "axis": axis})
+    inertia = (0.4 * layout.tip_mass_kg * radius**2,) * 3
+    own = {"pos": (0.0, 0.0, 0.0), "mass": layout.tip_mass_kg, "diaginertia": inertia}
+    add_element(body, "inertial", own)
+    tip = {"name": name, "type": "sphere", "size": radius, "contype": 0,
+           "conaffinity": FINGERTIPS, "friction": (layout.friction[finger], 0.0, 0.0),
+           "mass": 0.0, "group": 0, "rgba": (0.8, 0.25, 0.2, 1.0)}  # fmt: skip
+    add_element(body, "geom", tip | physics.contact())
+
+
+def _springs(actuators: ElementTree.Element, layout: HeldLayout, finger: int) -> None:
+    for place, spring in enumerate(SPRINGS):
+        name = f"finger{finger}_{spring}"
+        own = {"kp": layout.stiffness[finger, place], "kv": layout.damping[finger, place]}
+        unlimited = {"ctrllimited": "false", "forcelimited": "false"}
+        add_element(actuators, "position", {"name": name, "joint": name} | own | unlimited)
