@@ -1,4 +1,4 @@
-"""Simulates scenes under schedules and returns motions; the only module that steps MuJoCo.
+"""Simulates the scenes of closure tests under schedules and returns motions.
 
 The text of a scene is always what is compiled, so that the text is the whole experiment. All trials
 of a scene run together on MuJoCo's own threads; each is bit for bit what a plain loop over
@@ -10,25 +10,15 @@ of a scene run together on MuJoCo's own threads; each is bit for bit what a plai
 
 import math
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
-from grasp_core.errors import InputError
 from scenes.mjcf import Scene
+from sim_validate.simulation.engine import batch, compiled, mujoco, step, touched, unlogged
 from sim_validate.simulation.schedules import Clock, Schedule
-
-try:
-    import mujoco  # noqa: TID251 - this is the door
-    from mujoco import batch as mujoco_batch  # noqa: TID251
-except (ImportError, RuntimeError, AttributeError, OSError) as error:
-    raise InputError(  # importing mujoco looks for graphics, which nothing here needs
-        f"MuJoCo cannot be imported ({error}). If MUJOCO_GL names graphics that are missing, "
-        "unset it; otherwise reinstall the package"
-    ) from error
 
 CHUNK = 5
 """Simulation steps per sample; loads change, and motion is recorded, once per sample."""
@@ -81,7 +71,7 @@ class Bench:
         """
         self.scene, self.threads = scene, threads
         self.deadline = time.monotonic() + timeout_s
-        self.model = _compiled(scene)
+        self.model = compiled(scene.xml)
         self.clock = Clock(CHUNK * self.model.opt.timestep)
         self.body = self.model.body("object").id
         self.touching = np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
@@ -94,7 +84,7 @@ class Bench:
             start: State at the end of an earlier motion; None puts fingertips at their contacts, at
                 rest.
         """
-        trials = mujoco_batch.Batch(self.model, len(schedules), self.threads)
+        trials = batch.Batch(self.model, len(schedules), self.threads)
         if start is None:
             trials.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         else:
@@ -121,7 +111,7 @@ class Bench:
         )
 
     def _step_through(
-        self, trials: mujoco_batch.Batch, schedules: Sequence[Schedule]
+        self, trials: batch.Batch, schedules: Sequence[Schedule]
     ) -> tuple[Array, dict[int, str]]:
         """Step m trials; return joint positions so far, (m, n, q), and errors by trial."""
         layout = self.scene.layout
@@ -139,7 +129,7 @@ class Bench:
         friction, joints = trials.expand("geom_friction"), trials.bind("qpos")
         done: list[Array] = []
         errors: dict[int, str] = {}
-        with _unlogged():
+        with unlogged():
             for sample in range(frictions.shape[1]):
                 if time.monotonic() > self.deadline:
                     break
@@ -147,40 +137,9 @@ class Bench:
                 if not layout.drive.rigid:
                     servos[:] = controls[:, sample]
                 friction[:, self.touching, 0] = frictions[:, sample, None]
-                _step(trials, errors)
+                step(trials, errors, CHUNK)
                 done.append(joints.copy())
         return np.array(done).reshape(-1, *joints.shape).transpose(1, 0, 2), errors
-
-
-def _compiled(scene: Scene) -> mujoco.MjModel:
-    try:
-        return mujoco.MjModel.from_xml_string(scene.xml)
-    except ValueError as error:
-        raise InputError(f"MuJoCo cannot compile the scene: {error}") from error
-
-
-def _step(trials: mujoco_batch.Batch, errors: dict[int, str]) -> None:
-    """Step all trials by one sample, except those that an error ended."""
-    running = np.setdiff1d(np.arange(trials.nsim), list(errors)) if errors else None
-    try:
-        trials.step(running, nstep=CHUNK)
-    except mujoco_batch.SimulationError as failure:
-        errors.update({int(trial): trials.error(int(trial)) for trial in failure.ids})
-
-
-@contextmanager
-def _unlogged() -> Iterator[None]:
-    """Keep the simulator from writing warnings to a file in the working directory.
-
-    The simulator's data counts the warnings, and `Motion.warnings` reports them.
-    """
-    before, quiet = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
-    quiet.logto_file = quiet.logto_console = False
-    mujoco.MjLogConfig.set(quiet)
-    try:
-        yield
-    finally:
-        mujoco.MjLogConfig.set(before)
 
 
 def first_touch(scene: Scene) -> tuple[Array, Array]:
@@ -193,19 +152,9 @@ def first_touch(scene: Scene) -> tuple[Array, Array]:
         Normals out of the fingertips, (k, 3), world axes, and depths, (k,) [m]; NaN for a fingertip
         that has not exactly one contact.
     """
-    model = _compiled(scene)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    count = len(scene.layout.contacts)
-    tips = [model.geom(f"finger{finger}").id for finger in range(count)]
-    normals, depths = np.full((count, 3), np.nan), np.full(count, np.nan)
-    for finger, tip in enumerate(tips):
-        own = [contact for contact in data.contact if tip in contact.geom]
-        if len(own) == 1:
-            (contact,) = own
-            normals[finger] = contact.frame[:3] * (1.0 if contact.geom[0] == tip else -1.0)
-            depths[finger] = -contact.dist
-    return normals, depths
+    model = compiled(scene.xml)
+    tips = [model.geom(f"finger{finger}").id for finger in range(len(scene.layout.contacts))]
+    return touched(model, mujoco.MjData(model), tips)
 
 
 def acceleration(scene: Scene, wrenches: Array) -> Array:
@@ -219,11 +168,11 @@ def acceleration(scene: Scene, wrenches: Array) -> Array:
         Force and torque that are not opposed, which is mass times acceleration, (n, 6), torque
         about the centre of mass.
     """
-    model = _compiled(scene)
+    model = compiled(scene.xml)
     data = mujoco.MjData(model)
     body, mass = model.body("object").id, np.zeros((model.nv, model.nv))
     left = np.empty((len(wrenches), 6))
-    with _unlogged():
+    with unlogged():
         for place, wrench in enumerate(wrenches):
             mujoco.mj_resetData(model, data)
             torque = wrench[3:] - np.cross(scene.layout.center, wrench[:3])

@@ -77,8 +77,9 @@ def require_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -
     worst = worst_touch(body, contacts, setup)
     if not worst.right:
         raise UnfaithfulError(
-            f"fingertip {worst.finger} does not touch the mesh as the planned face lies: the "
-            f"normal is off by {worst.normal_error_rad:.3g} rad (at most {NORMAL_ERROR:g}), the "
-            f"depth by {worst.depth_error:.3g} of it (at most {DEPTH_ERROR:g}; nan is no "
-            "contact); let fingertips touch pads, or raise ccd_iterations"
+            f"in simulation, fingertip {worst.finger} does not touch the mesh as planned: the "
+            f"contact normal is off by {worst.normal_error_rad:.3g} rad (at most "
+            f"{NORMAL_ERROR:g} is allowed), the depth by a share of {worst.depth_error:.3g} (at "
+            f"most {DEPTH_ERROR:g}; nan means no contact); use --surface pads, or raise "
+            "ccd_iterations in the settings of the physics"
         )

@@ -1,0 +1,238 @@
+"""Simulates held objects under drives, and returns their motions and contact forces.
+
+All trials of a scene run together. The palm is moved by forces: armature times the acceleration
+that its path asks for. MuJoCo's bodies of motion capture would have no velocity, so the bases of
+the fingers would not carry what they hold along.
+"""
+
+# pyright: basic, reportAttributeAccessIssue=false
+# MuJoCo ships no types for its core; plain arrays and numbers leave this module.
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.errors import InputError
+from scenes.execution.held_mjcf import SAMPLE_S, HeldScene, palm_armature
+from scenes.mjcf_text import quaternion
+from sim_validate.execution.drives import Drive, Table
+from sim_validate.execution.paths import WHOLE
+from sim_validate.simulation.engine import batch, compiled, mujoco, step, touched, unlogged
+
+FREE, PALM = 6, 12
+"""Joint velocities up to the end of the object's, and up to the end of the palm's."""
+LAID = 1e-7
+"""Depth of a table in the object at the start, in object radii: more than the rounding of meshes to
+single precision, and about as deep as objects rest."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldMotion:
+    """Where object, palm and fingertips were in each of the n samples, in the world frame."""
+
+    moved: Array
+    """Displacement of the object's centre of mass, (n, 3) [m]."""
+    turned: Array
+    """Orientation of the object (w, x, y, z), (n, 4)."""
+    palm: Array
+    """Positions of the palm's slides and hinges, (n, 6) [m, rad]."""
+    tips: Array
+    """Displacements of the fingertips along their springs, (n, k, 3) [m]."""
+    forces: Array
+    """Contact forces on the object along the axes of the springs, (n, k, 3) [N]."""
+    table: Array
+    """Force of the table on the object, (n, 3) [N]; other loads are taken away."""
+    faults: tuple[str, ...]
+    """What went wrong in the simulator, in words; empty if nothing did."""
+
+    @property
+    def joints(self) -> Array:
+        """Return the positions of all joints as the scene has them, (n, 13 + 3k)."""
+        tips = self.tips.reshape(len(self.tips), -1)
+        return np.concatenate([self.moved, self.turned, self.palm, tips], axis=1)
+
+
+class HeldBench:
+    """A compiled scene of execution on which many trials run at once."""
+
+    def __init__(self, scene: HeldScene, *, threads: int = 1, sample_s: float = SAMPLE_S) -> None:
+        """Compile a scene.
+
+        Args:
+            scene: What to simulate.
+            threads: Number of the simulator's threads; results do not depend on it.
+            sample_s: Duration of a sample, rounded to whole steps [s].
+
+        Raises:
+            InputError: The simulator refuses the scene, or a sample is not a number of its steps.
+        """
+        self.scene, self.threads = scene, threads
+        self.model = compiled(scene.xml)
+        step_s = float(self.model.opt.timestep)
+        self.chunk = max(1, round(sample_s / step_s))
+        self.sample_s = self.chunk * step_s
+        if sample_s == SAMPLE_S and abs(self.sample_s - SAMPLE_S) > WHOLE * SAMPLE_S:
+            raise InputError(
+                f"physics.timestep must divide the sample of {SAMPLE_S:g} s, got {step_s:g} s; "
+                "take 0.00125 s"
+            )
+        self.body = self.model.body("object").id
+        self.tips = [
+            self.model.geom(f"finger{finger}").id for finger in range(len(scene.layout.contacts))
+        ]
+
+    def run(
+        self, drives: Sequence[Drive], start: Array | None = None, friction: Array | None = None
+    ) -> tuple[HeldMotion, ...]:
+        """Simulate trials, all from the same state or from their own start.
+
+        Args:
+            drives: What is applied in each trial.
+            start: State at the end of an earlier motion (see `settled`); None for fingertips at
+                their contacts that do not push yet.
+            friction: Coulomb coefficient of each contact, (k,); None for those of the scene.
+        """
+        trials = self._begun(drives, start, friction)
+        lengths = np.array([len(drive) for drive in drives])
+        moved, forces = self._recorded(trials, lengths)
+        errors = self._stepped(trials, drives, lengths, moved, forces)
+        return tuple(
+            self._motion(
+                moved[place, : len(drive)], forces[place, : len(drive)],
+                _faults(trials, place, errors.get(place, "")),
+            )
+            for place, drive in enumerate(drives)
+        )  # fmt: skip
+
+    def settled(self, drive: Drive, friction: Array | None = None) -> tuple[HeldMotion, Array]:
+        """Simulate one trial; return its motion and the simulator's complete state at its end."""
+        trials = self._begun([drive], None, friction)
+        lengths = np.array([len(drive)])
+        moved, forces = self._recorded(trials, lengths)
+        errors = self._stepped(trials, [drive], lengths, moved, forces)
+        faults = _faults(trials, 0, errors.get(0, ""))
+        return self._motion(moved[0], forces[0], faults), trials.state[0].copy()
+
+    def touched(self, reached: Array) -> tuple[Array, Array]:
+        """Find what each fingertip touches before anything moves.
+
+        Args:
+            reached: Displacements of the fingertips along their springs, (k, 3) [m].
+
+        Returns:
+            Normals into the object, (k, 3), and depths, (k,) [m]; NaN for a fingertip that has not
+            exactly one contact.
+        """
+        data = mujoco.MjData(self.model)
+        data.qpos[PALM + 1 :] = reached.ravel()
+        return touched(self.model, data, self.tips)
+
+    def _recorded(self, trials: batch.Batch, lengths: Array) -> tuple[Array, Array]:
+        count, most = trials.nsim, int(lengths.max())
+        return np.zeros((count, most, self.model.nq)), np.zeros((count, most, self.model.nv))
+
+    def _begun(
+        self, drives: Sequence[Drive], start: Array | None, friction: Array | None
+    ) -> batch.Batch:
+        """Put every trial into its state at the start."""
+        trials = batch.Batch(self.model, len(drives), self.threads)
+        trials.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        if start is not None:
+            trials.state[:] = start
+        joints, speeds = trials.bind("qpos"), trials.bind("qvel")
+        for place, drive in enumerate(drives):
+            if drive.pose is not None:
+                joints[place, :3] = drive.pose.moved
+                joints[place, 3:7] = drive.pose.quaternion
+            if drive.reached is not None:
+                joints[place, PALM + 1 :] = drive.reached.ravel()
+            speeds[place, :3] += drive.velocity
+            speeds[place, FREE : FREE + 3] += drive.velocity
+        if any(drive.table for drive in drives):
+            self._lay_tables(trials, drives)
+        if friction is not None:
+            trials.expand("geom_friction")[:, self.tips, 0] = friction
+        return trials
+
+    def _lay_tables(self, trials: batch.Batch, drives: Sequence[Drive]) -> None:
+        """Lay tables where they touch: objects would fall on others, and sink and rise again."""
+        into = LAID * self.scene.layout.radius_m
+        place, turn = trials.bind("mocap_pos"), trials.bind("mocap_quat")
+        for trial, drive in enumerate(drives):
+            if drive.table is not None:
+                place[trial, 0] = drive.table.point + into * drive.table.normal
+                turn[trial, 0] = quaternion(facing(drive.table))
+
+    def _stepped(
+        self, trials: batch.Batch, drives: Sequence[Drive], lengths: Array,
+        moved: Array, forces: Array,
+    ) -> dict[int, str]:  # fmt: skip
+        """Step all trials to their ends, filling in joints and contact forces; return errors."""
+        loads, motors, commands = self._applied(drives, int(lengths.max()))
+        applied, palm = trials.bind("xfrc_applied"), trials.bind("qfrc_applied")
+        servos, pushed = trials.bind("ctrl"), trials.bind("qfrc_constraint")
+        joints = trials.bind("qpos")
+        errors: dict[int, str] = {}
+        with unlogged():
+            for sample in range(len(loads)):
+                going = np.flatnonzero(lengths > sample)
+                applied[:, self.body] = loads[sample]
+                palm[:, FREE:PALM] = motors[sample]
+                servos[:] = commands[sample]
+                step(trials, errors, self.chunk, going)
+                moved[going, sample] = joints[going]
+                forces[going, sample] = pushed[going]
+        return errors
+
+    def _applied(self, drives: Sequence[Drive], most: int) -> tuple[Array, Array, Array]:
+        """Return loads, forces of the palm and commands, by sample and trial; zero after an end."""
+        layout = self.scene.layout
+        loads = np.zeros((most, len(drives), 6))
+        motors = np.zeros((most, len(drives), PALM - FREE))
+        commands = np.zeros((most, len(drives), layout.stiffness.size))
+        give = layout.pushes / layout.stiffness
+        for place, drive in enumerate(drives):
+            n = len(drive)
+            loads[:n, place] = drive.wrenches
+            loads[:n, place, :3] += layout.mass_kg * (drive.gravity - layout.gravity)
+            motors[:n, place] = drive.accelerations * palm_armature(layout)
+            base = 0.0 if drive.reached is None else drive.reached
+            told = base + drive.grasping.reshape(n, -1, 1) * give
+            commands[:n, place] = told.reshape(n, -1)
+        return loads, motors, commands
+
+    def _motion(self, joints: Array, forces: Array, faults: tuple[str, ...]) -> HeldMotion:
+        shape = (len(joints), *self.scene.layout.stiffness.shape)
+        own = -forces[:, PALM:].reshape(shape)
+        axes = self.scene.layout.axes
+        finger_forces = np.einsum("kij,nkj->ni", axes, own)
+        return HeldMotion(
+            moved=joints[:, :3],
+            turned=joints[:, 3:7],
+            palm=joints[:, 7 : PALM + 1],
+            tips=joints[:, PALM + 1 :].reshape(shape),
+            forces=own,
+            table=forces[:, :3] - finger_forces,
+            faults=faults,
+        )
+
+
+def facing(table: Table) -> Array:
+    """Return a rotation whose third column is the table's normal, (3, 3)."""
+    normal = table.normal
+    aside = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    first = np.cross(aside, normal)
+    first /= np.linalg.norm(first)
+    return np.column_stack([first, np.cross(normal, first), normal])
+
+
+def _faults(trials: batch.Batch, trial: int, error: str) -> tuple[str, ...]:
+    found = [error] if error else []
+    if not np.isfinite(trials.state[trial]).all():
+        found.append("a number of the simulator's state is not finite")
+    warnings = int(trials.warning[trial, :, 1].sum())
+    if warnings:
+        found.append(f"the simulator raised {warnings} warnings")
+    return tuple(found)

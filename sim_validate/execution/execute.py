@@ -1,0 +1,228 @@
+"""Executes a grasp: chooses its squeeze, runs all trials in one batch, and judges each.
+
+The squeeze is chosen once: the one that carries the most of the object's weight in any direction
+with the largest push allowed. Every trial then runs with it. Before, the simulator is checked on
+cases whose answers are known (see `gate`).
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array
+from grasp_core.checked import instance, several, whole
+from grasp_core.closure.contact_arrays import FEWEST, contact_arrays, stacked
+from grasp_core.errors import InputError, NoForcesError, UnfaithfulError
+from grasp_core.execution.best_squeeze import BestSqueeze, best_squeeze
+from grasp_core.execution.grips import Grip
+from grasp_core.execution.loads import any_direction
+from grasp_core.execution.worst_loads import Reactions
+from grasp_core.objects.on_faces import check_body, check_on_faces
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.solvers.ties import first_best
+from grasp_core.values import Contact, Grasp
+from scenes.execution.held import HeldLayout
+from scenes.execution.held_mjcf import HeldScene, build_held_scene
+from scenes.fingertips import fitting_radius
+from scenes.physics import PhysicsSettings
+from sim_validate.execution import paths
+from sim_validate.execution.bench import HeldBench, HeldMotion
+from sim_validate.execution.drives import Drive
+from sim_validate.execution.gate.gate import require_faithful_execution
+from sim_validate.execution.predictions import held_dynamics, predicted_slips
+from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.execution.slips import outcome
+from sim_validate.execution.trials import Trial, trials_of
+from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
+from sim_validate.simulation.setup import MOST_THREADS
+
+CONTROL_FRICTION = 0.9
+CONTROL_SQUEEZE = 0.9
+"""Friction and squeeze of the controls, relative to the trials'."""
+FOLLOWED = 12.0
+"""Duration of a rise that the held object follows, in reciprocals of its lowest frequency."""
+LONGEST_RISE_S = 10.0
+"""Longest rise that is simulated: objects of tonnes on soft springs would take minutes [s]."""
+
+
+def execute(
+    body: Polyhedron,
+    grasp: Grasp | Iterable[Contact],
+    friction: ArrayLike,
+    settings: ExecutionSettings,
+    *,
+    threads: int = 1,
+    physics: PhysicsSettings | None = None,
+) -> Execution:
+    """Simulate a grasp as a robot would execute it, and predict the outcome.
+
+    Args:
+        body: The object.
+        grasp: A grasp, or contacts, at least two.
+        friction: Coulomb coefficient, one for all contacts or one each.
+        settings: Mass, springs, trials and thresholds.
+        threads: Number of the simulator's threads; results do not depend on it.
+        physics: Settings of the simulator; None for those that suit springs and masses. Gravity
+            must be that of the settings.
+
+    Raises:
+        InputError: A number is out of range.
+        NoForcesError: No squeeze carries the weight, or the grip is unstable under the best one.
+        UnfaithfulError: The simulator fails on a case with a known answer, or failed in a trial.
+    """
+    instance(settings, ExecutionSettings, "settings")
+    whole(threads, "threads", least=1, most=MOST_THREADS)
+    best = chosen_squeeze(body, grasp, friction, settings)
+    scene = held_scene(body, best.grip, settings, physics)
+    require_faithful_execution(scene.layout, scene.physics, settings.hand, settings.push_n)
+    bench = HeldBench(scene, threads=threads)
+    dynamics = held_dynamics(best.grip, scene.layout)
+    trials, skipped = trials_of(body, scene.layout, settings, dynamics.lowest_frequency)
+    predicted = predicted_slips(dynamics, [trial.expected or trial.drive for trial in trials])
+    motions = run_trials(bench, trials)
+    judged = tuple(
+        _judged(trial, motion, float(multiple), scene.layout, best.grip, settings)
+        for trial, motion, multiple in zip(trials, motions, predicted, strict=True)
+    )
+    return Execution(
+        mass_kg=settings.mass_kg,
+        squeeze=best.grip.squeeze,
+        load_multiple=best.scale,
+        trials=judged,
+        controls=_controls(bench, best, dynamics.lowest_frequency),
+        skipped=skipped,
+        physics=scene.physics,
+    )
+
+
+def chosen_squeeze(
+    body: Polyhedron, grasp: Grasp | Iterable[Contact], friction: ArrayLike,
+    settings: ExecutionSettings,
+) -> BestSqueeze:  # fmt: skip
+    """Choose the squeeze that carries the most of the weight in any direction.
+
+    Raises:
+        InputError: A number is out of range.
+        NoForcesError: No squeeze carries any weight, or the grip is unstable under the best one.
+    """
+    check_body(body)
+    if isinstance(grasp, Grasp):
+        check_on_faces(body, grasp)
+    listed = grasp.contacts if isinstance(grasp, Grasp) else grasp
+    each = partial(instance, kind=Contact, name="grasp", remedy="or give a Grasp")
+    contacts = several(listed, each, "grasp", "Contact values")
+    if len(contacts) < FEWEST:
+        raise InputError(f"grasp: at least two contacts are needed, got {len(contacts)}")
+    radius = tip_radius(body, contacts, settings)
+    best = best_squeeze(
+        body, contacts, friction, any_direction(settings.mass_kg), max_push_n=settings.push_n,
+        stiffness=settings.stiffness_n_per_m, tip_radius_m=radius,
+    )  # fmt: skip
+    if best.scale == 0.0:
+        raise NoForcesError(
+            "no squeeze carries any part of the weight in every direction; use other contacts or "
+            "more friction"
+        )
+    return best
+
+
+def tip_radius(body: Polyhedron, contacts: Sequence[Contact], settings: ExecutionSettings) -> float:
+    """Return the radius of the fingertips: as in the settings, or one that fits the contacts [m].
+
+    Raises:
+        InputError: The contacts are not finite.
+    """
+    if settings.tip_radius_m is not None:
+        return settings.tip_radius_m
+    return fitting_radius(body, *contact_arrays(*stacked(contacts)))
+
+
+def held_scene(
+    body: Polyhedron, grip: Grip, settings: ExecutionSettings,
+    physics: PhysicsSettings | None = None,
+) -> HeldScene:  # fmt: skip
+    """Build the scene in which a grip is executed."""
+    return build_held_scene(body, grip, settings.mass_kg, settings=settings.hand, physics=physics)
+
+
+def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> tuple[HeldMotion, ...]:
+    """Simulate trials: those of a squeezed object from one state, the others from open fingers."""
+    _, squeezed = bench.settled(paths.closing())
+    found: dict[str, HeldMotion] = {}
+    for apart, start in ((False, squeezed), (True, None)):
+        own = [trial for trial in trials if trial.apart == apart]
+        if own:
+            motions = bench.run([trial.drive for trial in own], start)
+            found |= {trial.name: motion for trial, motion in zip(own, motions, strict=True)}
+    return tuple(found[trial.name] for trial in trials)
+
+
+def _judged(
+    trial: Trial, motion: HeldMotion, predicted: float, layout: HeldLayout, grip: Grip,
+    settings: ExecutionSettings,
+) -> ExecutionTrial:  # fmt: skip
+    if motion.faults:
+        raise UnfaithfulError(f"{trial.name}: {'; '.join(motion.faults)}")
+    found = outcome(motion, layout, trial.drive, grip.friction, trial.begun)
+    kept = found.displacement_m <= settings.most_m and found.turn_rad <= settings.most_rad
+    held = "slipped" if found.slipped else "stuck"
+    return ExecutionTrial(
+        kind=trial.kind,
+        name=trial.name,
+        survived=kept and not found.dropped,
+        fate="dropped" if found.dropped else held,
+        slip_m=found.slip_m,
+        displacement_m=found.displacement_m,
+        turn_rad=found.turn_rad,
+        predicted_first_slip=predicted,
+        simulated_first_slip=found.first_slip,
+    )
+
+
+def _controls(
+    bench: HeldBench, best: BestSqueeze, lowest_frequency: float
+) -> tuple[ExecutionControl, ...]:
+    """Put the least load that slips on grips that are weaker than certified; each must slip.
+
+    The load grows so slowly that the held object follows it.
+    """
+    layout, friction = bench.scene.layout, best.grip.friction
+    rise_s = min(max(2.0 * paths.RISE_S, FOLLOWED / lowest_frequency), LONGEST_RISE_S)
+    share = paths.smooth(paths.samples(rise_s))
+    drive = replace(paths.loaded(share, np.zeros(3)), wrenches=share[:, None] * slipping_load(best))
+    all_push = np.ones(len(friction))
+    one_idle = all_push.copy()
+    one_idle[int(np.argmax(layout.pushes.max(axis=1)))] = 0.0
+    weaker = {
+        f"friction {CONTROL_FRICTION:g}": (CONTROL_FRICTION * friction, all_push),
+        f"squeeze {CONTROL_SQUEEZE:g}": (friction, CONTROL_SQUEEZE * all_push),
+        "a finger that does not push": (friction, one_idle),
+    }
+    return tuple(_control(bench, name, drive, *weak) for name, weak in weaker.items())
+
+
+def slipping_load(best: BestSqueeze) -> Array:
+    """Return the least load of a set that makes a contact slip, (6,) [N, N m].
+
+    It is larger than the worst certified load where a finger reaches its largest push before any
+    contact slips: the simulated fingers push as hard as their springs do.
+    """
+    reactions = Reactions.of(best.grip, best.loads)
+    angles, scales = reactions.worst_angles()
+    contact = first_best(-scales)
+    direction = reactions.worst_of(contact, float(angles[contact]))
+    return best.loads.offset + float(scales[contact]) * best.loads.axes @ direction
+
+
+def _control(
+    bench: HeldBench, name: str, drive: Drive, friction: Array, pushing: Array
+) -> ExecutionControl:
+    close = paths.closing()
+    _, state = bench.settled(replace(close, grasping=np.outer(close.grasping, pushing)), friction)
+    weak = replace(drive, grasping=np.outer(np.ones(len(drive)), pushing))
+    (motion,) = bench.run([weak], state, friction)
+    found = outcome(motion, bench.scene.layout, weak, friction)
+    return ExecutionControl(name, found.slipped, found.first_slip)

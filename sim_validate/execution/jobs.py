@@ -1,0 +1,106 @@
+"""Executes several grasps of one object, in one process or in several, with results in order."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.errors import NoForcesError
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Grasp
+from scenes.physics import PhysicsSettings
+from sim_validate.execution.execute import chosen_squeeze, execute, held_scene
+from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.execution.verdict import Execution
+from sim_validate.parallel.processes import each, processes
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutionJob:
+    """One grasp to execute, as it is sent to a worker process."""
+
+    body: Polyhedron
+    grasp: Grasp
+    friction: float
+    settings: ExecutionSettings
+    physics: Mapping[str, object] = field(default_factory=dict[str, object])
+    """Settings of the simulator that differ from the usual ones, by name."""
+    threads: int = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExecutedGrasp:
+    """A grasp with what its execution found, or with the reason why no squeeze holds the object."""
+
+    id: str
+    family: str
+    contacts_sha256: str
+    """Hash of the contacts, which tells grasps of one id apart."""
+    execution: Execution | None
+    """Trials and negative controls; None where no squeeze carries the weight."""
+    reason: str | None = None
+    """Why there is no execution: no squeeze carries the weight, or the best one is unstable."""
+
+    @property
+    def survived(self) -> bool:
+        """Whether the object survived every trial, of at least one."""
+        return self.execution is not None and self.execution.survived
+
+    @property
+    def controls_let_go(self) -> bool:
+        """Whether every negative control slipped, as it must; True where there is none."""
+        return self.execution is None or self.execution.controls_let_go
+
+
+def executed(jobs: Sequence[ExecutionJob], processors: int) -> Iterator[ExecutedGrasp]:
+    """Yield one result per job, in order; the number of processors does not change the results.
+
+    Args:
+        jobs: The grasps to execute.
+        processors: How many processors to use: as processes, and as threads of the simulator where
+            there are too few grasps for that many processes.
+
+    Raises:
+        InputError: A grasp or a setting is refused.
+        UnfaithfulError: The simulator failed in a trial, or fails its checks.
+    """
+    threads = max(1, processors // processes(len(jobs), processors))
+    return each(executed_grasp, [replace(job, threads=threads) for job in jobs], jobs=processors)
+
+
+def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
+    """Execute one grasp; a grasp without a squeeze is a result with a reason.
+
+    Raises:
+        InputError: The grasp or a setting is refused.
+        UnfaithfulError: The simulator failed in a trial, or fails its checks.
+    """
+    grasp = job.grasp
+    found, reason = None, None
+    try:
+        found = execute(
+            job.body,
+            grasp,
+            job.friction,
+            job.settings,
+            physics=physics_of(job),
+            threads=job.threads,
+        )
+    except NoForcesError as error:
+        reason = str(error)
+    return ExecutedGrasp(grasp.id, grasp.family, contacts_sha256(grasp.contacts), found, reason)
+
+
+def physics_of(job: ExecutionJob) -> PhysicsSettings | None:
+    """Return the usual settings for the grasp's springs and masses with the job's changes.
+
+    Returns:
+        The settings; None where the job changes nothing, and the usual ones are taken.
+
+    Raises:
+        InputError: The grasp or a setting is refused.
+        NoForcesError: No squeeze carries the weight.
+    """
+    if not job.physics:
+        return None
+    best = chosen_squeeze(job.body, job.grasp, job.friction, job.settings)
+    return replace(held_scene(job.body, best.grip, job.settings).physics, **job.physics)

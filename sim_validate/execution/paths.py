@@ -1,0 +1,204 @@
+"""The drive of each kind of trial: how the palm moves, where gravity points, what strikes.
+
+Accelerations are differences of the path's velocity between samples, so the palm has the path's
+velocity at every sample, and rests when the path ends. Loads grow smoothly over `RISE_S`: what
+springs and masses do is to be seen, and not the ring of a sudden start.
+
+The direction of gravity in `weight` follows a spiral on the sphere,
+
+    polar angle = pi u,   azimuth = 2 pi N u,   0 <= u <= 1,                              (1)
+
+with N turns, whose neighbouring turns are `SPACING` apart: as close as 42 directions are that
+share the sphere evenly. u is chosen so that the speed on the sphere is the same everywhere.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from scenes.execution.held_mjcf import SAMPLE_S
+from sim_validate.execution.drives import Drive, idle
+from sim_validate.simulation.schedules import Clock, smooth
+
+CLOSE_S = 0.15
+"""Time in which the fingers build up the squeeze [s]."""
+LAY_S = 0.05
+"""Time in which an object on a table gets its weight, before fingers close; laid down at once, it
+would sink and rise while they hold on to it [s]."""
+REST_S = 0.1
+"""Time before the load comes, and after it has gone [s]."""
+RISE_S = 0.15
+"""Time in which a load grows [s]."""
+SPACING = 0.55
+"""Angle between neighbouring turns of gravity's spiral [rad]."""
+TURNING = (1.0, 10.0)
+"""Least and largest speed of gravity's direction [rad/s]."""
+SLOW = 0.15
+"""Speed of gravity's direction, relative to the held object's lowest natural frequency: it lags
+by some degrees, and gains 2 % at most."""
+CYCLES = 2
+"""Cycles of a shake at its full size, after one in which it grows."""
+STRIKE_S = 0.02
+"""Duration of a knock [s]."""
+WHOLE = 1e-9
+"""Difference from a whole number that is rounding."""
+STOP_RISE_S = 0.02
+"""Time in which the deceleration of a stop grows and goes [s]."""
+
+
+def samples(duration_s: float) -> int:
+    """Return the whole number of samples nearest to a duration, at least one."""
+    return Clock(SAMPLE_S).samples(duration_s)
+
+
+def smoother(count: int) -> Array:
+    """Return shares that rise from 0 to 1 without a jump of speed or acceleration, (count,)."""
+    u = np.arange(1, count + 1) / count
+    return u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
+
+
+def closing(after_s: float = REST_S) -> Drive:
+    """Return the drive in which fingers build up the squeeze on a weightless object."""
+    grasping = np.concatenate([smooth(samples(CLOSE_S)), np.ones(samples(after_s))])
+    return replace(idle(len(grasping)), grasping=grasping)
+
+
+def loaded(share: Array, gravity: Array) -> Drive:
+    """Return the drive in which a squeezed object comes under its weight.
+
+    Args:
+        share: Share of the load, (n,).
+        gravity: Full gravity, (3,) or (n, 3) [m/s^2].
+    """
+    count = len(share)
+    weight = share[:, None] * np.broadcast_to(gravity, (count, 3))
+    return replace(idle(count), gravity=weight, shares=share)
+
+
+def turned_weight(slowest_rad_per_s: float) -> Drive:
+    """Return the drive of `weight`: gravity turned through all directions.
+
+    Args:
+        slowest_rad_per_s: Lowest natural frequency of the held object [rad/s].
+    """
+    speed = float(np.clip(SLOW * slowest_rad_per_s, *TURNING))
+    turns = math.pi / SPACING
+    fine = np.arange(2001) / 2000.0
+    points = _spiral(fine, turns)
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(lengths)])
+    count = samples(float(along[-1]) / speed)
+    evenly = along[-1] * np.arange(count) / (count - 1.0)
+    path = _spiral(np.asarray(np.interp(evenly, along, fine), dtype=np.float64), turns)
+    rise = smooth(samples(RISE_S))
+    share = np.concatenate([rise, np.ones(count)])
+    way = np.concatenate([np.broadcast_to(path[0], (len(rise), 3)), path])
+    return loaded(share, GRAVITY_M_PER_S2 * way)
+
+
+def _spiral(u: Array, turns: float) -> Array:
+    polar, azimuth = math.pi * u, 2.0 * math.pi * turns * u
+    flat = np.sin(polar)
+    return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.cos(polar)], axis=1)
+
+
+def held_weight(gravity: Array, rest_s: float = RISE_S) -> Drive:
+    """Return the drive in which the weight comes in one direction, and stays."""
+    share = np.concatenate([smooth(samples(RISE_S)), np.ones(samples(rest_s))])
+    return loaded(share, gravity)
+
+
+def shake(gravity: Array, axis: Array, frequency_hz: float) -> Drive:
+    """Return the drive of a shake under weight.
+
+    Args:
+        gravity: Acceleration of gravity, (3,) [m/s^2].
+        axis: Largest acceleration of the palm, (6,) [m/s^2, rad/s^2].
+        frequency_hz: Frequency of the sinusoid [Hz].
+    """
+    rate = 2.0 * math.pi * frequency_hz
+    grow, hold = 1.0 / frequency_hz, CYCLES / frequency_hz
+    wave = samples(grow + hold)
+    weight = samples(RISE_S)
+    times = SAMPLE_S * np.arange(wave + 1)
+    size = np.clip(times / grow, 0.0, 1.0)
+    size = size * size * (3.0 - 2.0 * size)
+    # velocity of a sinusoid about a middle that rests: -cos, whose start is slow as its size is 0
+    speeds = -size * np.cos(rate * times) / rate
+    accelerations = np.zeros((weight + wave, 6))
+    accelerations[weight:] = np.diff(speeds)[:, None] / SAMPLE_S * axis
+    share = np.concatenate([smooth(weight), np.ones(wave)])
+    return replace(loaded(share, gravity), accelerations=accelerations)
+
+
+def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> Drive:
+    """Return the drive of a stop under weight.
+
+    Args:
+        gravity: Acceleration of gravity, (3,) [m/s^2].
+        way: Unit direction of the motion before, (3,).
+        deceleration: Largest deceleration [m/s^2].
+        speed: Speed before [m/s].
+    """
+    weight, rest = samples(RISE_S), samples(REST_S)
+    whole = speed / deceleration / SAMPLE_S  # samples at the full deceleration
+    rise = max(1, int(min(STOP_RISE_S / SAMPLE_S, whole) + WHOLE))
+    flat = max(0, int(whole - rise + WHOLE))
+    # a rise and its fall are as long as one; what is left of a sample finds its place in the fall
+    left = min(max(whole - rise - flat, 0.0), 1.0)
+    fall = np.sort(np.append(1.0 - smooth(rise), left))[::-1]
+    shape = np.concatenate([smooth(rise), np.ones(flat), fall])
+    accelerations = np.zeros((weight + len(shape) + rest, 6))
+    size = speed / (SAMPLE_S * float(shape.sum()))  # the deceleration, but for the shortest stops
+    accelerations[weight : weight + len(shape), :3] = -size * shape[:, None] * way
+    share = np.concatenate([smooth(weight), np.ones(len(shape) + rest)])
+    under = loaded(share, gravity)
+    return replace(under, accelerations=accelerations, velocity=speed * way)
+
+
+def knock(gravity: Array, impulse: Array, point: Array) -> Drive:
+    """Return the drive of a knock under weight.
+
+    Args:
+        gravity: Acceleration of gravity, (3,) [m/s^2].
+        impulse: Force over time, (3,) [N s].
+        point: Where it strikes, from the centre of mass, (3,) [m].
+    """
+    weight, strike, rest = samples(RISE_S), samples(STRIKE_S), samples(REST_S)
+    wrenches = np.zeros((weight + strike + rest, 6))
+    shape = np.sin(np.pi * (np.arange(strike) + 0.5) / strike)
+    force = impulse / (SAMPLE_S * shape.sum())
+    whole = np.concatenate([force, np.cross(point, force)])
+    wrenches[weight : weight + strike] = shape[:, None] * whole
+    share = np.concatenate([smooth(weight), np.ones(strike + rest)])
+    return replace(loaded(share, gravity), wrenches=wrenches)
+
+
+def lift(up: Array, height: float, duration_s: float) -> tuple[Drive, int]:
+    """Return the drive of a lift from a table, and the sample at which it begins.
+
+    Args:
+        up: Unit vector against gravity, (3,).
+        height: Height of the lift [m].
+        duration_s: Its duration [s].
+    """
+    laid = samples(LAY_S)
+    before, count, rest = laid + samples(CLOSE_S + REST_S), samples(duration_s), samples(REST_S)
+    u = np.arange(count + 1) / count
+    speeds = 30.0 * u**2 * (1.0 - u) ** 2 * height / duration_s  # of the path with least jerk
+    accelerations = np.zeros((before + count + rest, 6))
+    accelerations[before : before + count, :3] = np.diff(speeds)[:, None] / SAMPLE_S * up
+    total = len(accelerations)
+    close = smooth(samples(CLOSE_S))
+    grasping = np.concatenate([np.zeros(laid), close, np.ones(total - laid - len(close))])
+    share = np.zeros(total)
+    share[before : before + samples(RISE_S)] = smooth(samples(RISE_S))
+    share[before + samples(RISE_S) :] = 1.0
+    still = idle(total)
+    weight = np.concatenate([smooth(laid), np.ones(total - laid)])
+    gravity = -GRAVITY_M_PER_S2 * weight[:, None] * up
+    drive = Drive(accelerations, gravity, still.wrenches, grasping, share, np.zeros(3))
+    return drive, before

@@ -1,0 +1,184 @@
+"""The first slip that the analysis predicts for a trial, from small motions of the held object.
+
+While no contact slips, the fingertips move with the surface, and the object moves by x = (d, t)
+against the palm as a mass on springs:
+
+    M x'' + C x' + K x = w,                                                               (1)
+    M = M_o + sum_i m_t W_i W_i',   C = sum_i W_i C_i W_i',
+
+with the maps W_i and the grasp stiffness K of `grasp_core.execution.grips`, the object's mass
+matrix M_o, the tips' masses m_t and the dampers C_i. In the palm's axes, the load w is the object's
+weight and what else acts on it, less the inertial forces of the palm's acceleration (a, e) and
+rate of turning o:
+
+    w = (m g, 0) + w_e - M_o (a, e) - (0, o x I o) - sum_i W_i m_t b_i,                   (2)
+    b_i = a + e x c_i + o x (o x c_i),
+
+with the object's inertia I and the tips' centres c_i. The contact force on the object then changes
+by
+
+    -K_i d_i - C_i d_i' - m_t (d_i'' + b_i),   d_i = W_i' x,                              (3)
+
+and along axes that turn with the object by -t x f_i more. The whole load is scaled: the least
+multiple at which a contact reaches its cone at any time is the predicted one. A trial whose
+multiple is above one holds without slip. (1) is solved exactly for loads that are constant in each
+sample.
+"""
+
+import importlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure.wrenches import cross_matrix, grasp_map
+from grasp_core.execution.first_slip import slip_steps
+from grasp_core.execution.grips import Grip
+from scenes.execution.held import HeldLayout
+from scenes.execution.held_mjcf import SAMPLE_S
+from sim_validate.execution.drives import Drive
+
+POSE = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldDynamics:
+    """A held object as a mass on springs, by (1)."""
+
+    grip: Grip
+    layout: HeldLayout
+    maps: Array
+    """W_i, (k, 6, 3)."""
+    own: Array
+    """M_o, (6, 6) [kg, kg m^2]."""
+    mass: Array
+    """M, (6, 6) [kg, kg m, kg m^2]."""
+    damping: Array
+    """C, (6, 6) [N s/m, N s, N m s]."""
+    dampers: Array
+    """C_i, (k, 3, 3) [N s/m]."""
+
+    @property
+    def lowest_frequency(self) -> float:
+        """Return the lowest natural frequency [rad/s], without damping; 0 if unstable."""
+        inverse = np.linalg.inv(np.linalg.cholesky(self.mass))
+        stiff = inverse @ self.grip.grasp_stiffness @ inverse.T
+        return float(np.sqrt(max(np.linalg.eigvalsh(0.5 * (stiff + stiff.T))[0], 0.0)))
+
+
+def held_dynamics(grip: Grip, layout: HeldLayout) -> HeldDynamics:
+    """Build (1) for a grip and the masses and dampers of its scene."""
+    maps = grasp_map(grip.arms).reshape(POSE, -1, 3).transpose(1, 0, 2)
+    own = np.zeros((POSE, POSE))
+    own[:3, :3] = layout.mass_kg * np.eye(3)
+    own[3:, 3:] = layout.inertia_kg_m2
+    dampers = np.einsum("kij,kj,klj->kil", layout.axes, layout.damping, layout.axes)
+    mass = own + layout.tip_mass_kg * np.einsum("kij,klj->il", maps, maps)
+    damping = np.einsum("kij,kjl,kml->im", maps, dampers, maps)
+    return HeldDynamics(grip, layout, maps, own, mass, damping, dampers)
+
+
+def predicted_slips(dynamics: HeldDynamics, drives: Sequence[Drive]) -> Array:
+    """Return the least multiple of each drive's load at which a contact slips, (drives,).
+
+    Infinite where none ever does; zero where the grip is unstable at rest.
+    """
+    if not drives or not dynamics.grip.stable:
+        return np.zeros(len(drives))
+    lengths = [len(drive) for drive in drives]
+    loads = np.zeros((len(drives), max(lengths), POSE))
+    bases = np.zeros((len(drives), max(lengths), *dynamics.layout.contacts.shape))
+    for place, drive in enumerate(drives):
+        loads[place, : len(drive)], bases[place, : len(drive)] = _load(dynamics, drive)
+    changes = _force_changes(dynamics, loads, bases)
+    rest = dynamics.grip.local_squeeze
+    return np.array(
+        [
+            _least(rest, change[:length], dynamics.grip.friction)
+            for change, length in zip(changes, lengths, strict=True)
+        ]
+    )
+
+
+def _least(rest: Array, changes: Array, friction: Array) -> float:
+    count = len(changes)
+    flat = slip_steps(np.tile(rest, (count, 1)), changes.reshape(-1, 3), np.tile(friction, count))
+    return float(flat.min())
+
+
+def _load(dynamics: HeldDynamics, drive: Drive) -> tuple[Array, Array]:
+    """Return w of (2), (n, 6), and the accelerations b_i, (n, k, 3), in the palm's axes.
+
+    A table carries the object until its share of the load is one.
+    """
+    layout = dynamics.layout
+    angles = SAMPLE_S * np.cumsum(SAMPLE_S * np.cumsum(drive.accelerations[:, 3:], axis=0), axis=0)
+    share = drive.shares if drive.table is not None else np.ones(len(drive))
+    weight = layout.mass_kg * share[:, None] * drive.gravity
+    weight = _turned_back(weight, angles)
+    load = drive.wrenches.copy()
+    load[:, :3] += weight
+    bases = _bases(layout, drive.accelerations)
+    rates = _rates(drive.accelerations)
+    load -= drive.accelerations @ dynamics.own.T
+    load[:, 3:] -= np.cross(rates, rates @ layout.inertia_kg_m2)
+    load -= layout.tip_mass_kg * np.einsum("kij,nkj->ni", dynamics.maps, bases)
+    return load, bases
+
+
+def _turned_back(vectors: Array, angles: Array) -> Array:
+    """Turn vectors (n, 3) back by the palm's angles (n, 3), which are about one axis at a time."""
+    size = np.linalg.norm(angles, axis=1, keepdims=True)
+    axis = angles / np.where(size > 0.0, size, 1.0)
+    along = np.einsum("ni,ni->n", axis, vectors)[:, None] * axis
+    turned = np.cos(size) * (vectors - along) - np.sin(size) * np.cross(axis, vectors) + along
+    return np.where(size > 0.0, turned, vectors)
+
+
+def _bases(layout: HeldLayout, accelerations: Array) -> Array:
+    """Return the accelerations b_i of the fingers' bases in (2), (n, k, 3) [m/s^2]."""
+    turning = np.cross(accelerations[:, None, 3:], layout.tip_centers)
+    rates = _rates(accelerations)[:, None]
+    inwards = np.cross(rates, np.cross(rates, layout.tip_centers))
+    return accelerations[:, None, :3] + turning + inwards
+
+
+def _rates(accelerations: Array) -> Array:
+    """Return the palm's rate of turning in the middle of each sample, (n, 3) [rad/s]."""
+    turning = accelerations[:, 3:]
+    return SAMPLE_S * (np.cumsum(turning, axis=0) - 0.5 * turning)
+
+
+def _force_changes(dynamics: HeldDynamics, loads: Array, bases: Array) -> Array:
+    """Return the change of the contact forces by (3), in their frames, (drives, n, k, 3)."""
+    grip, layout = dynamics.grip, dynamics.layout
+    motion, speed, acceleration = _solved(dynamics, loads)
+    turned_maps = dynamics.maps.transpose(0, 2, 1)
+    inertia = layout.tip_mass_kg * (turned_maps @ acceleration + bases[..., None])
+    forces = grip.stiffness @ turned_maps @ motion + dynamics.dampers @ turned_maps @ speed
+    turns = np.array([cross_matrix(force) for force in grip.squeeze])
+    changes = turns @ motion[..., 3:, :] - forces - inertia
+    return np.einsum("kij,...kil->...kj", grip.frames, changes)
+
+
+def _solved(dynamics: HeldDynamics, loads: Array) -> tuple[Array, Array, Array]:
+    """Solve (1) from rest; return x, x' and x'' after each sample, (drives, n, 1, 6, 1) each."""
+    linalg: Any = importlib.import_module("scipy.linalg")
+    inverse = np.linalg.inv(dynamics.mass)
+    stiff, damp = inverse @ dynamics.grip.grasp_stiffness, inverse @ dynamics.damping
+    system = np.zeros((3 * POSE, 3 * POSE))
+    system[:POSE, POSE : 2 * POSE] = np.eye(POSE)
+    system[POSE : 2 * POSE] = np.hstack([-stiff, -damp, inverse])
+    advanced: Array = linalg.expm(SAMPLE_S * system)[: 2 * POSE]
+    step, gain = advanced[:, : 2 * POSE].T, advanced[:, 2 * POSE :].T
+    states = np.zeros((*loads.shape[:2], 2 * POSE))
+    pushed = loads @ gain
+    state = np.zeros((len(loads), 2 * POSE))
+    for sample in range(loads.shape[1]):
+        state = state @ step + pushed[:, sample]
+        states[:, sample] = state
+    motion, speed = states[..., :POSE], states[..., POSE:]
+    acceleration = loads @ inverse.T - motion @ stiff.T - speed @ damp.T
+    return motion[..., None, :, None], speed[..., None, :, None], acceleration[..., None, :, None]

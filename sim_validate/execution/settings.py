@@ -1,0 +1,116 @@
+"""What users choose for executions: mass, springs, trials, and what counts as survival."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias, get_args
+
+from grasp_core.checked import LARGEST, instance, number, one_of, positive, seed_of, several, whole
+from grasp_core.errors import InputError
+from grasp_core.execution.grips import STIFFNESS_N_PER_M
+from scenes.execution.held import HeldSettings
+
+TrialKind: TypeAlias = Literal["weight", "lift", "shake", "stop", "knock", "misplaced"]
+"""What a trial does: it turns gravity through all directions, lifts the object off a table, shakes
+or stops the palm, strikes the object, or closes fingers on an object that is not where it should
+be."""
+KINDS: tuple[TrialKind, ...] = get_args(TrialKind)
+MOST_MISPLACEMENTS = 1000
+"""Largest number of misplaced objects, which bounds the time that a file can ask for."""
+LONGEST_S = 100.0
+"""Longest duration of a lift or a stop [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutionSettings:
+    """How grasps are executed, and how far an object may move and still count as held.
+
+    Raises:
+        InputError: A number is out of its range, or a trial is unknown.
+    """
+
+    mass_kg: float
+    """Mass of the object [kg]."""
+    push_n: float = 10.0
+    """Largest normal force of a finger, at rest and under the loads that are planned for [N]."""
+    stiffness_n_per_m: float = STIFFNESS_N_PER_M
+    """Stiffness of the fingertips' springs [N/m]."""
+    tip_radius_m: float | None = None
+    """Radius of the fingertips; None for a tenth of the object's radius, or less where that would
+    overlap something [m]."""
+    hand: HeldSettings = field(default_factory=HeldSettings)
+    """Masses and damping of the fingers, and the direction of gravity."""
+    trials: tuple[TrialKind, ...] = KINDS
+    lift_m: float = 0.2
+    """Height that the object is lifted by [m]."""
+    lift_s: float = 0.6
+    """Duration of the lift, from 0.05 to 100 [s]."""
+    shake_g: float = 1.0
+    """Largest acceleration of a shake [9.80665 m/s^2]; a shake about an axis gives it to points at
+    the object's radius."""
+    shake_hz: float = 5.0
+    """Frequency of a shake, from 0.1 to 25 [Hz]."""
+    stop_m_per_s2: float = 10.0
+    """Deceleration of a stop [m/s^2]."""
+    stop_from_m_per_s: float = 0.5
+    """Speed before a stop [m/s]."""
+    knock_n_s: float = 0.05
+    """Impulse of a knock [N s]."""
+    off_mm: float = 2.0
+    """Distance of a misplaced object from where the fingers expect it [mm]."""
+    off_deg: float = 2.0
+    """Angle by which a misplaced object is turned [degrees]."""
+    misplacements: int = 5
+    """How many times the object is misplaced, each in a direction of its own."""
+    seed: int = 0
+    """Seed of these directions."""
+    most_mm: float = 5.0
+    """Displacement against the palm up to which an object counts as held [mm]."""
+    most_deg: float = 5.0
+    """Turn against the palm up to which an object counts as held [degrees]."""
+
+    def __post_init__(self) -> None:
+        for name in POSITIVE:
+            positive(getattr(self, name), name)
+        for name in NOT_NEGATIVE:
+            number(getattr(self, name), name, least=0.0, most=LARGEST)
+        if self.tip_radius_m is not None:
+            positive(self.tip_radius_m, "tip_radius_m")
+        instance(self.hand, HeldSettings, "hand")
+        kinds = several(self.trials, _trial_kind, "trials", "names of trials")
+        if not kinds:
+            raise InputError(f"trials must name at least one of {', '.join(KINDS)}, got none")
+        object.__setattr__(self, "trials", tuple(kind for kind in KINDS if kind in kinds))
+        for name, (least, most) in RANGES.items():
+            number(getattr(self, name), name, least=least, most=most)
+        stopping = self.stop_from_m_per_s / self.stop_m_per_s2
+        if stopping > LONGEST_S:
+            raise InputError(
+                f"stop_from_m_per_s over stop_m_per_s2 is the duration of a stop, at most "
+                f"{LONGEST_S:g} s, got {stopping:.3g} s; start slower, or stop harder"
+            )
+        whole(self.misplacements, "misplacements", least=1, most=MOST_MISPLACEMENTS)
+        seed_of(self.seed)
+
+    @property
+    def most_m(self) -> float:
+        """Displacement up to which an object counts as held [m]."""
+        return self.most_mm / 1000.0
+
+    @property
+    def most_rad(self) -> float:
+        """Turn up to which an object counts as held [rad]."""
+        return math.radians(self.most_deg)
+
+
+def _trial_kind(value: TrialKind) -> TrialKind:
+    one_of(value, KINDS, "trials")
+    return value
+
+
+POSITIVE = (
+    "mass_kg", "push_n", "stiffness_n_per_m", "lift_m", "stop_m_per_s2", "stop_from_m_per_s",
+    "most_mm", "most_deg",
+)  # fmt: skip
+NOT_NEGATIVE = ("shake_g", "knock_n_s", "off_mm")
+RANGES = {"lift_s": (0.05, LONGEST_S), "shake_hz": (0.1, 25.0), "off_deg": (0.0, 180.0)}
+"""A lift takes ten samples at least, and a cycle of a shake eight."""

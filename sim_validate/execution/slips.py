@@ -1,0 +1,181 @@
+"""What a motion says of a hold: how far contacts slipped, how far the object moved, when it began.
+
+Everything is seen from the palm. In the object's frame the centre of tip i is u_i, and a fingertip
+that does not turn rolls when the object turns, so with the turn dt since the last sample and the
+inward normal n_i the point of contact slides on the object by the tangential part of
+
+    du_i - rho_i dt x n_i.                                                                (1)
+
+The load of first slip is taken from the contact forces. They are (n, t) at rest and change by
+(a, b), in the frames of the contacts, so a load that is larger by the factor s would change them by
+s (a, b) as long as motions are small. The least s that brings a contact to its cone, times the
+share of the load that is applied, is the multiple of the load at which the first contact slips. It
+is taken in the sample before the first contact is on its cone. If none ever is, the least of all
+samples under the full load says how far away slip stayed.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.execution.first_slip import slip_steps
+from scenes.execution.held import HeldLayout
+from sim_validate.execution.bench import HeldMotion
+from sim_validate.execution.drives import Drive
+
+ON_CONE = 0.9995
+"""Tangential force, relative to friction times normal force, at which a contact counts as on its
+cone: the simulator's contacts approach it within as much."""
+SLID = 2e-3
+"""Distance that counts as slipped, in object radii: between two samples a contact may slip and
+hold again, and rolling over large turns is known to about a tenth of it."""
+IDLE = 1e-3
+"""Normal force at rest, relative to the largest, below which a fingertip does not push."""
+FULL = 0.999
+"""Share of the load above which it is all there."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """A motion as the palm sees it, in each of n samples."""
+
+    moved: Array
+    """Displacement of the object's centre of mass, (n, 3) [m]."""
+    turned: Array
+    """Orientation of the object, (n, 3, 3)."""
+    tips: Array
+    """Centres of the fingertips in the object's frame, (n, k, 3) [m]."""
+    forces: Array
+    """Contact forces on the object in the frames of the contacts, which turn with it, (n, k, 3)
+    [N]: normal, tangent, tangent."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of an object in one trial, against its place when the trial began."""
+
+    slip_m: float
+    """Farthest that a point of contact slid on the object [m]."""
+    displacement_m: float
+    """Largest displacement of the centre of mass against the palm [m]."""
+    turn_rad: float
+    """Largest turn against the palm [rad]."""
+    dropped: bool
+    """Whether no fingertip touches the object at the end."""
+    slipped: bool
+    """Whether a contact slipped: one was on its cone, or slid by more than `SLID`."""
+    first_slip: float
+    """Multiple of the trial's load at which the first contact slips; at most one if one did."""
+
+
+def seen(motion: HeldMotion, layout: HeldLayout) -> Seen:
+    """Look at a motion from the palm and from the object."""
+    palm = _hinged(motion.palm[:, 3:])
+    turned = palm.transpose(0, 2, 1) @ rotations(motion.turned)
+    moved = np.einsum("nji,nj->ni", palm, motion.moved - motion.palm[:, :3])
+    centers = layout.tip_centers + np.einsum("kij,nkj->nki", layout.axes, motion.tips)
+    tips = np.einsum("nji,nkj->nki", turned, centers - moved[:, None])
+    along = np.einsum("kij,nkj->nki", layout.axes, motion.forces)
+    own = np.einsum("nji,nkj->nki", turned, along)
+    return Seen(moved, turned, tips, np.einsum("kij,nki->nkj", layout.frames, own))
+
+
+def outcome(
+    motion: HeldMotion, layout: HeldLayout, drive: Drive, friction: Array, begun: int = 0
+) -> Outcome:
+    """Say what became of the object since a sample of a trial.
+
+    Args:
+        motion: The motion in the trial.
+        layout: Layout of the scene.
+        drive: What was applied.
+        friction: Coulomb coefficient of each contact, (k,).
+        begun: Index of the sample in which the object is at rest, before the load comes.
+    """
+    found = seen(motion, layout)
+    relative = found.turned[begun:] @ found.turned[begun].T
+    cosines = 0.5 * (np.einsum("nii->n", relative) - 1.0)
+    touching = found.forces[-1, :, 0] > 0.0
+    slid = float(slides(found, layout, begun).max(initial=0.0))
+    multiple = _first_slip(found, drive.shares, friction, begun)
+    slipped = multiple <= 1.0 or slid > SLID * layout.radius_m
+    return Outcome(
+        slip_m=slid,
+        displacement_m=float(
+            np.linalg.norm(found.moved[begun:] - found.moved[begun], axis=1).max()
+        ),
+        turn_rad=float(np.arccos(np.clip(cosines, -1.0, 1.0)).max()),
+        dropped=not touching.any(),
+        slipped=slipped,
+        first_slip=min(multiple, 1.0) if slipped else multiple,
+    )
+
+
+def slides(found: Seen, layout: HeldLayout, begun: int = 0) -> Array:
+    """Return how far each point of contact has slid by (1) since a sample, (n, k) [m]."""
+    normals = layout.frames[:, :, 0]
+    steps = np.diff(found.tips[begun:], axis=0)
+    turned = found.turned[begun:]
+    change = turned[:-1].transpose(0, 2, 1) @ turned[1:]
+    turns = 0.5 * np.stack(
+        [change[:, 2, 1] - change[:, 1, 2], change[:, 0, 2] - change[:, 2, 0],
+         change[:, 1, 0] - change[:, 0, 1]], axis=1,
+    )  # fmt: skip
+    rolled = layout.tip_radius_m[:, None] * np.cross(turns[:, None], normals)
+    slid = steps - rolled
+    slid -= np.einsum("nki,ki->nk", slid, normals)[..., None] * normals
+    total = np.concatenate([np.zeros((1, *slid.shape[1:])), np.cumsum(slid, axis=0)])
+    return np.linalg.norm(total, axis=2)
+
+
+def _first_slip(found: Seen, shares: Array, friction: Array, begun: int) -> float:
+    rest_n = found.forces[begun, :, 0]
+    pushing = rest_n > IDLE * rest_n.max()  # a fingertip that pushes at nothing cannot slip
+    if not pushing.any():
+        return 0.0
+    found, friction = replace(found, forces=found.forces[:, pushing]), friction[pushing]
+    n, across = found.forces[..., 0], np.linalg.norm(found.forces[..., 1:], axis=2)
+    slipping = (across >= ON_CONE * friction * n).any(axis=1)
+    slipping[: begun + 1] = False
+    if not slipping.any():
+        loaded = np.flatnonzero(shares >= FULL)
+        return float(_extrapolated(found, shares, friction, begun, loaded).min(initial=np.inf))
+    at = int(np.argmax(slipping))
+    before, after = sorted((float(shares[at - 1]), float(shares[at])))
+    (multiple,) = _extrapolated(found, shares, friction, begun, np.array([at - 1]))
+    return min(max(float(multiple), before), after)
+
+
+def _extrapolated(found: Seen, shares: Array, friction: Array, begun: int, at: Indices) -> Array:
+    """Return the multiple of the load at first slip as it is seen in some samples, (m,)."""
+    rest = found.forces[begun]
+    changes = (found.forces[at] - rest).reshape(-1, 3)
+    steps = slip_steps(np.tile(rest, (len(at), 1)), changes, np.tile(friction, len(at)))
+    least = steps.reshape(len(at), -1).min(axis=1)
+    return np.multiply(shares[at], least, out=np.full(len(at), np.inf), where=np.isfinite(least))
+
+
+def rotations(quaternions: Array) -> Array:
+    """Return the rotation matrices of unit quaternions (w, x, y, z), (n, 4), as (n, 3, 3)."""
+    w, x, y, z = quaternions.T
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=1),
+            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=1),
+            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1),
+        ],
+        axis=1,
+    )
+
+
+def _hinged(angles: Array) -> Array:
+    """Return the palm's rotation, (n, 3, 3): about x, then the turned y, then the turned z."""
+    half = 0.5 * angles
+    zero = np.zeros(len(angles))
+    turn = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
+    for axis in range(3):
+        parts = [np.cos(half[:, axis]), zero, zero, zero]
+        parts[axis + 1] = np.sin(half[:, axis])
+        turn = turn @ rotations(np.stack(parts, axis=1))
+    return turn

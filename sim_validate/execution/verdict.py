@@ -1,0 +1,122 @@
+"""What an execution found: each trial with its outcome and prediction, and whether all survived."""
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from grasp_core.arrays import Array
+from scenes.physics import PhysicsSettings
+from sim_validate.execution.settings import TrialKind
+from sim_validate.execution.trials import Skipped
+
+Fate: TypeAlias = Literal["stuck", "slipped", "dropped"]
+"""What became of the object: no contact slipped, one did and it was kept, or it was lost."""
+CLEAR_OF_SLIP = 1.05
+"""Predicted first slip from which on no contact slips, however processors round."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutionTrial:
+    """One trial of an execution, simulated and predicted."""
+
+    kind: TrialKind
+    """`weight`, `lift`, `shake`, `stop`, `knock` or `misplaced`."""
+    name: str
+    """The kind with its direction or number."""
+    survived: bool
+    """Whether the object was kept, and moved no farther than the settings allow."""
+    fate: Fate
+    slip_m: float
+    """Farthest that a point of contact slid on the object [m]."""
+    displacement_m: float
+    """Largest displacement of the centre of mass against the palm [m]."""
+    turn_rad: float
+    """Largest turn against the palm [rad]."""
+    predicted_first_slip: float
+    """Multiple of the trial's load at which the first contact slips, predicted; for `misplaced`,
+    that of the weight in the planned place."""
+    simulated_first_slip: float
+    """Multiple of the trial's load at which the first contact slips, from the simulated contact
+    forces: one or less if a contact slipped, else how far away slip stayed."""
+
+    @property
+    def dropped(self) -> bool:
+        """Whether no fingertip touched the object at the end."""
+        return self.fate == "dropped"
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutionControl:
+    """A trial that must slip: the least load that does so, on a grip weaker than certified."""
+
+    name: str
+    """What is weaker than certified: friction, squeeze, or a finger that does not push."""
+    let_go: bool
+    """Whether a contact slipped, as it must."""
+    first_slip: float
+    """Multiple of the load at which the first contact slipped."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Execution:
+    """The trials of one grasp, executed with one squeeze that was never replanned."""
+
+    mass_kg: float
+    squeeze: Array
+    """Contact forces at rest, on the object, (k, 3) [N]."""
+    load_multiple: float
+    """Multiple of the object's weight, in any direction, that the squeeze is certified for."""
+    trials: tuple[ExecutionTrial, ...]
+    controls: tuple[ExecutionControl, ...]
+    skipped: tuple[Skipped, ...]
+    physics: PhysicsSettings | None = None
+    """Settings of the simulator, where they are known."""
+
+    @property
+    def survived(self) -> bool:
+        """Whether the object survived every trial, of at least one."""
+        return bool(self.trials) and all(trial.survived for trial in self.trials)
+
+    @property
+    def controls_let_go(self) -> bool:
+        """Whether every control slipped, as it must."""
+        return all(control.let_go for control in self.controls)
+
+    def of_kind(self, kind: str) -> tuple[ExecutionTrial, ...]:
+        """Return the trials of a kind."""
+        return tuple(trial for trial in self.trials if trial.kind == kind)
+
+    def survival(self, kind: str) -> tuple[int, int]:
+        """Return how many trials of a kind the object survived, and of how many."""
+        own = self.of_kind(kind)
+        return sum(trial.survived for trial in own), len(own)
+
+
+def trial_in_words(trial: ExecutionTrial) -> str:
+    """Say how a trial of an execution ended, and what was predicted."""
+    return (
+        f"{trial.name}: {trial.fate}, moved {1e3 * trial.displacement_m:.2g} mm and turned "
+        f"{trial.turn_rad:.2g} rad; first slip predicted at {trial.predicted_first_slip:.3g} of "
+        f"the load, simulated at {trial.simulated_first_slip:.3g}"
+    )
+
+
+def losses_in_words(found: Execution) -> list[str]:
+    """Say which trials were not survived, or that there was none to survive."""
+    if not found.trials:
+        return ["no trial is possible, so nothing was survived"]
+    return [trial_in_words(trial) for trial in found.trials if not trial.survived]
+
+
+def held_controls_in_words(found: Execution) -> list[str]:
+    """Say which negative controls did not slip, and what follows."""
+    return [
+        f"control {control.name} did not slip, though it must: the simulator is not faithful, so "
+        "its other outcomes do not count"
+        for control in found.controls
+        if not control.let_go
+    ]
+
+
+def may_slip(predicted_first_slip: float | None) -> bool:
+    """Return whether a contact may slip by prediction; None stands for a slip that never comes."""
+    return predicted_first_slip is not None and predicted_first_slip < CLEAR_OF_SLIP

@@ -1,0 +1,89 @@
+"""Starts MuJoCo, compiles scenes and steps them: the only module that imports the simulator.
+
+Scenes reach the simulator as text, so that the text is the whole experiment. All trials of a scene
+run together on MuJoCo's own threads; each is bit for bit what a plain loop over `mj_step` gives,
+whatever the number of threads.
+"""
+
+# pyright: basic, reportAttributeAccessIssue=false
+# MuJoCo ships no types for its core.
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.errors import InputError
+
+try:
+    import mujoco  # noqa: TID251 - this is the door
+    from mujoco import batch  # noqa: TID251
+except (ImportError, RuntimeError, AttributeError, OSError) as error:
+    raise InputError(  # importing mujoco looks for graphics, which nothing here needs
+        f"MuJoCo cannot be imported ({error}). If MUJOCO_GL names graphics that are missing, "
+        "unset it; otherwise reinstall the package"
+    ) from error
+
+
+def compiled(xml: str) -> mujoco.MjModel:
+    """Compile the text of a scene.
+
+    Raises:
+        InputError: The simulator refuses the text.
+    """
+    try:
+        return mujoco.MjModel.from_xml_string(xml)
+    except ValueError as error:
+        raise InputError(f"MuJoCo cannot compile the scene: {error}") from error
+
+
+def step(
+    trials: batch.Batch, errors: dict[int, str], steps: int, going: Indices | None = None
+) -> None:
+    """Step trials (all, or those given by index), except those that an error ended."""
+    running = going
+    if errors:
+        running = np.setdiff1d(np.arange(trials.nsim) if going is None else going, list(errors))
+    try:
+        trials.step(running, nstep=steps)
+    except batch.SimulationError as failure:
+        errors.update({int(trial): trials.error(int(trial)) for trial in failure.ids})
+
+
+def touched(model: mujoco.MjModel, data: mujoco.MjData, tips: Sequence[int]) -> tuple[Array, Array]:
+    """Find what each fingertip touches in a state of a scene.
+
+    Args:
+        model: The compiled scene.
+        data: The state; what follows from its positions is computed here.
+        tips: Numbers of the fingertips' geoms.
+
+    Returns:
+        Normals out of the fingertips, (k, 3), world axes, and depths, (k,) [m]; NaN for a fingertip
+        that has not exactly one contact.
+    """
+    mujoco.mj_forward(model, data)
+    normals, depths = np.full((len(tips), 3), np.nan), np.full(len(tips), np.nan)
+    for finger, tip in enumerate(tips):
+        own = [contact for contact in data.contact if tip in contact.geom]
+        if len(own) == 1:
+            (contact,) = own
+            normals[finger] = contact.frame[:3] * (1.0 if contact.geom[0] == tip else -1.0)
+            depths[finger] = -contact.dist
+    return normals, depths
+
+
+@contextmanager
+def unlogged() -> Iterator[None]:
+    """Keep the simulator from writing warnings to a file in the working directory.
+
+    The simulator's data counts the warnings, and `Motion.warnings` reports them.
+    """
+    before, quiet = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
+    quiet.logto_file = quiet.logto_console = False
+    mujoco.MjLogConfig.set(quiet)
+    try:
+        yield
+    finally:
+        mujoco.MjLogConfig.set(before)
