@@ -1,4 +1,11 @@
 from sim_validate.datasets.open_dataset import load_dataset as load_dataset
+from sim_validate.execution.execute import execute as execute
+from sim_validate.execution.jobs import ExecutedGrasp as ExecutedGrasp
+from sim_validate.execution.settings import ExecutionSettings as ExecutionSettings
+from sim_validate.execution.verdict import Execution as Execution
+from sim_validate.execution.verdict import ExecutionTrial as ExecutionTrial
+from sim_validate.records.executions_json import Executions as Executions
+from sim_validate.records.executions_json import read_executions as read_executions
 from sim_validate.records.regions import read_regions as read_regions
 from sim_validate.reports.margin_charts import margin_figure as margin_figure
 from sim_validate.reports.report import write_report as write_report

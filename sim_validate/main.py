@@ -13,7 +13,13 @@ import tyro
 from tyro.conf import FlagCreatePairsOff
 
 from grasp_core.errors import GraspError, InputError
-from sim_validate.cli import baseline_flags, command_flags, dataset_flags, showing_flags
+from sim_validate.cli import (
+    baseline_flags,
+    command_flags,
+    dataset_flags,
+    execution_flags,
+    showing_flags,
+)
 from sim_validate.cli.baseline_flags import Baseline
 from sim_validate.cli.command_flags import COMMANDS, Command
 from sim_validate.cli.config_file import with_config
@@ -26,6 +32,7 @@ ACTIONS: dict[type[Any], str] = {
     command_flags.Run: "run:run_object",
     command_flags.Plan: "plan:plan_file",
     command_flags.Validate: "validate:validate_file",
+    execution_flags.Execute: "execute:execute_file",
     command_flags.Scene: "scene:write_scenes",
     showing_flags.View: "view:view_grasp",
     showing_flags.Report: "report:report_folder",

@@ -1,9 +1,10 @@
-"""A pytest plugin: `*.grasps.toml` files become tests, and `assert_stable` checks one grasp.
+"""A pytest plugin: `*.grasps.toml` files become tests, and fixtures check single grasps.
 
 Nothing but pytest is imported until such a file, the fixtures or the marker are used.
 """
 
 from collections.abc import Callable, Generator, Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ import pytest
 if TYPE_CHECKING:
     from sim_validate.baselines.source_file import Source
     from sim_validate.baselines.suite_toml import Suite
+    from sim_validate.execution.verdict import Execution
     from sim_validate.validation.grasp_verdict import Verdict
 
     Entries = tuple[dict[str, Any] | None, dict[str, Any] | None]
@@ -165,7 +167,7 @@ class GraspItem(_SuiteItem):
         """Fail if the grasp is worse, missing or new, or cannot be compared."""
         from grasp_core.errors import GraspError
         from sim_validate.baselines.compare import Status, failing
-        from sim_validate.baselines.entries import plain
+        from sim_validate.baselines.entries import plain, properties_of
         from sim_validate.baselines.explain import explained
         from sim_validate.baselines.source_file import ChangedPartError
 
@@ -182,9 +184,11 @@ class GraspItem(_SuiteItem):
         fails = finding.status in (*failing(strict=suite.strict), Status.NOT_COMPARABLE)
         told = fails or finding.status is not Status.SAME
         files = suite.baseline, suite.grasps
-        why = explained(finding, done.verdicts.get(self.name), files, done.how) if told else ""
+        now = done.verdicts.get(self.name), done.measured.executions.get(self.name)
+        why = explained(finding, now[0], files, done.how, now[1]) if told else ""
         before, after = plain(finding.before), plain(finding.after)
-        self.user_properties += [("status", finding.status.value), *(after or {}).items()]
+        self.user_properties.append(("status", finding.status.value))
+        self.user_properties += properties_of(after or {}).items()
         _note(self, finding.id, finding.status.value, why, (before, after), suite.source)
         if fails:
             raise UnstableError(f"{why}\n  to accept the change: pytest --grasp-bless {self.path}")
@@ -240,12 +244,42 @@ def assert_stable(
         entry = plain(entry_of(chosen.grasp, verdict, chosen.body.radius)) or {}
         for key, value in entry.items():
             record_property(f"{name}.{key}", value)
-        _note(
-            request.node, name, "unstable" if why else "stable", why, (None, entry), chosen.source
-        )
+        status = "unstable" if why else "stable"
+        _note(request.node, name, status, why, (None, entry), chosen.source)
         if why:
             raise UnstableError(why)
         return verdict
+
+    return check
+
+
+@pytest.fixture
+def assert_survives(
+    request: pytest.FixtureRequest, record_property: Callable[[str, object], None]
+) -> Callable[..., "Execution"]:
+    """A function that executes a grasp and fails the test unless the object survives."""
+
+    def check(*case: Any, settings: Any = None, friction: float | None = None) -> "Execution":
+        """Execute a grasp with its negative controls.
+
+        Args:
+            case: A `grasp_case`; or the object, a grasp on its faces, and the friction.
+            settings: The `ExecutionSettings`; also allowed as the last of `case`.
+            friction: As in `assert_stable`.
+
+        Raises:
+            UnstableError: A trial was lost, no squeeze carries the weight, or a control held.
+        """
+        from sim_validate.baselines.demands import survival
+        from sim_validate.baselines.executions import execution_entry
+
+        chosen, found, why = survival(case, friction, settings)
+        for key, value in asdict(execution_entry(found)).items():
+            record_property(f"{found.id}.execution.{key}", value)
+        _note(request.node, found.id, "lost" if why else "survived", why, source=chosen.source)
+        if why or found.execution is None:
+            raise UnstableError(why)
+        return found.execution
 
     return check
 
@@ -255,11 +289,9 @@ def _note(
     source: "Source | None" = None,
 ) -> None:  # fmt: skip
     """Remember the outcome of a grasp in a test, with its entries before and after."""
+    file, note = (None, "") if source is None else (source.file, source.note)
     line: dict[str, Any] = {
-        "test": item.nodeid, "grasp": grasp, "status": status, "why": why,
-        "before": entries[0], "after": entries[1], "mesh_file": None, "mesh_note": "",
+        "test": item.nodeid, "grasp": grasp, "status": status, "why": why, "before": entries[0],
+        "after": entries[1], "mesh_file": None if file is None else str(file), "mesh_note": note,
     }  # fmt: skip
-    if source is not None:
-        line["mesh_file"] = None if source.file is None else str(source.file)
-        line["mesh_note"] = source.note
     item.stash.setdefault(LINES, []).append(line)

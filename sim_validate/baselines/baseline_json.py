@@ -1,7 +1,7 @@
 """Reads and writes baselines as JSON that people can review: a header, then one line per grasp."""
 
 import json
-from dataclasses import asdict, fields
+from dataclasses import fields
 from pathlib import Path, PurePath
 
 from pydantic import TypeAdapter, ValidationError
@@ -9,7 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import complaint
 from grasp_core.files.strict_json import check_schema, object_of, shown
-from sim_validate.baselines.entries import Baseline
+from sim_validate.baselines.entries import Baseline, fields_of
 from sim_validate.files.reading import read_text, write_text
 
 SCHEMA = 1
@@ -25,7 +25,9 @@ def baseline_to_json(baseline: Baseline) -> str:
     }
     del header["entries"]
     head = json.dumps(header, indent=1, sort_keys=True, allow_nan=False).removesuffix("\n}")
-    lines = ",\n  ".join(json.dumps(asdict(entry), allow_nan=False) for entry in baseline.entries)
+    lines = ",\n  ".join(
+        json.dumps(fields_of(entry), allow_nan=False) for entry in baseline.entries
+    )
     return f'{head},\n "grasps": [\n  {lines}\n ]\n}}\n'
 
 

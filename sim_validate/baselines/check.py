@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from grasp_core.records.grasps_json import SavedGrasps
-from sim_validate.baselines.compare import Finding, bands_between, compare
+from sim_validate.baselines.compare import Finding, Status, bands_between, compare
 from sim_validate.baselines.entries import Baseline
 from sim_validate.baselines.measure import Measured, Report, measured, with_planned_fingers
-from sim_validate.simulation.setup import Agenda, Setup
+from sim_validate.baselines.settings import How
 from sim_validate.validation.grasp_verdict import Verdict
 
 
@@ -27,9 +27,8 @@ class Checked:
 
 
 def check(
-    before: Baseline, saved: SavedGrasps, where: str, how: tuple[Setup, Agenda],
-    processors: int, report: Report,
-) -> Checked:  # fmt: skip
+    before: Baseline, saved: SavedGrasps, where: str, how: How, processors: int, report: Report
+) -> Checked:
     """Simulate grasps again and compare them with a baseline.
 
     Args:
@@ -44,8 +43,8 @@ def check(
         InputError: The file of grasps is empty.
         UnfaithfulError: The simulator fails its checks on cases with known answers.
     """
-    setup, agenda = with_planned_fingers(how[0], before, saved), how[1]
-    found = measured(saved, (where, before.limit), setup, agenda, processors, report)
+    how = with_planned_fingers(how, before, saved)
+    found = measured(saved, (where, before.limit), how, processors, report)
     return Checked(
         compare(before, found.baseline, found.refused),
         found,
@@ -53,9 +52,7 @@ def check(
     )
 
 
-def check_one(
-    before: Baseline, saved: SavedGrasps, where: str, how: tuple[Setup, Agenda], name: str
-) -> Checked:
+def check_one(before: Baseline, saved: SavedGrasps, where: str, how: How, name: str) -> Checked:
     """Simulate one grasp again, by its id, and compare it with a baseline."""
     limited = saved.grasps[: before.limit]
     one = tuple(grasp for grasp in limited if grasp.id == name)
@@ -65,6 +62,22 @@ def check_one(
         return check(kept, alone, where, how, 1, silent)
     gone = Measured(replace(kept, entries=(), content_sha256=saved.body.content_sha256), {}, {})
     return Checked(compare(kept, gone.baseline), gone, "")
+
+
+def demanded(done: Checked) -> Checked:
+    """Count grasps that do not survive their execution as regressed, whatever the baseline says.
+
+    A grasp that has no entry now, or whose settings differ from the baseline's, stays as it is.
+    """
+    return replace(done, findings=tuple(map(_surviving, done.findings)))
+
+
+def _surviving(finding: Finding) -> Finding:
+    now = None if finding.after is None else finding.after.execution
+    if now is None or now.survived or finding.status is Status.NOT_COMPARABLE:
+        return finding
+    why = "the grasp must survive its execution, but does not"
+    return replace(finding, status=Status.REGRESSED, reasons=(why, *finding.reasons))
 
 
 def silent(_: int, __: int) -> None:

@@ -31,7 +31,7 @@ class Status(StrEnum):
     WITHIN = "within bands"
     """Numbers differ only as much as other versions or processors make them differ."""
     GREY = "grey zone"
-    """The verdict differs, on a grasp that is too close to its critical friction to tell."""
+    """The verdict differs, on a grasp too close to its critical friction for a sure result."""
     IMPROVED = "improved"
     REGRESSED = "regressed"
     NOT_COMPARABLE = "not comparable"

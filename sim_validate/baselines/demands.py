@@ -1,4 +1,4 @@
-"""Checks whether a grasp is as stable as a test demands."""
+"""Checks whether a grasp is as stable as a test demands, or survives as a test demands."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -6,8 +6,11 @@ from typing import Any
 
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.errors import InputError
+from sim_validate.baselines.executions import not_survived
 from sim_validate.baselines.explain import unstable
-from sim_validate.baselines.grasp_cases import GraspCase
+from sim_validate.baselines.grasp_cases import GraspCase, case_of
+from sim_validate.execution.jobs import ExecutedGrasp, ExecutionJob, executed_grasp
+from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.simulation.noise import Noise
 from sim_validate.simulation.setup import Agenda, NamedWrench, Setup
 from sim_validate.validation.grasp_verdict import Verdict
@@ -107,3 +110,32 @@ def _lacking(verdict: Verdict, demands: Demands) -> Iterator[str]:
                 f"friction {verdict.friction:g} is less than {demands.min_margin:g} above the "
                 f"{how} critical one, {value:.6g}"
             )
+
+
+def survival(
+    given: Sequence[Any], friction: float | None, settings: ExecutionSettings | None
+) -> tuple[GraspCase, ExecutedGrasp, str]:
+    """Execute a grasp, and say why it does not survive.
+
+    Args:
+        given: A case, or object, grasp and perhaps a friction; then the settings, unless named.
+        friction: Friction in place of the case's own.
+        settings: How the grasp is executed, if that is not the last of `given`.
+
+    Returns:
+        The case, its execution, and sentences on what went wrong, empty if the object survived.
+
+    Raises:
+        InputError: The arguments, the grasp or a setting are refused.
+        UnfaithfulError: The simulator failed in a trial.
+    """
+    if settings is None and given:
+        given, settings = given[:-1], given[-1]
+    if not isinstance(settings, ExecutionSettings):
+        raise InputError(
+            f"assert_survives: expected ExecutionSettings as `settings`, got {settings!r}; give "
+            "sim_validate.ExecutionSettings(mass_kg=...)"
+        )
+    case = case_of(given, friction, "assert_survives")
+    found = executed_grasp(ExecutionJob(case.body, case.grasp, case.friction, settings))
+    return case, found, not_survived(found)

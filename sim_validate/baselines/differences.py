@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from sim_validate.baselines.entries import Entry
+from sim_validate.baselines.executions import ExecutionEntry
+from sim_validate.execution.verdict import may_slip
 
 
 @dataclass(frozen=True, slots=True)
@@ -11,9 +13,11 @@ class Bands:
     """Tolerances: how far results may differ from a baseline without counting as changed."""
 
     predicted: float
-    """Tolerance of predicted critical frictions and wrench limits, relative to the baseline's."""
+    """Tolerance of predicted critical frictions, wrench limits and first slips, relative to the
+    baseline's."""
     simulated: float
-    """Tolerance of simulated critical frictions and wrench limits, relative to the baseline's."""
+    """Tolerance of simulated critical frictions, wrench limits and first slips, relative to the
+    baseline's."""
     least: float
     """Differences of critical frictions and wrench limits that never count; critical frictions are
     proved to 1e-7."""
@@ -51,6 +55,7 @@ def differences(one: Entry, other: Entry, bands: Bands) -> tuple[Difference, ...
         *_of_controls(one, other),
         *_of_numbers(one, other, bands),
         *_of_repeats(one, other, bands),
+        *_of_executions(one.execution, other.execution, bands),
     )
 
 
@@ -126,3 +131,62 @@ def _of_repeats(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]:
             numbers = ", ".join(map(str, sorted(flipped)))
             counts = bool(flipped - close)
             yield Difference(f"repeats with noise {text}: {numbers}", worse, counts=counts)
+
+
+def _of_executions(
+    one: ExecutionEntry | None, other: ExecutionEntry | None, bands: Bands
+) -> Iterator[Difference]:
+    if one is None or other is None:  # then the settings differ, and nothing is comparable
+        return
+    if one.survived != other.survived:
+        said = ["survived" if each.survived else "did not survive" for each in (one, other)]
+        yield Difference(f"execution: {said[0]} -> {said[1]}", worse=not other.survived)
+    if one.reason != other.reason:
+        text = f"execution: {one.reason or 'executed'} -> {other.reason or 'executed'}"
+        yield Difference(text, worse=other.reason is not None)
+    if lost := [name for name in other.lost if name not in one.lost]:
+        yield Difference(f"execution: no longer survived: {', '.join(lost)}", worse=True)
+    if won := [name for name in one.lost if name not in other.lost]:
+        yield Difference(f"execution: survived now: {', '.join(won)}", worse=False)
+    if one.trials != other.trials:
+        text = f"execution: trials: {one.trials} -> {other.trials}"
+        yield Difference(text, worse=other.trials < one.trials)
+    before, after = (entry.controls - entry.controls_let_go for entry in (one, other))
+    if before != after:
+        text = f"execution: controls that did not slip: {before} -> {after}"
+        yield Difference(text, worse=after > before)
+    yield from _of_execution_numbers(one, other, bands)
+
+
+def _of_execution_numbers(
+    one: ExecutionEntry, other: ExecutionEntry, bands: Bands
+) -> Iterator[Difference]:
+    """Compare measured numbers; a first slip of None is infinite, so more than any number.
+
+    How far a contact slides, once it slips, depends on rounding too much to count by itself.
+    """
+    if not (one.trials and other.trials):
+        return
+    slides = any(may_slip(entry.predicted_first_slip) for entry in (one, other))
+    rows = (
+        ("load_multiple", bands.predicted, bands.least, -1.0),
+        ("predicted_first_slip", bands.predicted, bands.least, -1.0),
+        ("simulated_first_slip", bands.simulated, bands.least, -1.0),
+        ("slip_m", 0.0, bands.displacement_m, 1.0),
+        ("displacement_m", 0.0, bands.displacement_m, 1.0),
+        ("turn_rad", 0.0, bands.rotation_rad, 1.0),
+    )
+    for name, relative, absolute, sign in rows:
+        before, after = getattr(one, name), getattr(other, name)
+        if before == after:
+            continue
+        if before is None or after is None:
+            yield Difference(f"execution: {name}: {before} -> {after}", worse=before is None)
+            continue
+        change = after - before
+        moved = name not in ("load_multiple", "predicted_first_slip")
+        counts = abs(change) > relative * before + absolute and not (
+            slides and moved and bands.grey > 0.0
+        )
+        text = f"execution: {name}: {before:.12g} -> {after:.12g}{_per_cent(change, before)}"
+        yield Difference(text, sign * change > 0.0, counts=counts)

@@ -1,32 +1,35 @@
 """The contents of a baseline: a header, and one entry that summarises the verdict on each grasp."""
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import ConfigDict, Field
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.values import Grasp
+from sim_validate.baselines.executions import (
+    STRICT,
+    Count,
+    ExecutionEntry,
+    Size,
+    execution_entry,
+    rounded,
+)
+from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.setup import WEAKEST
 from sim_validate.validation.grasp_verdict import Verdict
 from sim_validate.validation.wrench_verdict import WrenchVerdict
 
-DIGITS = 12
-"""Number of decimal digits to which a baseline keeps numbers."""
 NUMBERS = (
     "critical_friction", "simulated_critical_friction", "limit_n", "simulated_limit_n",
     "displacement_m", "rotation_rad",
 )  # fmt: skip
 """Names of the fields that hold measured numbers."""
-STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
-Count = Annotated[int, Field(ge=0)]
-Size = Annotated[float, Field(ge=0.0)]
 
 
 @dataclass(frozen=True, slots=True, config=STRICT)
@@ -65,6 +68,8 @@ class Entry:
     noisy_close: tuple[Count, ...]
     """Indices of the repeats with noise whose load is very close to the largest that can be
     resisted."""
+    execution: ExecutionEntry | None = None
+    """How the grasp was executed; None if that is not asked for, and then no file mentions it."""
 
     def __post_init__(self) -> None:
         """Refuse an entry whose numbers contradict each other."""
@@ -122,16 +127,34 @@ class Baseline:
 
 def plain(entry: Entry | None) -> dict[str, Any] | None:
     """Turn an entry into plain values, which processes can send and any file can hold."""
-    return None if entry is None else json.loads(json.dumps(asdict(entry), allow_nan=False))
+    return None if entry is None else json.loads(json.dumps(fields_of(entry), allow_nan=False))
 
 
-def entry_of(grasp: Grasp, verdict: Verdict, radius_m: float) -> Entry:
+def fields_of(entry: Entry) -> dict[str, Any]:
+    """Return the fields of an entry by name, without its execution if there is none."""
+    found = asdict(entry)
+    if entry.execution is None:
+        del found["execution"]
+    return found
+
+
+def properties_of(listed: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of an entry by name, those of its execution beside the others."""
+    found = {name: value for name, value in listed.items() if name != "execution"}
+    executed: Mapping[str, Any] = listed.get("execution") or {}
+    return {**found, **{f"execution.{name}": value for name, value in executed.items()}}
+
+
+def entry_of(
+    grasp: Grasp, verdict: Verdict, radius_m: float, executed: ExecutedGrasp | None = None
+) -> Entry:
     """Summarise a verdict as an entry of a baseline.
 
     Args:
         grasp: The grasp.
         verdict: What simulation says about it.
         radius_m: Radius of the object [m].
+        executed: What its execution found; None if it was not executed.
     """
     weakest = next(trial for trial in verdict.wrenches if trial.name == WEAKEST)
     predicted, simulated = _limits(weakest, radius_m)
@@ -158,15 +181,9 @@ def entry_of(grasp: Grasp, verdict: Verdict, radius_m: float) -> Entry:
         noisy_trials=len(noisy),
         noisy_not_held=tuple(t.number for t in noisy if t.outcome is not Outcome.HELD),
         noisy_close=tuple(trial.number for trial in noisy if trial.close),
-        **{name: _rounded(value) for name, value in measured.items()},  # pyright: ignore
+        execution=None if executed is None else execution_entry(executed),
+        **{name: rounded(value) for name, value in measured.items()},  # pyright: ignore
     )
-
-
-def _rounded(value: float | None) -> float | None:
-    """Round a number to the digits that are kept; None for a number that no file can hold."""
-    if value is None or not math.isfinite(value):
-        return None
-    return float(f"{value:.{DIGITS}g}")
 
 
 def _limits(trial: WrenchVerdict, radius_m: float) -> tuple[float, float | None]:

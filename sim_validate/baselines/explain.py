@@ -6,11 +6,16 @@ from pathlib import Path
 
 from sim_validate.baselines.compare import Finding
 from sim_validate.baselines.entries import Entry
+from sim_validate.baselines.executions import not_survived
+from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.validation.grasp_verdict import Verdict
 from sim_validate.validation.wrench_verdict import WrenchVerdict
 
 
-def explained(finding: Finding, verdict: Verdict | None, files: tuple[Path, Path], how: str) -> str:
+def explained(
+    finding: Finding, verdict: Verdict | None, files: tuple[Path, Path], how: str,
+    executed: ExecutedGrasp | None = None,
+) -> str:  # fmt: skip
     """Explain how a grasp has changed: prediction, simulation, baseline, and commands to run next.
 
     Args:
@@ -18,6 +23,7 @@ def explained(finding: Finding, verdict: Verdict | None, files: tuple[Path, Path
         verdict: The verdict measured now, or None if the grasp could not be simulated.
         files: Paths of the baseline and the grasps.
         how: How results were compared, in words.
+        executed: The execution measured now; None if the grasp was not executed.
     """
     lines = [f"{finding.id}: {finding.status.value}", *(f"  {why}" for why in finding.reasons)]
     lines += [f"  {text}" for text in finding.differences if text not in finding.reasons]
@@ -27,6 +33,7 @@ def explained(finding: Finding, verdict: Verdict | None, files: tuple[Path, Path
     failed = verdict.failures[0] if verdict is not None and verdict.failures else None
     if failed is not None:
         lines.append(f"  first wrench that was not held: {in_words(failed)}")
+    lines += [f"  {not_survived(executed)}"] if executed and not_survived(executed) else []
     baseline, grasps = (shlex.quote(str(path)) for path in files)
     if verdict is not None:
         chosen = "" if failed is None else f" --wrench={shlex.quote(failed.name)}"
@@ -37,7 +44,7 @@ def explained(finding: Finding, verdict: Verdict | None, files: tuple[Path, Path
 
 
 def unstable(verdict: Verdict) -> str:
-    """Describe what the grasp did not hold, or a negative control held; empty if all is right."""
+    """Describe loads that the grasp did not hold or a negative control held; empty if none."""
     lines = [f"{verdict.id} at friction {verdict.friction}: {verdict.outcome.value}"]
     lines += [f"  {in_words(failed)}" for failed in verdict.failures[:1]]
     lines += [f"  control {each.control.name} was not let go"
@@ -65,6 +72,11 @@ def _numbers(title: str, entry: Entry) -> Iterator[str]:
     yield f"    weakest wrench {entry.limit_n:.6g} N predicted, {limit} simulated"
     if entry.noisy_trials:
         yield f"    with noise {entry.noisy_held} of {entry.noisy_trials} held"
+    if (found := entry.execution) is not None:
+        lost = f"lost {', '.join(found.lost)}" if found.lost else found.reason
+        yield f"    executed: {'survived' if found.survived else lost or 'no trial is possible'}"
+        slips = [number(found.predicted_first_slip), number(found.simulated_first_slip)]
+        yield f"    first slip {slips[0]} predicted, {slips[1]} simulated"
 
 
 def number(value: float | None) -> str:

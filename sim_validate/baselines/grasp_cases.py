@@ -29,12 +29,15 @@ class GraspCase:
     """The mesh file that the grasp was planned from, if it comes from a file of grasps."""
 
 
-def case_of(given: Sequence[Any], friction: float | None) -> GraspCase:
+def case_of(
+    given: Sequence[Any], friction: float | None, asking: str = "assert_stable"
+) -> GraspCase:
     """Build a case from a test's arguments: a case, or object and grasp, perhaps with a friction.
 
     Args:
         given: A case, or an object, a grasp and perhaps a friction, in that order.
         friction: Friction in place of the case's own.
+        asking: Name of the fixture, for messages.
 
     Raises:
         InputError: The arguments are of other types.
@@ -50,7 +53,7 @@ def case_of(given: Sequence[Any], friction: float | None) -> GraspCase:
             return GraspCase(given[0], given[1], _number(*frictions) if frictions else FRICTION)
     got = ", ".join(kind.__name__ for kind in kinds)
     raise InputError(
-        f"assert_stable: expected a grasp_case, or an object, a grasp and a friction; got {got}"
+        f"{asking}: expected a grasp_case, or an object, a grasp and a friction; got {got}"
     )
 
 

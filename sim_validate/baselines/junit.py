@@ -1,10 +1,10 @@
 """Writes the findings of a check as a JUnit file, which build servers show as test results."""
 
 from collections.abc import Iterable
-from dataclasses import asdict
 from xml.etree import ElementTree
 
 from sim_validate.baselines.compare import Finding, Status, failing
+from sim_validate.baselines.entries import fields_of, properties_of
 
 
 def junit_text(name: str, findings: Iterable[Finding], *, strict: bool) -> str:
@@ -29,7 +29,7 @@ def junit_text(name: str, findings: Iterable[Finding], *, strict: bool) -> str:
             ElementTree.SubElement(case, "error", type=finding.status.value, message=said)
         if finding.after is not None:
             kept = ElementTree.SubElement(case, "properties")
-            for key, value in asdict(finding.after).items():
+            for key, value in properties_of(fields_of(finding.after)).items():
                 ElementTree.SubElement(kept, "property", name=key, value=str(value))
     suite.set("failures", str(failures))
     suite.set("errors", str(errors))

@@ -1,18 +1,22 @@
 """Simulates grasps and makes a baseline of the verdicts, with all that they depend on."""
 
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from grasp_core.errors import InputError
 from grasp_core.provenance import arithmetic, versions
 from grasp_core.records.grasps_json import SavedGrasps
-from sim_validate.baselines.entries import Baseline, entry_of
-from sim_validate.baselines.settings import settings_of
+from grasp_core.values import Grasp
+from sim_validate.baselines.entries import Baseline, Entry, entry_of
+from sim_validate.baselines.executions import tried_execution
+from sim_validate.baselines.settings import How, settings_of
+from sim_validate.execution.asked import AskedExecution
+from sim_validate.execution.jobs import ExecutedGrasp, ExecutionJob
 from sim_validate.parallel.processes import each
 from sim_validate.simulation.gate.gate import require_faithful
-from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.validation.grasp_verdict import Verdict
 from sim_validate.validation.jobs import Job, verdict_of, with_threads
 
@@ -30,31 +34,33 @@ class Measured:
     """Verdicts by the ids of their grasps."""
     refused: Mapping[str, str]
     """Reasons why grasps could not be simulated, by id."""
+    executions: Mapping[str, ExecutedGrasp] = field(default_factory=dict[str, ExecutedGrasp])
+    """Executions by the ids of their grasps; empty if none are asked for."""
 
 
 def measured(
-    saved: SavedGrasps, about: tuple[str, int | None], setup: Setup, agenda: Agenda,
-    processors: int, report: Report,
+    saved: SavedGrasps, about: tuple[str, int | None], how: How, processors: int, report: Report
 ) -> Measured:  # fmt: skip
     """Simulate grasps and make a baseline of their verdicts.
 
     Args:
         saved: The grasps.
         about: Path of the grasps, relative to the baseline's folder, and how many to simulate.
-        setup: How trials are simulated.
-        agenda: Which trials to run.
+        how: How trials are simulated, and which.
         processors: Number of processors to use; no result depends on it.
-        report: Called with (done, total) after each grasp.
+        report: Called with (done, total) after each grasp, and again after each execution.
 
     Raises:
-        InputError: The file of grasps is empty.
+        InputError: The file of grasps is empty, or the object's mass is out of range.
         UnfaithfulError: The simulator fails its checks on cases with known answers.
     """
     chosen = saved.grasps[: about[1]]
     if not chosen:
         raise InputError(f"{about[0]}: expected at least one grasp to simulate, found none")
-    require_faithful(setup, saved.friction, saved.body.radius)
-    jobs = [Job(saved.body, grasp, saved.friction, agenda, setup) for grasp in chosen]
+    require_faithful(how.setup, saved.friction, saved.body.radius)
+    jobs = [Job(saved.body, grasp, saved.friction, how.agenda, how.setup) for grasp in chosen]
+    executing = _executing(saved, chosen, how.execution)
+    total = len(jobs) + len(executing)
     verdicts, refused = dict[str, Verdict](), dict[str, str]()
     for grasp, answer in zip(
         chosen, each(_try, with_threads(jobs, processors), jobs=processors), strict=True
@@ -63,19 +69,38 @@ def measured(
             verdicts[grasp.id] = answer
         else:
             refused[grasp.id] = answer
-        report(len(verdicts) + len(refused), len(jobs))
-    return Measured(_kept(saved, about, setup, agenda, verdicts), verdicts, refused)
+        report(len(verdicts) + len(refused), total)
+    executions = dict[str, ExecutedGrasp]()
+    for done, (job, found) in enumerate(
+        zip(executing, each(tried_execution, executing, jobs=processors), strict=True), start=1
+    ):
+        if isinstance(found, str):
+            refused.setdefault(job.grasp.id, found)
+        else:
+            executions[job.grasp.id] = found
+        report(len(jobs) + done, total)
+    entries = [
+        entry_of(grasp, verdicts[grasp.id], saved.body.radius, executions.get(grasp.id))
+        for grasp in chosen
+        if grasp.id in verdicts and grasp.id not in refused
+    ]
+    kept = _kept(saved, about, settings_of(how), entries)
+    return Measured(kept, verdicts, refused, executions)
+
+
+def _executing(
+    saved: SavedGrasps, chosen: Sequence[Grasp], asked: AskedExecution | None
+) -> list[ExecutionJob]:
+    if asked is None:
+        return []
+    settings = asked.settings_for(saved.body)
+    return [ExecutionJob(saved.body, grasp, saved.friction, settings) for grasp in chosen]
 
 
 def _kept(
-    saved: SavedGrasps, about: tuple[str, int | None], setup: Setup, agenda: Agenda,
-    verdicts: Mapping[str, Verdict],
+    saved: SavedGrasps, about: tuple[str, int | None], settings: Mapping[str, Any],
+    entries: Sequence[Entry],
 ) -> Baseline:  # fmt: skip
-    entries = [
-        entry_of(grasp, verdicts[grasp.id], saved.body.radius)
-        for grasp in saved.grasps
-        if grasp.id in verdicts
-    ]
     return Baseline(
         grasps_file=about[0],
         limit=about[1],
@@ -83,7 +108,7 @@ def _kept(
         content_sha256=saved.body.content_sha256,
         friction=saved.friction,
         planned_radius_m=_planned_radius(saved),
-        settings=settings_of(setup, agenda),
+        settings=settings,
         versions=versions(),
         arithmetic=arithmetic(),
         entries=tuple(sorted(entries, key=lambda entry: entry.id)),
@@ -108,14 +133,16 @@ def complete(found: Measured) -> Baseline:
     return found.baseline
 
 
-def with_planned_fingers(setup: Setup, before: Baseline, saved: SavedGrasps) -> Setup:
-    """Replace a setup's fingertips by those that the grasps are planned for now.
+def with_planned_fingers(how: How, before: Baseline, saved: SavedGrasps) -> How:
+    """Replace the fingertips of the setup by those that the grasps are planned for now.
 
     A radius that was not the planned one when the baseline was recorded stays.
     """
-    if setup.fingers.radius_m != before.planned_radius_m:
-        return setup
-    return replace(setup, fingers=replace(setup.fingers, radius_m=_planned_radius(saved)))
+    fingers = how.setup.fingers
+    if fingers.radius_m != before.planned_radius_m:
+        return how
+    fingers = replace(fingers, radius_m=_planned_radius(saved))
+    return replace(how, setup=replace(how.setup, fingers=fingers))
 
 
 def seen_from(baseline: Path, grasps: Path) -> str:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +15,12 @@ from grasp_core.files.strict_json import shown
 from grasp_core.records.grasps_json import SavedGrasps
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Surface
+from sim_validate.execution.asked import (
+    TABLE,
+    AskedExecution,
+    asked_execution,
+    execution_table,
+)
 from sim_validate.records.setup_toml import setup_from_file, setup_from_tables, tables_of
 from sim_validate.simulation.noise import Noise
 from sim_validate.simulation.setup import (
@@ -41,11 +47,23 @@ class _Settings(BaseModel):
     trials: Count
     noise: dict[str, float]
     seed: Count
+    execution: dict[str, Any] | None = None
 
 
-def settings_of(setup: Setup, agenda: Agenda) -> dict[str, Any]:
-    """Write simulation settings and a choice of trials in the form that a baseline keeps."""
-    settings = {
+@dataclass(frozen=True, slots=True)
+class How:
+    """How the grasps of a baseline are simulated."""
+
+    setup: Setup
+    agenda: Agenda
+    execution: AskedExecution | None = None
+    """How the grasps are executed besides; None to leave it out."""
+
+
+def settings_of(how: How) -> dict[str, Any]:
+    """Write how grasps are simulated in the form that a baseline keeps."""
+    setup, agenda = how.setup, how.agenda
+    settings: dict[str, Any] = {
         "setup": tables_of(setup),
         "surface": setup.surface,
         "random_wrenches": agenda.random_wrenches,
@@ -55,11 +73,13 @@ def settings_of(setup: Setup, agenda: Agenda) -> dict[str, Any]:
         "noise": asdict(agenda.noise),
         "seed": agenda.seed,
     }
+    if how.execution is not None:
+        settings[TABLE] = execution_table(how.execution)
     return json.loads(json.dumps(settings))
 
 
-def of_settings(settings: Mapping[str, Any], path: str) -> tuple[Setup, Agenda]:
-    """Read the simulation settings and the choice of trials that a baseline keeps.
+def of_settings(settings: Mapping[str, Any], path: str) -> How:
+    """Read how the grasps of a baseline are simulated.
 
     Args:
         settings: Settings as `settings_of` writes them.
@@ -82,9 +102,10 @@ def of_settings(settings: Mapping[str, Any], path: str) -> tuple[Setup, Agenda]:
             noise=noise_from_table(given.noise),
             seed=given.seed,
         )
+        execution = None if given.execution is None else asked_execution(given.execution)
     except InputError as error:
         raise InputError(f"{path}: settings: {error}") from error
-    return setup, agenda
+    return How(setup, agenda, execution)
 
 
 def noise_from_table(given: Mapping[str, Any]) -> Noise:

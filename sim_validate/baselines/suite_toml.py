@@ -13,7 +13,7 @@ from grasp_core.errors import InputError
 from grasp_core.files.strict_json import place, shown
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
-from sim_validate.baselines.check import Checked, check_one, silent
+from sim_validate.baselines.check import Checked, check_one, demanded, silent
 from sim_validate.baselines.entries import Baseline
 from sim_validate.baselines.measure import (
     complete,
@@ -21,18 +21,20 @@ from sim_validate.baselines.measure import (
     seen_from,
     with_planned_fingers,
 )
-from sim_validate.baselines.settings import noise_from_table, of_settings, setup_for
+from sim_validate.baselines.settings import How, noise_from_table, of_settings, setup_for
 from sim_validate.baselines.source_file import Source, source_of
+from sim_validate.execution.asked import TABLE, AskedExecution, asked_execution
 from sim_validate.files.toml_tables import read_tables
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.wrenches import wrenches_from_file
 from sim_validate.simulation.noise import Noise
-from sim_validate.simulation.setup import Agenda, Setup
+from sim_validate.simulation.setup import Agenda
 
 ENDING = ".grasps.toml"
 KINDS: Mapping[str, type] = {
     "grasps": str, "object": str, "baseline": str, "strict": bool, "setup": str, "wrenches": str,
     "limits": str, "random_wrenches": int, "trials": int, "noise": dict, "seed": int,
+    "survives": bool, "execution": dict,
 }  # fmt: skip
 """Types of the file's settings, by name."""
 WORDS = {str: "text", bool: "true or false", int: "a whole number", dict: "a table"}
@@ -66,6 +68,10 @@ class Suite:
     """Number of repeats with noise."""
     noise: Noise | None = None
     seed: int | None = None
+    survives: bool = False
+    """Whether each grasp must survive its execution, whatever the baseline says."""
+    execution: AskedExecution | None = None
+    """How grasps are executed besides."""
 
     @cached_property
     def saved(self) -> SavedGrasps:
@@ -124,7 +130,8 @@ class Suite:
         """
         _ = self.source
         before = self.kept
-        return check_one(before, self.saved, self.where, self._settings(before), name)
+        done = check_one(before, self.saved, self.where, self._how(before), name)
+        return demanded(done) if self.survives else done
 
     def bless(self) -> Baseline:
         """Simulate all grasps and write the results as the new baseline.
@@ -136,11 +143,11 @@ class Suite:
         _ = self.source
         check_writable(self.baseline)
         before, saved = self._kept_if_any(), self.saved
-        setup, agenda = self._settings(before)
+        how = self._how(before)
         if before is not None:
-            setup = with_planned_fingers(setup, before, saved)
+            how = with_planned_fingers(how, before, saved)
         about = self.where, before and before.limit
-        found = complete(measured(saved, about, setup, agenda, 1, silent))
+        found = complete(measured(saved, about, how, 1, silent))
         write_baseline(self.baseline, found)
         return found
 
@@ -157,20 +164,29 @@ class Suite:
                 f"{error}; remove the file, then write a new baseline with pytest --grasp-bless"
             ) from error
 
-    def _settings(self, before: Baseline | None) -> tuple[Setup, Agenda]:
-        """Take the baseline's settings, or the default ones, replaced by those of the file."""
+    def _how(self, before: Baseline | None) -> How:
+        """Take the baseline's settings, or the default ones, replaced by those of the file.
+
+        Raises:
+            InputError: Grasps must survive, but nothing says how they are executed.
+        """
         if before is None:
-            setup, agenda = setup_for(self.saved, None), Agenda(seed=self.saved.seed)
+            how = How(setup_for(self.saved, None), Agenda(seed=self.saved.seed))
         else:
-            setup, agenda = of_settings(before.settings, str(self.baseline))
-        if self.setup is not None:
-            setup = setup_for(self.saved, self.setup)
+            how = of_settings(before.settings, str(self.baseline))
+        setup = how.setup if self.setup is None else setup_for(self.saved, self.setup)
+        execution = how.execution if self.execution is None else self.execution
+        if self.survives and execution is None:
+            raise InputError(
+                f"{self.path}: survives: expected a table [{TABLE}] too, with mass_kg or "
+                "density_kg_m3, but the file has none"
+            )
         given: dict[str, Any] = {name: getattr(self, name) for name in (*DIRECT, "noise")}
         if self.wrenches is not None:
             given["wrenches"] = wrenches_from_file(self.wrenches)
         try:
             asked = {name: value for name, value in given.items() if value is not None}
-            return setup, replace(agenda, **asked)
+            return How(setup, replace(how.agenda, **asked), execution)
         except InputError as error:
             raise InputError(f"{self.path}: {error}") from error
 
@@ -199,6 +215,11 @@ def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
     if "noise" in settings:
         try:
             settings["noise"] = noise_from_table(settings["noise"])
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
+    if TABLE in settings:
+        try:
+            settings[TABLE] = asked_execution(settings[TABLE])
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
     return Suite(path=path, **settings)

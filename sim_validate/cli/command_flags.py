@@ -10,9 +10,11 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 from grasp_core.checked import MOST_COUNT
 from sim_validate.cli.baseline_flags import Baseline
 from sim_validate.cli.dataset_flags import Dataset
+from sim_validate.cli.execution_flags import UPRIGHT, Execute, Executing, Mass, Tips, Trials
 from sim_validate.cli.flag_bounds import at_least
 from sim_validate.cli.flag_groups import (
     Count,
+    Direction,
     Edges,
     Fingers,
     Friction,
@@ -45,6 +47,16 @@ class Run:
     """Folder for the results; if not given, graspproof-out/OBJECT."""
     no_report: bool = False
     """Write no pages about the results; `graspproof report` can write them later."""
+    execute: bool = False
+    """Also simulate the grasps as a robot executes them, with the object's true mass, springy
+    fingers and one fixed squeeze, and write executions.json."""
+    executing: OmitArgPrefixes[Executing] = field(default_factory=Executing)
+    execute_trials: Annotated[Trials, arg(metavar="NAME,NAME,...")] = ()
+    """With --execute: names of the trials, separated by commas (weight, lift, shake, stop, knock,
+    misplaced); all if not given."""
+    execute_down: Annotated[Direction, arg(metavar="X Y Z")] = UPRIGHT
+    """With --execute: direction of gravity in the object's frame, in the trials that do not choose
+    their own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +93,12 @@ class Validate:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Write grasps as MuJoCo scenes, which MuJoCo's own viewer can open."""
+    """Write grasps as MuJoCo scenes, which MuJoCo's own viewer can open.
+
+    Without a mass, the scenes are those of `validate`: masses are scaled to suit the grasp, and
+    there is no gravity. With a mass or a density, objects have their true mass and are held under
+    gravity, as in the command `execute`.
+    """
 
     grasps: Positional[Path]
     """The grasps.json with the grasps to write as scenes."""
@@ -93,6 +110,10 @@ class Scene:
     surface: Literal["pads", "mesh"] = "pads"
     """What fingertips touch: flat pads at the contacts, which are exact on any object, or the mesh
     of a convex object."""
+    mass: OmitArgPrefixes[Mass] = field(default_factory=Mass)
+    tips: OmitArgPrefixes[Tips] = field(default_factory=Tips)
+    down: Annotated[Direction, arg(metavar="X Y Z")] = UPRIGHT
+    """With a mass or a density: direction of gravity in the object's frame."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for the scenes; if not given, a single scene is printed."""
@@ -172,7 +193,7 @@ class Analyze:
     """An external wrench whose largest resisted multiple is wanted [N, N m], torque about the
     center; may be repeated."""
     outward: bool = False
-    """Tell that the file's normals point out of the object, not into it."""
+    """Read the file's normals as pointing out of the object, not into it."""
     edges: Edges = 8
     """Number of edges of the pyramids that replace friction cones in two quality measures,
     min-weight and hull volume."""
@@ -209,6 +230,7 @@ Command = (
     Run
     | Plan
     | Validate
+    | Execute
     | Scene
     | View
     | Report

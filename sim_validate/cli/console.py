@@ -65,7 +65,12 @@ class Reporter:
     def document(self, value: object) -> None:
         """Print the one JSON document of a command run with --json."""
         if self.json_only:
-            sys.stdout.write(json.dumps(value, allow_nan=False, indent=1) + "\n")
+            self.text(json.dumps(value, allow_nan=False, indent=1) + "\n")
+
+    def text(self, text: str) -> None:
+        """Print the text of the one JSON document of a command run with --json."""
+        if self.json_only:
+            sys.stdout.write(text)
 
     def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """Print a table on the same stream as lines of results."""

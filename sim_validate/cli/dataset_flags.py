@@ -100,7 +100,7 @@ class Import:
     out: Path
     """Folder of the dataset."""
     outward: bool = False
-    """Tell that the file's normals point out of the object, not into it."""
+    """Read the file's normals as pointing out of the object, not into it."""
     settings: OmitArgPrefixes[Settings] = field(default_factory=Settings)
     work: OmitArgPrefixes[Work] = field(default_factory=Work)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
@@ -108,7 +108,7 @@ class Import:
 
 @dataclass(frozen=True, slots=True)
 class Verify:
-    """Check a dataset: its files and rows, every closure again, and a sample computed again."""
+    """Check files and rows of a dataset, prove force closure again, and redo a sample."""
 
     dataset: Positional[Path]
     """Folder of the dataset."""

@@ -4,6 +4,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "run": (
         "run wedge",
         "run part.stl --unit mm --friction 0.3 --limit 20 --limits ramp --out results",
+        "run wedge --limit 10 --execute --mass-kg 0.3",
     ),
     "plan": (
         "plan wedge --limit 10 --out plan",
@@ -13,9 +14,14 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "validate plan/grasps.json --out plan",
         "validate plan/grasps.json --weight-n 3 --down 0 0 -1 --limits ramp --trials 20",
     ),
+    "execute": (
+        "execute plan/grasps.json --mass-kg 0.3 --out plan",
+        "execute plan/grasps.json --density-kg-m3 2700 --trials lift,shake --shake-g 2",
+    ),
     "scene": (
         "scene plan/grasps.json --out scenes",
         "scene plan/grasps.json --grasp c-0-1-2-7",
+        "scene plan/grasps.json --mass-kg 0.3 --out held",
     ),
     "regions": (
         "regions plan/grasps.json --out plan",

@@ -46,7 +46,7 @@ class Report:
     limit: Count | None = None
     """Draw only this many grasps per run, those with problems before others; if not given, all."""
     clips: Annotated[int, at_least(0)] = 0
-    """Number of grasps per run of which a clip of a trial is made, those with problems first, if
+    """Number of grasps per run of which clips of trials are made, those with problems first, if
     graphics are available."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes."""

@@ -60,22 +60,22 @@ def _show(analyses: Sequence[Analysis], reporter: Reporter) -> None:
     if len(analyses) == 1:
         reporter.table(f"grasp {shown[0].contacts.id}", ("property", "value"), _facts(shown[0]))
     else:
-        columns = ("grasp", "k", "closed", "margin", "mu*", "l1 N", "linf N", "weakest axis")
+        columns = ("grasp", "contacts", "closed", "margin", "mu*", "l1 N", "linf N", "weakest axis")
         reporter.table(f"{len(analyses)} grasps", columns, [_row(found) for found in shown])
     if shown[0].wrenches:
         rows = [row for found in shown for row in _wrench_rows(found)]
-        columns = ("grasp", "wrench", "resisted up to", "at most", "least-norm forces N")
+        columns = ("grasp", "wrench", "resisted up to", "upper bound", "least-norm forces N")
         reporter.table("wrenches", columns, rows)
     if len(analyses) > TABLE_ROWS:
         reporter.say(f"... and {len(analyses) - TABLE_ROWS} more; --json shows all")
     for found in shown:
         for name, reason in found.undecided.items():
-            reporter.say(f"grasp {found.contacts.id}: {name} undecided: {reason}")
+            reporter.say(f"grasp {found.contacts.id}: {name} is undecided: {reason}")
     _say_measures(shown[0].contacts, reporter)
     totals = summary(analyses)
     reporter.say(
-        f"{totals['closed']} of {totals['grasps']} grasps closed, {totals['open']} not, "
-        f"{totals['undecided']} undecided"
+        f"{totals['closed']} of {totals['grasps']} grasps are in force closure, "
+        f"{totals['open']} are not, {totals['undecided']} are undecided"
     )
 
 
@@ -89,12 +89,12 @@ def _say_measures(contacts: ContactSet, reporter: Reporter) -> None:
     scales = {
         "flag": "--torque-scale-m",
         "file": "the torque_scale_m of the file",
-        "farthest contact": "the distance of the farthest contact from there (no torque_scale_m)",
+        "farthest contact": "the distance of the farthest contact (no torque_scale_m given)",
         "object radius": "the object's radius",
     }
     reporter.say(
-        f"torques are about {centers[contacts.center_from]}, compared with forces through "
-        f"{scales[contacts.torque_scale_from]}"
+        f"torques are about {centers[contacts.center_from]}, and are divided by "
+        f"{scales[contacts.torque_scale_from]} to compare them with forces"
     )
 
 

@@ -2,19 +2,20 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import replace
 
 from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
 from sim_validate.baselines.check import Checked, check
 from sim_validate.baselines.compare import Finding, Status, failing
+from sim_validate.baselines.entries import fields_of
 from sim_validate.baselines.junit import junit_text
 from sim_validate.baselines.measure import complete, measured, seen_from
-from sim_validate.baselines.settings import of_settings, setup_for
+from sim_validate.baselines.settings import How, of_settings, setup_for
 from sim_validate.baselines.source_file import Source, source_of
 from sim_validate.cli import baseline_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked_trials import noise_of
+from sim_validate.commands.asked.trials import noise_of
 from sim_validate.files.reading import write_text
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.setup_toml import setup_from_file
@@ -35,9 +36,10 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
         noise=noise_of(command.repeats),
         seed=saved.seed if command.seed is None else command.seed,
     )
-    setup, about = setup_for(saved, command.setup), seen_from(command.out, command.grasps)
+    how = How(setup_for(saved, command.setup), agenda)
+    about = seen_from(command.out, command.grasps)
     with reporter.progress("simulating") as steps:
-        done = measured(saved, (about, command.limit), setup, agenda, command.jobs, steps.update)
+        done = measured(saved, (about, command.limit), how, command.jobs, steps.update)
     found = complete(done)
     write_baseline(command.out, found)
     held = sum(entry.held for entry in found.entries)
@@ -53,12 +55,12 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     path = command.grasps or command.baseline.parent / before.grasps_file
     saved = read_grasps(path)
     source = source_of(saved, path, [command.baseline.parent])
-    setup, agenda = of_settings(before.settings, str(command.baseline))
+    how = of_settings(before.settings, str(command.baseline))
     if command.setup is not None:
-        setup = setup_from_file(command.setup, setup)
+        how = replace(how, setup=setup_from_file(command.setup, how.setup))
     where = seen_from(command.baseline, path)
     with reporter.progress("simulating") as steps:
-        done = check(before, saved, where, (setup, agenda), command.jobs, steps.update)
+        done = check(before, saved, where, how, command.jobs, steps.update)
     if command.junit is not None:
         text = junit_text(str(command.baseline), done.findings, strict=command.strict)
         write_text(command.junit, text)
@@ -88,7 +90,8 @@ def _show(done: Checked, reporter: Reporter) -> None:
     told = [finding for finding in done.findings if finding.status is not Status.SAME]
     rows = [(each.id, each.status.value, _why(each)) for each in told]
     if rows:
-        reporter.table("what became of grasps", ("grasp", "status", "why"), rows[:TABLE_ROWS])
+        title = "grasps that differ from the baseline"
+        reporter.table(title, ("grasp", "status", "why"), rows[:TABLE_ROWS])
         say_cut(len(rows), reporter)
     counts = Counter(finding.status.value for finding in done.findings)
     reporter.say(", ".join(f"{count} {name}" for name, count in sorted(counts.items())))
@@ -109,6 +112,6 @@ def _record(finding: Finding) -> dict[str, object]:
         "status": finding.status.value,
         "reasons": list(finding.reasons),
         "differences": list(finding.differences),
-        "before": None if finding.before is None else asdict(finding.before),
-        "after": None if finding.after is None else asdict(finding.after),
+        "before": None if finding.before is None else fields_of(finding.before),
+        "after": None if finding.after is None else fields_of(finding.after),
     }

@@ -53,6 +53,7 @@ def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter:
     reporter.say(
         f"{out}: {built.units} units, {built.made} made now, {built.quarantined} quarantined; "
         f"{rows['objects']} objects, {rows['grasps']} grasps and controls, {rows['trials']} trials"
+        + (f", {rows['executions']} trials of executions" if config.execution else "")
     )
     if built.quarantined:
         reporter.warn(f"{out / 'quarantine.jsonl'} says why objects were left out")
@@ -98,7 +99,8 @@ def export_dataset(command: dataset_flags.Export, reporter: Reporter) -> int:
     counts = ", ".join(f"{count} {name}" for name, count in done.rows.items())
     reporter.say(f"{command.out}: {done.files} files, {counts}")
     if not done.rows["grasps"]:
-        reporter.warn(f"{command.dataset}: no grasps in {command.split or 'it'}")
+        where = f"the split {command.split} of the dataset" if command.split else "the dataset"
+        reporter.warn(f"{command.dataset}: {where} has no grasps")
     asked = {"dataset": str(command.dataset), "to": command.to, "split": command.split}
     reporter.document({**asked, "out": str(command.out), **asdict(done)})
     return Exit.GOOD

@@ -118,5 +118,5 @@ def _concluded(checks: Mapping[str, bool], reporter: Reporter) -> int:
             ".ci/constraints.txt"
         )
     else:
-        reporter.warn("solvers or simulation give wrong answers: reinstall the package")
+        reporter.warn(f"wrong answers from {', '.join(failed)}: reinstall the package")
     return Exit.INTERNAL

@@ -13,7 +13,7 @@ from scenes.example_objects import example_names
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked_objects import load_object
+from sim_validate.commands.asked.objects import load_object
 
 WIDTH = 20
 """Width of the column with the names of facts, in characters."""

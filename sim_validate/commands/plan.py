@@ -18,7 +18,7 @@ from grasp_core.values import FaceQuadruple, Grasp
 from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked_objects import asked_finger, object_to_plan
+from sim_validate.commands.asked.objects import asked_finger, object_to_plan
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.reading import write_text
 from sim_validate.files.stale_results import remove_results
@@ -60,7 +60,7 @@ def plan_object(
                 jobs=jobs, progress=steps.update,
             )  # fmt: skip
         if left_out := len(moves) - len(found.grasps):
-            reporter.say(f"{left_out} optimised grasps are left out: others have the same contacts")
+            reporter.say(f"{left_out} optimised grasps are left out, equal to others after moving")
     return found, moves
 
 
@@ -83,7 +83,7 @@ def with_regions(
         each = certified(body, found.grasps, asked, jobs=jobs, progress=steps.update)
         write_regions(folder, body, asked, kept(each))
     widened = sum(new is not old for new, old in zip(grasps, found.grasps, strict=True))
-    reporter.say(f"{widened} of {len(grasps)} grasps got regions with proofs of their own")
+    reporter.say(f"{widened} of {len(grasps)} grasps got larger regions, each with its own proof")
     return replace(found, grasps=tuple(grasps))
 
 
@@ -124,9 +124,9 @@ def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
     counts = found.counts
     reporter.say(
         f"{body.name}: {counts.faces} faces, {counts.quadruples} face quadruples, "
-        + (f"normals of {counts.spanning} span (P3), " if counts.spanning is not None else "")
+        + (f"{counts.spanning} with spanning normals (P3), " if counts.spanning is not None else "")
         + f"friction {found.friction:g}, "
-        f"theta {math.degrees(found.theta):.4g} deg"
+        f"cone half-angle {math.degrees(found.theta):.4g} deg"
     )
     known = found.outcomes
     reporter.say(
@@ -138,14 +138,14 @@ def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
         undecided = f"{tally.undecided} undecided, " if method == "free" else ""
         undecided += f"{tally.unreachable} out of reach, " if found.unreached else ""
         reporter.say(
-            f"{method}: {tally.tried} tried, {tally.pruned} pruned, {tally.infeasible} "
+            f"{method} candidates: {tally.tried} tried, {tally.pruned} pruned, {tally.infeasible} "
             f"infeasible, {undecided}{tally.duplicates} duplicates, {tally.found} found, "
             f"{tally.rejected} rejected, {found.seconds[method]:.2f} s"
         )
     if found.undecided:
         named = [f"{_listed(faces)} ({100.0 * share:.3g} % open)"
                  for faces, share in found.undecided.items()]  # fmt: skip
-        reporter.say(f"undecided faces: {', '.join(named[:TABLE_ROWS])}")
+        reporter.say(f"undecided face quadruples: {', '.join(named[:TABLE_ROWS])}")
         say_cut(len(named), reporter)
     reasons = Counter(_whoever(why) for why in found.unreached.values())
     for why, count in reasons.most_common():
@@ -169,11 +169,11 @@ def show_gains(moves: Sequence[Moved], reporter: Reporter) -> None:
          "" if move.ceiling is None else f"{move.ceiling:.4f}")
         for move in moves[:TABLE_ROWS]
     ]  # fmt: skip
-    columns = ("grasp", "quality before", "after", "gain", "none above")
+    columns = ("grasp", "quality before", "after", "gain", "upper bound")
     reporter.table("Ferrari-Canny l1 [N]", columns, rows)
     gains = np.array([move.gain for move in moves])
     low, quarter, middle, upper, high = np.percentile(gains, [0, 25, 50, 75, 100])
     reporter.say(
-        f"{int((gains > 1.0).sum())} of {len(gains)} grasps raised; gain from {low:.3f} to "
+        f"{int((gains > 1.0).sum())} of {len(gains)} grasps improved; gain from {low:.3f} to "
         f"{high:.3f}, median {middle:.3f}, half of them between {quarter:.3f} and {upper:.3f}"
     )

@@ -49,8 +49,9 @@ def _show(document: Mapping[str, Any], reporter: Reporter) -> None:
     reporter.table("independent regions", columns, [_row(grasp) for grasp in grasps[:TABLE_ROWS]])
     say_cut(len(grasps), reporter)
     reporter.say(
-        "disc: radius proved around contacts or middles, cut with the faces; open: a radius with "
-        "a choice that is not closed; inner: smallest disc in the polygons; mm2: their area"
+        "disc: proved radius around contacts or face middles, cut off at face borders; open: a "
+        "larger radius, at which some choice of contacts is not in force closure; inner: smallest "
+        "of the discs inscribed in the regions; mm2: area of the regions; cones: size of the proof"
     )
     reasons = Counter(grasp["reason"] for grasp in grasps if grasp["regions"] is None)
     for reason, count in reasons.most_common():
@@ -59,7 +60,8 @@ def _show(document: Mapping[str, Any], reporter: Reporter) -> None:
     left = document["friction"] * (1.0 - document["reserve"])
     if counted and min(counted) < left:
         reporter.say(
-            f"friction counted on: {min(counted):.4g}, as the surface leans from its plane"
+            f"the proofs use friction {min(counted):.4g} only, because curved faces lean from "
+            "the planes that replace them"
         )
 
 

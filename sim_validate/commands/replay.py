@@ -54,16 +54,16 @@ def _show(recorded: Recorded, found: Replayed, said: str | None, reporter: Repor
          *(f"{MICRO * value[row].max():.3g}" for value in (trace.slips_m, trace.gaps_m)))
         for row in range(0, len(trace.times_s), step)
     ]  # fmt: skip
-    columns = ("s", "um moved", "urad turned", "um slid at most", "um off a face at most")
-    reporter.table(f"{recorded.name}: {found.name}, from when friction is lowered", columns, rows)
+    columns = ("s", "um moved", "urad turned", "most um slid", "most um off a face")
+    reporter.table(f"{recorded.name}: {found.name}, once friction is lowered", columns, rows)
     limit = found.predicted_limit
-    predicted = "nothing resists it" if limit is None else f"{limit:.4g} times as much is resisted"
+    predicted = "no forces resist it" if limit is None else f"{limit:.4g} times it is resisted"
     needs = found.required_friction
-    friction = "no forces balance it" if needs is None else f"planned forces need {needs:.4g}"
-    reporter.say(f"wrench {found.load.wrench.tolist()} N, N m: by analysis {predicted}")
-    reporter.say(f"friction {found.friction:.6g}: {friction}")
+    friction = "no forces balance it" if needs is None else f"the planned forces need {needs:.4g}"
+    reporter.say(f"wrench {found.load.wrench.tolist()} (N, N m): by analysis {predicted}")
+    reporter.say(f"simulated with friction {found.friction:.6g}: {friction}")
     ended = f"{hold.outcome.value}{f': {hold.reason}' if hold.reason else ''}"
-    reporter.say(f"{ended} (the file says {said or 'nothing'})")
+    reporter.say(f"outcome: {ended} (the file says {said or 'nothing'})")
 
 
 def _written(found: Replayed, command: command_flags.Replay, reporter: Reporter) -> Iterator[Path]:

@@ -1,5 +1,6 @@
 """Runs the command `run`, which plans grasps, simulates them and writes all results."""
 
+import json
 import re
 from pathlib import Path
 
@@ -10,14 +11,11 @@ from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit, reason_of
 from sim_validate.cli.showing_flags import Report
-from sim_validate.commands.asked_objects import asked_finger, object_to_plan
-from sim_validate.commands.asked_trials import prepared
-from sim_validate.commands.plan import (
-    plan_object,
-    say_counts,
-    show_gains,
-    with_regions,
-)  # fmt: skip
+from sim_validate.commands.asked.executions import check_executing, execution_of_run
+from sim_validate.commands.asked.objects import asked_finger, object_to_plan
+from sim_validate.commands.asked.trials import prepared
+from sim_validate.commands.execute import execute_grasps
+from sim_validate.commands.plan import plan_object, say_counts, show_gains, with_regions
 from sim_validate.commands.report import shown_report
 from sim_validate.commands.validate import simulate_grasps
 from sim_validate.files.folder_lock import alone_in
@@ -40,6 +38,7 @@ REPORTED = 200
 def run_object(command: command_flags.Run, reporter: Reporter) -> int:
     """Plan grasps of an object, simulate them, and write and show all results."""
     planning = command.planning
+    check_executing(command)
     trials = prepared(
         command.testing, asked_finger(planning), planning.seed, command.out or RESULTS
     )
@@ -60,6 +59,7 @@ def _run_in(
     reporter: Reporter,
 ) -> int:
     (setup, agenda), jobs = trials, command.testing.jobs
+    execution = execution_of_run(command, body)
     found, moves = plan_object(body, command.planning, jobs, reporter)
     remove_results(folder)
     found = with_regions(body, found, command.planning, folder, jobs, reporter)
@@ -71,21 +71,44 @@ def _run_in(
         return Exit.NONE
     if moves:
         show_gains(moves, reporter)
-    for grasp in found.grasps:
-        scene = setup.scene(body, grasp, found.friction)
-        write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
     saved = SavedGrasps(body, found.friction, found.seed, found.grasps, found.finger)
-    code = simulate_grasps(saved, setup, agenda, jobs=jobs, folder=folder, reporter=reporter)
+    _write_scenes(folder, saved, setup)
+    code, text = simulate_grasps(saved, setup, agenda, jobs=jobs, folder=folder, reporter=reporter)
     reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
-    if not command.no_report:
-        _report(folder, jobs, reporter)
+    try:
+        if execution is None:
+            reporter.text(text)
+        else:
+            survival, more = execute_grasps(
+                saved, execution, jobs=jobs, folder=folder, reporter=reporter
+            )
+            reporter.text(_together(text, more))
+            code = max(code, survival)
+    except GraspError:  # the other results are complete, so that pages can show them
+        _report(command, folder, reporter)
+        raise
+    _report(command, folder, reporter)
     return code
 
 
-def _report(folder: Path, jobs: int, reporter: Reporter) -> None:
-    """Write the results of a run as pages; a failure to do so only gives a warning."""
+def _write_scenes(folder: Path, saved: SavedGrasps, setup: Setup) -> None:
+    for grasp in saved.grasps:
+        scene = setup.scene(saved.body, grasp, saved.friction)
+        write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
+
+
+def _together(verdicts: str, executions: str) -> str:
+    """Put executions into the document of verdicts, under the key `executions`."""
+    document = json.loads(verdicts) | {"executions": json.loads(executions)}
+    return json.dumps(document, allow_nan=False, indent=1) + "\n"
+
+
+def _report(command: command_flags.Run, folder: Path, reporter: Reporter) -> None:
+    """Write the results of a run as pages if asked to; a failure only gives a warning."""
+    if command.no_report:
+        return
     try:
-        shown_report(Report(folder, limit=REPORTED, jobs=jobs), reporter)
+        shown_report(Report(folder, limit=REPORTED, jobs=command.testing.jobs), reporter)
     except (GraspError, OSError) as error:
         reporter.warn(f"no report: {reason_of(error)}")
 

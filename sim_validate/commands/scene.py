@@ -1,19 +1,31 @@
-"""Runs the command `scene`, which writes grasps as MuJoCo scenes."""
+"""Runs the command `scene`, which writes grasps as MuJoCo scenes, with true masses if asked to."""
 
-from grasp_core.errors import InputError
+from collections.abc import Callable
+from pathlib import Path
+
+from grasp_core.errors import InputError, NoForcesError
+from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.values import Grasp
 from scenes.mjcf import build_scene
-from sim_validate.cli import command_flags
+from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import Reporter
+from sim_validate.cli.execution_flags import UPRIGHT, Mass, Tips
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked_trials import finger_settings
+from sim_validate.cli.flag_bounds import FlagsError
+from sim_validate.commands.asked.executions import check_mass, holding
+from sim_validate.commands.asked.trials import finger_settings
+from sim_validate.execution.execute import chosen_squeeze, held_scene
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.reading import write_text
 from sim_validate.records.grasps import grasp_with_id, read_grasps
 from sim_validate.simulation.setup import with_planned_radius
 
+TextOf = Callable[[Grasp], str]
+
 
 def write_scenes(command: command_flags.Scene, reporter: Reporter) -> int:
     """Write a MuJoCo scene for each grasp of a file, or print a single one."""
+    _check(command)
     saved = read_grasps(command.grasps)
     chosen = saved.grasps
     if command.grasp is not None:
@@ -24,20 +36,83 @@ def write_scenes(command: command_flags.Scene, reporter: Reporter) -> int:
             "--grasp ID"
         )
     friction = saved.friction if command.friction is None else command.friction
-    fingers = with_planned_radius(finger_settings(command.fingers), saved.finger)
-    written: list[str] = []
+    if _heavy(command):
+        text_of = _held(command, saved, friction, reporter)
+    else:
+        text_of = _scaled(command, saved, friction)
     with alone_in(command.out):
-        for grasp in chosen:
-            scene = build_scene(
-                saved.body, grasp, friction, fingers=fingers, surface=command.surface
-            )
-            if command.out is not None:
-                written.append(str(write_text(command.out / f"{grasp.id}.xml", scene.xml)))
-                reporter.say(f"wrote {written[-1]}")
-            elif reporter.json_only:
-                reporter.document({"id": grasp.id, "xml": scene.xml})
-            else:
-                print(scene.xml, end="")  # noqa: T201 - the document itself
+        written = [_written(grasp, text_of, command.out, reporter) for grasp in chosen]
     if command.out is not None:
-        reporter.document({"scenes": written})
-    return Exit.GOOD
+        reporter.document({"scenes": [path for path in written if path]})
+    return Exit.GOOD if all(written) else Exit.NEGATIVE
+
+
+def _written(grasp: Grasp, text_of: TextOf, folder: Path | None, reporter: Reporter) -> str:
+    """Write or print the scene of one grasp; return its place, or nothing if it has no scene."""
+    try:
+        text = text_of(grasp)
+    except NoForcesError as error:
+        reporter.warn(f"{grasp.id}: no scene: {error}")
+        if folder is None:
+            reporter.document({"id": grasp.id, "absence": str(error)})
+        return ""
+    if folder is None:
+        reporter.document({"id": grasp.id, "xml": text})
+        if not reporter.json_only:
+            print(text, end="")  # noqa: T201 - the document itself
+        return grasp.id
+    path = str(write_text(folder / f"{grasp.id}.xml", text))
+    reporter.say(f"wrote {path}")
+    return path
+
+
+def _heavy(command: command_flags.Scene) -> bool:
+    """Return whether the flags ask for an object of true mass."""
+    return command.mass != Mass()
+
+
+def _check(command: command_flags.Scene) -> None:
+    """Refuse flags that the scene asked for does not use, before any file is read.
+
+    Raises:
+        FlagsError: The flags contradict each other.
+    """
+    check_mass(command.mass)
+    if _heavy(command):
+        if (command.fingers, command.surface) != (flag_groups.Fingers(), "pads"):
+            raise FlagsError(
+                "the flags from --max-normal-force to --surface are for scenes with scaled "
+                "masses: leave out --mass-kg and --density-kg-m3, or use the flags from --push-n "
+                "to --damping-ratio"
+            )
+    elif (command.tips, command.down) != (Tips(), UPRIGHT):
+        raise FlagsError(
+            "the flags from --push-n to --down are for objects of true mass: give --mass-kg or "
+            "--density-kg-m3 too"
+        )
+
+
+def _scaled(command: command_flags.Scene, saved: SavedGrasps, friction: float) -> TextOf:
+    """Return a function that writes scenes as `validate` simulates them, with scaled masses."""
+    fingers = with_planned_radius(finger_settings(command.fingers), saved.finger)
+    return lambda grasp: (
+        build_scene(saved.body, grasp, friction, fingers=fingers, surface=command.surface).xml
+    )
+
+
+def _held(
+    command: command_flags.Scene, saved: SavedGrasps, friction: float, reporter: Reporter
+) -> TextOf:
+    """Return a function that writes scenes as `execute` simulates them, with true masses."""
+    settings = holding(saved, command.mass, command.tips, command.down)
+
+    def text_of(grasp: Grasp) -> str:
+        best = chosen_squeeze(saved.body, grasp, friction, settings)
+        if best.scale < 1.0:
+            reporter.warn(
+                f"{grasp.id}: the squeeze is certified for {best.scale:.3g} of the weight only, so "
+                "the object may slip; use a smaller mass, or a larger --push-n"
+            )
+        return held_scene(saved.body, best.grip, settings).xml
+
+    return text_of

@@ -10,11 +10,11 @@ from grasp_core.values import Grasp
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked_trials import prepared
+from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
+from sim_validate.commands.asked.trials import prepared
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.reading import write_arrays, write_text
 from sim_validate.files.stale_results import remove_verdicts
-from sim_validate.records.grasps import read_grasps
 from sim_validate.records.verdicts_json import summary, trace_arrays, verdicts_to_json
 from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.hold_verdict import Outcome
@@ -27,31 +27,27 @@ from sim_validate.validation.wrench_verdict import WrenchVerdict
 
 def validate_file(command: command_flags.Validate, reporter: Reporter) -> int:
     """Simulate the grasps of a file and report which of them hold."""
-    saved = read_grasps(command.grasps)
-    if not saved.grasps:
-        absence = f"{command.grasps} holds no grasp"
-        reporter.say(absence)
-        reporter.document({"absence": absence})
+    saved = saved_grasps(command.grasps, reporter)
+    if saved is None:
         return Exit.NONE
-    chosen = SavedGrasps(
-        saved.body,
-        saved.friction if command.friction is None else command.friction,
-        saved.seed if command.seed is None else command.seed,
-        saved.grasps[: command.limit],
-        saved.finger,
-    )
+    chosen = chosen_grasps(saved, friction=command.friction, seed=command.seed, limit=command.limit)
     setup, agenda = prepared(command.testing, saved.finger, chosen.seed, command.out)
     with alone_in(command.out):
-        return simulate_grasps(
+        code, text = simulate_grasps(
             chosen, setup, agenda, jobs=command.testing.jobs, folder=command.out, reporter=reporter
         )
+    reporter.text(text)
+    return code
 
 
 def simulate_grasps(
     saved: SavedGrasps, setup: Setup, agenda: Agenda, *, jobs: int, folder: Path | None,
     reporter: Reporter,
-) -> int:  # fmt: skip
+) -> tuple[Exit, str]:  # fmt: skip
     """Simulate grasps, show the verdicts, and write them even if the run is interrupted.
+
+    Returns:
+        The exit code, and the text of verdicts.json.
 
     Raises:
         InputError: A grasp is refused.
@@ -78,10 +74,9 @@ def simulate_grasps(
         if folder and verdicts:
             path = write_text(folder / "verdicts.json", text)
             reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
-    if reporter.json_only:
-        print(text, end="")  # noqa: T201 - the document itself
     _show(saved.grasps, verdicts, setup, reporter)
-    return Exit.GOOD if all(verdict.good for verdict in verdicts) else Exit.NEGATIVE
+    good = all(verdict.good for verdict in verdicts)
+    return (Exit.GOOD if good else Exit.NEGATIVE), text
 
 
 def _show(
@@ -147,7 +142,7 @@ def _show_bounds(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
              f"{min(found.limit_shares):.1f}-{max(found.limit_shares):.1f}",
              f"{found.residual:.3f}")
         )  # fmt: skip
-    columns = ("grasp", "mu*", "rigid tips", "fixed squeeze", "residual")
+    columns = ("grasp", "mu*", "mu, rigid tips", "limits, fixed squeeze", "residual")
     reporter.table("without planned forces (bounds)", columns, rows)
 
 
@@ -165,7 +160,7 @@ def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
             (verdict.id, f"{found.held} of {count}", str(found.predicted),
              f"{100.0 * lower:.3g} to {100.0 * upper:.3g} %", first)
         )  # fmt: skip
-    columns = ("grasp", "held", "predicted", "95 % interval", "first that did not")
+    columns = ("grasp", "held", "predicted", "95 % interval", "first not held")
     reporter.table("repeats with noise", columns, rows)
 
 
@@ -181,7 +176,7 @@ def _show_rules(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
         for name in names
     ]  # fmt: skip
     if rows:
-        columns = ("rule", "grasps accepted", "controls accepted", "rule of")
+        columns = ("rule", "grasps accepted", "controls accepted", "used by")
         reporter.table("rules of other tools", columns, rows)
 
 

@@ -97,7 +97,7 @@ def _written(
         try:
             yield write_closing_clip(_scene(saved, grasp, friction), grasp, command.clip)
         except GraphicsError as error:
-            reporter.warn(f"no graphics for MuJoCo's renderer, the picture turns instead: {error}")
+            reporter.warn(f"the clip shows the picture turning, not the fingers closing: {error}")
             yield write_turning_clip(body, grasp, command.clip, friction)
         reporter.say(f"wrote {command.clip}")
 

@@ -1,14 +1,17 @@
 """Defines the tables of a dataset: every column with its type, unit and meaning.
 
+A dataset whose configuration asks for executions has one table and some columns more.
+
 Names end in their unit. Geometry is in the object's own frame, in float64, with normals into the
 object and torques about its centre of mass. A value that could not be measured is null.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 Kind: TypeAlias = Literal["text", "bool", "int", "float"]
-Name: TypeAlias = Literal["objects", "grasps", "trials"]
+Name: TypeAlias = Literal["objects", "grasps", "trials", "executions"]
 SplitName: TypeAlias = Literal["train", "validation", "test"]
 ExportFormat: TypeAlias = Literal["csv", "jsonl", "npz", "hdf5", "isaac", "mjcf"]
 """Names of the formats that `datasets.exports` writes."""
@@ -27,10 +30,10 @@ class Column:
 
 
 OBJECTS = (
-    Column("object_id", "text", "sha256 of the canonical mesh"),
+    Column("object_id", "text", "SHA-256 hash of the object's mesh; identifies the object"),
     Column("source_name", "text", "file name, or name of the built-in object"),
-    Column("source_sha256", "text", "of the file's bytes, or of the built-in object's mesh"),
-    Column("split", "text", "train, validation or test"),
+    Column("source_sha256", "text", "SHA-256 hash of the mesh file or built-in mesh"),
+    Column("split", "text", "part of the dataset: train, validation or test"),
     Column("vertices", "int", "number of vertices"),
     Column("triangles", "int", "number of triangles"),
     Column("faces", "int", "number of planar faces or patches"),
@@ -40,56 +43,95 @@ OBJECTS = (
     Column("center_of_mass_m", "float", "centre of mass", "m", (3,)),
 )
 GRASPS = (
-    Column("grasp_id", "text", "object, friction and grasp"),
-    Column("object_id", "text", "of `objects`"),
-    Column("split", "text", "that of the object"),
-    Column("name", "text", "family and faces, as in the planner's files"),
+    Column("grasp_id", "text", "identifies the row: made of object, friction and name"),
+    Column("object_id", "text", "object of the grasp"),
+    Column("split", "text", "part of the dataset that the object is in"),
+    Column("name", "text", "the grasp's id in the planner's files: family and faces"),
     Column("label", "text", "grasp, given (from elsewhere), or the name of the negative control"),
     Column("control_of", "text", "the grasp that a negative control was made from"),
-    Column("friction", "float", "Coulomb coefficient planned for and tried at", "1"),
-    Column("family", "text", "class of the four lines of force; null for controls"),
+    Column("friction", "float", "Coulomb coefficient of the plan and of the trials", "1"),
+    Column("family", "text", "family of the grasp, given by its lines of force; null for controls"),
     Column("faces", "int", "indices of the faces or patches; null for controls", shape=(4,)),
-    Column("contacts", "int", "number of contacts: four but for some controls"),
-    Column("contact_points_m", "float", "contacts in finger order, then nulls", "m", (4, 3)),
-    Column("contact_normals", "float", "unit vectors into the object, then nulls", "1", (4, 3)),
-    Column("moved_m", "float", "largest way of a given contact onto the surface", "m"),
-    Column("force_closed", "bool", "proved: true for grasps, false for controls"),
-    Column("closure_margin", "float", "margin of the exact closure test", "1"),
-    Column("critical_friction", "float", "smallest coefficient that suffices", "1"),
-    Column("region_radius_m", "float", "radius of the smallest independent disc, 0 without", "m"),
-    Column("region_kind", "text", "what certifies the regions: cone, disc; point claims none"),
-    Column("region_radii_m", "float", "radius of the largest disc in each region", "m", (4,)),
-    Column("ferrari_canny_lower_n", "float", "proved lower bound of the quality", "N"),
-    Column("ferrari_canny_upper_n", "float", "proved upper bound of the quality", "N"),
-    Column("held", "bool", "whether every trial held"),
+    Column("contacts", "int", "number of contacts: four, fewer for some controls"),
+    Column("contact_points_m", "float", "contacts by finger; null after the last", "m", (4, 3)),
+    Column("contact_normals", "float", "inward unit normals; null after the last", "1", (4, 3)),
+    Column("moved_m", "float", "largest distance by which a given contact was moved", "m"),
+    Column("force_closed", "bool", "whether it is proved to be in force closure"),
+    Column("closure_margin", "float", "margin of the exact test of force closure", "1"),
+    Column("critical_friction", "float", "smallest coefficient with force closure", "1"),
+    Column("region_radius_m", "float", "radius of the smallest contact region; 0 for points", "m"),
+    Column("region_kind", "text", "how contact regions were made: cone, disc, or point for none"),
+    Column("region_radii_m", "float", "largest disc radius in each contact region", "m", (4,)),
+    Column("ferrari_canny_lower_n", "float", "proved lower bound of Ferrari-Canny quality", "N"),
+    Column("ferrari_canny_upper_n", "float", "proved upper bound of Ferrari-Canny quality", "N"),
+    Column("held", "bool", "whether the grasp held in every trial"),
     Column("outcome", "text", "held, or how the first trial that did not hold ended"),
     Column("note", "text", "why a given grasp was not tried, else empty"),
-    Column("trials", "int", "number of trials"),
-    Column("mismatches", "int", "in how many ways simulation contradicts the analysis"),
-    Column("simulated_critical_friction", "float", "where the object slips in simulation", "1"),
+    Column("trials", "int", "number of simulated trials"),
+    Column("mismatches", "int", "number of contradictions between simulation and analysis"),
+    Column("simulated_critical_friction", "float", "friction at which it slips in simulation", "1"),
 )
 TRIALS = (
-    Column("grasp_id", "text", "of `grasps`"),
-    Column("trial", "int", "number within the grasp"),
-    Column("name", "text", "of the wrench"),
-    Column("wrench_n_nm", "float", "applied force and torque", "N, N m", (6,)),
-    Column("predicted_limit", "float", "largest multiple resisted, by analysis", "1"),
-    Column("required_friction", "float", "what the planned forces need", "1"),
-    Column("outcome", "text", "held, or how it ended"),
-    Column("reason", "text", "what happened, empty if it held"),
+    Column("grasp_id", "text", "grasp that is tried"),
+    Column("trial", "int", "number of the trial, from 0 for each grasp"),
+    Column("name", "text", "name of the wrench"),
+    Column("wrench_n_nm", "float", "applied force, then torque", "N, N m", (6,)),
+    Column("predicted_limit", "float", "largest multiple of the wrench resisted, by analysis", "1"),
+    Column("required_friction", "float", "friction that the planned contact forces need", "1"),
+    Column("outcome", "text", "held, or how the trial ended"),
+    Column("reason", "text", "what happened; empty if the grasp held"),
     Column("displacement_m", "float", "largest motion of the object while holding", "m"),
     Column("rotation_rad", "float", "largest rotation of the object while holding", "rad"),
-    Column("slip_m", "float", "largest tangential motion of each fingertip, then nulls", "m", (4,)),
-    Column("failed_after_s", "float", "when a threshold was first crossed", "s"),
-    Column("simulated_limit", "float", "multiple at which it lets go in simulation", "1"),
+    Column("slip_m", "float", "largest slip of each fingertip; null after the last", "m", (4,)),
+    Column("failed_after_s", "float", "time until a limit on motion was first crossed", "s"),
+    Column("simulated_limit", "float", "multiple of the wrench that slips in simulation", "1"),
 )
+EXECUTED = (
+    Column("executed", "bool", "whether its execution was simulated; false for controls"),
+    Column("survived", "bool", "whether the object survived every trial; null if not known"),
+    Column("execution_note", "text", "why it was not executed, or which trials are not possible"),
+    Column("mass_kg", "float", "mass of the object in the execution", "kg"),
+    Column("squeeze_n", "float", "contact forces on the object at rest, by finger", "N", (4, 3)),
+    Column("load_multiple", "float", "multiple of the weight that the squeeze is proved for", "1"),
+    Column("predicted_first_slip", "float", "least multiple of a trial's load that slips", "1"),
+    Column("simulated_first_slip", "float", "the same from simulated contact forces", "1"),
+    Column("executed_trials", "int", "number of trials of the execution"),
+    Column("execution_mismatches", "int", "number of its controls that did not slip, but must"),
+)
+"""Columns of grasps that only a dataset with executions has."""
+EXECUTIONS = (
+    Column("grasp_id", "text", "grasp that is executed"),
+    Column("trial", "int", "number of the trial, from 0 for each grasp"),
+    Column("kind", "text", "weight, lift, shake, stop, knock or misplaced"),
+    Column("name", "text", "the kind with its direction or number"),
+    Column("survived", "bool", "whether the object was kept, and moved no farther than allowed"),
+    Column("fate", "text", "stuck, slipped (at a contact, but kept), or dropped"),
+    Column("slip_m", "float", "farthest that a point of contact slid on the object", "m"),
+    Column("displacement_m", "float", "largest displacement of the object in the hand", "m"),
+    Column("turn_rad", "float", "largest turn of the object in the hand", "rad"),
+    Column("predicted_first_slip", "float", "multiple of the load that slips; null if none", "1"),
+    Column("simulated_first_slip", "float", "the same from simulated contact forces", "1"),
+)
+Tables: TypeAlias = Mapping[Name, tuple[Column, ...]]
 TABLES: dict[Name, tuple[Column, ...]] = {"objects": OBJECTS, "grasps": GRASPS, "trials": TRIALS}
+"""Tables of a dataset without executions."""
+
+
+def dataset_tables(*, executed: bool) -> Tables:
+    """Return the tables of a dataset, with or without executions."""
+    if not executed:
+        return TABLES
+    return {**TABLES, "grasps": (*TABLES["grasps"], *EXECUTED), "executions": EXECUTIONS}
+
+
 KEYS: dict[Name, tuple[str, ...]] = {
     "objects": ("object_id",), "grasps": ("object_id", "grasp_id"), "trials": ("grasp_id", "trial"),
+    "executions": ("grasp_id", "trial"),
 }  # fmt: skip
 """Columns by which the rows of a table are sorted; no two rows have the same values in them."""
 REFERENCES: dict[tuple[Name, str], tuple[Name, str]] = {
     ("grasps", "object_id"): ("objects", "object_id"),
     ("trials", "grasp_id"): ("grasps", "grasp_id"),
+    ("executions", "grasp_id"): ("grasps", "grasp_id"),
 }
 """Columns whose cells name a row of another table, with the column there that holds the name."""

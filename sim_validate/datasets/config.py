@@ -19,6 +19,13 @@ from grasp_core.objects.face import FaceKind
 from grasp_core.objects.polyhedron import UNITS_M
 from grasp_core.planning.request import METHODS, ConeKind
 from grasp_core.values import Method
+from sim_validate.datasets.columns import Tables, dataset_tables
+from sim_validate.execution.asked import (
+    TABLE,
+    AskedExecution,
+    asked_execution,
+    execution_table,
+)
 from sim_validate.files.toml_tables import read_tables
 
 LimitsKind: TypeAlias = Literal["none", "ramp", "bisection"]
@@ -88,6 +95,8 @@ class DatasetConfig:
     published: str = ""
     """Date of publication, such as `2026-11-22`. It is a setting, because a clock would make every
     build differ."""
+    execution: AskedExecution | None = None
+    """How grasps are executed besides: with true mass and springy fingers; None to leave it out."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frictions", tuple(map(float, self.frictions)))
@@ -132,6 +141,11 @@ class DatasetConfig:
             )
 
     @property
+    def tables(self) -> Tables:
+        """Tables of the dataset, with their columns."""
+        return dataset_tables(executed=self.execution is not None)
+
+    @property
     def sha256(self) -> str:
         """SHA-256 of the text with all settings."""
         return hashlib.sha256(config_to_toml(self).encode()).hexdigest()
@@ -168,6 +182,8 @@ def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
 
 def _typed(name: str, value: Any) -> Any:
     """Check a setting, and convert it to the type it has in the configuration."""
+    if name == TABLE:
+        return asked_execution(value)
     kinds = {**LISTS, **dict.fromkeys(LEAST, int), **dict.fromkeys(SWITCHES, bool)}
     wanted = kinds.get(name, str)
     if name not in LISTS:
@@ -199,9 +215,16 @@ def _is_date(text: str) -> bool:
 
 def config_to_toml(config: DatasetConfig) -> str:
     """Write every setting in the order of the class; equal configurations give equal texts."""
-    return "".join(
-        f"{each.name} = {_as_toml(getattr(config, each.name))}\n" for each in fields(config)
-    )
+    own = {each.name: getattr(config, each.name) for each in fields(config) if each.name != TABLE}
+    if config.execution is None:
+        return _lines(own)
+    table = execution_table(config.execution)
+    hand = table.pop("hand")
+    return f"{_lines(own)}\n[{TABLE}]\n{_lines(table)}\n[{TABLE}.hand]\n{_lines(hand)}"
+
+
+def _lines(values: Mapping[str, object]) -> str:
+    return "".join(f"{name} = {_as_toml(value)}\n" for name, value in values.items())
 
 
 def _as_toml(value: object) -> str:

@@ -17,7 +17,7 @@ from pydantic.dataclasses import dataclass
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import complaint
 from grasp_core.files.strict_json import object_of, place
-from sim_validate.datasets.columns import TABLES, Name
+from sim_validate.datasets.columns import Name, Tables, dataset_tables
 from sim_validate.files.paths import require_inside
 from sim_validate.files.reading import read_text, write_text
 
@@ -59,10 +59,17 @@ class Manifest:
     """Number of units of work that were left out."""
     files: tuple[Listed, ...]
     schema: int = SCHEMA
+    executed: bool = False
+    """Whether the dataset has executions; a manifest without them does not mention this."""
+
+    @property
+    def tables(self) -> Tables:
+        """Tables of the dataset, with their columns."""
+        return dataset_tables(executed=self.executed)
 
     def rows(self) -> dict[Name, int]:
         """Number of rows of each table."""
-        return {name: sum(each.rows or 0 for each in self.of_table(name)) for name in TABLES}
+        return {name: sum(each.rows or 0 for each in self.of_table(name)) for name in self.tables}
 
     def of_table(self, name: Name) -> tuple[Listed, ...]:
         """List the files of a table."""
@@ -87,6 +94,8 @@ def write_manifest(folder: Path, manifest: Manifest) -> Path:
 def manifest_to_json(manifest: Manifest) -> str:
     """Write the text of a manifest; equal manifests give equal texts."""
     record = asdict(manifest)
+    if not manifest.executed:
+        del record["executed"]
     record["files"] = [
         {name: value for name, value in asdict(each).items() if value is not None}
         for each in sorted(manifest.files, key=lambda each: each.path)

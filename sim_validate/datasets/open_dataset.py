@@ -7,7 +7,7 @@ from typing import Any
 
 from grasp_core.checked import one_of, path_of
 from grasp_core.errors import InputError
-from sim_validate.datasets.columns import TABLES, Name
+from sim_validate.datasets.columns import Name, Tables
 from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_toml
 from sim_validate.datasets.manifest import Listed, Manifest, listed, read_manifest
 from sim_validate.datasets.parquet import Columns, each_batch, read_columns
@@ -23,6 +23,11 @@ class Selection:
     manifest: Manifest
     split: str | None
 
+    @property
+    def tables(self) -> Tables:
+        """Tables of the dataset, with their columns."""
+        return self.manifest.tables
+
     def paths(self, name: Name) -> list[Path]:
         """List the files of a table, each checked to be unchanged.
 
@@ -33,7 +38,7 @@ class Selection:
 
     def counts(self) -> dict[Name, int]:
         """Number of rows of each table."""
-        return {name: sum(each.rows or 0 for each in self._listed(name)) for name in TABLES}
+        return {name: sum(each.rows or 0 for each in self._listed(name)) for name in self.tables}
 
     def rows(self, name: Name) -> Iterator[dict[str, Any]]:
         """Yield the rows of a table without holding all of them in memory.
@@ -52,7 +57,7 @@ class Selection:
         """
         for each in self._listed(name):
             found = 0
-            for batch in each_batch(path_inside(self.folder, each.path), name):
+            for batch in each_batch(path_inside(self.folder, each.path), name, self.tables):
                 found += batch.num_rows
                 yield batch
             if found != each.rows:
@@ -135,4 +140,4 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
         InputError: The split is unknown, the dataset is not finished, or a file is damaged.
     """
     chosen = select(path_of(folder, "folder"), split)
-    return {name: read_columns(chosen.paths(name), name) for name in TABLES}
+    return {name: read_columns(chosen.paths(name), name, chosen.tables) for name in chosen.tables}

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
 from grasp_core.files.strict_json import shown
-from sim_validate.datasets.columns import KEYS, TABLES, Column, Name
+from sim_validate.datasets.columns import KEYS, TABLES, Column, Name, Tables, dataset_tables
 
 Columns: TypeAlias = dict[str, NDArray[Any]]
 TYPES = {"text": "string", "bool": "bool_", "int": "int64", "float": "float64"}
@@ -56,7 +56,10 @@ def pyarrow_parquet() -> Any:
     return importlib.import_module("pyarrow.parquet")
 
 
-def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[str, str]) -> bytes:
+def parquet_bytes(
+    name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[str, str],
+    tables: Tables = TABLES,
+) -> bytes:  # fmt: skip
     """Encode one table as the bytes of a file.
 
     Args:
@@ -64,6 +67,7 @@ def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[
         rows: Rows as cells by column. Missing cells and numbers that are not finite become null.
             The rows are sorted here by the table's key.
         about: Metadata of the file: text by name.
+        tables: Tables of the dataset, with their columns.
 
     Raises:
         InputError: Two rows have the same key, or a cell is not of its column's type.
@@ -76,8 +80,8 @@ def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[
                 f"table {name}: expected rows with different keys, got two rows with the key "
                 f"{_key(name, one)}"
             )
-    schema = schema_of(name).with_metadata(dict(sorted(about.items())))
-    columns = [[_cell(row.get(column.name)) for row in listed] for column in TABLES[name]]
+    schema = schema_of(tables[name]).with_metadata(dict(sorted(about.items())))
+    columns = [[_cell(row.get(column.name)) for row in listed] for column in tables[name]]
     try:
         arrays = [arrow.array(values, type=each.type)
                   for values, each in zip(columns, schema, strict=True)]  # fmt: skip
@@ -89,47 +93,52 @@ def parquet_bytes(name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[
     return held.getvalue()
 
 
-def as_read(name: Name, rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def as_read(
+    name: Name, rows: Iterable[Mapping[str, Any]], tables: Tables = TABLES
+) -> list[dict[str, Any]]:
     """Return rows as a file would give them: sorted, null for numbers that are not finite."""
-    held = pyarrow().BufferReader(parquet_bytes(name, rows, {}))
+    held = pyarrow().BufferReader(parquet_bytes(name, rows, {}, tables))
     return pyarrow_parquet().ParquetFile(held).read().to_pylist()
 
 
-def read_rows(path: Path, name: Name | None = None) -> list[dict[str, Any]]:
+def read_rows(
+    path: Path, name: Name | None = None, tables: Tables | None = None
+) -> list[dict[str, Any]]:
     """Read the rows of a file and check all of its checksums.
 
     Raises:
         InputError: The file does not hold the table, or is damaged.
     """
-    return read_table(path, name).to_pylist()
+    return read_table(path, name, tables).to_pylist()
 
 
-def each_batch(path: Path, name: Name) -> Iterator[Any]:
+def each_batch(path: Path, name: Name, tables: Tables | None = None) -> Iterator[Any]:
     """Yield the rows of a file as Arrow's record batches, without holding all of them in memory.
 
     Raises:
         InputError: The file does not hold the table, or is damaged.
     """
-    with _opened(path, name) as file:
+    with _opened(path, name, tables) as file:
         yield from file.iter_batches(GROUP_ROWS)
 
 
-def read_table(path: Path, name: Name | None = None) -> Any:
+def read_table(path: Path, name: Name | None = None, tables: Tables | None = None) -> Any:
     """Read a file as an Arrow table and check all of its checksums.
 
     Args:
         path: Path of the file.
         name: Name of its table; any table if None.
+        tables: Tables of its dataset; those with or without executions if None.
 
     Raises:
         InputError: The file does not hold the table, or is damaged.
     """
-    with _opened(path, name) as file:
+    with _opened(path, name, tables) as file:
         return file.read()
 
 
 @contextmanager
-def _opened(path: Path, name: Name | None = None) -> Generator[Any]:
+def _opened(path: Path, name: Name | None, tables: Tables | None) -> Generator[Any]:
     """Open a file of one of the tables; any damage is raised as an `InputError`.
 
     Raises:
@@ -138,27 +147,33 @@ def _opened(path: Path, name: Name | None = None) -> Generator[Any]:
     arrow, parquet = pyarrow(), pyarrow_parquet()
     try:
         with parquet.ParquetFile(path, page_checksum_verification=True) as file:
-            _check_columns(path, file.schema_arrow, list(TABLES) if name is None else [name])
+            _check_columns(path, file.schema_arrow, name, tables)
             _check_size(path, file.metadata)
             yield file
     # ValueError: also for names that are not valid text
     except (OSError, ValueError, arrow.ArrowException) as error:
         said = shown(" ".join(str(error).split()))
         raise InputError(
-            f"{path}: this file cannot be read as Parquet, or is damaged ({said})"
+            f"{path}: this file is not Parquet, or is damaged ({said}); copy the dataset again"
         ) from error
 
 
-def _check_columns(path: Path, came: Any, names: Sequence[Name]) -> None:
-    known = [[column.name for column in TABLES[name]] for name in names]
-    if any(
-        came.names == columns and came.types == schema_of(name).types
-        for name, columns in zip(names, known, strict=True)
-    ):
+def _check_columns(path: Path, came: Any, name: Name | None, tables: Tables | None) -> None:
+    both = [dataset_tables(executed=executed) for executed in (False, True)]
+    kinds = both if tables is None else [tables]
+    known = [
+        (each, schema_of(columns))
+        for kind in kinds
+        for each, columns in kind.items()
+        if name in (None, each)
+    ]
+    if any(came.names == one.names and came.types == one.types for _, one in known):
         return
-    what = "columns of other types" if came.names in known else "other columns"
+    what = "column types" if any(came.names == one.names for _, one in known) else "columns"
+    named = " or ".join(dict.fromkeys(each for each, _ in known))
     raise InputError(
-        f"{path}: the file has {what} than the table {' or '.join(names)} has in this version"
+        f"{path}: expected the {what} of the table {named} in this version of graspproof, got "
+        "others; build the dataset again"
     )
 
 
@@ -169,11 +184,11 @@ def _check_size(path: Path, claimed: Any) -> None:
     if not 0 <= rows <= MOST_ROWS or not 0 <= largest <= MOST_GROUP_BYTES:
         raise InputError(
             f"{path}: the file claims {rows} rows, and {largest} bytes in one group of rows; the "
-            f"limits are {MOST_ROWS} and {MOST_GROUP_BYTES}"
+            f"limits are {MOST_ROWS} and {MOST_GROUP_BYTES}, so the file is not read"
         )
 
 
-def read_columns(paths: Sequence[Path], name: Name) -> Columns:
+def read_columns(paths: Sequence[Path], name: Name, tables: Tables = TABLES) -> Columns:
     """Read the columns of a table's files, one after another, as arrays (rows, ..).
 
     Null is NaN in columns of floats, and -1 in columns of whole numbers. Text and truth values are
@@ -182,8 +197,8 @@ def read_columns(paths: Sequence[Path], name: Name) -> Columns:
     Raises:
         InputError: A file is damaged.
     """
-    rows = [row for path in paths for row in read_rows(path, name)]
-    return {column.name: _as_array(column, rows) for column in TABLES[name]}
+    rows = [row for path in paths for row in read_rows(path, name, tables)]
+    return {column.name: _as_array(column, rows) for column in tables[name]}
 
 
 def _as_array(column: Column, rows: Sequence[Mapping[str, Any]]) -> NDArray[Any]:
@@ -210,10 +225,10 @@ def _cell(value: Any) -> Any:
 
 
 @cache
-def schema_of(name: Name) -> Any:
-    """Return the columns of a table as an Arrow schema, with units and meanings as metadata."""
+def schema_of(columns: tuple[Column, ...]) -> Any:
+    """Return columns of a table as an Arrow schema, with units and meanings as metadata."""
     arrow = pyarrow()
-    return arrow.schema([_field(column) for column in TABLES[name]])
+    return arrow.schema([_field(column) for column in columns])
 
 
 def _field(column: Column) -> Any:

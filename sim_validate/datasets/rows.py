@@ -9,8 +9,14 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.values import FINGERS, Contact, Grasp
+from grasp_core.values import Contact, Grasp
 from sim_validate.datasets.columns import Name
+from sim_validate.datasets.execution_rows import (
+    Executed,
+    execution_cells,
+    execution_rows,
+    for_fingers,
+)
 from sim_validate.datasets.given_contacts import GivenGrasp
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.simulation.hold_verdict import HoldVerdict, Outcome
@@ -69,23 +75,27 @@ class GraspRows:
     unit: WorkUnit
     grasps: list[Row] = field(default_factory=list[Row])
     trials: list[Row] = field(default_factory=list[Row])
+    executions: list[Row] = field(default_factory=list[Row])
 
-    def add(self, grasp: Grasp, verdict: Verdict) -> None:
+    def add(self, grasp: Grasp, verdict: Verdict, executed: Executed = None) -> None:
         """Add the rows of a planned grasp, its negative controls, and the trials of all."""
         about = {
             "label": "grasp",
             "family": grasp.family,
             "region_radius_m": grasp.radius,
         }
-        self._add_closed(grasp, verdict, about)
+        self._add_closed(grasp, verdict, about, executed)
 
-    def add_given(self, given: GivenGrasp, grasp: Grasp, verdict: Verdict, moved_m: float) -> None:
+    def add_given(
+        self, given: GivenGrasp, grasp: Grasp, verdict: Verdict, moved_m: float,
+        executed: Executed = None,
+    ) -> None:  # fmt: skip
         """Add rows of a force-closed given grasp, its negative controls, and all trials."""
         about: dict[str, Any] = {"name": given.name, "label": GIVEN, "moved_m": moved_m}
         if self.body.patches is not None:
             # on curved surfaces the contacts' faces are made for this grasp alone
             about["faces"] = None
-        self._add_closed(grasp, verdict, about)
+        self._add_closed(grasp, verdict, about, executed)
 
     def add_open(self, given: GivenGrasp, verdict: ControlVerdict, moved_m: float) -> None:
         """Add rows of a given grasp that is not force-closed; it is a negative control."""
@@ -111,7 +121,9 @@ class GraspRows:
             }
         )
 
-    def _add_closed(self, grasp: Grasp, verdict: Verdict, about: Mapping[str, Any]) -> None:
+    def _add_closed(
+        self, grasp: Grasp, verdict: Verdict, about: Mapping[str, Any], executed: Executed
+    ) -> None:
         name = self.name(grasp.id)
         friction = verdict.critical_friction
         self.grasps.append(
@@ -133,8 +145,10 @@ class GraspRows:
                 "mismatches": len(verdict.mismatches),
                 "simulated_critical_friction": friction.simulated,
                 **about,
+                **execution_cells(executed),
             }
         )
+        self.executions += execution_rows(name, executed)
         self._add_trials(name, verdict.wrenches, _wrench_row)
         for control in verdict.controls:
             kind = control.control.name
@@ -165,15 +179,17 @@ class GraspRows:
 
     def _common(self, name: str, contacts: Iterable[Contact]) -> dict[str, Any]:
         listed = list(contacts)
+        unexecuted = {} if self.unit.config.execution is None else {"executed": False}
         return {
+            **unexecuted,
             "grasp_id": name,
             "object_id": self.body.content_sha256,
             "split": split_of(self.body.content_sha256, self.unit.config.seed),
             "friction": self.unit.friction,
             "note": "",
             "contacts": len(listed),
-            "contact_points_m": _for_fingers([c.position.tolist() for c in listed], [None] * 3),
-            "contact_normals": _for_fingers([c.normal.tolist() for c in listed], [None] * 3),
+            "contact_points_m": for_fingers([c.position.tolist() for c in listed], [None] * 3),
+            "contact_normals": for_fingers([c.normal.tolist() for c in listed], [None] * 3),
         }
 
     def _add_trials(
@@ -201,18 +217,12 @@ def _wrench_row(trial: WrenchVerdict) -> dict[str, Any]:
     }
 
 
-def _for_fingers(values: Iterable[Any], missing: Any) -> list[Any]:
-    """Pad a list to four fingers, as negative controls may have fewer."""
-    listed = list(values)
-    return listed + [missing] * (FINGERS - len(listed))
-
-
 def _hold_row(hold: HoldVerdict) -> dict[str, Any]:
     return {
         "outcome": hold.outcome.value,
         "reason": hold.reason,
         "displacement_m": hold.displacement_m,
         "rotation_rad": hold.rotation_rad,
-        "slip_m": _for_fingers(hold.slip_m.tolist(), None),
+        "slip_m": for_fingers(hold.slip_m.tolist(), None),
         "failed_after_s": hold.failed_after_s,
     }

@@ -22,6 +22,7 @@ from grasp_core.provenance import versions
 from scenes.example_objects import example_object
 from sim_validate.datasets.config import CREDITS, DatasetConfig
 from sim_validate.datasets.given_contacts import GivenGrasp, given_sha256, read_given
+from sim_validate.execution.asked import TABLE, execution_table
 
 CHUNK = 2**20
 PART = 25
@@ -83,9 +84,11 @@ def provenance() -> Mapping[str, str]:
 
 def shared_settings(config: DatasetConfig) -> dict[str, object]:
     """Return the settings that decide the rows of every unit, such as the seed, but no objects."""
-    return {
+    settings = {
         each.name: getattr(config, each.name) for each in fields(config) if each.name not in APART
     }
+    executed = settings.pop(TABLE)
+    return settings if executed is None else {**settings, TABLE: execution_table(executed)}
 
 
 def units_of(config: DatasetConfig) -> list[WorkUnit]:
@@ -154,5 +157,5 @@ def _source_sha256(name: str) -> str:
             while part := stream.read(CHUNK):
                 digest.update(part)
     except OSError as error:
-        raise InputError(f"{name}: this mesh file cannot be read ({error.strerror})") from error
+        raise InputError(f"{name}: the mesh file cannot be read ({error.strerror})") from error
     return digest.hexdigest()

@@ -34,7 +34,7 @@ def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
         data = bounded_bytes(path, most)
     except OSError as error:
         raise InputError(
-            f"{path}: the file cannot be read ({error.strerror}); give a readable file"
+            f"{path}: the file cannot be read ({error.strerror}); give the path of a readable file"
         ) from error
     if len(data) > most:
         raise InputError(f"{path}: the file is larger than {most} bytes; give a smaller file")

@@ -13,7 +13,7 @@ from grasp_core.errors import InputError
 
 REPORT, INDEX, GRASPS = "report", "index.html", "grasps"
 STATIC = ("style.css", "gallery.js", "turntable.js")
-FIDELITY = "fidelity.svg"
+FIDELITY, SURVIVAL = "fidelity.svg", "survival.svg"
 PICTURES, CHARTS, CLIPS = "pictures", "charts", "clips"
 MARK = ".graspproof-report"
 ID = re.compile(r"[cprf](-\d+){4}[\w-]*", re.ASCII)
@@ -24,6 +24,7 @@ def remove_results(folder: Path) -> None:
     """Remove grasps and all results about them."""
     remove_verdicts(folder)
     remove_regions(folder)
+    remove_executions(folder)
     _remove([*_of_grasps(folder / "scenes", ".xml"), folder / "grasps.json"])
 
 
@@ -37,6 +38,12 @@ def remove_regions(folder: Path) -> None:
     """Remove certified regions, their proofs, and pages that show them."""
     remove_report(folder / REPORT)
     _remove([folder / "regions.json", *_of_grasps(folder / "proofs", ".npz")])
+
+
+def remove_executions(folder: Path) -> None:
+    """Remove the results of executed grasps, and pages that show them."""
+    remove_report(folder / REPORT)
+    _remove([folder / "executions.json"])
 
 
 def _of_grasps(folder: Path, suffix: str) -> list[Path]:
@@ -75,7 +82,7 @@ def remove_pages(folder: Path) -> None:
     """Remove the pages of a report, the first page first; its mark stays."""
     _remove(
         chain(
-            (folder / name for name in (INDEX, FIDELITY, *STATIC)),
+            (folder / name for name in (INDEX, FIDELITY, SURVIVAL, *STATIC)),
             folder.glob("object-*.js"),
             folder.glob(f"{GRASPS}/*.html"),
             *(folder.glob(f"{kind}/*.webp") for kind in (PICTURES, CHARTS, CLIPS)),

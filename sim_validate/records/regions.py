@@ -224,14 +224,14 @@ def _region(name: str, polygon: Array, normal: Array, scale: float) -> ContactRe
     if not FEWEST_CORNERS <= len(polygon) <= MOST_CORNERS or np.abs(polygon).max() > LARGEST:
         raise InputError(
             f"{name}: expected a polygon of {FEWEST_CORNERS} to {MOST_CORNERS} corners within "
-            f"{LARGEST:g} m"
+            f"{LARGEST:g} m; certify the regions again"
         )
     try:
         with np.errstate(invalid="ignore", divide="ignore"):  # edges without length divide by zero
             return ContactRegion("certified", polygon, _inscribed(polygon, normal, scale))
     except SolverError as error:
         raise InputError(
-            f"{name}: expected the corners of a convex polygon in order, got other points"
+            f"{name}: expected the corners of a convex polygon in order; certify the regions again"
         ) from error
 
 

@@ -71,6 +71,29 @@ def setup_from_tables(tables: Mapping[str, Any], setup: Setup, path: str) -> Set
     return setup
 
 
+def physics_from_file(path: Path) -> dict[str, Any]:
+    """Read the settings in the table `physics` of a file, by name.
+
+    Args:
+        path: A TOML file with no other table.
+
+    Raises:
+        InputError: The file is missing or invalid, or sets gravity, whose direction is a flag.
+    """
+    given: dict[str, Any] = {}
+    for name, table in read_tables(path).items():
+        if name != "physics" or not isinstance(table, dict):
+            raise InputError(f"{path}: expected the table physics, got {shown(name)}")
+        given = cast("dict[str, Any]", table)
+    if "gravity" in given:
+        raise InputError(
+            f"{path}: [physics] gravity is that of the earth; leave it out, and give its "
+            "direction with --down"
+        )
+    checked = _filled(str(path), "physics", PhysicsSettings(), given)
+    return {name: getattr(checked, name) for name in given}
+
+
 def tables_of(setup: Setup) -> dict[str, dict[str, Any]]:
     """Write a setup as the TOML tables that would reproduce it."""
     return {

@@ -17,6 +17,7 @@ from sim_validate.records.verdicts_schema import (
     FingersRecord,
     GateRecord,
     HoldRecord,
+    ObjectRecord,
     RobustnessRecord,
     SettingsRecord,
     Summary,
@@ -47,11 +48,7 @@ def verdicts_to_json(
     listed = list(verdicts)
     document: VerdictsFile = {
         "schema": SCHEMA,
-        "object": {
-            "name": body.name,
-            "source_sha256": body.source_sha256,
-            "content_sha256": body.content_sha256,
-        },
+        "object": object_record(body),
         "friction": friction,
         "complete": complete,
         "gate": gate_record(gate),
@@ -59,6 +56,15 @@ def verdicts_to_json(
         "verdicts": [_verdict_record(body, verdict) for verdict in listed],
     }
     return json.dumps(finite(document), allow_nan=False, indent=1) + "\n"
+
+
+def object_record(body: Polyhedron) -> ObjectRecord:
+    """Record which object a file is about: its name, and hashes of its file and of its mesh."""
+    return {
+        "name": body.name,
+        "source_sha256": body.source_sha256,
+        "content_sha256": body.content_sha256,
+    }
 
 
 def gate_record(gate: Gate) -> GateRecord:

@@ -77,8 +77,8 @@ def _from_baseline(path: Path, wanted: Wanted) -> Recorded:
     baseline = read_baseline(path)
     grasps = wanted.grasps or path.parent / baseline.grasps_file
     saved = grasps_behind(grasps, baseline.content_sha256, baseline.friction)
-    setup, agenda = of_settings(baseline.settings, str(path))
-    found = of_grasp(path, saved, setup, agenda, wanted)
+    how = of_settings(baseline.settings, str(path))
+    found = of_grasp(path, saved, how.setup, how.agenda, wanted)
     grasp = grasp_with_id(path, saved, wanted.grasp)
     entry = next((each for each in baseline.entries if each.id == grasp.id), None)
     if entry is None:

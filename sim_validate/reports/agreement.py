@@ -129,9 +129,9 @@ def said_of(verdict: Record | None) -> tuple[str, str]:
     if verdict["mismatches"]:
         return "contradicts the analysis", BAD
     if any(control["held"] for control in controls):
-        return "a control held", BAD
+        return "a negative control held", BAD
     if not all(map(let_go, controls)):
-        return "a control is undecided", BAD
+        return "a negative control is undecided", BAD
     return outcome.replace("_", " "), GOOD if verdict["held"] else BAD
 
 

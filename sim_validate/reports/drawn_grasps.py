@@ -2,16 +2,17 @@
 
 Charts of motion need a trial. The first trial that was not held, or else the weakest wrench, is
 simulated again. This gives bit for bit the motion that was judged, unless the trial was stopped
-early.
+early. Clips of an executed grasp show its lift, its worst shake, and a trial in which it slipped.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from grasp_core.closure.force_closure import force_closure
+from grasp_core.errors import InputError
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import ContactRegion, Grasp, four
 from scenes.drawing.canvas import write_figure
@@ -19,7 +20,10 @@ from scenes.drawing.clips import GraphicsError, magnified, write_clip
 from scenes.drawing.pictures import grasp_figure
 from scenes.drawing.views import best_view
 from scenes.fingertips import FingerSettings
+from sim_validate.execution.filming import film, worth_seeing
+from sim_validate.execution.jobs import ExecutionJob
 from sim_validate.files.stale_results import CHARTS, CLIPS, PICTURES
+from sim_validate.records.executions_json import EXECUTIONS, Executions
 from sim_validate.replaying.from_verdicts import of_verdict
 from sim_validate.replaying.recorded import Wanted
 from sim_validate.replaying.replay import Replayed, replayed
@@ -40,6 +44,8 @@ class Task:
     verdict: Record | None
     regions: Record | None
     """Record of the grasp's certified regions, if it has any."""
+    executions: Executions | None
+    """The execution of this grasp alone, if it was executed."""
     source: Path
     """Path of the file with the verdict, which error messages name."""
     folder: Path
@@ -47,12 +53,22 @@ class Task:
     name: str
     """Beginning of the names of the grasp's files."""
     clip: bool
-    """Whether to draw a clip of a trial, too."""
+    """Whether to draw clips of trials, too."""
 
     @property
     def grasp(self) -> Grasp:
         """The grasp, with its certified regions if it has any."""
         return certified(self.saved.grasps[0], self.regions)
+
+
+@dataclass(frozen=True, slots=True)
+class FilmedTrial:
+    """A clip of a trial of an execution."""
+
+    path: str
+    trial: str
+    """Name of the trial."""
+    fate: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +86,8 @@ class Drawn:
     trial: str = ""
     """Name of the wrench in the trial that is shown."""
     outcome: str = ""
+    executed: tuple[FilmedTrial, ...] = ()
+    """Clips of the execution's trials."""
     no_clip: str = ""
     """Reason why no clip could be drawn; empty if there is a clip or none was asked for."""
 
@@ -84,6 +102,7 @@ def tasks_of(run: RunFolder, folder: Path, prefix: str, clips: int) -> list[Task
             friction=run.friction,
             verdict=run.verdicts.get(grasp.id),
             regions=run.shaded.get(grasp.id),
+            executions=_own(run, grasp),
             source=run.verdicts_path,
             folder=folder,
             name=f"{prefix}{grasp.id}",
@@ -91,6 +110,13 @@ def tasks_of(run: RunFolder, folder: Path, prefix: str, clips: int) -> list[Task
         )
         for grasp in grasps
     ]
+
+
+def _own(run: RunFolder, grasp: Grasp) -> Executions | None:
+    found = run.executed(grasp.id)
+    if run.executions is None or found is None:
+        return None
+    return replace(run.executions, grasps=(found,))
 
 
 def certified(grasp: Grasp, record: Record | None) -> Grasp:
@@ -108,7 +134,8 @@ def draw(task: Task) -> Drawn:
     """Draw one grasp and write its pictures and charts.
 
     Raises:
-        InputError: The verdict is about other contacts than those of the grasp.
+        InputError: The verdict is about other contacts than those of the grasp, or the execution
+            has a trial or settings that do not fit the grasp.
     """
     body, grasp = task.saved.body, task.grasp
     view = best_view(body, grasp)
@@ -125,7 +152,9 @@ def draw(task: Task) -> Drawn:
             wrenches=_written(task, CHARTS, "-wrenches", wrenches),
             margins=_written(task, CHARTS, "-margins", margins),
         )
-    return drawn if task.verdict is None else _with_motion(task, task.verdict, drawn)
+    if task.verdict is not None:
+        drawn = _with_motion(task, task.verdict, drawn)
+    return _with_executed(task, task.executions, drawn) if task.clip and task.executions else drawn
 
 
 def _with_motion(task: Task, verdict: Record, drawn: Drawn) -> Drawn:
@@ -154,6 +183,29 @@ def _with_clip(task: Task, found: Replayed, drawn: Drawn) -> Drawn:
     except GraphicsError as error:
         return replace(drawn, no_clip=str(error))
     return replace(drawn, clip=f"{CLIPS}/{path.name}")
+
+
+def _with_executed(task: Task, executions: Executions, drawn: Drawn) -> Drawn:
+    """Film the trials of an execution in which something can be seen."""
+    (found,) = executions.grasps
+    if found.execution is None:
+        return drawn
+    used = found.execution.physics
+    job = ExecutionJob(
+        task.saved.body, task.saved.grasps[0], executions.friction, executions.settings,
+        {} if used is None else asdict(used),
+    )  # fmt: skip
+    filmed = list[FilmedTrial]()
+    for place, trial in enumerate(worth_seeing(found.execution)):
+        path = task.folder / CLIPS / f"{task.name}-executed-{place}.webp"
+        try:
+            film(job, trial.name, path)
+        except GraphicsError as error:
+            return replace(drawn, no_clip=str(error))
+        except InputError as error:
+            raise InputError(f"{task.source.with_name(EXECUTIONS)}: {found.id}: {error}") from error
+        filmed.append(FilmedTrial(f"{CLIPS}/{path.name}", trial.name, trial.fate))
+    return replace(drawn, executed=tuple(filmed))
 
 
 def _written(task: Task, kind: str, ending: str, figure: Any) -> str:

@@ -18,6 +18,7 @@ from sim_validate.reports.agreement import (
     wrench_size,
 )
 from sim_validate.reports.drawn_grasps import Drawn, certified, largest_push
+from sim_validate.reports.executed_grasps import execute_command, execution_section
 from sim_validate.reports.pages import NOTHING, number, page
 from sim_validate.reports.run_folder import GRASPS, RunFolder
 from sim_validate.reports.turntable import as_text, grasp_data
@@ -59,6 +60,8 @@ def grasp_page(
         shown=drawn.trial,
         shown_outcome=drawn.outcome,
         clip=drawn.clip,
+        executed=execution_section(run.executions, run.executed(grasp.id)),
+        executed_clips=drawn.executed,
         object_script=object_script,
         facts=list(_facts(run, grasp, verdict)),
         contacts=list(_contacts(shown, run.saved.body.radius)),
@@ -88,12 +91,12 @@ def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[tup
     yield "Ferrari-Canny quality", f"{number(lower, 5)} to {number(upper, 5)} N{at_plan}"
     yield "Normals span up to", f"{number(math.degrees(grasp.span_angle), 3)} deg"
     for place, focus in enumerate(grasp.focus_points):
-        name = "Between the lines of pair" if grasp.family == "regulus" else "Focus"
+        name = "Point between the lines of pair" if grasp.family == "regulus" else "Focus"
         yield f"{name} {place}", f"{vector(MILLI * focus, MILLI * run.saved.body.radius)} mm"
     if verdict is not None:
         moved = [trial["displacement_m"] for trial in verdict["wrenches"]]
         known = [MICRO * each for each in moved if each is not None]
-        yield "Moved at most", f"{number(max(known, default=None), 2)} µm"
+        yield "Object moved at most", f"{number(max(known, default=None), 2)} µm"
         if (repeats := verdict.get("robustness")) is not None:
             low, high = repeats["pass_rate_interval"]
             yield (
@@ -178,6 +181,8 @@ def _commands(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[
         yield f"graspproof replay . {asked} --out replay"
         for name in verdict["controls"]:
             yield f"graspproof replay . {asked} --control {shlex.quote(name)} --out replay"
+    if run.executions is not None and run.executed(grasp.id) is not None:
+        yield execute_command(run.executions, GRASPS, grasp.id)
 
 
 def vector(parts: Array, size: float) -> str:

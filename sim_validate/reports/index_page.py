@@ -6,6 +6,7 @@ from typing import Any, cast
 
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
+from sim_validate.records.executions_json import Executions
 from sim_validate.reports.agreement import (
     Agreement,
     Record,
@@ -16,9 +17,11 @@ from sim_validate.reports.agreement import (
     said_of,
     wrench_size,
 )
+from sim_validate.reports.executed_grasps import described_executions, execution_row
 from sim_validate.reports.grasp_page import MILLI
 from sim_validate.reports.pages import page
 from sim_validate.reports.run_folder import RunFolder
+from sim_validate.reports.survival_charts import survival_sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +54,28 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown]) -> str:
         limits=any(each.pairs for each in found[1:]),
         mismatches=[f"{each['id']}: {line}" for each in verdicts for line in each["mismatches"]],
         controls=_controls(verdicts),
+        executions=_executions(all_executions(runs)),
     )
 
 
 def all_verdicts(runs: Iterable[RunFolder]) -> list[Record]:
     """List the verdicts of several runs, in order."""
     return [verdict for run in runs for verdict in run.verdicts.values()]
+
+
+def all_executions(runs: Iterable[RunFolder]) -> list[Executions]:
+    """List the executions of several runs, in order, where there are any."""
+    found = [run.executions for run in runs if run.executions is not None]
+    return [executions for executions in found if executions.grasps]
+
+
+def _executions(executed: Sequence[Executions]) -> Record | None:
+    if not executed:
+        return None
+    return {
+        "runs": [described_executions(each) for each in executed],
+        "sentence": survival_sentence(executed),
+    }
 
 
 def agreements(verdicts: Sequence[Record]) -> list[Agreement]:
@@ -79,6 +98,7 @@ def _card(shown: Shown) -> dict[str, Any]:
         "radius_mm": round(MILLI * grasp.radius, 6),
         "quality": grasp.ferrari_canny[0],
         "critical_friction": grasp.critical_friction,
+        "executed": execution_row(shown.run.executed(grasp.id)) if shown.run.executions else None,
         "weakest": None if verdict is None else _weakest(verdict),
     }
 
@@ -100,13 +120,13 @@ def _described(run: RunFolder) -> dict[str, Any]:
         said += (
             f"; {counts['grasps_held']} of {counts['grasps']} held, "
             f"{counts['controls_let_go']} of {counts['controls']} negative controls were let go, "
-            f"{counts['mismatches']} figures contradict the analysis"
+            f"{counts['mismatches']} results contradict the analysis"
         )
         said += "" if run.summary.get("complete", True) else "; the run was interrupted"
     said += "."
     if run.left_out:
         said += (
-            f" {len(run.saved.grasps)} are shown, those with bad news among them; "
+            f" {len(run.saved.grasps)} are shown, those with problems among them; "
             "`graspproof report` draws all."
         )
     gate = run.summary.get("gate", {}).get("checks", ())

@@ -14,6 +14,7 @@ from sim_validate.files.stale_results import (
     MARK,
     REPORT,
     STATIC,
+    SURVIVAL,
     remove_pages,
     remove_report,
     require_report_folder,
@@ -22,9 +23,16 @@ from sim_validate.parallel.processes import available_cores, each
 from sim_validate.reports.drawn_grasps import Drawn, draw, tasks_of
 from sim_validate.reports.fidelity_charts import fidelity_figure
 from sim_validate.reports.grasp_page import Neighbours, grasp_page
-from sim_validate.reports.index_page import Shown, agreements, all_verdicts, index_page
+from sim_validate.reports.index_page import (
+    Shown,
+    agreements,
+    all_executions,
+    all_verdicts,
+    index_page,
+)
 from sim_validate.reports.pages import asset
 from sim_validate.reports.run_folder import RunFolder, folder_of, runs_in
+from sim_validate.reports.survival_charts import survival_figure
 from sim_validate.reports.turntable import as_text, object_data
 
 MARKED = "The pages here were written by graspproof, which may replace them.\n"
@@ -57,7 +65,7 @@ def write_report(
         out: Folder to write to; `report` in the folder if None.
         jobs: Largest number of processes; all cores if None.
         limit: Number of grasps to draw per run, those with problems before others; all if None.
-        clips: Number of grasps per run of which a trial is filmed, those with problems first, where
+        clips: Number of grasps per run of which trials are filmed, those with problems first, where
             there are graphics.
         progress: Called with (drawn, total) after each grasp.
 
@@ -105,6 +113,8 @@ def _written(
         write_text(out / name, asset(name))
     if verdicts := all_verdicts(runs):
         write_figure(fidelity_figure(agreements(verdicts)), out / FIDELITY)
+    if executions := all_executions(runs):
+        write_figure(survival_figure(executions), out / SURVIVAL)
     index = write_text(out / INDEX, index_page(runs, shown))
     return Report(index, len(tasks), next((each.no_clip for each in drawn if each.no_clip), ""))
 

@@ -1,4 +1,4 @@
-"""Reads the folder of a run: its grasps, verdicts and regions."""
+"""Reads the folder of a run: its grasps, verdicts, executions and regions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -8,7 +8,9 @@ from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
 from grasp_core.records.grasps_json import SavedGrasps
+from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.files.reading import read_text
+from sim_validate.records.executions_json import EXECUTIONS, Executions, read_executions
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.regions import REGIONS
 from sim_validate.records.regions import SCHEMA as REGIONS_SCHEMA
@@ -24,7 +26,7 @@ SCHEMAS = {VERDICTS: VERDICTS_SCHEMA, REGIONS: REGIONS_SCHEMA}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunFolder:
-    """The results that `plan`, `validate` and `regions` have written into one folder."""
+    """What `plan`, `validate`, `execute` and `regions` have written into one folder."""
 
     path: Path
     saved: SavedGrasps
@@ -38,6 +40,8 @@ class RunFolder:
     """Records of certified regions, by the grasps' ids; empty if there are none."""
     regions_friction: float | None
     """Friction for which the regions are certified; None if there are none."""
+    executions: Executions | None
+    """Grasps as a robot executes them; None if the file does not exist."""
     left_out: int = 0
     """Number of grasps in the files that `saved` leaves out."""
 
@@ -53,8 +57,15 @@ class RunFolder:
         return replace(self, saved=replace(self.saved, grasps=kept), left_out=len(grasps) - limit)
 
     def alarms(self, name: str) -> bool:
-        """Tell whether the verdict on a grasp is a problem."""
-        return said_of(self.verdicts.get(name))[1] == BAD
+        """Tell whether the verdict on a grasp is a problem, or its execution lost the object."""
+        found = self.executed(name)
+        lost = found is not None and not (found.survived and found.controls_let_go)
+        return lost or said_of(self.verdicts.get(name))[1] == BAD
+
+    def executed(self, name: str) -> ExecutedGrasp | None:
+        """Return what the execution of a grasp found; None if the grasp was not executed."""
+        grasps = () if self.executions is None else self.executions.grasps
+        return next((each for each in grasps if each.id == name), None)
 
     @property
     def shaded(self) -> Mapping[str, Record]:
@@ -111,21 +122,48 @@ def _run(path: Path) -> RunFolder:
         summary={} if tried is None else {key: tried[key] for key in tried if key != "verdicts"},
         regions=_by_id(path / REGIONS, regions, saved),
         regions_friction=None if certified is None else certified["friction"],
+        executions=_executions(path / EXECUTIONS, saved),
     )
 
 
 def _by_id(path: Path, records: Sequence[Record], saved: SavedGrasps) -> Mapping[str, Record]:
     """Index records by id, after a check that they are about the contacts of the grasps."""
+    _check_contacts(path, [(each["id"], each["contacts_sha256"]) for each in records], saved)
+    return {each["id"]: each for each in records}
+
+
+def _check_contacts(path: Path, listed: Sequence[tuple[str, str]], saved: SavedGrasps) -> None:
+    """Refuse a file that lists a grasp twice, or with other contacts than its own.
+
+    Args:
+        path: The file.
+        listed: Id and hash of the contacts of each grasp that the file lists.
+        saved: The grasps beside it.
+
+    Raises:
+        InputError: The file is about other grasps.
+    """
     contacts = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
-    for each in records:
-        if contacts.get(each["id"]) != each["contacts_sha256"]:
+    for name, found in listed:
+        if contacts.get(name) != found:
             raise InputError(
-                f"{path}: the contacts of {each['id']} differ from those in {GRASPS} beside it, "
+                f"{path}: the contacts of {name} differ from those in {GRASPS} beside it, "
                 f"or the grasp is not in that file: write {path.name} again, or remove it"
             )
-    found = {each["id"]: each for each in records}
-    if len(found) < len(records):
-        raise InputError(f"{path}: the file lists a grasp twice; write it again, or remove it")
+    if len(dict(listed)) < len(listed):
+        raise InputError(
+            f"{path}: the file has two records of one grasp; make {path.name} again with the "
+            "command that wrote it"
+        )
+
+
+def _executions(path: Path, saved: SavedGrasps) -> Executions | None:
+    """Read executions of the grasps; return None if the file does not exist."""
+    if not path.is_file():
+        return None
+    found = read_executions(path)
+    _check_object(path, found.object_sha256, saved)
+    _check_contacts(path, [(each.id, each.contacts_sha256) for each in found.grasps], saved)
     return found
 
 
@@ -165,9 +203,13 @@ def _read(path: Path, kind: type[Record], saved: SavedGrasps) -> Record | None:
         found = record_of(kind, text, path.name, schema=schema)
     except InputError as error:
         raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
-    if found["object"]["content_sha256"] != saved.body.content_sha256:
+    _check_object(path, found["object"]["content_sha256"], saved)
+    return found
+
+
+def _check_object(path: Path, sha256: str, saved: SavedGrasps) -> None:
+    if sha256 != saved.body.content_sha256:
         raise InputError(
             f"{path}: the file is about another object than {GRASPS} beside it; write it again, "
             "or remove it"
         )
-    return found

@@ -19,7 +19,7 @@ COLUMNS = ("test", "grasp", "what became of it", "outcome", "critical friction",
            "weakest wrench, N", "in simulation", "moved, um", "held with noise")  # fmt: skip
 MEASURED = ("outcome", "critical_friction", "simulated_critical_friction", "limit_n",
             "simulated_limit_n", "displacement_m")  # fmt: skip
-CALM = ("same", "within bands", "stable", "blessed")
+CALM = ("same", "within bands", "stable", "blessed", "survived")
 
 
 def write_report(folder: Path, lines: Iterable[Line]) -> Path:

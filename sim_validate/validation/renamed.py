@@ -1,4 +1,4 @@
-"""An attribute that a value had under another name: reading it tells the new name."""
+"""Handles attributes that were renamed: reading the old name raises an error with the new one."""
 
 from typing import NoReturn
 

@@ -115,7 +115,7 @@ def simulated_critical_friction(
     setup = _given(setup, Setup(), "setup")
     predicted = critical_friction(grasp)
     if not np.isfinite(predicted):
-        raise InputError(f"grasp {grasp.id}: no friction gives force closure")
+        raise InputError(f"grasp {grasp.id}: no friction gives force closure; choose another grasp")
     friction = max(predicted, setup.friction.least_friction)
     require_faithful(setup, radius_m=body.radius)
     require_touch(body, grasp.contacts, setup)

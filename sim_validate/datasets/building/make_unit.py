@@ -9,10 +9,12 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import grasp_of, seat
 from grasp_core.planning.planner import plan
 from grasp_core.values import Grasp
+from sim_validate.datasets.execution_rows import Executed
 from sim_validate.datasets.given_contacts import GivenGrasp
 from sim_validate.datasets.meshes import mesh_path, mesh_text
 from sim_validate.datasets.rows import GIVEN, GraspRows, Rows, object_row
 from sim_validate.datasets.units import WorkUnit
+from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.validation.control_trials import try_control
 from sim_validate.validation.controls import Control
@@ -48,9 +50,11 @@ def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
         making.plan()
     row = object_row(body, unit)
     found = making.found
-    rows: Rows = {
+    every: Rows = {
         "objects": (row,), "grasps": tuple(found.grasps), "trials": tuple(found.trials),
+        "executions": tuple(found.executions),
     }  # fmt: skip
+    rows: Rows = {name: every[name] for name in unit.config.tables}
     return Made(body.content_sha256, row["split"], rows, making.files)
 
 
@@ -76,7 +80,9 @@ class _Making:
                 limit=config.limit, seed=config.seed,
             )  # fmt: skip
             for grasp in planned.grasps:
-                self.found.add(grasp, self._tried(grasp, self.body))
+                self.found.add(
+                    grasp, self._tried(grasp, self.body), self._executed(grasp, self.body)
+                )
 
     def judge(self) -> None:
         """Judge the given grasps; a grasp that cannot be simulated gets a row with the reason."""
@@ -97,7 +103,8 @@ class _Making:
         seated = seat(self.body, given.points, given.normals)
         grasp = grasp_of(seated, friction, given.id)
         if isinstance(grasp, Grasp):
-            self.found.add_given(given, grasp, self._tried(grasp, seated.body), seated.moved_m)
+            tried, executed = self._tried(grasp, seated.body), self._executed(grasp, seated.body)
+            self.found.add_given(given, grasp, tried, seated.moved_m, executed)
             return
         control = Control(GIVEN, seated.contacts, friction, grasp)
         verdict = try_control(seated.body, control, self.agenda, Setup())
@@ -108,3 +115,14 @@ class _Making:
         if self.unit.config.scenes:
             self.files[f"scenes/{self.found.name(grasp.id)}.xml"] = verdict.scene.xml
         return verdict
+
+    def _executed(self, grasp: Grasp, body: Polyhedron) -> Executed:
+        """Execute a grasp if that is asked for, or say why its execution is refused."""
+        asked = self.unit.config.execution
+        if asked is None:
+            return None
+        try:
+            settings = asked.settings_for(body)
+            return executed_grasp(ExecutionJob(body, grasp, self.unit.friction, settings))
+        except InputError as error:
+            return str(error)

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
 from sim_validate.datasets.building.make_unit import Made
-from sim_validate.datasets.columns import TABLES, Name
+from sim_validate.datasets.columns import Name
 from sim_validate.datasets.parquet import parquet_bytes
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.files.paths import path_inside
@@ -79,7 +79,8 @@ class Staging:
 
     def write(self, unit: WorkUnit, made: Made) -> None:
         """Keep the rows and files of a finished unit."""
-        tables = {_file(name): parquet_bytes(name, made.rows[name], {}) for name in TABLES}
+        kinds = unit.config.tables
+        tables = {_file(name): parquet_bytes(name, made.rows[name], {}, kinds) for name in kinds}
         others = {f"{OTHERS}/{path}": text.encode() for path, text in made.files.items()}
         self._put(unit, {**tables, **others}, object_id=made.object_id, split=made.split)
 

@@ -13,7 +13,6 @@ from pathlib import Path
 
 from grasp_core.provenance import arithmetic
 from sim_validate.datasets.building.staging import Finished, Staging
-from sim_validate.datasets.columns import TABLES
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.describing.card import CARD, card_text
 from sim_validate.datasets.given_contacts import given_text
@@ -60,6 +59,7 @@ def finish(
         units=len(units),
         units_sha256=units_sha256(units),
         quarantined=len(quarantined),
+        executed=config.execution is not None,
         files=(*tables, *(listed(folder, path) for path in others)),
     )
     card = write_text(folder / CARD, card_text(config, manifest))
@@ -100,7 +100,7 @@ def _write_tables(
     with TableFiles(folder / DATA, about) as files:
         for _, same in groupby(good, key=lambda each: each.object_id):
             of_object = list(same)
-            for name in TABLES:
+            for name in config.tables:
                 chosen = of_object[:1] if name == "objects" else of_object
                 paths = [staging.table(each.unit, name) for each in chosen]
                 files.add(name, of_object[0].split, paths)

@@ -7,16 +7,16 @@ header as quoted strings, in the text as Markdown.
 import re
 from collections.abc import Iterable
 
-from sim_validate.datasets.columns import KEYS, REFERENCES, TABLES, Column, Name
+from sim_validate.datasets.columns import KEYS, REFERENCES, Column, Name
 from sim_validate.datasets.config import DatasetConfig, config_to_toml, quoted
 from sim_validate.datasets.describing.statements import (
     CONVENTIONS,
     KEYWORDS,
     LABELS,
-    LIMITS,
     ROWS,
     SOURCES,
     choice,
+    limits,
     made,
     makers,
     splitting,
@@ -71,11 +71,11 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
         f"of the code. The settings, as in `config.toml`:\n\n"
         f"```toml\n{config_to_toml(config)}```\n",
         f"## Tables\n\n{_counts(manifest)}",
-        *(_table(name) for name in TABLES),
+        *(_table(name, columns) for name, columns in config.tables.items()),
         f"## Splits\n\n{splitting()}\n",
         f"## Negative controls and labels\n\n{_labels()}",
         f"## Units and frames\n\n{CONVENTIONS}\n",
-        f"## Limits\n\n{_list(LIMITS)}",
+        f"## Limits\n\n{_list(limits(config))}",
         f"## Licences of the meshes\n\n{SOURCES}\n",
         _loading(manifest),
     )
@@ -88,7 +88,7 @@ def _header(config: DatasetConfig, manifest: Manifest) -> str:
     lines += ["task_categories:", f"- {quoted('robotics')}", "tags:"]
     lines += [f"- {quoted(word)}" for word in KEYWORDS]
     lines += ["size_categories:", f"- {quoted(_size(sum(manifest.rows().values())))}"]
-    configs = [line for name in TABLES for line in _config_lines(name, manifest)]
+    configs = [line for name in config.tables for line in _config_lines(name, manifest)]
     lines += ["configs:", *configs] if configs else []
     return "\n".join(["---", *lines, "---", ""])
 
@@ -135,8 +135,8 @@ def _credits(config: DatasetConfig) -> str:
     """Write the user's statements about the dataset, such as its creator, as a list."""
     name = _known_license(config.license) or config.license
     said = {
-        "By": _as_markdown(config.creator),
-        "At": f"<{config.url}>" if _is_address(config.url) else _as_markdown(config.url),
+        "Creator": _as_markdown(config.creator),
+        "Address": f"<{config.url}>" if _is_address(config.url) else _as_markdown(config.url),
         "Published": _as_markdown(config.published),
         "Licence": f"<{name}>" if _is_address(name) else _as_markdown(name),
     }
@@ -146,7 +146,7 @@ def _credits(config: DatasetConfig) -> str:
 
 def _counts(manifest: Manifest) -> str:
     lines = ["| table | a row is | split | rows |", "|---|---|---|---|"]
-    for name in TABLES:
+    for name in manifest.tables:
         for split in _splits(name, manifest):
             files = [each for each in manifest.of_table(name) if each.split == split]
             rows = sum(each.rows or 0 for each in files)
@@ -154,7 +154,7 @@ def _counts(manifest: Manifest) -> str:
     return _lines(lines)
 
 
-def _table(name: Name) -> str:
+def _table(name: Name, columns: Iterable[Column]) -> str:
     """Write a Markdown table of all columns of a table."""
     lines = [
         f"### {name}", "",
@@ -163,7 +163,7 @@ def _table(name: Name) -> str:
     ]  # fmt: skip
     lines += [
         f"| `{each.name}` | {_type(each)} | {each.unit} | {_meaning(name, each)} |"
-        for each in TABLES[name]
+        for each in columns
     ]
     return _lines(lines)
 
@@ -180,9 +180,9 @@ def _meaning(name: Name, column: Column) -> str:
 
 def _labels() -> str:
     rest = (
-        "Controls stay in the tables, with `control_of`, the `friction` they were tried at and "
-        "`force_closed` false. `held` is what came of the trials, `force_closed` what is proved; "
-        "`mismatches` counts where they contradict each other."
+        "Negative controls are rows like the grasps; `control_of` names their grasp, `friction` is "
+        "what they were tried at, and `force_closed` is false. `held` is the result of the "
+        "simulation, `force_closed` is proved; `mismatches` counts their contradictions."
     )
     lines = ["| `label` | what it is |", "|---|---|"]
     lines += [f"| `{label}` | {meaning} |" for label, meaning in LABELS.items()]
@@ -226,8 +226,8 @@ import sim_validate
 grasps = sim_validate.load_dataset("ds", "{split}")["grasps"]
 ```
 
-`graspproof dataset verify ds` compares every file with `manifest.json`, proves every closure again
-from the contacts in the table, and plans and simulates a sample again.
+`graspproof dataset verify ds` compares every file with `manifest.json`, proves force closure again
+for every row from its contacts, and plans and simulates a sample of the grasps again.
 """
 
 

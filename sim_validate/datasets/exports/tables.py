@@ -10,7 +10,7 @@ numbers and truth values, and "" in columns of text, which has a fixed width.
 import importlib
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import reduce
 from itertools import chain, product
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
 from grasp_core.files.whole_files import write_parts
-from sim_validate.datasets.columns import TABLES, Column, Name
+from sim_validate.datasets.columns import Column, Name
 from sim_validate.datasets.open_dataset import Selection
 from sim_validate.datasets.parquet import Columns, pyarrow, read_columns, schema_of
 from sim_validate.files.reading import write_arrays, write_bytes, write_lines, write_text
@@ -53,10 +53,11 @@ def write_tables(
     Raises:
         InputError: The dataset is damaged.
     """
-    for done, name in enumerate(TABLES, start=1):
+    tables = chosen.tables
+    for done, name in enumerate(tables, start=1):
         write(chosen, name, folder)
-        report(done, len(TABLES))
-    columns = {name: [asdict(column) for column in table] for name, table in TABLES.items()}
+        report(done, len(tables))
+    columns = {name: [asdict(column) for column in table] for name, table in tables.items()}
     about = {"dataset": chosen.facts(), "columns": columns}
     write_text(folder / "about.json", json.dumps(about, indent=1) + "\n")
     return chosen.counts()
@@ -65,15 +66,16 @@ def write_tables(
 def csv_file(chosen: Selection, name: Name, folder: Path) -> None:
     """Write a table as CSV with all text in quotes; null is an empty cell."""
     csv: Any = importlib.import_module("pyarrow.csv")
+    columns = chosen.tables[name]
 
     def text(part: Any, *, header: bool) -> bytes:
         held = io.BytesIO()
-        csv.write_csv(_flat(part, name), held, csv.WriteOptions(include_header=header))
+        csv.write_csv(_flat(part, columns), held, csv.WriteOptions(include_header=header))
         return held.getvalue()
 
     rest = (text(part, header=False) for part in chosen.batches(name))
     write_parts(
-        folder / f"{name}.csv", chain([text(schema_of(name).empty_table(), header=True)], rest)
+        folder / f"{name}.csv", chain([text(schema_of(columns).empty_table(), header=True)], rest)
     )
 
 
@@ -105,7 +107,7 @@ def write_hdf5(
     held = io.BytesIO()
     with h5py.File(held, "w") as file:
         file.attrs.update(chosen.facts())
-        for done, (name, columns) in enumerate(TABLES.items(), start=1):
+        for done, (name, columns) in enumerate(chosen.tables.items(), start=1):
             group, arrays = file.create_group(name), _plain_columns(chosen, name)
             for column in columns:
                 values = arrays[column.name]
@@ -117,16 +119,16 @@ def write_hdf5(
                 added = group.create_dataset(column.name, data=values, track_times=False, **packed)
                 unit = {"unit": column.unit} if column.unit else {}
                 added.attrs.update(unit | {"meaning": column.meaning, "null": NULLS[column.kind]})
-            report(done, len(TABLES))
+            report(done, len(chosen.tables))
     write_bytes(folder / "dataset.h5", held.getvalue())
     return chosen.counts()
 
 
-def _flat(table: Any, name: Name) -> Any:
+def _flat(table: Any, of_table: Sequence[Column]) -> Any:
     """Return an Arrow table with one column per number; no text can pass for a formula."""
     compute: Any = importlib.import_module("pyarrow.compute")
     columns = dict[str, Any]()
-    for column in TABLES[name]:
+    for column in of_table:
         if column.kind == "text":
             text = table[column.name]
             marked = compute.binary_join_element_wise("'", text, "")
@@ -143,8 +145,8 @@ def _flat(table: Any, name: Name) -> Any:
 
 def _plain_columns(chosen: Selection, name: Name) -> Columns:
     """Return the columns of a table as arrays (rows, ..) of numbers and fixed-width text."""
-    found = read_columns(chosen.paths(name), name)
-    return {column.name: _plain(column, found[column.name]) for column in TABLES[name]}
+    found = read_columns(chosen.paths(name), name, chosen.tables)
+    return {column.name: _plain(column, found[column.name]) for column in chosen.tables[name]}
 
 
 def _plain(column: Column, values: NDArray[Any]) -> NDArray[Any]:

@@ -20,7 +20,7 @@ from grasp_core.errors import GraspError
 from grasp_core.provenance import arithmetic
 from sim_validate.datasets.building.make_unit import made_of
 from sim_validate.datasets.building.write_tables import CONFIG, CONTACTS, QUARANTINE, TWIN
-from sim_validate.datasets.columns import KEYS, TABLES, Name
+from sim_validate.datasets.columns import KEYS, Name, Tables
 from sim_validate.datasets.config import config_from_toml
 from sim_validate.datasets.given_contacts import read_given
 from sim_validate.datasets.manifest import Manifest
@@ -30,6 +30,7 @@ from sim_validate.datasets.parquet import as_read
 from sim_validate.datasets.quarantine import read_left_out
 from sim_validate.datasets.rows import id_beginning
 from sim_validate.datasets.units import WorkUnit, provenance
+from sim_validate.datasets.verifying.executions import loose_difference
 from sim_validate.datasets.verifying.rows_by_object import ObjectRows, Row, by_object
 from sim_validate.files.reading import read_text
 
@@ -120,12 +121,13 @@ class _Redoing:
         except GraspError as error:
             yield f"the grasps cannot be computed again ({error})"
             return
-        now: ObjectRows = {table: as_read(table, made.rows[table]) for table in TABLES}
+        tables = self._config.tables
+        now: ObjectRows = {each: as_read(each, made.rows[each], tables) for each in tables}
         if not self._exact:
             yield from _loose_differences(stored, now)
             return
-        for table in TABLES:
-            yield from _differences(table, stored[table], now[table])
+        for table in tables:
+            yield from _differences(table, tables, stored[table], now[table])
         for path, text in made.files.items():
             if read_text(self._folder / path) != text:
                 yield f"{path}: the file differs from what is computed again"
@@ -152,13 +154,19 @@ def drawn(units: Sequence[tuple[str, float]], sample: Sample) -> list[tuple[str,
 def _of_unit(rows: ObjectRows, object_id: str, friction: float) -> ObjectRows:
     beginning = id_beginning(object_id, friction)
     return {
-        "objects": [row for row in rows["objects"] if row["object_id"] == object_id],
-        "grasps": [row for row in rows["grasps"] if row["grasp_id"].startswith(beginning)],
-        "trials": [row for row in rows["trials"] if row["grasp_id"].startswith(beginning)],
-    }
+        name: [
+            row
+            for row in of_table
+            if (row["object_id"] == object_id if name == "objects"
+                else row["grasp_id"].startswith(beginning))
+        ]
+        for name, of_table in rows.items()
+    }  # fmt: skip
 
 
-def _differences(name: Name, stored: Sequence[Row], made: Sequence[Row]) -> Iterator[str]:
+def _differences(
+    name: Name, tables: Tables, stored: Sequence[Row], made: Sequence[Row]
+) -> Iterator[str]:
     """Yield sentences on cells that differ, and on rows that only one side has."""
     before = {tuple(row[key] for key in KEYS[name]): row for row in stored}
     after = {tuple(row[key] for key in KEYS[name]): row for row in made}
@@ -171,7 +179,7 @@ def _differences(name: Name, stored: Sequence[Row], made: Sequence[Row]) -> Iter
         for key in after.keys() - before.keys()
     )
     for key in before.keys() & after.keys():
-        for column in TABLES[name]:
+        for column in tables[name]:
             one, other = before[key][column.name], after[key][column.name]
             if one != other:
                 yield f"{name}: {key}: {column.name} is {one}, but {other} when computed again"
@@ -194,6 +202,8 @@ def _loose_differences(stored: ObjectRows, made: ObjectRows) -> Iterator[str]:
                 f"grasps: {name}: outcome is {one['outcome']}, but {other['outcome']} when "
                 "computed again"
             )
+        if said := loose_difference(one, other):
+            yield f"grasps: {name}: {said}"
         frictions = [float(row["critical_friction"] or 0.0) for row in (one, other)]
         if not np.isclose(*frictions, rtol=OTHER_ROUNDING, atol=0.0):
             yield f"grasps: {name}: critical friction {frictions[0]}, done again {frictions[1]}"

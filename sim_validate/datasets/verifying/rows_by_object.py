@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any, TypeAlias
 
-from sim_validate.datasets.columns import TABLES, Name
+from sim_validate.datasets.columns import Name
 from sim_validate.datasets.open_dataset import Selection
 from sim_validate.datasets.rows import SHORT
 
@@ -19,6 +19,7 @@ BEGINNINGS: Mapping[Name, Callable[[Row], str]] = {
     "objects": lambda row: str(row["object_id"])[:SHORT],
     "grasps": lambda row: str(row["object_id"])[:SHORT],
     "trials": lambda row: str(row["grasp_id"])[:SHORT],
+    "executions": lambda row: str(row["grasp_id"])[:SHORT],
 }
 """Functions that return the part of a row's name that all rows of its object share."""
 
@@ -29,11 +30,11 @@ def by_object(chosen: Selection) -> Iterator[ObjectRows]:
     Raises:
         InputError: A file is damaged, or its number of rows differs from the manifest's.
     """
-    streams = {name: _groups(chosen, name) for name in TABLES}
-    heads: dict[Name, Group | None] = {name: next(streams[name], None) for name in TABLES}
+    streams = {name: _groups(chosen, name) for name in chosen.tables}
+    heads: dict[Name, Group | None] = {name: next(streams[name], None) for name in chosen.tables}
     while waiting := [head[0] for head in heads.values() if head is not None]:
         first = min(waiting)
-        rows: dict[Name, list[Row]] = {name: [] for name in TABLES}
+        rows: dict[Name, list[Row]] = {name: [] for name in chosen.tables}
         for name, head in heads.items():
             if head is not None and head[0] == first:
                 rows[name] = head[1]

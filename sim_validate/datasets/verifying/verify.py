@@ -13,7 +13,7 @@ from grasp_core.files.strict_json import shown
 from grasp_core.geometry.on_mesh import Surface
 from grasp_core.values import FINGERS
 from sim_validate.datasets.building.write_tables import CONFIG, QUARANTINE
-from sim_validate.datasets.columns import KEYS, TABLES
+from sim_validate.datasets.columns import KEYS
 from sim_validate.datasets.config import config_from_toml
 from sim_validate.datasets.manifest import MANIFEST, Listed, Manifest, listed, read_manifest
 from sim_validate.datasets.meshes import stored_surface
@@ -21,6 +21,7 @@ from sim_validate.datasets.open_dataset import Selection
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.quarantine import read_left_out
 from sim_validate.datasets.rows import GIVEN, NOT_TRIED
+from sim_validate.datasets.verifying.executions import execution_faults
 from sim_validate.datasets.verifying.redo import Sample, sample_faults
 from sim_validate.datasets.verifying.rows_by_object import ObjectRows, by_object
 from sim_validate.files.paths import path_inside
@@ -41,7 +42,8 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
 
     Checked are hashes, sizes and page checksums of all files; counts, keys and references of rows;
     for each contact set its normals, its closure (proved again), and that its trials agree with its
-    row; and for a sample, whether planning and simulating again gives the same rows.
+    row; for each execution what its squeeze carries (proved again), and that its trials agree with
+    the row; and for a sample, whether planning and simulating again gives the same rows.
 
     Args:
         folder: Folder of the dataset.
@@ -73,7 +75,7 @@ def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
     Raises:
         InputError: A file is damaged, or its number of rows differs from the manifest's.
     """
-    frictions = config_from_toml(folder / CONFIG).frictions
+    config = config_from_toml(folder / CONFIG)
     for each in manifest.files:
         if each.table and not Path(each.path).name.startswith(f"{each.split}-"):
             yield (
@@ -83,8 +85,9 @@ def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
     for split in sorted({each.split for each in manifest.files if each.split is not None}):
         for rows in by_object(Selection(folder, manifest, split)):
             yield from _split_faults(split, rows)
-            yield from _row_faults(rows, frictions)
+            yield from _row_faults(rows, config.frictions)
             yield from _mesh_faults(folder, rows)
+            yield from execution_faults(folder, config, rows)
 
 
 def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
@@ -129,6 +132,8 @@ def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
     config = config_from_toml(folder / CONFIG)
     if config.sha256 != manifest.config_sha256:
         yield f"{CONFIG}: the file is not the configuration that the manifest names"
+    if manifest.executed != (config.execution is not None):
+        yield f"{MANIFEST}: `executed` is {manifest.executed}, unlike {CONFIG}"
     lines = len(read_left_out(folder / QUARANTINE))
     if lines != manifest.quarantined:
         yield (
@@ -138,7 +143,7 @@ def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
 
 
 def _row_faults(rows: ObjectRows, frictions: Sequence[float]) -> Iterator[str]:
-    for name in TABLES:
+    for name in rows:
         keys = [tuple(row[key] for key in KEYS[name]) for row in rows[name]]
         if len(set(keys)) < len(keys):
             yield f"{name}: two rows have the same {' and '.join(KEYS[name])}"

@@ -1,0 +1,35 @@
+"""Reads the grasps that a command simulates; flags replace the file's friction and seed."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from grasp_core.records.grasps_json import SavedGrasps
+from sim_validate.cli.console import Reporter
+from sim_validate.records.grasps import read_grasps
+
+
+def saved_grasps(path: Path, reporter: Reporter) -> SavedGrasps | None:
+    """Read a `grasps.json`; say so and return None if it holds no grasp.
+
+    Raises:
+        InputError: The file is missing or invalid; the message names the field.
+    """
+    saved = read_grasps(path)
+    if saved.grasps:
+        return saved
+    absence = f"{path} holds no grasp"
+    reporter.say(absence)
+    reporter.document({"absence": absence})
+    return None
+
+
+def chosen_grasps(
+    saved: SavedGrasps, *, friction: float | None, seed: int | None, limit: int | None
+) -> SavedGrasps:
+    """Keep the first grasps, up to a limit, with another friction or seed where one is given."""
+    return replace(
+        saved,
+        friction=saved.friction if friction is None else friction,
+        seed=saved.seed if seed is None else seed,
+        grasps=saved.grasps[:limit],
+    )

@@ -1,0 +1,182 @@
+"""Runs the command `execute`, which simulates grasps as a robot executes them."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from grasp_core.records.grasps_json import SavedGrasps
+from sim_validate.cli import execution_flags
+from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.commands.asked.executions import check_mass, execution_settings
+from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
+from sim_validate.execution.jobs import ExecutedGrasp, ExecutionJob, executed
+from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.execution.verdict import (
+    Execution,
+    held_controls_in_words,
+    losses_in_words,
+)
+from sim_validate.files.folder_lock import alone_in
+from sim_validate.files.reading import write_text
+from sim_validate.files.stale_results import remove_executions
+from sim_validate.records.executions_json import (
+    EXECUTIONS,
+    executions_summary,
+    executions_to_json,
+)
+from sim_validate.records.grasps import grasp_with_id
+from sim_validate.records.setup_toml import physics_from_file
+
+ABSENT = "-"
+
+
+def execute_file(command: execution_flags.Execute, reporter: Reporter) -> int:
+    """Execute the grasps of a file in simulation and report which of them survive."""
+    check_mass(command.executing.mass)
+    saved = saved_grasps(command.grasps, reporter)
+    if saved is None:
+        return Exit.NONE
+    if command.grasp is not None:
+        saved = replace(saved, grasps=(grasp_with_id(command.grasps, saved, command.grasp),))
+    chosen = chosen_grasps(saved, friction=command.friction, seed=command.seed, limit=command.limit)
+    settings = execution_settings(chosen, command.executing, command.trials, command.down)
+    physics = {} if command.setup is None else physics_from_file(command.setup)
+    with alone_in(command.out):
+        code, text = execute_grasps(
+            chosen,
+            settings,
+            jobs=command.jobs,
+            folder=command.out,
+            reporter=reporter,
+            physics=physics,
+        )
+    reporter.text(text)
+    return code
+
+
+def execute_grasps(
+    saved: SavedGrasps, settings: ExecutionSettings, *, jobs: int, folder: Path | None,
+    reporter: Reporter, physics: Mapping[str, object] | None = None,
+) -> tuple[Exit, str]:  # fmt: skip
+    """Execute grasps, show the results, and write them even if the run is interrupted.
+
+    Args:
+        saved: The grasps.
+        settings: How they are executed.
+        jobs: Largest number of processes.
+        folder: Where executions.json goes, if anywhere.
+        reporter: What shows the results.
+        physics: Settings of the simulator that differ from the usual ones, by name.
+
+    Returns:
+        The exit code, and the text of executions.json.
+
+    Raises:
+        InputError: A grasp is refused.
+        UnfaithfulError: The simulator failed in a trial, or fails its checks.
+    """
+    if folder:
+        remove_executions(folder)
+    changed = physics or {}
+    tasks = [ExecutionJob(saved.body, g, saved.friction, settings, changed) for g in saved.grasps]
+    found: list[ExecutedGrasp] = []
+    try:
+        with reporter.progress("executing") as steps:
+            for each in executed(tasks, jobs):
+                found.append(each)
+                survived = sum(one.survived for one in found)
+                steps.update(len(found), len(tasks), f"({survived} survived)")
+    finally:
+        complete = len(found) == len(tasks)
+        text = executions_to_json(saved.body, saved.friction, settings, found, complete=complete)
+        if folder and found:
+            path = write_text(folder / EXECUTIONS, text)
+            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
+    _show(found, settings, reporter)
+    return _code(found), text
+
+
+def _code(found: Sequence[ExecutedGrasp]) -> Exit:
+    if not all(each.controls_let_go for each in found):
+        return Exit.INTERNAL
+    return Exit.GOOD if all(each.survived for each in found) else Exit.NEGATIVE
+
+
+def _show(found: Sequence[ExecutedGrasp], settings: ExecutionSettings, reporter: Reporter) -> None:
+    kinds, shown = settings.trials, found[:TABLE_ROWS]
+    columns = ("grasp", "family", "load", "survived", "mm moved", "controls let go")
+    reporter.table("executions", columns, [_row(each) for each in shown])
+    for title, cell in (
+        ("trials survived", _survived), ("first slips, predicted/simulated", _slips)
+    ):  # fmt: skip
+        rows = [(each.id, *(cell(each.execution, kind) for kind in kinds)) for each in shown]
+        reporter.table(title, ("grasp", *kinds), rows)
+    say_cut(len(found), reporter)
+    _say_totals(found, settings, reporter)
+    lines = list(_losses(found))
+    for line in lines[:TABLE_ROWS]:
+        reporter.warn(line)
+    if len(lines) > TABLE_ROWS:
+        reporter.warn(f"and {len(lines) - TABLE_ROWS} more lines")
+
+
+def _say_totals(
+    found: Sequence[ExecutedGrasp], settings: ExecutionSettings, reporter: Reporter
+) -> None:
+    """Say what the columns mean, which trials were left out, and how many were survived."""
+    reporter.say(
+        "load: multiple of the weight, in any direction, that the squeeze is certified for; first "
+        "slips: least multiple of the trials' loads at which a contact slips"
+    )
+    left_out = Counter(
+        (each.kind, each.reason) for one in found if one.execution for each in one.execution.skipped
+    )
+    for (kind, reason), count in left_out.items():
+        reporter.say(f"no {kind} for {count} of {len(found)} grasps: {reason}")
+    totals = executions_summary(found)
+    reporter.say(
+        f"{totals['grasps_survived']} of {totals['grasps']} grasps survived every trial with "
+        f"{settings.mass_kg:g} kg; {totals['trials_survived']} of {totals['trials']} trials were "
+        f"survived; {totals['controls_let_go']} of {totals['controls']} negative controls let go "
+        "(all should)"
+    )
+
+
+def _row(each: ExecutedGrasp) -> tuple[str, ...]:
+    found = each.execution
+    if found is None:
+        return (each.id, each.family, ABSENT, "no", ABSENT, ABSENT)
+    moved = max((trial.displacement_m for trial in found.trials), default=0.0)
+    let_go = sum(control.let_go for control in found.controls)
+    return (
+        each.id, each.family, f"{found.load_multiple:.3g}", "yes" if found.survived else "no",
+        f"{1e3 * moved:.2g}", f"{let_go} of {len(found.controls)}",
+    )  # fmt: skip
+
+
+def _survived(found: Execution | None, kind: str) -> str:
+    survived, count = (0, 0) if found is None else found.survival(kind)
+    return f"{survived} of {count}" if count else ABSENT
+
+
+def _slips(found: Execution | None, kind: str) -> str:
+    """Write the least first slip of the trials of a kind, predicted and simulated."""
+    trials = () if found is None else found.of_kind(kind)
+    if not trials:
+        return ABSENT
+    predicted = min(trial.predicted_first_slip for trial in trials)
+    return f"{predicted:.2f}/{min(trial.simulated_first_slip for trial in trials):.2f}"
+
+
+def _losses(found: Sequence[ExecutedGrasp]) -> Iterator[str]:
+    """Yield a line about each control that held, grasp without a squeeze, and failed trial."""
+    for each in found:
+        if each.execution is not None:
+            yield from (f"{each.id}: {line}" for line in held_controls_in_words(each.execution))
+    for each in found:
+        if each.execution is None:
+            yield f"{each.id}: not executed: {each.reason}"
+        else:
+            yield from (f"{each.id}: {line}" for line in losses_in_words(each.execution))

@@ -1,0 +1,277 @@
+"""Writes and reads `executions.json`: each executed grasp, with all settings that were used.
+
+Numbers that JSON lacks are null: a first slip that never comes is infinite.
+"""
+
+import json
+import math
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+from grasp_core.arrays import frozen
+from grasp_core.checked import path_of
+from grasp_core.errors import InputError
+from grasp_core.files.complaints import record_of, settings_of
+from grasp_core.files.strict_json import place
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.provenance import versions
+from scenes.physics import PhysicsSettings
+from sim_validate.execution.jobs import ExecutedGrasp
+from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.execution.trials import Skipped
+from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
+from sim_validate.files.reading import read_text
+from sim_validate.records.executions_schema import (
+    SCHEMA,
+    ExecutionRecord,
+    ExecutionsFile,
+    ExecutionsSummary,
+    ExecutionTrialRecord,
+)
+from sim_validate.records.verdicts_json import finite, object_record
+
+EXECUTIONS = "executions.json"
+"""Name of the file in a folder of results."""
+Where = tuple[str | int, ...]
+"""Keys that lead to a record in its file."""
+Settings = TypeVar("Settings", ExecutionSettings, PhysicsSettings)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Executions:
+    """The executions of an object's grasps, as a file holds them."""
+
+    object_sha256: str
+    """Hash of the object's canonical mesh, as in `Polyhedron.content_sha256`."""
+    friction: float
+    settings: ExecutionSettings
+    complete: bool
+    """Whether every grasp that was asked for was executed."""
+    grasps: tuple[ExecutedGrasp, ...]
+
+    def __len__(self) -> int:
+        """Return the number of grasps."""
+        return len(self.grasps)
+
+    def __getitem__(self, grasp_id: str) -> ExecutedGrasp:
+        """Return the grasp with an id.
+
+        Raises:
+            KeyError: No grasp has this id.
+        """
+        found = next((each for each in self.grasps if each.id == grasp_id), None)
+        if found is None:
+            raise KeyError(grasp_id)
+        return found
+
+
+def executions_to_json(
+    body: Polyhedron, friction: float, settings: ExecutionSettings,
+    grasps: Iterable[ExecutedGrasp], *, complete: bool,
+) -> str:  # fmt: skip
+    """Write the text of `executions.json`; equal executions give equal texts.
+
+    Args:
+        body: The object.
+        friction: Coulomb coefficient.
+        settings: How the grasps were executed.
+        grasps: The results, one per grasp.
+        complete: Whether every grasp that was asked for was executed.
+    """
+    listed = list(grasps)
+    document: ExecutionsFile = {
+        "schema": SCHEMA,
+        "object": object_record(body),
+        "friction": friction,
+        "complete": complete,
+        "settings": asdict(settings),
+        "summary": executions_summary(listed),
+        "executions": [_record(grasp) for grasp in listed],
+        "versions": {**versions()},
+    }
+    return json.dumps(finite(document), allow_nan=False, indent=1) + "\n"
+
+
+def executions_summary(grasps: Iterable[ExecutedGrasp]) -> ExecutionsSummary:
+    """Count grasps, trials and negative controls, and how they ended."""
+    listed = list(grasps)
+    found = [grasp.execution for grasp in listed if grasp.execution is not None]
+    trials = [trial.survived for execution in found for trial in execution.trials]
+    controls = [control.let_go for execution in found for control in execution.controls]
+    return {
+        "grasps": len(listed),
+        "grasps_survived": sum(grasp.survived for grasp in listed),
+        "grasps_without_squeeze": len(listed) - len(found),
+        "trials": len(trials),
+        "trials_survived": sum(trials),
+        "controls": len(controls),
+        "controls_let_go": sum(controls),
+    }
+
+
+def _record(grasp: ExecutedGrasp) -> ExecutionRecord:
+    found = grasp.execution
+    return {
+        "id": grasp.id,
+        "family": grasp.family,
+        "contacts_sha256": grasp.contacts_sha256,
+        "survived": grasp.survived,
+        "reason": grasp.reason,
+        "load_multiple": None if found is None else found.load_multiple,
+        "squeeze_n": None if found is None else found.squeeze.tolist(),
+        "trials": [] if found is None else [_trial_record(trial) for trial in found.trials],
+        "controls": [] if found is None else [
+            {"name": each.name, "let_go": each.let_go, "first_slip": each.first_slip}
+            for each in found.controls
+        ],
+        "skipped": [] if found is None else [
+            {"kind": each.kind, "reason": each.reason} for each in found.skipped
+        ],
+        "physics": None if found is None or found.physics is None else asdict(found.physics),
+    }  # fmt: skip
+
+
+def _trial_record(trial: ExecutionTrial) -> ExecutionTrialRecord:
+    return {
+        "kind": trial.kind,
+        "name": trial.name,
+        "survived": trial.survived,
+        "fate": trial.fate,
+        "slip_m": trial.slip_m,
+        "displacement_m": trial.displacement_m,
+        "turn_rad": trial.turn_rad,
+        "predicted_first_slip": trial.predicted_first_slip,
+        "simulated_first_slip": trial.simulated_first_slip,
+    }
+
+
+def read_executions(path: str | Path) -> Executions:
+    """Read executions, as `graspproof execute` and `graspproof run --execute` write them.
+
+    Args:
+        path: An `executions.json`.
+
+    Raises:
+        InputError: The file is missing or invalid; the message names the file and the field.
+    """
+    path = path_of(path, "path")
+    text = read_text(path)
+    try:
+        return executions_from_json(text)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def executions_from_json(text: str) -> Executions:
+    """Read the text of an `executions.json`.
+
+    Raises:
+        InputError: The text is no such file; the message names the field.
+    """
+    record = record_of(ExecutionsFile, text, EXECUTIONS, schema=SCHEMA)
+    settings = _filled(ExecutionSettings, record["settings"], ("settings",))
+    grasps = tuple(
+        _grasp(each, settings, ("executions", row)) for row, each in enumerate(record["executions"])
+    )
+    _check_summary(record.get("summary"), grasps)
+    return Executions(
+        object_sha256=record["object"]["content_sha256"],
+        friction=record["friction"],
+        settings=settings,
+        complete=record["complete"],
+        grasps=grasps,
+    )
+
+
+def _check_summary(summary: ExecutionsSummary | None, grasps: Iterable[ExecutedGrasp]) -> None:
+    """Refuse a summary that contradicts the executions.
+
+    Raises:
+        InputError: A count differs from that of the executions.
+    """
+    if summary is None:
+        return
+    for name, count in executions_summary(grasps).items():
+        if summary[name] != count:
+            raise InputError(
+                f"summary.{name}: expected {count}, as the executions say, got {summary[name]}; "
+                "write the file again, or remove it"
+            )
+
+
+def _filled(kind: type[Settings], given: dict[str, Any], where: Where) -> Settings:
+    """Make settings of a class from their record, with every field checked."""
+    known = [each.name for each in fields(kind)]
+    for name in given:
+        if name not in known:
+            said = f"unknown key; known keys are {', '.join(known)}"
+            raise InputError(f"{place([*where, name])}: {said}")
+    return settings_of(kind, given, where)
+
+
+def _grasp(record: ExecutionRecord, settings: ExecutionSettings, where: Where) -> ExecutedGrasp:
+    if record["reason"] is None:
+        found = _execution(record, settings, where)
+    else:
+        found = None
+        _require_nothing(record, where)
+    grasp = ExecutedGrasp(
+        record["id"], record["family"], record["contacts_sha256"], found, record["reason"]
+    )
+    if grasp.survived != record["survived"]:
+        said = "true" if grasp.survived else "false"
+        raise InputError(
+            f"{place([*where, 'survived'])}: expected {said}, by the trials, got the opposite"
+        )
+    return grasp
+
+
+def _require_nothing(record: ExecutionRecord, where: Where) -> None:
+    """Refuse results of a grasp that was not executed."""
+    results = {name: record[name] for name in (
+        "load_multiple", "squeeze_n", "physics", "trials", "controls", "skipped",
+    )}  # fmt: skip
+    for name, result in results.items():
+        if result not in (None, []):
+            raise InputError(
+                f"{place([*where, name])}: expected nothing (null or an empty list) beside a reason"
+            )
+
+
+def _execution(record: ExecutionRecord, settings: ExecutionSettings, where: Where) -> Execution:
+    multiple, squeeze = record["load_multiple"], record["squeeze_n"]
+    if multiple is None or squeeze is None:
+        name = "load_multiple" if multiple is None else "squeeze_n"
+        raise InputError(f"{place([*where, name])}: null is not allowed where reason is null")
+    physics = record["physics"]
+    return Execution(
+        mass_kg=settings.mass_kg,
+        squeeze=frozen(squeeze, (None, 3), place([*where, "squeeze_n"])),
+        load_multiple=multiple,
+        trials=tuple(
+            ExecutionTrial(
+                kind=each["kind"],
+                name=each["name"],
+                survived=each["survived"],
+                fate=each["fate"],
+                slip_m=each["slip_m"],
+                displacement_m=each["displacement_m"],
+                turn_rad=each["turn_rad"],
+                predicted_first_slip=_or_infinite(each["predicted_first_slip"]),
+                simulated_first_slip=_or_infinite(each["simulated_first_slip"]),
+            )
+            for each in record["trials"]
+        ),
+        controls=tuple(
+            ExecutionControl(each["name"], each["let_go"], _or_infinite(each["first_slip"]))
+            for each in record["controls"]
+        ),
+        skipped=tuple(Skipped(each["kind"], each["reason"]) for each in record["skipped"]),
+        physics=None if physics is None else _filled(PhysicsSettings, physics, (*where, "physics")),
+    )
+
+
+def _or_infinite(value: float | None) -> float:
+    return math.inf if value is None else value

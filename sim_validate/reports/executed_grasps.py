@@ -1,0 +1,176 @@
+"""Says what executions found, as tables of the first page and of the pages about grasps."""
+
+import math
+import shlex
+from collections.abc import Iterable
+from operator import attrgetter
+from typing import cast
+
+import numpy as np
+
+from sim_validate.execution.jobs import ExecutedGrasp
+from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.execution.verdict import Execution, ExecutionTrial
+from sim_validate.records.executions_json import Executions, executions_summary
+from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record
+from sim_validate.reports.pages import NOTHING, number
+
+MILLI = 1e3
+FLAGS = {
+    "mass_kg": "mass-kg", "push_n": "push-n", "stiffness_n_per_m": "tip-stiffness-n-per-m",
+    "tip_radius_m": "tip-radius-m", "hand.tip_mass_kg": "tip-mass-kg",
+    "hand.damping_ratio": "damping-ratio", "hand.down": "down", "trials": "trials",
+    "lift_m": "lift-m", "lift_s": "lift-s", "shake_g": "shake-g", "shake_hz": "shake-hz",
+    "stop_m_per_s2": "stop-m-per-s2", "stop_from_m_per_s": "stop-from-m-per-s",
+    "knock_n_s": "knock-n-s", "off_mm": "off-mm", "off_deg": "off-deg",
+    "misplacements": "misplacements", "seed": "seed", "most_mm": "max-mm", "most_deg": "max-deg",
+}  # fmt: skip
+"""Flag of `graspproof execute` for each setting."""
+ALWAYS = ("mass_kg", "seed")
+"""Settings whose usual value depends on the object or on the plan."""
+NEVER = "never"
+"""Text that stands for a first slip that no multiple of a load brings about."""
+
+
+def said_of_execution(found: ExecutedGrasp | None) -> tuple[str, str]:
+    """Say in words how the execution of a grasp ended, with the tone: good, bad or neither."""
+    if found is None:
+        return "not executed", QUIET
+    if found.execution is None:
+        return "no squeeze", BAD
+    if not found.controls_let_go:
+        return "a negative control held", BAD
+    if not found.execution.trials:
+        return "no trial is possible", BAD
+    lost = sum(not trial.survived for trial in found.execution.trials)
+    if lost:
+        return f"failed {lost} of {len(found.execution.trials)} trials", BAD
+    return "survived", GOOD
+
+
+def execution_row(found: ExecutedGrasp | None) -> Record:
+    """Build the cells about one grasp in the table of the first page."""
+    said, tone = said_of_execution(found)
+    execution = None if found is None else found.execution
+    trials = () if execution is None else execution.trials
+    return {
+        "said": said,
+        "tone": tone,
+        "multiple": number(None if execution is None else execution.load_multiple, 3),
+        "survived": f"{sum(trial.survived for trial in trials)} of {len(trials)}",
+        "predicted": _slip(min((trial.predicted_first_slip for trial in trials), default=None)),
+        "simulated": _slip(min((trial.simulated_first_slip for trial in trials), default=None)),
+    }
+
+
+def described_executions(executions: Executions) -> str:
+    """Say in one sentence how many grasps survived being executed, and with which mass."""
+    counts = executions_summary(executions.grasps)
+    lost = counts["grasps_without_squeeze"]
+    said = (
+        f"Executed with {executions.settings.mass_kg:.4g} kg at friction "
+        f"{executions.friction:g}, {counts['grasps_survived']} of {counts['grasps']} grasps "
+        f"survived every trial; {counts['controls_let_go']} of {counts['controls']} negative "
+        "controls let go, as all should"
+    )
+    said += f"; no squeeze holds the object in {lost} of them" if lost else ""
+    return said + ("." if executions.complete else "; the executions were interrupted.")
+
+
+def execution_section(executions: Executions | None, found: ExecutedGrasp | None) -> Record | None:
+    """Build the section about the execution of a grasp; None where no grasp was executed."""
+    if executions is None:
+        return None
+    said, tone = said_of_execution(found)
+    execution = None if found is None else found.execution
+    return {
+        "said": said,
+        "tone": tone,
+        "facts": list(_facts(executions, execution)),
+        "reason": None if found is None else found.reason,
+        "trials": [] if execution is None else [_trial(each) for each in execution.trials],
+        "controls": [] if execution is None else [
+            {
+                "name": each.name,
+                "said": "let go" if each.let_go else "held",
+                "tone": GOOD if each.let_go else BAD,
+                "slip": _slip(each.first_slip),
+            }
+            for each in execution.controls
+        ],
+        "skipped": [] if execution is None else execution.skipped,
+    }  # fmt: skip
+
+
+def execute_command(executions: Executions, path: str, grasp_id: str) -> str:
+    """Write the shell command that executes a grasp again, with the same settings.
+
+    The simulator's own settings are no flags, so the command takes the usual ones.
+
+    Args:
+        executions: The friction and the settings.
+        path: Path of the file with the grasp.
+        grasp_id: Id of the grasp.
+    """
+    words = ["graspproof", "execute", path, "--grasp", grasp_id]
+    words += ["--friction", repr(executions.friction)]
+    usual = ExecutionSettings(executions.settings.mass_kg)
+    for name, flag in FLAGS.items():
+        value = attrgetter(name)(executions.settings)
+        if name in ALWAYS or value != attrgetter(name)(usual):
+            words += [f"--{flag}", *_words(value)]
+    return shlex.join(words)
+
+
+def _words(value: object) -> list[str]:
+    """Write the value of a flag: several numbers stand apart, names of trials have commas."""
+    if not isinstance(value, tuple):
+        return [repr(value)]
+    parts = cast("tuple[object, ...]", value)
+    if all(isinstance(part, str) for part in parts):
+        return [",".join(map(str, parts))]
+    return [repr(part) for part in parts]
+
+
+def _facts(executions: Executions, found: Execution | None) -> Iterable[tuple[str, str]]:
+    """Yield names and values of what the fingers and the object were, and of the squeeze."""
+    settings = executions.settings
+    yield "Mass", f"{settings.mass_kg:.4g} kg, at friction {executions.friction:g}"
+    yield "Push of a finger", f"at most {settings.push_n:.4g} N"
+    yield "Springs", _springs(settings)
+    yield "Counts as held", f"up to {settings.most_mm:g} mm and {settings.most_deg:g} deg"
+    if found is not None:
+        sizes = ", ".join(f"{size:.3g}" for size in np.linalg.norm(found.squeeze, axis=1))
+        yield "Squeeze, finger by finger", f"{sizes} N"
+        yield "Certified for", f"{found.load_multiple:.3g} times the weight, in any direction"
+        if found.load_multiple >= 1.0:
+            spare = f"{found.load_multiple - 1.0:.3g} g in any direction, if it grows slowly"
+            yield "So the palm may accelerate by", spare
+
+
+def _springs(settings: ExecutionSettings) -> str:
+    tips = f"fingertips of {MILLI * settings.hand.tip_mass_kg:.4g} g"
+    if settings.tip_radius_m is not None:
+        tips += f" and {MILLI * settings.tip_radius_m:.4g} mm radius"
+    return f"{settings.stiffness_n_per_m:.5g} N/m, {tips}"
+
+
+def _trial(trial: ExecutionTrial) -> Record:
+    return {
+        "name": trial.name,
+        "fate": trial.fate,
+        "said": "survived" if trial.survived else "failed",
+        "tone": GOOD if trial.survived else BAD,
+        "slip": number(MILLI * trial.slip_m, 2),
+        "displacement": number(MILLI * trial.displacement_m, 2),
+        "turn": number(math.degrees(trial.turn_rad), 2),
+        "predicted": _slip(trial.predicted_first_slip),
+        "simulated": _slip(trial.simulated_first_slip),
+    }
+
+
+def _slip(multiple: float | None) -> str:
+    """Write the multiple of a load at which a contact slips."""
+    if multiple is None:
+        return NOTHING
+    return NEVER if math.isinf(multiple) else f"{multiple:.2f}"

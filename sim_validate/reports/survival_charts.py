@@ -1,0 +1,230 @@
+"""Draws which share of executed grasps survives, by the acceleration of the palm.
+
+A squeeze that is certified for s times the weight in any direction carries the weight while the
+palm accelerates by up to (s - 1) g in any direction, as |g + a| <= g + |a|. The curve is the share
+of grasps so certified. Marks are the shares that survived the trials of one kind in simulation, at
+the largest acceleration of these trials; hollow marks are the shares in which no slip is predicted.
+The certificate is for forces through the centre of mass that come slowly. Springs that overshoot,
+and the torques of knocks and of shakes about an axis, can put marks below the curve.
+"""
+
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from scenes.drawing.canvas import LETTERS, Around, in_style, legend_line, new_figure, panels
+from scenes.drawing.palette import FINGERS, GOOD, INK, NEUTRAL
+from sim_validate.execution import paths
+from sim_validate.execution.jobs import ExecutedGrasp
+from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.execution.verdict import ExecutionTrial
+from sim_validate.records.executions_json import Executions
+
+LOOKS = {
+    "weight": ("s", INK), "misplaced": ("X", NEUTRAL), "lift": ("^", FINGERS[2]),
+    "shake along": ("o", FINGERS[1]), "shake about": ("D", FINGERS[3]), "stop": ("v", FINGERS[0]),
+    "knock": ("P", "#D55E00"),
+}  # fmt: skip
+"""Marker and colour of each kind of trial."""
+FILLED = "filled: survived in simulation\nhollow: predicted not to slip"
+"""Explanation of the marks, which stands above the chart's legend."""
+STRAIGHT = ("lift", "shake along", "stop")
+"""Kinds of trials in which the palm accelerates without turning."""
+TICKS_G = (0.0, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+"""Round accelerations at which the axis may have ticks [9.80665 m/s^2]."""
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Shares of grasps at which the chart has ticks."""
+NARROWEST, WIDEST = 2.0, 1001.0
+"""Least and largest multiple of the weight at which the axis may end."""
+BEYOND = 1.1
+"""End of the axis, relative to the largest multiple in the chart."""
+APART = 0.08
+"""Least distance between ticks, relative to the length of the axis."""
+SAME = 9
+"""Number of decimals to which two accelerations must agree to count as equal [g]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Survival:
+    """How many grasps survived all of their trials of one kind."""
+
+    kind: str
+    """Kind of the trials; shakes along and about axes are two kinds."""
+    acceleration_g: float
+    """Largest acceleration of the trials [9.80665 m/s^2]."""
+    grasps: int
+    """Number of grasps that went through such trials, or have no squeeze and are lost; those of
+    which a negative control held do not count."""
+    survived: int
+    predicted: int
+    """Number of grasps for which no slip is predicted in any of the trials."""
+
+
+def certified_multiples(executed: Iterable[Executions]) -> Array:
+    """List the certified multiple of the weight of each grasp, (n,); 0 stands for no squeeze."""
+    return np.array([
+        0.0 if each.execution is None else each.execution.load_multiple
+        for one in executed
+        for each in one.grasps
+    ])  # fmt: skip
+
+
+def survivals(executed: Iterable[Executions]) -> list[Survival]:
+    """Count the grasps that survived each kind of trial, kinds in the order of `LOOKS`."""
+    found = defaultdict[tuple[str, float], list[tuple[bool, bool]]](list)
+    for one in executed:
+        accelerations = accelerations_g(one.settings)
+        lost = sum(each.execution is None for each in one.grasps)
+        for kind, ends in _ends(one.grasps).items():
+            found[kind, round(accelerations[kind], SAME)] += ends + [(False, False)] * lost
+    order = list(LOOKS)
+    return [
+        Survival(
+            kind, acceleration, len(ends), sum(held for held, _ in ends),
+            sum(predicted for _, predicted in ends),
+        )
+        for (kind, acceleration), ends in sorted(
+            found.items(), key=lambda item: (order.index(item[0][0]), item[0][1])
+        )
+    ]  # fmt: skip
+
+
+def _ends(grasps: Iterable[ExecutedGrasp]) -> dict[str, list[tuple[bool, bool]]]:
+    """List, for each kind of trial, whether grasps survived it and were predicted not to slip."""
+    ends = defaultdict[str, list[tuple[bool, bool]]](list)
+    for each in grasps:
+        if each.execution is None or not each.controls_let_go:
+            continue
+        for kind, trials in _by_kind(each.execution.trials).items():
+            survived = all(trial.survived for trial in trials)
+            ends[kind].append((survived, all(trial.predicted_first_slip > 1.0 for trial in trials)))
+    return ends
+
+
+def _by_kind(trials: Iterable[ExecutionTrial]) -> dict[str, list[ExecutionTrial]]:
+    """Group trials by kind; shakes along and about axes are two kinds."""
+    found = defaultdict[str, list[ExecutionTrial]](list)
+    for trial in trials:
+        about = "about" if trial.name.startswith("shake about") else "along"
+        found[f"shake {about}" if trial.kind == "shake" else trial.kind].append(trial)
+    return found
+
+
+def accelerations_g(settings: ExecutionSettings) -> dict[str, float]:
+    """Compute the largest acceleration of each kind of trial [9.80665 m/s^2].
+
+    It is the palm's, at the object's radius where the palm turns. For a knock it is that of the
+    object if nothing held it.
+    """
+    gravity, way = settings.hand.gravity, np.array([1.0, 0.0, 0.0])
+    sideways = np.concatenate([GRAVITY_M_PER_S2 * settings.shake_g * way, np.zeros(3)])
+    shake = _largest(paths.shake(gravity, sideways, settings.shake_hz).accelerations)
+    stop = paths.stop(gravity, way, settings.stop_m_per_s2, settings.stop_from_m_per_s)
+    lift, _ = paths.lift(way, settings.lift_m, settings.lift_s)
+    knock = paths.knock(gravity, settings.knock_n_s * way, np.zeros(3))
+    return {
+        "weight": 0.0,
+        "misplaced": 0.0,
+        "lift": _largest(lift.accelerations),
+        "shake along": shake,
+        "shake about": shake,
+        "stop": _largest(stop.accelerations),
+        "knock": _largest(knock.wrenches) / settings.mass_kg,
+    }
+
+
+def _largest(values: Array) -> float:
+    return float(np.linalg.norm(values[:, :3], axis=1).max()) / GRAVITY_M_PER_S2
+
+
+def survival_sentence(executed: Sequence[Executions]) -> str:
+    """Say in one sentence what the chart shows, at the hardest motion of the palm."""
+    multiples = certified_multiples(executed)
+    marks = survivals(executed)
+    straight = [mark for mark in marks if mark.kind in STRAIGHT] or [
+        mark for mark in marks if mark.acceleration_g == 0.0
+    ]
+    if not straight:
+        certified = int((multiples >= 1.0).sum())
+        return f"{certified} of {len(multiples)} grasps are certified to carry the weight."
+    hardest = max(straight, key=lambda mark: mark.acceleration_g)
+    certified = int((multiples >= 1.0 + hardest.acceleration_g).sum())
+    return (
+        f"{certified} of {len(multiples)} grasps are certified to carry the weight while the palm "
+        f"accelerates by {hardest.acceleration_g:.3g} g in any direction, and in simulation "
+        f"{hardest.survived} of {hardest.grasps} survived every trial of the kind "
+        f"“{hardest.kind}”, which reaches that acceleration."
+    )
+
+
+@in_style
+def survival_figure(executed: Sequence[Executions]) -> Any:
+    """Draw the share of grasps that survives, by the acceleration of the palm.
+
+    Args:
+        executed: Executions of the grasps of one object or of several, with a grasp at least.
+
+    Returns:
+        A matplotlib figure.
+    """
+    multiples, marks = certified_multiples(executed), survivals(executed)
+    ends = [NARROWEST, *multiples, *(1.0 + mark.acceleration_g for mark in marks)]
+    end = min(BEYOND * max(ends), WIDEST)
+    figure = new_figure(9.0, 3.7)
+    (axes,) = panels(figure, 1, around=Around(left=0.09, right=0.27, below=0.14, above=0.05))
+    _curve(axes, multiples, end)
+    handles = [legend_line(GOOD, "certified in any direction")]
+    handles += [_marked(axes, mark) for mark in marks]
+    _scale(axes, end)
+    axes.legend(handles=handles, title=FILLED, title_fontsize=LETTERS - 1.0, loc="upper left",
+                bbox_to_anchor=(1.03, 1.0), alignment="left")  # fmt: skip
+    return figure
+
+
+def _curve(axes: Any, multiples: Array, end: float) -> None:
+    """Draw the share of grasps that are certified for each multiple of the weight."""
+    steps = np.concatenate([[1.0], np.sort(multiples[(multiples >= 1.0) & (multiples < end)])])
+    shares = (multiples[None] > steps[:, None]).mean(axis=1)
+    shares[0] = (multiples >= 1.0).mean()
+    steps, shares = np.append(steps, end), np.append(shares, shares[-1])
+    axes.step(steps, shares, where="post", color=GOOD)
+    axes.fill_between(steps, shares, step="post", color=GOOD, alpha=0.15, linewidth=0.0)
+
+
+def _marked(axes: Any, mark: Survival) -> Any:
+    """Draw the marks of a kind of trial, and return their line of the legend."""
+    marker, colour = LOOKS[mark.kind]
+    place = 1.0 + mark.acceleration_g
+    axes.plot(place, mark.predicted / mark.grasps, marker, mfc="none", mec=colour, ms=11,
+              mew=1.2, clip_on=False, zorder=3)  # fmt: skip
+    axes.plot(place, mark.survived / mark.grasps, marker, color=colour, ms=6,
+              clip_on=False, zorder=4)  # fmt: skip
+    label = f"{mark.kind}, {mark.acceleration_g:.3g} g: {mark.survived} of {mark.grasps}"
+    return legend_line(colour, label, style="", marker=marker)
+
+
+def ticks_up_to(end: float) -> list[float]:
+    """List round accelerations for an axis up to a multiple of the weight, not too close [g]."""
+    found = [0.0]
+    for tick in TICKS_G:
+        if 1.0 + tick <= end and math.log((1.0 + tick) / (1.0 + found[-1])) > APART * math.log(end):
+            found.append(tick)
+    return found
+
+
+def _scale(axes: Any, end: float) -> None:
+    axes.set_xscale("log")
+    axes.set_xlim(1.0, end)
+    axes.set_ylim(0.0, 1.03)
+    ticks = ticks_up_to(end)
+    axes.xaxis.set_ticks([1.0 + tick for tick in ticks], [f"{tick:g}" for tick in ticks])
+    axes.xaxis.set_ticks([], minor=True)
+    axes.yaxis.set_ticks(SHARES, [f"{share:.0%}" for share in SHARES])
+    axes.set_xlabel("acceleration beside the weight [g]")
+    axes.set_ylabel("share of grasps that survives")
