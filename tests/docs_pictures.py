@@ -9,12 +9,16 @@ import scenes
 from scenes.drawing.canvas import Around, entitle, in_style, new_figure, panels, write_figure
 from scenes.drawing.pictures import draw_grasp, grasp_figure
 from scenes.drawing.views import best_view
+from sim_validate.execution.jobs import ExecutionJob, executed_grasp
+from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.records.executions_json import Executions
 from sim_validate.replaying.recorded import Recorded
 from sim_validate.replaying.replay import replayed
 from sim_validate.reports.drawn_grasps import certified
 from sim_validate.reports.fidelity_charts import Agreement, fidelity_figure
 from sim_validate.reports.margin_charts import margin_figure
 from sim_validate.reports.motion_charts import motion_figure
+from sim_validate.reports.survival_charts import survival_figure
 from sim_validate.reports.wrench_charts import wrench_figure
 from sim_validate.simulation.setup import Agenda, Setup
 
@@ -93,8 +97,22 @@ def fidelity():
     return fidelity_figure([Agreement("critical friction", tuple(pairs))])
 
 
+def survival():
+    """Survival of executed grasps of a wedge of 0.7 kg, by the acceleration of the palm."""
+    body = scenes.example_object("wedge")
+    settings = ExecutionSettings(0.7)
+    found = [
+        executed_grasp(ExecutionJob(body, grasp, FRICTION, settings))
+        for grasp in gc.plan(body, FRICTION, limit=8).grasps
+    ]
+    return survival_figure(
+        [Executions(body.content_sha256, FRICTION, settings, True, tuple(found))]
+    )
+
+
 PICTURES: dict[str, Callable[[], object]] = {
-    make.__name__: make for make in (families, grasp, regions, wrenches, margins, motion, fidelity)
+    make.__name__: make
+    for make in (families, grasp, regions, wrenches, margins, motion, fidelity, survival)
 }
 
 

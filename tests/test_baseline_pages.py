@@ -12,6 +12,7 @@ import pytest
 
 from sim_validate.baselines.compare import EXACT, OTHER_PROCESSOR, OTHER_VERSIONS, Status
 from sim_validate.baselines.entries import Entry
+from sim_validate.baselines.executions import ExecutionEntry
 from sim_validate.baselines.suite_toml import KINDS, suite_from_toml
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
@@ -68,7 +69,7 @@ def test_the_tests_of_the_page_pass(first_steps):
     (project / "test_page.py").write_text(block(PAGE, "python"))
     code, said = run_pytest(project, "test_page.py", "--strict-markers", "-W", "error")
     assert code == 0, said
-    assert "3 passed" in said
+    assert "4 passed" in said
 
 
 def test_all_settings_are_shown(tmp_path):
@@ -78,10 +79,14 @@ def test_all_settings_are_shown(tmp_path):
     assert set(re.findall(r"^\[?(\w+)", block(PAGE, "toml"), re.MULTILINE)) >= set(KINDS)
     assert suite.baseline == tmp_path / "wedge.baseline.json"
     assert suite.noise == dataclasses.replace(Noise(), friction=0.1)
+    assert suite.survives
+    assert suite.execution.settings.trials == ("weight", "lift")
 
 
 def test_all_fields_and_all_answers_are_described():
     for field in dataclasses.fields(Entry):
+        assert f"`{field.name}`" in PAGE
+    for field in dataclasses.fields(ExecutionEntry):
         assert f"`{field.name}`" in PAGE
     for status in Status:
         assert f"`{status.value}`" in PAGE

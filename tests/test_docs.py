@@ -3,7 +3,10 @@
 import json
 import re
 import shlex
+import tomllib
+from dataclasses import fields
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -11,9 +14,11 @@ import grasp_core as gc
 from grasp_core import errors
 from sim_validate import main as commands
 from sim_validate.cli import command_flags
+from sim_validate.cli.execution_flags import TRIALS, Executing
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
 from sim_validate.datasets.given_contacts import read_given
+from sim_validate.execution.verdict import Fate
 from sim_validate.main import main
 from sim_validate.records.setup_toml import setup_from_file
 from sim_validate.records.wrenches import wrenches_from_file
@@ -136,14 +141,15 @@ def listed(page, heading):
 def run_files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     asked = ["run", "wedge", "--limit", "1", "--no-report", "--out", str(folder), "-q"]
-    assert main(asked) == Exit.GOOD
+    assert main([*asked, "--execute", "--execute-trials", "lift,knock"]) == Exit.GOOD
     return tuple(
-        json.loads((folder / f"{name}.json").read_text()) for name in ("grasps", "verdicts")
+        json.loads((folder / f"{name}.json").read_text())
+        for name in ("grasps", "verdicts", "executions")
     )
 
 
 def test_the_fields_of_files_are_those_of_the_page(run_files):
-    grasps, verdicts = run_files
+    grasps, verdicts, executions = run_files
     assert set(listed("files", "## grasps.json")) | {"schema"} == set(grasps)
     assert set(listed("files", "Each grasp:")) == set(grasps["grasps"][0])
     assert set(listed("files", "## verdicts.json")) | {"schema"} == set(verdicts)
@@ -157,6 +163,27 @@ def test_the_fields_of_files_are_those_of_the_page(run_files):
     for part in (grasps["object"], grasps["object"]["mesh"], grasp["witness"], grasp["regions"][0],
                  verdicts["summary"], verdicts["gate"]):  # fmt: skip
         assert all(f"`{name}`" in PAGES["files"] for name in part)
+    execution = executions["executions"][0]
+    assert set(listed("files", "## executions.json")) | {"schema"} == set(executions)
+    assert set(listed("files", "Each execution:")) == set(execution)
+    for part in (executions["summary"], execution["trials"][0], execution["controls"][0],
+                 execution["skipped"][0]):  # fmt: skip
+        assert all(f"`{name}`" in PAGES["files"] for name in part)
+
+
+def test_the_page_of_executions_names_every_trial_fate_and_flag():
+    page = PAGES["execution"]
+    assert listed("execution", "### The trials") == list(TRIALS)
+    assert all(f"`{fate}`" in page for fate in get_args(Fate))
+    groups = (Executing(), Executing().mass, Executing().tips)
+    names = [field.name for group in groups for field in fields(group)]
+    for name in set(names) - {"mass", "tips"}:
+        assert f"`--{name.replace('_', '-')}" in page, name
+    trials = page.partition("### The trials")[2].partition("The fingers and the object")[0]
+    shown = re.findall(r"`--([\w-]+) ([\d.]+)`", trials)
+    assert len(shown) == 10
+    for name, value in shown:
+        assert getattr(Executing(), name.replace("-", "_")) == float(value)
 
 
 def test_the_files_that_the_page_shows_are_accepted(tmp_path, monkeypatch):
@@ -193,10 +220,11 @@ def test_the_settings_of_a_dataset_are_all_shown(tmp_path):
     path = tmp_path / "grasps.toml"
     path.write_text(text)
     config = config_from_toml(path)
-    shown = set(re.findall(r"^(\w+) =", text, re.MULTILINE))
+    shown = set(tomllib.loads(text))
     assert set(DatasetConfig.__dataclass_fields__) - shown == {"contacts", "outward"}
+    assert config.execution.settings.mass_kg == 0.3
     plain = DatasetConfig(objects=config.objects)
-    told = {"objects", "frictions", "title", "license", "creator", "url", "published"}
+    told = {"objects", "frictions", "title", "license", "creator", "url", "published", "execution"}
     for name in shown - told:
         assert getattr(config, name) == getattr(plain, name)
 

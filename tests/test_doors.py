@@ -24,7 +24,7 @@ DOORS = {
     "qpsolvers": "grasp_core/solvers/qp.py",
     "scipy.sparse": "grasp_core/geometry/connectivity.py",
     "scipy.optimize": "grasp_core/solvers/nearest_point.py",
-    "mujoco": ("sim_validate/simulation/simulate.py", "scenes/drawing/frames.py"),
+    "mujoco": ("sim_validate/simulation/engine.py", "scenes/drawing/frames.py"),
     "PIL": "scenes/drawing/frames.py",
     "matplotlib": "scenes/drawing/canvas.py",
     "jinja2": "sim_validate/reports/pages.py",

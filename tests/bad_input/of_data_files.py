@@ -30,6 +30,7 @@ READERS = {
 TOMLS = {
     "flags.toml": "plan box --config FILE",
     "setup.toml": "validate {grasps} --setup FILE",
+    "physics.toml": "execute {grasps} --setup FILE",
     "dataset.toml": "dataset build FILE --out made",
 }
 TOML_TEXTS = {

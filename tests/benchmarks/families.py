@@ -114,10 +114,11 @@ def regulus_programs(pieces, cones):
 
 def _attempts(body, shapes, construction):
     """Every order of the fingers on every spanning quadruple."""
-    blocks = spanning_blocks(PlannedCones(body, shapes, THETA, tilted=False), len(body.faces))
+    cones = PlannedCones(body, shapes, THETA, tilted=False)
+    rooms, make = spanning_blocks(cones, len(body.faces))
     found = []
-    for place in range(len(blocks)):
-        part = blocks.make(place).coned(slice(None))
+    for place in range(len(rooms)):
+        part = make(place).coned(slice(None))
         for order in map(list, construction.orders):
             normals, half_angles = part.normals[:, order], part.half_angles[:, NORMAL]
             some = construction.admits(normals, half_angles)
@@ -213,9 +214,9 @@ TOO_LONG = 1.5e6
 def decided(body, shapes, bounded, least):
     """Which attempts have a grasp, counted by family."""
     cones = PlannedCones(body, shapes, THETA, tilted=False)
-    blocks, counts = spanning_blocks(cones, len(body.faces)), Counter()
-    for place in range(len(blocks)):
-        wide = blocks.make(place)
+    (rooms, make), counts = spanning_blocks(cones, len(body.faces)), Counter()
+    for place in range(len(rooms)):
+        wide = make(place)
         wide = wide.some(np.flatnonzero(wide.widest >= least))
         for family, construction in CONSTRUCTIONS.items():
             ranked, _ = wide.ranked(construction, construction.least)

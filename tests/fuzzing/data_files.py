@@ -24,12 +24,14 @@ from sim_validate.datasets.manifest import Listed, Manifest, manifest_from_json,
 from sim_validate.datasets.quarantine import left_out_from
 from sim_validate.files.reading import text_of
 from sim_validate.files.toml_tables import tables_of_toml
+from sim_validate.records.executions_json import executions_from_json, executions_to_json
 from sim_validate.records.regions_schema import RegionsFile
 from sim_validate.records.setup_toml import setup_from_tables, tables_of
 from sim_validate.records.verdicts_schema import VerdictsFile
 from sim_validate.records.wrenches import wrenches_from_json
 from sim_validate.simulation.setup import Setup
 from tests.fuzzing.targets import Target
+from tests.sim_validate.records.executed import executions_text
 
 STABILITY = Path(__file__).parents[1] / "stability" / "box"
 HASH = "0" * 64
@@ -116,6 +118,15 @@ VERDICTS = {
         "versions": {"numpy": "2.2"},
     }],
 }  # fmt: skip
+
+
+def _same_executions(data: bytes, found: Any) -> None:
+    stated, body = json.loads(data), example_object("tetrahedron")
+    text = executions_to_json(body, 0.5, found.settings, found.grasps, complete=True)
+    for name in ("executions", "settings"):
+        _compare(stated[name], json.loads(text)[name])
+
+
 POLYGON = [[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]]
 REGIONS = {
     "schema": 3, "object": {"name": "box", "content_sha256": HASH}, "friction": 0.5,
@@ -166,7 +177,7 @@ def _same_baseline(data: bytes, found: Any) -> None:
     stated = json.loads(data)
     _compare(stated, again)
     assert stated.keys() == again.keys()
-    setup, agenda = found[1]
+    setup, agenda = found[1].setup, found[1].agenda
     assert agenda.seed == stated["settings"]["seed"]
     given = stated["settings"]["setup"].get("hold", {})
     assert {name: getattr(setup.hold, name) for name in given} == given
@@ -308,6 +319,8 @@ TARGETS = (
     Target("verdicts",
            lambda data: record_of(VerdictsFile, text_of(data), "verdicts.json", schema=1),
            lambda: [_json(VERDICTS)], _same_record, "json"),
+    Target("executions", lambda data: executions_from_json(text_of(data)),
+           lambda: [executions_text().encode()], _same_executions, "json"),
     Target("regions", lambda data: record_of(RegionsFile, text_of(data), "regions.json", schema=3),
            lambda: [_json(REGIONS)], _same_record, "json"),
     Target("baseline", _baseline, _baseline_seed, _same_baseline, "json"),

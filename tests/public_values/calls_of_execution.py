@@ -5,11 +5,16 @@ from functools import cache
 import numpy as np
 
 import grasp_core as gc
+import scenes
+import sim_validate as sv
 from grasp_core.forces.even_forces import even_forces
 from tests.public_values.bad_values import (
+    AT_LEAST_ONE,
     FRICTION,
     NOT_NEGATIVE,
+    PATH,
     POSITIVE,
+    SEED,
     SEVERAL,
     VALUE,
     WORD,
@@ -18,7 +23,7 @@ from tests.public_values.bad_values import (
     optional,
     unless,
 )
-from tests.public_values.call import Call, body, grasp
+from tests.public_values.call import Call, body, fields_of, grasp
 
 WRENCH = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 GRAVITY = np.array([0.0, 0.0, -9.8])
@@ -33,6 +38,15 @@ def gripped():
     return gc.grip(body(), grasp(), 0.5, squeeze())
 
 
+@cache
+def held_scene():
+    return scenes.build_held_scene(body(), gripped(), 0.1)
+
+
+def tilted():
+    return scenes.PhysicsSettings(gravity=(1.0, 0.0, 0.0))
+
+
 def held(**more):
     return lambda: {"body": body(), "contacts": grasp(), "friction": 0.5, **more}
 
@@ -44,6 +58,7 @@ ARGUMENTS = {
     "stiffness": each_of(POSITIVE) | {"not symmetric": np.triu(np.ones((4, 3, 3)))},
     "tip_radius_m": each_of(NOT_NEGATIVE),
 }
+ONE_TRIAL = sv.ExecutionSettings(0.1, trials=("weight",))
 
 CALLS = [
     Call("gc.grip", lambda: held(squeeze=squeeze())(), ARGUMENTS | {
@@ -68,5 +83,51 @@ CALLS = [
     Call("gc.LoadSet", lambda: {"offset": WRENCH, "axes": np.eye(6)}, {
         "offset": array(WRENCH),
         "axes": array(np.eye(6)) | {"zero": np.zeros((6, 6)), "seven": np.ones((6, 7))},
+    }),
+    Call("scenes.HeldSettings", dict, {
+        "tip_mass_kg": POSITIVE,
+        "damping_ratio": POSITIVE | {"a hundred": 100.0},
+        "down": array(GRAVITY) | {"zero": (0.0, 0.0, 0.0), "minute": (1e-300, 0.0, 0.0)},
+    }),
+    Call("scenes.build_held_scene", lambda: {"body": body(), "grip": gripped(), "mass_kg": 0.1}, {
+        "body": VALUE,
+        "grip": VALUE,
+        "mass_kg": POSITIVE,
+        "settings": optional(VALUE),
+        "physics": optional(VALUE) | {"other gravity": tilted()},
+    }),
+    Call("scenes.write_held_scene", lambda: {"scene": held_scene(), "path": "no/such/a.xml"}, {
+        "scene": VALUE, "path": PATH,
+    }, succeeds_in="tests/scenes/execution/test_held_mjcf.py"),
+    Call("sv.ExecutionSettings", lambda: fields_of(sv.ExecutionSettings, ONE_TRIAL), {
+        "mass_kg": POSITIVE,
+        "push_n": POSITIVE,
+        "stiffness_n_per_m": POSITIVE,
+        "tip_radius_m": optional(POSITIVE),
+        "hand": VALUE,
+        "trials": SEVERAL | {"none of them": (), "unknown": ("lift", "throw"), "one": "lift"},
+        "lift_m": POSITIVE,
+        "lift_s": POSITIVE | {"a millisecond": 1e-3, "an hour": 3600.0},
+        "shake_g": NOT_NEGATIVE,
+        "shake_hz": POSITIVE | {"a minute's cycle": 1.0 / 60.0, "two samples": 100.0},
+        "stop_m_per_s2": POSITIVE | {"for ages": 1e-6},
+        "stop_from_m_per_s": POSITIVE | {"for ages": 1e6},
+        "knock_n_s": NOT_NEGATIVE,
+        "off_mm": NOT_NEGATIVE,
+        "off_deg": NOT_NEGATIVE | {"a whole turn": 360.0},
+        "misplacements": AT_LEAST_ONE,
+        "seed": SEED,
+        "most_mm": POSITIVE,
+        "most_deg": POSITIVE,
+    }),
+    Call("sv.execute", lambda: {
+        "body": body(), "grasp": grasp(), "friction": 0.5, "settings": ONE_TRIAL,
+    }, {
+        "body": VALUE,
+        "grasp": SEVERAL | {"one": grasp().contacts[:1]},
+        "friction": each_of(FRICTION, "zero"),
+        "settings": VALUE,
+        "threads": AT_LEAST_ONE,
+        "physics": optional(VALUE) | {"other gravity": tilted()},
     }),
 ]  # fmt: skip

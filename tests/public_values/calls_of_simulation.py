@@ -84,6 +84,9 @@ CALLS = [
     Call("sv.read_regions", lambda: {"path": "no/such/file.npz"}, {
         "path": PATH | {"nowhere": "no/such/file.npz"},
     }, succeeds_in="tests/sim_validate/commands/test_regions.py"),
+    Call("sv.read_executions", lambda: {"path": "no/such/executions.json"}, {
+        "path": PATH | {"nowhere": "no/such/executions.json"},
+    }, succeeds_in="tests/sim_validate/records/test_executions_json.py"),
     Call("sv.margin_figure", of_grasp(friction=0.5), BODY_AND_GRASP | {
         "friction": FRICTION, "max_normal_force_n": POSITIVE,
     }, slow=True),

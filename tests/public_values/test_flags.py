@@ -14,7 +14,7 @@ RUN = "from sim_validate.main import run_and_exit; run_and_exit()"
 FRICTIONS = ["0", "-1", "nan", "inf", "1e9", "1e-300", "1e300", f"{LARGEST_FRICTION + 1.0}"]
 WITH_FRICTION = [
     ["plan", "tetrahedron"], ["run", "tetrahedron"], ["validate", "no.json"], ["scene", "no.json"],
-    ["regions", "no.json"], ["view", "no.json"], ["analyze", "no.json"],
+    ["execute", "no.json"], ["regions", "no.json"], ["view", "no.json"], ["analyze", "no.json"],
     ["dataset", "build", "tetrahedron", "--out", "no"],
 ]  # fmt: skip
 OTHERS = [
@@ -37,6 +37,35 @@ OTHERS = [
     ["run", "tetrahedron", "--fingertip-radius-m", "0"],
     ["run", "tetrahedron", "--trials", "-1"],
     ["run", "tetrahedron", "--timeout-s", "nan"],
+    ["run", "tetrahedron", "--mass-kg", "0"],
+    ["scene", "no.json", "--density-kg-m3", "-1"],
+    ["execute", "no.json", "--seed", f"{MOST_SEED + 1}"],
+    ["execute", "no.json", "--misplacements", "1001"],
+    ["execute", "no.json", "--off-deg", "nan"],
+    *(
+        ["execute", "no.json", f"--{name}", value]
+        for name in (
+            "mass-kg",
+            "density-kg-m3",
+            "push-n",
+            "tip-stiffness-n-per-m",
+            "tip-radius-m",
+            "lift-m",
+            "tip-mass-kg",
+            "damping-ratio",
+            "lift-s",
+            "shake-g",
+            "shake-hz",
+            "stop-m-per-s2",
+            "stop-from-m-per-s",
+            "knock-n-s",
+            "off-mm",
+            "off-deg",
+            "max-mm",
+            "max-deg",
+        )
+        for value in ("-1", "1e300")
+    ),
 ]
 
 

@@ -23,6 +23,8 @@ CALLS = [
 ]  # fmt: skip
 BY_NAME = {call.name: call for call in CALLS}
 MADE_BY_FUNCTIONS = {
+    "sv.ExecutedGrasp": "read_executions",
+    "sv.Executions": "read_executions",
     "gc.BestSqueeze": "best_squeeze",
     "gc.FirstSlip": "first_slip",
     "gc.FreeMass": "payload",
@@ -36,8 +38,11 @@ MADE_BY_FUNCTIONS = {
     "gc.Plan": "plan",
     "gc.QualityCeiling": "quality_ceiling",
     "gc.WrenchLimit": "wrench_limits",
+    "scenes.HeldScene": "build_held_scene",
     "scenes.Layout": "build_scene",
     "scenes.Scene": "build_scene",
+    "sv.Execution": "execute",
+    "sv.ExecutionTrial": "execute",
     "sv.Verdict": "validate",
 }
 """Results: users read them and do not make them."""
@@ -53,6 +58,7 @@ NAMED_OTHERWISE = {
     ("scenes.example_object", "name"): "name|object",
     ("scenes.write_picture", "path"): "path|picture's name",
     ("sv.read_regions", "path"): "path|no/such",
+    ("sv.read_executions", "path"): "path|no/such",
     ("sv.load_dataset", "folder"): "folder|no/such",
     ("sv.write_report", "folder"): "folder|no/such",
     ("sv.Agenda", "rules"): "rule",

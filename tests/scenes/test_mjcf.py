@@ -7,7 +7,7 @@ import pytest
 import grasp_core as gc
 import scenes
 from scenes.layout import SQUEEZE, TOUCH, arrange, grasp_size
-from scenes.mjcf import quaternion
+from scenes.mjcf_text import quaternion
 from scenes.physics import CHOSEN_FLAGS, ENABLED_FLAGS, UNUSED_FLAGS
 from tests.judges import random_rotation
 

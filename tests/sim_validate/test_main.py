@@ -351,7 +351,7 @@ def test_planning_flags_reach_the_planner(capsys):
         (["--approach-m", "0.1"], "--approach-m also needs --finger-radius-m"),
         (["--finger-radius-m", "0.01"], "--finger-radius-m also needs --approach-m"),
         (["--edge-clearance-m", "5"], "clearance must be a number from 0"),
-        (["--complete", "--family", "pencil"], "takes the free method"),
+        (["--complete", "--family", "pencil"], "needs the free method"),
         (["--optimize", "--share-faces-m", "0.01"], "leave out --optimize or these"),
         (["--unit", "mm"], "box is a built-in object"),
     ],

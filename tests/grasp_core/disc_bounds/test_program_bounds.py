@@ -29,7 +29,8 @@ NONE = np.empty((0, 4), dtype=np.int64)
 def attempts(body, kind, order, count=60):
     """Faces in finger order, axes and half-angles of some quadruples of a body."""
     cones = PlannedCones(body, face_shapes(body), math.atan(0.5), tilted=True)
-    wide = all_blocks(cones, len(body.faces), NONE).make(0)
+    _, make = all_blocks(cones, len(body.faces), NONE)
+    wide = make(0)
     found = wide.coned(slice(None))
     usable = np.flatnonzero(found.half_angles[:, kind] > LEAST_SPAN_ANGLE)
     some = np.random.default_rng(0).permutation(usable)[:count]

@@ -155,3 +155,11 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path):
     (tmp_path / "folder.stl").mkdir()
     with pytest.raises(gc.MeshError):
         gc.load_polyhedron(tmp_path / "folder.stl")
+
+
+def test_a_density_gives_a_mass(box):
+    body = gc.Polyhedron.from_mesh(box.vertices, box.faces)
+    assert body.mass_at(2700.0) == pytest.approx(2700.0 * 0.006, rel=1e-8)
+    for wrong in (0.0, -1.0, float("nan"), float("inf"), "1", True):
+        with pytest.raises(gc.InputError, match="density_kg_m3 must be a number"):
+            body.mass_at(wrong)

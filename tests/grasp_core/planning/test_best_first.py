@@ -10,9 +10,10 @@ from grasp_core.families import discs as largest_discs
 from grasp_core.families.constructions import CONSTRUCTIONS
 from grasp_core.planning import best_first as promising_module
 from grasp_core.planning.best_first import BestFirst
-from grasp_core.planning.blocks import Blocks
+from grasp_core.planning.blocks import all_blocks
 from grasp_core.planning.family_search import SAME_MERIT
-from grasp_core.planning.methods import Searches
+from grasp_core.planning.methods import prepared
+from grasp_core.planning.planned_cones import PlannedCones
 from grasp_core.planning.request import PlanRequest
 from grasp_core.planning.result import Tally
 from scenes.example_objects import example_object
@@ -64,15 +65,16 @@ def test_cones_that_are_tilted_late_are_not_missed(monkeypatch):
 def opened(body, family, least):
     """Quadruples as they are handed out, and blocks that were made."""
     request = PlanRequest(0.4, (family,), None, "tilted")
-    searches = Searches(body, request)
-    blocks, made = searches.tilted_blocks, []
+    on, _ = prepared(body, request)
+    cones = PlannedCones(on.body, on.shapes, request.theta, tilted=True)
+    (rooms, blocks), made = all_blocks(cones, len(on.faces), on.shared), []
 
     def make(place):
         made.append(place)
-        return blocks.make(place)
+        return blocks(place)
 
-    search = BestFirst(CONSTRUCTIONS[family], AttemptBounds(searches.shapes), Tally())
-    return search.over(Blocks(blocks.rooms, make), lambda _: least[0]), made
+    search = BestFirst(CONSTRUCTIONS[family], AttemptBounds(on.shapes), Tally())
+    return search.over((rooms, make), range(len(rooms)), lambda _: least[0]), made
 
 
 def bound(attempts):

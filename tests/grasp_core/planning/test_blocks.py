@@ -30,8 +30,8 @@ def planned(body):
 def test_blocks_hold_every_quadruple_with_room_once(name):
     cones = planned(example_object(name))
     roomy = np.flatnonzero(cones.rooms > 0.0)
-    blocks = all_blocks(cones, len(cones.rooms), NONE)
-    made = [blocks.make(place).faces for place in range(len(blocks))]
+    rooms, make = all_blocks(cones, len(cones.rooms), NONE)
+    made = [make(place).faces for place in range(len(rooms))]
     assert all(len(each) <= LARGEST_BLOCK for each in made)
     listed = np.concatenate(made)
     assert len(listed) == math.comb(len(roomy), 4)
@@ -41,19 +41,19 @@ def test_blocks_hold_every_quadruple_with_room_once(name):
 @pytest.mark.parametrize("build", [all_blocks, spanning_blocks])
 def test_no_block_has_more_room_than_it_says_nor_than_the_one_before(build):
     cones = planned(example_object("random-40-1"))
-    blocks = build(cones, 40, NONE) if build is all_blocks else build(cones, 40)
-    assert len(blocks) >= 5
-    assert (np.diff(blocks.rooms) <= 0.0).all()
-    for place, room in enumerate(blocks.rooms):
-        assert blocks.make(place).rooms.max() <= room
+    rooms, make = build(cones, 40, NONE) if build is all_blocks else build(cones, 40)
+    assert len(rooms) >= 5
+    assert (np.diff(rooms) <= 0.0).all()
+    for place, room in enumerate(rooms):
+        assert make(place).rooms.max() <= room
 
 
 def test_the_blocks_of_800_faces_are_not_listed_before_they_are_asked_for():
     body = sphere_hull(800)
     assert len(body.faces) == 800
-    blocks = all_blocks(planned(body), 800, NONE)
-    assert len(blocks) > math.comb(800, 4) / LARGEST_BLOCK
-    last = blocks.make(len(blocks) - 1)
+    rooms, make = all_blocks(planned(body), 800, NONE)
+    assert len(rooms) > math.comb(800, 4) / LARGEST_BLOCK
+    last = make(len(rooms) - 1)
     order = np.argsort(-last.cones.rooms, kind="stable")
     assert np.sort(order[-4:]).tolist() in last.faces.tolist()
 
@@ -99,7 +99,8 @@ def test_the_widest_half_angle_is_that_of_the_definition():
 def test_limits_before_cones_are_chosen_bound_those_after(name):
     body = example_object(name)
     cones, tested = planned(body), 0
-    wide = all_blocks(cones, len(body.faces), NONE).make(0)
+    _, make = all_blocks(cones, len(body.faces), NONE)
+    wide = make(0)
     limits = cones.limits(wide.faces, wide.widest)
     coned = wide.coned(slice(None))
     usable = coned.half_angles > LEAST_SPAN_ANGLE
@@ -136,7 +137,8 @@ def test_no_pair_of_tilted_cones_has_larger_discs_than_its_widest_cones_allow():
 def test_widths_from_distances_bound_those_from_corners_however_axes_lean():
     body = example_object("random-14-1")
     cones = planned(body)
-    coned = all_blocks(cones, 14, NONE).make(0).coned(slice(None))
+    _, make = all_blocks(cones, 14, NONE)
+    coned = make(0).coned(slice(None))
     held = coned.half_angles[:, TILTED] > LEAST_SPAN_ANGLE
     faces, axes = coned.faces[held], coned.axes[held, TILTED]
     leaning = np.arccos(np.clip((axes * coned.normals[held]).sum(axis=-1), -1.0, 1.0))

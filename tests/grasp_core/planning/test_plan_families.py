@@ -83,10 +83,9 @@ def test_radii_stay_below_the_bounds_that_prune():
     planned = standard(given)
     body = planned.body
     cones = PlannedCones(body, face_shapes(body), theta, tilted=True)
-    blocks, tested = all_blocks(cones, len(body.faces), np.empty((0, 4), dtype=int)), 0
-    (room,) = blocks.rooms
+    ((room,), make), tested = all_blocks(cones, len(body.faces), np.empty((0, 4), dtype=int)), 0
     for family in DISCS:
-        wide, loose = blocks.make(0).ranked(CONSTRUCTIONS[family], LEAST_RADIUS)
+        wide, loose = make(0).ranked(CONSTRUCTIONS[family], LEAST_RADIUS)
         coned, tight = wide.coned(slice(None)).ranked(CONSTRUCTIONS[family])
         coarse = dict(zip(map(tuple, wide.faces.tolist()), loose, strict=True))
         limits = [coarse[tuple(each)] for each in coned.faces.tolist()]

@@ -7,8 +7,18 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
+import grasp_core as gc
 import scenes
-from scenes.drawing.clips import MOST, VISIBLE, GraphicsError, magnified, write_clip
+from grasp_core.forces.even_forces import even_forces
+from scenes.drawing import clips
+from scenes.drawing.clips import (
+    MOST,
+    VISIBLE,
+    GraphicsError,
+    magnified,
+    write_clip,
+    write_held_clip,
+)
 from tests.sim_validate.rigs import grasps
 
 
@@ -83,3 +93,72 @@ def test_without_graphics_the_message_says_so(scene, tmp_path, monkeypatch):
     ):
         write_clip(scene, np.eye(1, 19, 3), tmp_path / "clip.gif", "")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture(scope="module")
+def held_scene():
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    squeeze = 3.0 * even_forces(grasp.positions, grasp.normals, 0.4)
+    return scenes.build_held_scene(body, gc.grip(body, grasp, 0.5, squeeze), 0.2)
+
+
+def held_joints(count, shift):
+    """Joints of a held object whose palm and object shift together."""
+    joints = np.zeros((count, 25))
+    joints[:, 3] = 1.0
+    joints[:, :3] = joints[:, 7:10] = np.linspace(0.0, 1.0, count)[:, None] * np.array(shift)
+    return joints
+
+
+def drawn_with(monkeypatch, *arguments, **more):
+    """What is handed to the process that draws."""
+    found = {}
+    monkeypatch.setattr(clips, "_written", lambda path, **parts: found.update(parts) or path)
+    write_held_clip(*arguments, **more)
+    return found
+
+
+def test_what_points_up_is_drawn_up(held_scene, tmp_path, monkeypatch):
+    up = np.array([0.6, 0.0, 0.8])
+    joints = held_joints(5, 0.3 * up)
+    table = (-0.1 * up, np.array([1.0, 0.0, 0.0, 0.0]))
+    parts = drawn_with(
+        monkeypatch, held_scene, joints, tmp_path / "a.gif", "lift", up=up, table=table
+    )
+    np.testing.assert_allclose(parts["joints"][-1, :3], [0.0, 0.0, 0.3], atol=1e-12)
+    np.testing.assert_allclose(parts["middle"], [0.0, 0.0, 0.15], atol=1e-12)
+    np.testing.assert_allclose(parts["table"][:3], [0.0, 0.0, -0.1], atol=1e-12)
+    for quaternion in (parts["palm"], parts["table"][3:], parts["joints"][0, 3:7]):
+        turned = Rotation.from_quat(quaternion, scalar_first=True).apply(up)
+        np.testing.assert_allclose(turned, [0.0, 0.0, 1.0], atol=1e-12)
+    np.testing.assert_array_equal(parts["joints"][:, 7:], joints[:, 7:])  # in the palm's frame
+    assert parts["radius"] >= 0.15 + held_scene.layout.radius_m
+
+
+def test_a_held_clip_is_not_magnified(held_scene, tmp_path, monkeypatch):
+    joints = held_joints(3, [1e-6, 0.0, 0.0])
+    parts = drawn_with(monkeypatch, held_scene, joints, tmp_path / "a.gif", "shake")
+    np.testing.assert_allclose(parts["joints"], joints, atol=1e-15)
+    assert "table" not in parts
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("laid", [False, True])
+def test_a_held_clip_shows_palm_and_object_moving(held_scene, tmp_path, laid):
+    low = np.array([0.0, 0.0, -held_scene.layout.radius_m])
+    table = (low, np.array([1.0, 0.0, 0.0, 0.0])) if laid else None
+    joints = held_joints(4, [0.0, 0.0, 0.15])
+    try:
+        path = write_held_clip(held_scene, joints, tmp_path / "a.gif", "lift", table=table)
+    except GraphicsError as error:
+        pytest.skip(str(error))
+    with Image.open(path) as clip:
+        assert clip.n_frames == 4
+        first = np.asarray(clip.convert("RGB")).astype(int)
+        clip.seek(3)
+        last = np.asarray(clip.convert("RGB")).astype(int)
+    # the object's colour leaves the lower half and comes into the upper one
+    changed = np.abs(first - last).max(axis=2) > 30
+    assert 0.01 < changed.mean() < 0.6
+    assert changed[:180].any()
+    assert changed[180:].any()

@@ -13,7 +13,7 @@ from sim_validate.baselines.baseline_json import (
     write_baseline,
 )
 from sim_validate.baselines.entries import entry_of
-from sim_validate.baselines.settings import of_settings, settings_of
+from sim_validate.baselines.settings import How, of_settings, settings_of
 from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.setup import Agenda, Setup
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY
@@ -105,8 +105,8 @@ def test_what_is_no_baseline_is_refused_with_the_field(text, message):
     ],
 )
 def test_settings_that_are_none_are_refused(change, message):
-    settings = settings_of(Setup(), Agenda())
-    assert of_settings(settings, "b.json") == (Setup(), Agenda())
+    settings = settings_of(How(Setup(), Agenda()))
+    assert of_settings(settings, "b.json") == How(Setup(), Agenda())
     with pytest.raises(gc.InputError, match=message) as raised:
         of_settings(settings | change, "b.json")
     assert str(raised.value).startswith("b.json: ")

@@ -125,7 +125,7 @@ def test_several_grasps_are_judged_one_by_one(analyze, capsys):
     assert document["summary"] == {"grasps": 3, "closed": 2, "open": 1, "undecided": 0}
     assert main(["analyze", "contacts.json", "--wrench", "0", "0", "-1", "0", "0", "0"]) == code
     shown = capsys.readouterr().out
-    for word in ("four", "mu*", "weakest axis", "resisted up to", "2 of 3 grasps closed"):
+    for word in ("four", "mu*", "weakest axis", "resisted up to", "2 of 3 grasps are in"):
         assert word in shown
 
 
@@ -217,7 +217,7 @@ def test_what_cannot_be_decided_is_named_and_the_rest_is_answered(analyze, monke
     assert grasp["ferrari_canny_l1_n"][0] > 0.2
     assert document["summary"]["undecided"] == 1
     assert main(["analyze", "contacts.json"]) == Exit.NEGATIVE
-    assert "closure undecided: too close to zero" in capsys.readouterr().out
+    assert "closure is undecided: too close to zero" in capsys.readouterr().out
 
 
 def test_an_interrupted_analysis_tells_what_is_done(analyze, monkeypatch):

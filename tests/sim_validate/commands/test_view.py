@@ -137,7 +137,7 @@ def test_without_graphics_the_picture_turns(planned, tmp_path, monkeypatch, caps
     monkeypatch.setattr("scenes.drawing.turning_clips.FRAMES", 4)
     path = tmp_path / "a.gif"
     assert main(["view", str(planned), "--clip", str(path)]) == Exit.GOOD
-    assert "the picture turns instead" in capsys.readouterr().err
+    assert "the clip shows the picture turning" in capsys.readouterr().err
     with Image.open(path) as clip:
         assert clip.n_frames == 4
 

@@ -124,7 +124,7 @@ def test_only_addresses_become_links(manifest):
     def said(url):
         return card_text(dataclasses.replace(SMALL, url=url), manifest)
 
-    assert "- At: <https://example.org/a_b?c=d>\n" in said("https://example.org/a_b?c=d")
+    assert "- Address: <https://example.org/a_b?c=d>\n" in said("https://example.org/a_b?c=d")
     assert "javascript:alert(1)" in said("javascript:alert(1)")
     for url in ("javascript:alert(1)", "https://a.b/<script>", "https://a.b/c d"):
         assert f"<{url}>" not in said(url).split("## How")[0]
@@ -141,7 +141,7 @@ def test_a_dataset_without_rows_has_a_card(manifest):
     empty = dataclasses.replace(manifest, units=3, quarantined=3, files=())
     header, body = split_card(card_text(SMALL, empty))
     assert "configs" not in header
-    assert "Of 3 units of work 3 were left out" in body
+    assert "Of 3 units of work, 3 were left out" in body
 
 
 @pytest.mark.parametrize(("rows", "size"), [(999, "n<1K"), (1000, "1K<n<10K"), (10**6, "1M<n<10M")])

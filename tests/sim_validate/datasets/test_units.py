@@ -57,7 +57,7 @@ def test_more_objects_and_frictions_leave_the_units_that_were_there():
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [("wegde", "did you mean wedge"), ("nowhere/part.stl", r"part\.stl: this mesh file cannot")],
+    [("wegde", "did you mean wedge"), ("nowhere/part.stl", r"part\.stl: the mesh file cannot")],
 )
 def test_objects_that_are_nowhere_are_refused_before_anything_runs(name, message):
     with pytest.raises(gc.InputError, match=message):

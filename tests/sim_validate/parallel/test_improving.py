@@ -26,8 +26,8 @@ def test_optimised_grasps_are_better_and_their_file_says_by_how_much(tmp_path, c
     qualities = [grasp.ferrari_canny[0] for grasp in saved.grasps]
     assert qualities == sorted(qualities, reverse=True)
     said = capsys.readouterr().out
-    assert "3 of 3 grasps raised; gain from " in said
-    assert "none above" in said
+    assert "3 of 3 grasps improved; gain from " in said
+    assert "upper bound" in said
 
 
 def test_grasps_that_end_at_the_same_contacts_are_kept_once(tmp_path):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.files.strict_json import DEEPEST, object_of, value_of
+from grasp_core.files.strict_json import BESIDE, DEEPEST, object_of, value_of
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.given_contacts import read_given
 from sim_validate.files import npz
@@ -237,6 +237,7 @@ def test_links_that_lead_out_are_not_followed(tmp_path):
 KINDS = {
     "verdicts.json": {"schema": 1, "verdicts": []},
     "regions.json": {"schema": 3, "edge_clearance_m": 0, "grasps": []},
+    "executions.json": {"schema": 1, "executions": []},
     "baseline": {"schema": 1, "grasps_file": "a"},
     "manifest.json": {"schema": 1, "units_sha256": "", "files": []},
     "wrench file": {"wrenches": []},
@@ -250,5 +251,6 @@ def test_another_file_of_ours_is_called_by_its_name(tmp_path, capsys, kind):
     for command in ("view", "validate"):
         assert main([command, str(path)]) == Exit.INPUT
         said = capsys.readouterr().err
-        assert f"x.json: this is a {kind}, not a grasps.json; give the grasps.json" in said
-        assert ("beside it" in said) == (kind in ("verdicts.json", "regions.json"))
+        article = "an" if kind.startswith("e") else "a"
+        assert f"x.json: this is {article} {kind}, not a grasps.json; give the grasps.json" in said
+        assert ("beside it" in said) == (kind in BESIDE)

@@ -315,7 +315,7 @@ def test_a_control_that_says_nothing_is_bad_news(small_run):
     verdict = json.loads((small_run / "verdicts.json").read_text())["verdicts"][0]
     for trial in next(iter(verdict["controls"].values()))["wrenches"]:
         trial["outcome"] = "diverged"
-    assert said_of(verdict) == ("a control is undecided", "bad")
+    assert said_of(verdict) == ("a negative control is undecided", "bad")
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 
 import scenes
 from scenes.layout import TOUCH
-from scenes.mjcf import quaternion
+from scenes.mjcf_text import quaternion
 from sim_validate.simulation.simulate import Motion
 from sim_validate.simulation.traces import rotated, rotation_angles, trace
 from tests.judges import random_rotation

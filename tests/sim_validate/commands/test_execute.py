@@ -1,0 +1,297 @@
+"""The commands `execute` and `run --execute`: what they print, write and end with."""
+
+import json
+import re
+from dataclasses import MISSING, fields, replace
+from typing import get_args
+
+import pytest
+
+import scenes
+import sim_validate as sv
+from grasp_core.errors import UnfaithfulError
+from scenes.execution.held import HeldSettings
+from sim_validate.cli import execution_flags
+from sim_validate.cli.execution_flags import DENSITY_KG_M3, TRIALS, UPRIGHT, Executing, Tips
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.commands import run
+from sim_validate.execution import jobs
+from sim_validate.execution.execute import execute
+from sim_validate.execution.settings import ExecutionSettings, TrialKind
+from sim_validate.main import main
+
+QUICK = ["--trials", "knock"]
+IDS = ("c-0-1-2-7", "p-0-7-1-5")
+
+
+@pytest.fixture(scope="module")
+def plans(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("plan")
+    assert main(["plan", "wedge", "--limit", "2", "--out", str(folder), "-q"]) == Exit.GOOD
+    return (folder / "grasps.json").read_text()
+
+
+@pytest.fixture
+def here(plans, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "grasps.json").write_text(plans)
+    return tmp_path
+
+
+def test_grasps_that_survive_are_shown_and_written(here, capsys):
+    words = ["execute", "grasps.json", "--mass-kg", "0.3", "--out", "e"]
+    assert main([*words, "--trials", "weight,lift,knock"]) == Exit.GOOD
+    shown = capsys.readouterr().out
+    for part in (
+        "wrote e/executions.json", "controls let go", "2.78", "3 of 3", "6 of 6", "1 of 1",
+        "first slips, predicted/simulated", "2.77/2.77", "no lift for 2 of 2 grasps: a fingertip",
+        "2 of 2 grasps survived every trial with 0.3 kg; 14 of 14 trials were survived; 6 of 6",
+    ):  # fmt: skip
+        assert part in shown, shown
+    found = sv.read_executions(here / "e" / "executions.json")
+    assert [grasp.id for grasp in found.grasps] == list(IDS)
+    assert found.complete
+    for grasp in found.grasps:
+        assert grasp.survived
+        assert grasp.controls_let_go
+        assert grasp.execution.survival("knock") == (6, 6)
+        assert [each.kind for each in grasp.execution.skipped] == ["lift"]
+        assert grasp.execution.load_multiple > 1.0
+    assert found.settings.trials == ("weight", "lift", "knock")
+
+
+def test_the_file_is_the_document_and_does_not_depend_on_jobs(here, capsys):
+    texts = []
+    for count in ("1", "2"):
+        words = ["execute", "grasps.json", "--mass-kg", "0.3", "--grasp", IDS[1], "--jobs", count]
+        assert main([*words, *QUICK, "--out", count, "--json"]) == Exit.GOOD
+        texts += [(here / count / "executions.json").read_text(), capsys.readouterr().out]
+    assert len(set(texts)) == 1
+    (only,) = json.loads(texts[0])["executions"]
+    assert only["id"] == IDS[1]
+
+
+@pytest.mark.usefixtures("here")
+def test_a_grasp_that_does_not_survive_is_a_result(capsys):
+    words = ["execute", "grasps.json", "--mass-kg", "1.3", "--limit", "1", "--trials", "weight"]
+    assert main([*words, "--out", "."]) == Exit.NEGATIVE
+    said = capsys.readouterr()
+    assert "0 of 1 grasps survived every trial with 1.3 kg" in said.out
+    assert re.search(r"^c-0-1-2-7: weight: (slipped|dropped), moved [\d.e+]+ mm", said.err, re.M)
+    (grasp,) = sv.read_executions("executions.json").grasps
+    assert not grasp.survived
+    (trial,) = grasp.execution.trials
+    assert trial.fate in {"slipped", "dropped"}
+    assert trial.predicted_first_slip == pytest.approx(grasp.execution.load_multiple, rel=0.05)
+
+
+@pytest.mark.usefixtures("here")
+def test_a_grasp_without_a_squeeze_is_a_result_with_its_reason(capsys):
+    words = ["execute", "grasps.json", "--friction", "0.03", "--mass-kg", "0.3", *QUICK]
+    assert main([*words, "--out", "."]) == Exit.NEGATIVE
+    found = sv.read_executions("executions.json")
+    first, second = found.grasps
+    assert found.friction == 0.03
+    assert first.execution is None
+    assert first.reason.startswith("no squeeze carries any part of the weight")
+    assert not first.survived
+    assert second.execution is not None
+    assert f"c-0-1-2-7: not executed: {first.reason}" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("here")
+def test_where_no_trial_is_possible_nothing_was_survived(capsys):
+    words = ["execute", "grasps.json", "--limit", "1", "--trials", "lift", "--out", "."]
+    assert main(words) == Exit.NEGATIVE
+    assert "no trial is possible, so nothing was survived" in capsys.readouterr().err
+    assert not sv.read_executions("executions.json").grasps[0].survived
+
+
+@pytest.mark.usefixtures("here")
+def test_a_control_that_holds_is_a_fault_of_the_simulator(capsys, monkeypatch):
+    def kept(*given, **more):
+        found = execute(*given, **more)
+        held = tuple(replace(each, let_go=False) for each in found.controls[:1])
+        return replace(found, controls=held + found.controls[1:])
+
+    monkeypatch.setattr(jobs, "execute", kept)
+    words = ["execute", "grasps.json", "--mass-kg", "0.3", "--limit", "1", *QUICK, "--out", "."]
+    assert main(words) == Exit.INTERNAL
+    assert "control friction 0.9 did not slip, though it must" in capsys.readouterr().err
+    (grasp,) = sv.read_executions("executions.json").grasps
+    assert grasp.survived
+    assert not grasp.controls_let_go
+
+
+@pytest.mark.usefixtures("here")
+def test_what_was_done_is_kept_where_the_simulator_fails(capsys, monkeypatch):
+    def failing(body, grasp, *given, **more):
+        if grasp.id == IDS[1]:
+            raise UnfaithfulError("knock +x: a number is not finite")
+        return execute(body, grasp, *given, **more)
+
+    monkeypatch.setattr(jobs, "execute", failing)
+    words = ["execute", "grasps.json", "--mass-kg", "0.3", *QUICK, "--out", "."]
+    assert main(words) == Exit.INTERNAL
+    said = capsys.readouterr()
+    assert "wrote what is done to executions.json" in said.out
+    assert "a number is not finite" in said.err
+    found = sv.read_executions("executions.json")
+    assert not found.complete
+    assert [each.id for each in found.grasps] == [IDS[0]]
+
+
+def settings_of(here, *flags, code=Exit.GOOD):
+    assert main(["execute", "grasps.json", "--limit", "1", "--out", ".", "-q", *flags]) == code
+    return sv.read_executions(here / "executions.json").settings
+
+
+def test_an_object_without_a_mass_has_the_density_of_water(here):
+    volume = scenes.example_object("wedge").volume
+    assert settings_of(here, *QUICK).mass_kg == pytest.approx(1000.0 * volume, rel=1e-8)
+    heavier = settings_of(here, *QUICK, "--density-kg-m3", "1500")
+    assert heavier.mass_kg == pytest.approx(1500.0 * volume, rel=1e-8)
+
+
+def test_every_flag_reaches_the_settings(here):
+    flags = {
+        "mass-kg": 0.2, "push-n": 12.0, "tip-stiffness-n-per-m": 3000.0, "tip-radius-m": 0.003,
+        "tip-mass-kg": 0.04, "damping-ratio": 0.6, "lift-m": 0.1, "lift-s": 0.5, "shake-g": 0.5,
+        "shake-hz": 6.0, "stop-m-per-s2": 9.0, "stop-from-m-per-s": 0.4, "knock-n-s": 0.01,
+        "off-mm": 1.0, "off-deg": 1.5, "misplacements": 2, "max-mm": 6.0, "max-deg": 7.0, "seed": 5,
+    }  # fmt: skip
+    words = [word for name, value in flags.items() for word in (f"--{name}", str(value))]
+    found = settings_of(here, *words, "--trials", "shake", "--down", "1", "0", "0")
+    assert found == ExecutionSettings(
+        mass_kg=0.2, push_n=12.0, stiffness_n_per_m=3000.0, tip_radius_m=0.003,
+        hand=HeldSettings(tip_mass_kg=0.04, damping_ratio=0.6, down=(1.0, 0.0, 0.0)),
+        trials=("shake",), lift_m=0.1, lift_s=0.5, shake_g=0.5, shake_hz=6.0, stop_m_per_s2=9.0,
+        stop_from_m_per_s=0.4, knock_n_s=0.01, off_mm=1.0, off_deg=1.5, misplacements=2, seed=5,
+        most_mm=6.0, most_deg=7.0,
+    )  # fmt: skip
+    plain = ExecutionSettings(mass_kg=0.3)
+    assert all(getattr(found, each.name) != getattr(plain, each.name) for each in fields(found))
+
+
+def test_the_defaults_of_flags_are_those_of_the_settings():
+    plain, hand = ExecutionSettings(mass_kg=1.0), HeldSettings()
+    other = {"max_mm": "most_mm", "max_deg": "most_deg",
+             "tip_stiffness_n_per_m": "stiffness_n_per_m"}  # fmt: skip
+    for group in (Executing(), Tips()):
+        for each in fields(group):
+            if each.name not in {"mass", "tips"}:
+                holder = hand if hasattr(hand, each.name) else plain
+                wanted = getattr(holder, other.get(each.name, each.name))
+                assert getattr(group, each.name) == wanted, each.name
+    assert hand.down == UPRIGHT
+    assert get_args(TrialKind) == TRIALS
+    assert DENSITY_KG_M3 == 1000.0
+    shared = {each.name: each.default for each in fields(execution_flags.Execute)}
+    assert shared["trials"] == ()
+    assert shared["grasps"] is MISSING
+
+
+def test_a_file_of_flags_and_a_file_of_physics(here):
+    (here / "flags.toml").write_text('trials = ["knock", "weight"]\nmass_kg = 0.25\npush_n = 11\n')
+    (here / "physics.toml").write_text("[physics]\ntimestep = 0.001\n")
+    found = settings_of(here, "--config", "flags.toml", "--setup", "physics.toml")
+    assert (found.trials, found.mass_kg, found.push_n) == (("weight", "knock"), 0.25, 11.0)
+    document = json.loads((here / "executions.json").read_text())
+    (execution,) = document["executions"]
+    assert execution["physics"]["timestep"] == 0.001
+    assert execution["physics"]["impratio"] == 100.0
+
+
+REFUSED = {
+    "--mass-kg 1 --density-kg-m3 1000": (Exit.USAGE, "exclude each other"),
+    "--mass-kg 0": (Exit.USAGE, "--mass-kg must be at least 1e-09"),
+    "--density-kg-m3 nan": (Exit.USAGE, "--density-kg-m3 must be at least"),
+    "--trials weight,throw": (Exit.USAGE, "--trials must be names among weight, lift, shake"),
+    "--down 0 0 0": (Exit.USAGE, "--down must not be zero"),
+    "--off-deg 181": (Exit.USAGE, "--off-deg must be at least 0, at most 180"),
+    "--misplacements 0": (Exit.USAGE, "--misplacements must be at least 1"),
+    "--lift-s 0": (Exit.USAGE, "--lift-s must be at least 0.05"),
+    "--shake-hz 1e6": (Exit.USAGE, "--shake-hz must be at least 0.1, at most 25"),
+    "--damping-ratio 0": (Exit.USAGE, "--damping-ratio must be at least 0.01"),
+    "--grasp nobody": (Exit.INPUT, "no grasp is named nobody"),
+    "--setup none.toml": (Exit.INPUT, "none.toml"),
+    "--setup fingers.toml": (Exit.INPUT, "fingers.toml: expected the table physics"),
+    "--setup gravity.toml": (Exit.INPUT, "give its direction with --down"),
+    "--setup unknown.toml": (Exit.INPUT, 'no setting is named "speed"'),
+}
+
+
+@pytest.mark.parametrize("flags", REFUSED)
+def test_flags_that_make_no_sense_are_refused_before_anything_runs(here, capsys, flags):
+    (here / "fingers.toml").write_text("[fingers]\nradius_m = 0.01\n")
+    (here / "gravity.toml").write_text("[physics]\ngravity = [0, 0, 0]\n")
+    (here / "unknown.toml").write_text("[physics]\nspeed = 1\n")
+    code, said = REFUSED[flags]
+    assert main(["execute", "grasps.json", "--out", "e", *flags.split()]) == code
+    assert said in capsys.readouterr().err
+    assert not (here / "e" / "executions.json").exists()
+
+
+def test_a_file_without_grasps_has_nothing_to_execute(here, capsys):
+    document = json.loads((here / "grasps.json").read_text())
+    (here / "none.json").write_text(json.dumps(document | {"grasps": []}))
+    assert main(["execute", "none.json", "--json"]) == Exit.NONE
+    assert json.loads(capsys.readouterr().out) == {"absence": "none.json holds no grasp"}
+
+
+RUN = ["run", "tetrahedron", "--limit", "1", "--no-report", "--out", "r"]
+
+
+def test_run_executes_grasps_too_and_a_run_without_removes_the_file(here, capsys):
+    flags = ["--execute", "--mass-kg", "0.1", "--execute-trials", "stop", "--seed", "3"]
+    assert main([*RUN, *flags, "--json"]) == Exit.GOOD
+    document = json.loads(capsys.readouterr().out)
+    written = json.loads((here / "r" / "executions.json").read_text())
+    assert document.pop("executions") == written
+    assert document == json.loads((here / "r" / "verdicts.json").read_text())
+    assert written["settings"]["trials"] == ["stop"]
+    assert written["settings"]["seed"] == 3
+    assert [each["id"] for each in written["executions"]] == [
+        each["id"] for each in document["verdicts"]
+    ]
+    assert main([*RUN, "-q"]) == Exit.GOOD
+    assert not (here / "r" / "executions.json").exists()
+
+
+def test_the_report_of_a_run_shows_its_executions(here):
+    words = [word for word in RUN if word != "--no-report"]
+    flags = ["--execute", "--mass-kg", "0.1", "--execute-trials", "knock"]
+    assert main([*words, *flags, "-q"]) == Exit.GOOD
+    page = (here / "r" / "report" / "index.html").read_text()
+    assert "1 of 1 grasps survived every trial" in page
+    assert (here / "r" / "report" / "survival.svg").is_file()
+
+
+def test_a_run_has_a_report_where_executions_are_refused(here, capsys, monkeypatch):
+    def refuse(*_args, **_more):
+        raise UnfaithfulError("the simulator fails")
+
+    monkeypatch.setattr(run, "execute_grasps", refuse)
+    words = [word for word in RUN if word != "--no-report"]
+    assert main([*words, "--execute", "--mass-kg", "0.1", "-q"]) == Exit.INTERNAL
+    assert "the simulator fails" in capsys.readouterr().err
+    assert (here / "r" / "report" / "index.html").is_file()
+
+
+@pytest.mark.usefixtures("here")
+def test_run_ends_with_1_where_a_grasp_holds_but_does_not_survive(capsys):
+    flags = ["--execute", "--mass-kg", "30", "--execute-trials", "weight"]
+    assert main([*RUN, *flags]) == Exit.NEGATIVE
+    said = capsys.readouterr().out
+    assert "1 of 1 grasps held all wrenches" in said
+    assert "0 of 1 grasps survived every trial" in said
+    assert said.index("results in r/: ") < said.index("wrote r/executions.json")
+
+
+@pytest.mark.parametrize(
+    "flags", ["--mass-kg 1", "--execute-trials lift", "--execute-down 1 0 0", "--lift-m 1"]
+)
+def test_run_refuses_flags_of_executions_without_any(here, capsys, flags):
+    assert main([*RUN, *flags.split()]) == Exit.USAGE
+    assert "add --execute too" in capsys.readouterr().err
+    assert not (here / "r").exists()

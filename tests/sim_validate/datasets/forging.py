@@ -1,0 +1,23 @@
+"""Changes rows of a dataset as someone would who also adapts the hashes."""
+
+import dataclasses
+import hashlib
+
+from sim_validate.datasets.manifest import read_manifest, write_manifest
+from sim_validate.datasets.parquet import parquet_bytes, read_rows
+
+
+def forged(folder, name, change):
+    """Change rows of one table of a dataset, and write the hashes that match."""
+    path = next(folder.glob(f"data/{name}/*.parquet"))
+    rows = read_rows(path)
+    change(rows)
+    data = parquet_bytes(name, rows, {}, read_manifest(folder).tables)
+    path.write_bytes(data)
+    manifest, name = read_manifest(folder), path.relative_to(folder).as_posix()
+    others = [each for each in manifest.files if each.path != name]
+    (entry,) = [each for each in manifest.files if each.path == name]
+    changed = dataclasses.replace(
+        entry, bytes=len(data), sha256=hashlib.sha256(data).hexdigest(), rows=len(rows)
+    )
+    write_manifest(folder, dataclasses.replace(manifest, files=(*others, changed)))

@@ -1,0 +1,190 @@
+"""A dataset with executions: its grasps, its natural negatives, and what is wrong with forged rows.
+
+One kilogram is too much for the grasp of the wedge, though it is in force closure, and not for that
+of the tetrahedron.
+"""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import sim_validate as sv
+from scenes.example_objects import example_object
+from sim_validate.datasets.building.build import build
+from sim_validate.datasets.columns import EXECUTED, EXECUTIONS, TABLES
+from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.describing.card import CARD
+from sim_validate.datasets.execution_rows import execution_cells, execution_rows
+from sim_validate.datasets.exports.formats import export
+from sim_validate.datasets.manifest import MANIFEST
+from sim_validate.datasets.open_dataset import select
+from sim_validate.datasets.verifying.executions import loose_difference
+from sim_validate.datasets.verifying.redo import Sample
+from sim_validate.datasets.verifying.verify import verify
+from sim_validate.execution.asked import AskedExecution
+from sim_validate.execution.jobs import ExecutedGrasp
+from tests.sim_validate.datasets.engines import Here, silent
+from tests.sim_validate.datasets.forging import forged
+from tests.sim_validate.datasets.pair import all_rows
+
+pytest.importorskip("pyarrow")
+SETTINGS = sv.ExecutionSettings(mass_kg=1.0, trials=("weight",))
+CONFIG = DatasetConfig(
+    objects=("tetrahedron", "wedge"), families=("concurrent",), limit=1,
+    execution=AskedExecution(SETTINGS),
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def executed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("executed") / "ds"
+    built = build(CONFIG, folder, Here(), silent)
+    assert (built.quarantined, built.rows["executions"]) == (0, 2)
+    return folder
+
+
+@pytest.fixture
+def copied(executed, tmp_path):
+    return shutil.copytree(executed, tmp_path / "copy")
+
+
+def grasps_of(folder):
+    """Rows of planned grasps by the name of their object."""
+    names = {row["object_id"]: row["source_name"] for row in all_rows(folder, "objects")}
+    rows = [row for row in all_rows(folder, "grasps") if row["control_of"] is None]
+    return {names[row["object_id"]]: row for row in rows}
+
+
+def test_a_grasp_that_loses_its_object_is_a_natural_negative(executed):
+    rows = grasps_of(executed)
+    kept, lost = rows["tetrahedron"], rows["wedge"]
+    assert all(row["executed"] and row["force_closed"] and row["held"] for row in (kept, lost))
+    assert kept["survived"]
+    assert kept["predicted_first_slip"] > 1.0
+    assert not lost["survived"]
+    assert lost["predicted_first_slip"] < 1.0
+    assert lost["load_multiple"] < 1.0
+    controls = [row for row in all_rows(executed, "grasps") if row["control_of"] is not None]
+    assert controls
+    assert all(row["executed"] is False and row["survived"] is None for row in controls)
+
+
+def test_the_rows_say_what_an_execution_says(executed):
+    wedge = example_object("wedge")
+    row = grasps_of(executed)["wedge"]
+    (grasp,) = gc.plan(wedge, 0.5, families=("concurrent",), limit=1).grasps
+    found = sv.execute(wedge, grasp, 0.5, SETTINGS)
+    assert row["mass_kg"] == found.mass_kg
+    assert row["load_multiple"] == found.load_multiple
+    assert np.array_equal(row["squeeze_n"], found.squeeze)
+    assert row["execution_mismatches"] == sum(not each.let_go for each in found.controls)
+    (trial,) = found.trials
+    (stored,) = [
+        each for each in all_rows(executed, "executions") if each["grasp_id"] == row["grasp_id"]
+    ]
+    for name in ("kind", "name", "survived", "fate", "slip_m", "displacement_m", "turn_rad",
+                 "predicted_first_slip", "simulated_first_slip"):  # fmt: skip
+        assert stored[name] == getattr(trial, name), name
+
+
+def test_tables_and_exports_have_the_columns(executed, tmp_path):
+    loaded = sv.load_dataset(executed)
+    assert list(loaded) == [*TABLES, "executions"]
+    own = [column.name for column in EXECUTED]
+    assert list(loaded["grasps"])[-len(own) :] == own
+    assert loaded["grasps"]["squeeze_n"].shape[1:] == (4, 3)
+    export(executed, "npz", tmp_path / "npz", None, silent)
+    with np.load(tmp_path / "npz" / "executions.npz") as stored:
+        assert stored.files == [column.name for column in EXECUTIONS]
+    export(executed, "csv", tmp_path / "csv", None, silent)
+    header = (tmp_path / "csv" / "grasps.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert '"survived"' in header
+    assert '"squeeze_n_3_z"' in header
+    about = json.loads((tmp_path / "csv" / "about.json").read_text(encoding="utf-8"))
+    assert [each["name"] for each in about["columns"]["executions"]] == stored.files
+
+
+def test_the_readme_explains_executions(executed):
+    text = (executed / CARD).read_text(encoding="utf-8")
+    assert "which has its mass of 1 kg" in text
+    assert "natural negative" in text
+    assert 'config_name: "executions"' in text
+    for column in (*EXECUTED, *EXECUTIONS):
+        assert f"| `{column.name}` |" in text
+    assert "those in `executions` are in `mass_kg`" in text
+
+
+def test_a_dataset_without_executions_does_not_mention_them(small_dataset):
+    assert "executed" not in (small_dataset / MANIFEST).read_text(encoding="utf-8")
+    assert "execut" not in (small_dataset / CARD).read_text(encoding="utf-8")
+    assert list(select(small_dataset).tables) == list(TABLES)
+
+
+def test_a_whole_dataset_has_no_fault(executed):
+    assert verify(executed) == []
+
+
+def first(row_of, **cells):
+    """A change of the first row that was executed."""
+
+    def change(rows):
+        next(row for row in rows if row_of(row)).update(cells)
+
+    return change
+
+
+def executed_row(row):
+    return row.get("executed", True)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "message"),
+    [
+        ("grasps", first(executed_row, load_multiple=2.0), "is not proved to carry as much"),
+        ("grasps", first(executed_row, mass_kg=0.5), "mass_kg is 0.5, but by config.toml it is 1"),
+        ("grasps", first(executed_row, squeeze_n=[[1.0] * 3] * 4), "the squeeze must balance"),
+        ("grasps", first(executed_row, executed_trials=2), "executed_trials is 2, but 1 by"),
+        ("grasps", first(executed_row, executed=False), "although none was simulated"),
+        ("grasps", first(lambda row: not row["executed"], survived=True), "none was simulated"),
+        ("executions", first(executed_row, predicted_first_slip=9.0), "but 9.0 by the table of"),
+        ("executions", first(executed_row, survived=None), "survived is"),
+        ("executions", first(executed_row, grasp_id="0" * 20), "has no row in the table of grasps"),
+        ("executions", lambda rows: rows.clear(), "executed_trials is 1, but 0 by"),
+    ],
+)  # fmt: skip
+def test_forged_rows_are_named(copied, name, change, message):
+    forged(copied, name, change)
+    assert any(message in fault for fault in verify(copied))
+
+
+def test_trials_that_come_out_otherwise_are_named(copied):
+    def change(rows):
+        for row in rows:
+            row["slip_m"] += 1e-6
+
+    forged(copied, "executions", change)
+    assert verify(copied) == []
+    faults = verify(copied, Sample(0.01))
+    assert len(faults) == 1
+    assert "slip_m is" in faults[0]
+
+
+def test_survival_may_differ_by_rounding_only_where_contacts_slip():
+    kept = {"survived": True, "predicted_first_slip": 2.0}
+    assert "but False when executed" in loose_difference(kept, {**kept, "survived": False})
+    slipping = {"survived": True, "predicted_first_slip": 1.0}
+    assert loose_difference(slipping, {**slipping, "survived": False}) == ""
+    assert loose_difference({"held": True}, {"held": True}) == ""
+
+
+def test_a_grasp_without_a_squeeze_did_not_survive_and_a_refused_one_is_not_known():
+    unheld = ExecutedGrasp("c", "concurrent", "0", None, "no squeeze holds")
+    assert execution_cells(unheld) == {
+        "executed": False, "survived": False, "execution_note": "no squeeze holds"
+    }  # fmt: skip
+    assert "survived" not in execution_cells("the tips overlap")
+    assert execution_cells(None) == {}
+    assert list(execution_rows("a", unheld)) == []

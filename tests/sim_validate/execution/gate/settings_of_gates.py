@@ -1,0 +1,84 @@
+"""Settings with which executions must be refused, or accepted, and the cases that show it."""
+
+from sim_validate.execution.gate.held_case import HeldCase
+
+USUAL, STIFF, SOFT = (0.3, 2000.0, 0.07), (0.05, 10_000.0, 0.02), (2.0, 500.0, 0.2)
+"""Mass of the object [kg], stiffness of the springs [N/m], radius of the object [m]."""
+
+
+def held_case(mass_kg, stiffness_n_per_m, radius_m, **more):
+    """The usual case with a mass, a stiffness and a size, and the physics that suit them."""
+    fields = {
+        "push_n": 10.0, "friction": 0.5, "tip_radius_m": 0.1 * radius_m, "tip_mass_kg": 0.05,
+        "damping_ratio": 0.5, "physics": None,
+    } | more  # fmt: skip
+    case = HeldCase(mass_kg, stiffness_n_per_m, radius_m=radius_m, **fields)
+    if case.physics is None:
+        own = case.held_box().physics
+        case = held_case(mass_kg, stiffness_n_per_m, radius_m, **(more | {"physics": own}))
+    return case
+
+
+DEFAULTS = {
+    "cone": "pyramidal", "impratio": 1.0, "integrator": "Euler", "tolerance": 1e-8,
+    "solref": (0.02, 1.0), "solimp": (0.9, 0.95, 0.001, 0.5, 2.0), "timestep": 0.002,
+}  # fmt: skip
+"""MuJoCo's own defaults; executions are refused with them."""
+BROKEN = (
+    (USUAL, {"timestep": 0.005}),
+    (STIFF, {"timestep": 0.005}),
+    (STIFF, {"timestep": 0.0025}),
+    (STIFF, {"timestep": 0.00125}),
+    (USUAL, {"timestep": 0.0025}),
+    (USUAL, {"timestep": 0.002}),
+    (SOFT, {"timestep": 0.005}),
+    (SOFT, {"integrator": "implicitfast"}),
+    (SOFT, {"integrator": "implicit"}),
+    (USUAL, {"integrator": "implicitfast", "timestep": 0.00125}),
+    (USUAL, {"cone": "pyramidal"}),
+    (USUAL, {"impratio": 0.1}),
+    (STIFF, {"impratio": 1.0}),
+    (USUAL, {"solimp": (0.9, 0.95, 0.001, 0.5, 2.0)}),
+    (USUAL, {"solimp": (0.5, 0.5, 0.001, 0.5, 2.0)}),
+    (STIFF, {"solref": (0.02, 1.0)}),
+    (USUAL, {"solref": (0.1, 1.0)}),
+    (USUAL, {"solref": (0.005, 0.2)}),
+    (USUAL, {"iterations": 1}),
+    (SOFT, {"iterations": 2}),
+    (USUAL, {"ls_iterations": 1}),
+    (USUAL, {"tolerance": 1e-4}),
+    (USUAL, {"tolerance": 1e-7}),
+    (USUAL, {"solver": "CG"}),
+    (STIFF, {"solver": "PGS", "iterations": 10}),
+    (USUAL, {"condim": 1}),
+    (USUAL, {"margin": 1e-2}),
+    (USUAL, {"margin": 1e-3}),
+    (USUAL, {"margin": 1e-4}),
+    (USUAL, {"margin": 1e-3, "gap": 1e-3}),
+    (USUAL, {"viscosity": 1.0}),
+    (USUAL, {"viscosity": 0.1}),
+    (USUAL, {"density": 1000.0}),
+    (USUAL, {"density": 1.2, "wind": (10.0, 0.0, 0.0)}),
+    (USUAL, {"ccd_iterations": 1}),
+    (USUAL, {"ccd_tolerance": 0.01}),
+    (USUAL, DEFAULTS),
+)
+RIGHT = (
+    (USUAL, {}),
+    (USUAL, {"timestep": 0.0005}),
+    (USUAL, {"integrator": "Euler"}),
+    (USUAL, {"integrator": "RK4"}),
+    (USUAL, {"impratio": 1000.0}),
+    (USUAL, {"solver": "PGS"}),
+    (USUAL, {"jacobian": "sparse"}),
+    (USUAL, {"tolerance": 1e-12}),
+    (USUAL, {"condim": 4}),
+    (USUAL, {"condim": 6}),
+    (USUAL, {"autoreset": True}),
+    (USUAL, {"diagexact": True}),
+    (USUAL, {"wind": (10.0, 0.0, 0.0)}),
+    (USUAL, {"gap": 1e-3}),
+    (USUAL, {"solimp": (0.99, 0.99, 0.001, 0.5, 2.0)}),
+)
+"""They change nothing that matters: fingertips have no torsional friction to use, a blow-up that is
+reset is still reported, and wind needs air."""

@@ -1,0 +1,134 @@
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+import sim_validate as sv
+from scenes.execution.held import HeldSettings
+from sim_validate.execution.gate.gate import cases_of, measured_case, require_faithful_execution
+from tests.marks import MORE
+from tests.sim_validate.execution.gate.settings_of_gates import (
+    BROKEN,
+    RIGHT,
+    SOFT,
+    STIFF,
+    USUAL,
+    held_case,
+)  # fmt: skip
+
+TABLE = list(product((0.05, 0.3, 2.0), (500.0, 2000.0, 10_000.0), (0.02, 0.07, 0.2)))
+EVERYDAY = (0, 10, 18, 22, 25)
+"""Places of the broken settings that are tried every day."""
+
+
+def refused(where, numbers):
+    case = held_case(*where)
+    gate = measured_case(replace(case, physics=replace(case.physics, **numbers)))
+    return [check for check in gate.checks if not check.passed]
+
+
+def held(body, **more):
+    grasp = gc.plan(body, 0.5, limit=1).grasps[0]
+    settings = sv.ExecutionSettings(mass_kg=0.2, trials=("stop",), **more)
+    return grasp, settings
+
+
+def test_the_usual_settings_give_the_known_answers_and_every_figure_is_measured():
+    gate = measured_case(held_case(*USUAL))
+    assert gate.passed
+    assert len(gate.checks) == 27
+    assert len({check.name for check in gate.checks}) == 27
+    for check in gate.checks:
+        if check.least > 0.0:
+            assert (check.least, check.largest) == (0.99, 1.01)
+
+
+@pytest.mark.parametrize("where", [STIFF, SOFT])
+def test_so_do_stiff_and_soft_springs(where):
+    assert not refused(where, {})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("where", TABLE)
+def test_each_closed_form_is_met_at_all_masses_stiffnesses_and_sizes(where):
+    assert not refused(where, {})
+
+
+@pytest.mark.slow
+def test_so_it_is_with_other_pushes_frictions_fingertips_and_dampers():
+    rng = np.random.default_rng(1)
+    least = np.log([0.01, 200.0, 0.01, 1.0, 0.1, 0.02, 0.005, 0.1])
+    most = np.log([5.0, 2e4, 0.3, 50.0, 1.5, 0.3, 0.2, 2.0])
+    for _ in range(40):
+        m, k, r, push, friction, tip, tip_mass, damping = np.exp(rng.uniform(least, most)).tolist()
+        case = held_case(
+            m, k, r, push_n=push, friction=friction, tip_radius_m=tip * r, tip_mass_kg=tip_mass,
+            damping_ratio=damping,
+        )  # fmt: skip
+        assert [str(check) for check in measured_case(case).checks if not check.passed] == []
+
+
+@pytest.mark.parametrize(
+    ("where", "numbers"),
+    [
+        pytest.param(*case, marks=() if place in EVERYDAY else MORE)
+        for place, case in enumerate(BROKEN)
+    ],
+)
+def test_broken_settings_are_refused(where, numbers):
+    assert refused(where, numbers)
+
+
+@pytest.mark.parametrize(
+    ("where", "numbers"), [pytest.param(*case, marks=MORE) for case in RIGHT[1:]]
+)
+def test_settings_that_change_nothing_are_accepted(where, numbers):
+    assert not refused(where, numbers)
+
+
+def test_enough_settings_are_tried():
+    assert len({repr(case) for case in BROKEN}) >= 30
+
+
+def test_no_grasp_is_executed_with_broken_settings():
+    body = scenes.example_object("wedge")
+    grasp, settings = held(body)
+    contacts = [gc.Contact(each.position, each.normal) for each in grasp.contacts]
+    layout = scenes.build_held_scene(
+        body, gc.best_squeeze(body, contacts, 0.5, gc.any_direction(0.2), max_push_n=10.0).grip, 0.2
+    )
+    physics = replace(layout.physics, cone="pyramidal")
+    with pytest.raises(gc.UnfaithfulError, match=r"no grasp is executed.*obliquely.*OUT OF TOL"):
+        sv.execute(body, grasp, 0.5, settings, physics=physics)
+    with pytest.raises(gc.InputError, match=r"physics\.gravity must be that of the settings"):
+        sv.execute(body, grasp, 0.5, settings, physics=replace(physics, gravity=(0.0, 0.0, -9.0)))
+    with pytest.raises(gc.InputError, match="physics"):
+        sv.execute(body, grasp, 0.5, settings, physics={"cone": "elliptic"})
+
+
+def test_settings_are_measured_once_whatever_the_direction_of_gravity():
+    case = held_case(*USUAL)
+    scene = case.held_box()
+    hand = HeldSettings(down=(1.0, 0.0, 0.0))
+    (first,) = cases_of(scene.layout, scene.physics, HeldSettings(), 10.0)
+    turned = replace(scene.physics, gravity=tuple(hand.gravity.tolist()))
+    nearly = replace(scene.layout, mass_kg=1.001 * scene.layout.mass_kg)
+    (second,) = cases_of(nearly, turned, hand, 10.0)
+    assert measured_case(first) is measured_case(second)
+    require_faithful_execution(scene.layout, scene.physics, HeldSettings(), 10.0)
+
+
+def test_each_friction_of_a_scene_is_measured():
+    scene = held_case(*USUAL).held_box()
+    layout = replace(scene.layout, friction=np.array([0.3, 0.3, 0.6, 0.301]))
+    cases = cases_of(layout, scene.physics, HeldSettings(), 10.0)
+    assert [case.friction for case in cases] == [0.3, 0.6]
+
+
+def test_a_push_that_springs_are_too_soft_for_is_lowered():
+    case = held_case(*SOFT)
+    assert case.push < case.push_n
+    assert case.halves == pytest.approx(0.2 / 0.0659545 * np.array([0.05, 0.035, 0.025]), rel=1e-5)

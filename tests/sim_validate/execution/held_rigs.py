@@ -1,0 +1,79 @@
+"""Held objects for tests of executions: grips with answers by hand, their scenes and benches."""
+
+from functools import cache
+
+import numpy as np
+
+import grasp_core as gc
+import scenes
+from sim_validate.execution import paths
+from sim_validate.execution.bench import HeldBench
+from sim_validate.execution.predictions import held_dynamics
+from tests.grasp_core.execution.held import box
+
+MASS = 0.3
+G = 9.80665
+
+
+@cache
+def box_grip(push=5.0, friction=0.5, stiffness=2000.0):
+    """Four fingers on the faces of a box, opposed along x, with this push each."""
+    contacts = opposed()
+    squeeze = push * np.array([contact.normal for contact in contacts])
+    return gc.grip(box(), contacts, friction, squeeze, stiffness=stiffness, tip_radius_m=0.005)
+
+
+@cache
+def opposed(aside=0.02):
+    """Contacts in the middles of the faces along x, and beside them along y."""
+    center = box().center_of_mass
+    half = box().vertices[:, 0].max() - center[0]
+    return tuple(
+        gc.Contact(center + np.array([side * half, y, 0.0]), [-side, 0.0, 0.0])
+        for y in (-aside, aside)
+        for side in (-1.0, 1.0)
+    )
+
+
+@cache
+def box_scene(push=5.0, friction=0.5, stiffness=2000.0, mass=MASS):
+    return scenes.build_held_scene(box(), box_grip(push, friction, stiffness), mass)
+
+
+@cache
+def box_bench(**rig):
+    return HeldBench(box_scene(**rig))
+
+
+@cache
+def squeezed(**rig):
+    """The simulator's state after the box is squeezed."""
+    motion, state = box_bench(**rig).settled(paths.closing())
+    assert not motion.faults
+    return state
+
+
+def box_dynamics(push=5.0, friction=0.5, stiffness=2000.0, mass=MASS):
+    layout = box_scene(push, friction, stiffness, mass).layout
+    return held_dynamics(box_grip(push, friction, stiffness), layout)
+
+
+@cache
+def planned(name, friction=0.5, **chosen):
+    body = scenes.example_object(name)
+    return body, gc.plan(body, friction, limit=1, **chosen).grasps[0]
+
+
+def icosphere():
+    """42 directions: the corners of an icosahedron and the middles of its edges."""
+    golden = 0.5 * (1.0 + np.sqrt(5.0))
+    corners = np.array(
+        [np.roll([0.0, a, b * golden], k) for k in range(3) for a in (-1, 1) for b in (-1, 1)]
+    )
+    apart = np.linalg.norm(corners[:, None] - corners, axis=2)
+    edges = [
+        corners[i] + corners[j] for i, j in zip(*np.nonzero(apart == 2.0), strict=True) if i < j
+    ]
+    found = np.vstack([corners, edges])
+    assert len(found) == 42
+    return found / np.linalg.norm(found, axis=1)[:, None]

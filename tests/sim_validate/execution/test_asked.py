@@ -1,0 +1,73 @@
+import dataclasses
+import tomllib
+
+import pytest
+
+import grasp_core as gc
+import sim_validate as sv
+from scenes.example_objects import example_object
+from sim_validate.datasets.config import DatasetConfig, config_from_toml, config_to_toml
+from sim_validate.execution.asked import AskedExecution, asked_execution, execution_table
+
+TABLE = {
+    "density_kg_m3": 700, "trials": ["lift", "weight"], "tip_radius_m": 0.004,
+    "hand": {"down": [1, 0, 0]},
+}  # fmt: skip
+
+
+def test_a_table_says_how_objects_are_executed():
+    asked = asked_execution(TABLE)
+    assert asked.settings.trials == ("weight", "lift")
+    assert asked.settings.hand.down == (1.0, 0.0, 0.0)
+    wedge = example_object("wedge")
+    settings = asked.settings_for(wedge)
+    assert settings == dataclasses.replace(asked.settings, mass_kg=wedge.mass_at(700.0))
+    assert asked_execution({"mass_kg": 2}).settings_for(wedge) == sv.ExecutionSettings(mass_kg=2.0)
+
+
+@pytest.mark.parametrize("table", [TABLE, {"mass_kg": 0.3}])
+def test_a_configuration_is_the_same_when_it_is_written_and_read_again(tmp_path, table):
+    asked = asked_execution(table)
+    assert asked_execution(execution_table(asked)) == asked
+    config = DatasetConfig(objects=("wedge",), execution=asked)
+    path = tmp_path / "dataset.toml"
+    path.write_text(config_to_toml(config))
+    assert config_from_toml(path) == config
+
+
+def test_a_configuration_without_executions_does_not_mention_them():
+    plain, executed = (
+        config_to_toml(DatasetConfig(objects=("wedge",), execution=asked))
+        for asked in (None, asked_execution(TABLE))
+    )
+    assert "execution" not in plain
+    assert executed.startswith(plain)
+    assert tomllib.loads(executed)["execution"]["density_kg_m3"] == 700.0
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("soft", 'execution: expected a table of settings, got "soft"'),
+        ({}, "execution: expected one of mass_kg and density_kg_m3, got neither"),
+        ({"mass_kg": 1.0, "density_kg_m3": 1.0}, "got both"),
+        ({"mass_kg": 1.0, "colour": "red"}, 'no setting is named "colour"; choose from mass_kg'),
+        ({"mass_kg": 1.0, "hand": {"left": 1}}, 'execution.hand: no setting is named "left"'),
+        ({"mass_kg": 1.0, "hand": 3}, "execution.hand: expected an object"),
+        ({"mass_kg": "heavy"}, 'execution.mass_kg: expected a number, got "heavy"'),
+        ({"density_kg_m3": True}, "execution.density_kg_m3: expected a number, got true"),
+        ({"density_kg_m3": -1.0}, "execution: density_kg_m3 must be"),
+        ({"mass_kg": 1.0, "trials": ["juggle"]}, "execution.trials"),
+        ({"mass_kg": 1.0, "lift_s": 1e9}, "execution: lift_s must be"),
+    ],
+)
+def test_what_is_refused_names_the_setting(table, message):
+    with pytest.raises(gc.InputError) as raised:
+        asked_execution(table)
+    assert message in str(raised.value)
+
+
+def test_a_density_that_makes_an_object_too_light_is_refused():
+    wedge = example_object("wedge")
+    with pytest.raises(gc.InputError, match="mass_kg"):
+        AskedExecution(sv.ExecutionSettings(mass_kg=1.0), 1e-9).settings_for(wedge)

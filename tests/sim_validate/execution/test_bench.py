@@ -1,0 +1,229 @@
+"""Held objects in the simulator, against mechanics by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+from scenes.execution.held_mjcf import SAMPLE_S
+from sim_validate.execution import paths
+from sim_validate.execution.bench import HeldBench
+from sim_validate.execution.drives import Pose, Table, idle, joined
+from sim_validate.execution.slips import outcome, seen
+from tests.grasp_core.execution.held import box
+from tests.sim_validate.execution.held_rigs import (
+    MASS,
+    G,
+    box_bench,
+    box_grip,
+    box_scene,
+    squeezed,
+)
+
+DOWN = np.array([0.0, 0.0, -G])
+UP = np.array([0.0, 0.0, 1.0])
+FIELDS = ("moved", "turned", "palm", "tips", "forces", "table")
+
+
+def ran(*drives, start=None, **rig):
+    state = squeezed(**rig) if start is None else start
+    motions = box_bench(**rig).run(drives, state)
+    assert not any(motion.faults for motion in motions)
+    return motions
+
+
+def in_world(motion):
+    """Contact forces along the world's axes, (n, k, 3)."""
+    return np.einsum("kij,nkj->nki", box_scene().layout.axes, motion.forces)
+
+
+def same(one, other):
+    for name in FIELDS:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+
+
+def several():
+    """Trials of different lengths."""
+    return (
+        paths.held_weight(DOWN, 0.3),
+        paths.shake(DOWN, np.array([0, 6.0, 0, 0, 0, 0]), 10.0),
+        paths.knock(DOWN, np.array([0.02, 0, 0]), np.array([0, 0.01, 0])),
+        paths.stop(DOWN, UP, 10.0, 0.3),
+    )
+
+
+def test_the_squeeze_comes_and_leaves_the_object_where_it_is():
+    motion, _ = box_bench().settled(paths.closing())
+    assert not motion.faults
+    assert motion.forces[-1] == pytest.approx(box_scene().layout.pushes, rel=1e-3, abs=1e-6)
+    assert np.abs(motion.moved).max() < 1e-6
+    assert motion.table == pytest.approx(np.zeros_like(motion.table), abs=1e-9)
+
+
+@pytest.mark.parametrize("stiffness", [2000.0, 10000.0])
+def test_the_weight_sinks_by_load_over_stiffness(stiffness):
+    """Across the pushes four equal springs carry it; contacts give a little beside them."""
+    (motion,) = ran(paths.held_weight(DOWN, 1.0), stiffness=stiffness)
+    assert motion.moved[-1] == pytest.approx([0, 0, -MASS * G / (4 * stiffness)], abs=1e-6)
+    assert in_world(motion)[-1, :, 2] == pytest.approx(MASS * G / 4, rel=1e-3)
+
+
+@pytest.mark.parametrize("push", [1.2, 1.7])
+def test_the_weight_is_held_where_friction_times_push_carries_it(push):
+    """The least push is m g / (4 mu), 1.47 N."""
+    (motion,) = ran(paths.held_weight(DOWN, 0.5), push=push)
+    found = outcome(
+        motion, box_scene(push=push).layout, paths.held_weight(DOWN, 0.5), np.full(4, 0.5)
+    )
+    assert found.slipped == (push < MASS * G / 2.0)
+
+
+def test_an_object_that_is_let_go_falls():
+    """Fingers open in an instant and swing outwards; it is free from then on."""
+    count = 80
+    falling = replace(
+        idle(count), gravity=np.tile(DOWN, (count, 1)), grasping=np.full(count, -2.0),
+        shares=np.ones(count),
+    )  # fmt: skip
+    (motion,) = ran(falling)
+    assert not motion.forces[20:].any()
+    fallen = motion.moved[20:, 2]
+    speeds = np.diff(fallen) / SAMPLE_S
+    assert np.diff(speeds) / SAMPLE_S == pytest.approx(-G, rel=1e-6)
+    assert outcome(motion, box_scene().layout, falling, np.full(4, 0.5)).dropped
+
+
+def test_an_impulse_gives_a_free_object_its_speed():
+    """Nothing holds the object: the fingers stay at their places and do not push."""
+    bench, count = box_bench(), 40
+    wrenches = np.zeros((count, 6))
+    wrenches[0] = [0, 0, 0.03 / SAMPLE_S, 0, 0, 0]
+    drive = replace(idle(count), wrenches=wrenches, grasping=np.full(count, -1.0))
+    (motion,) = bench.run([drive])
+    speed = np.diff(motion.moved[:, 2])[-1] / SAMPLE_S
+    assert speed == pytest.approx(0.03 / MASS, rel=1e-3)
+
+
+def test_a_held_object_swings_at_its_natural_frequency():
+    """Struck across the pushes, it crosses its place after half of the damped period of
+    M = m + 4 m_t on four springs. The integrator adds omega h / 2 = 0.08 to the damping ratio."""
+    light = scenes.HeldSettings(damping_ratio=0.05)
+    scene = scenes.build_held_scene(box(), box_grip(), MASS, settings=light)
+    strike = np.zeros((100, 6))
+    strike[0, 2] = 2.0
+    bench = HeldBench(scene)
+    _, state = bench.settled(paths.closing(0.5))
+    (motion,) = bench.run([replace(idle(100), wrenches=strike)], state)
+    heights = motion.moved[:, 2]
+    down = np.flatnonzero((heights[:-1] > 0) & (heights[1:] <= 0))[0]
+    crossing = down + heights[down] / (heights[down] - heights[down + 1])
+    rate = np.sqrt(4 * 2000.0 / (MASS + 4 * scene.layout.tip_mass_kg))
+    zeta = 0.05 + 0.5 * rate * scene.physics.timestep
+    half = np.pi / (rate * np.sqrt(1.0 - zeta**2))
+    # the strike lasts a sample, and its middle is half a sample after the start
+    assert (crossing + 0.5) * SAMPLE_S == pytest.approx(half, rel=0.05)
+
+
+def test_the_palm_follows_its_path_and_takes_the_object_along():
+    drive, begun = paths.lift(UP, 0.2, 0.6)
+    height = box().center_of_mass[2] - box().vertices[:, 2].min()
+    (motion,) = box_bench().run([replace(drive, table=Table(-height * UP, UP))])
+    assert not motion.faults
+    speeds = SAMPLE_S * np.cumsum(drive.accelerations[:, 2])
+    path = SAMPLE_S * np.cumsum(speeds - 0.5 * SAMPLE_S * drive.accelerations[:, 2])
+    # within a step the simulator's palm has the velocity at the end of it
+    late = 0.5 * box_scene().physics.timestep * speeds.max()
+    assert motion.palm[:, 2] == pytest.approx(path, abs=1.01 * late)
+    assert motion.palm[-1, 2] == pytest.approx(0.2, rel=1e-3)
+    assert motion.moved[-1, 2] - motion.palm[-1, 2] == pytest.approx(-MASS * G / 8000.0, abs=1e-4)
+    assert np.abs(motion.palm[:, [0, 1, 3, 4, 5]]).max() < 1e-4
+    # the table carries the weight before the lift, and nothing after it
+    assert motion.table[begun - 1] == pytest.approx([0, 0, MASS * G], abs=0.01)
+    assert motion.table[-1] == pytest.approx(np.zeros(3), abs=1e-9)
+
+
+def test_a_turn_of_the_palm_takes_the_object_along():
+    drive = paths.shake(0 * DOWN, np.array([0, 0, 0, 0, 0, 30.0]), 5.0)
+    (motion,) = ran(drive)
+    assert np.abs(motion.palm[:, 5]).max() > 0.02
+    assert np.abs(motion.palm[:, :5]).max() < 1e-4
+    angles = 2.0 * np.arctan2(motion.turned[:, 3], motion.turned[:, 0])
+    assert angles[-1] == pytest.approx(motion.palm[-1, 5], abs=5e-3)
+
+
+def test_uniform_motion_changes_nothing():
+    """Galilei: a knock in a hand that moves at 2 m/s, seen from the hand."""
+    knock = several()[2]
+    still, moving = ran(knock, replace(knock, velocity=np.array([2.0, -1.0, 0.5])))
+    layout = box_scene().layout
+    one, other = seen(still, layout), seen(moving, layout)
+    assert moving.palm[-1, :3] == pytest.approx(len(knock) * SAMPLE_S * np.array([2.0, -1.0, 0.5]))
+    assert other.moved == pytest.approx(one.moved, abs=1e-8)
+    assert other.forces == pytest.approx(one.forces, abs=1e-4)
+
+
+def test_results_depend_on_no_company_order_or_threads():
+    drives = several()
+    together = ran(*drives)
+    back = ran(*drives[::-1])[::-1]
+    (alone,) = ran(drives[1])
+    threaded = HeldBench(box_scene(), threads=2).run(drives, squeezed())
+    same(together[1], alone)
+    for one, reversed_, two in zip(together, back, threaded, strict=True):
+        same(one, reversed_)
+        same(one, two)
+
+
+def test_a_trial_in_two_parts_is_the_trial():
+    """What the settled state holds is all that the future depends on."""
+    whole, _ = box_bench().settled(joined(paths.closing(), several()[0]))
+    (rest,) = ran(several()[0])
+    first = len(paths.closing())
+    np.testing.assert_array_equal(whole.moved[first:], rest.moved)
+    np.testing.assert_array_equal(whole.forces[first:], rest.forces)
+
+
+def test_friction_is_that_of_each_contact():
+    """Only two fingers across from each other hold, and carry the weight in halves."""
+    light = 0.8 * 2 * 0.5 * 5.0 / G
+    friction = np.array([0.5, 0.0, 0.0, 0.5])
+    drive = paths.held_weight(DOWN, 0.4)
+    bench = box_bench(mass=light)
+    close, state = bench.settled(paths.closing(), friction)
+    assert not close.faults
+    (motion,) = bench.run([drive], state, friction)
+    across = np.linalg.norm(motion.forces[..., 1:], axis=2)
+    assert across[:, 1:3].max() < 1.1e-5 * 5.0  # the simulator's least friction is 1e-5
+    assert across[-1, [0, 3]] == pytest.approx(light * G / 2, rel=0.02)
+
+
+def test_a_displaced_object_starts_where_it_is():
+    pose = Pose(np.array([0.0, 1e-3, 0.0]), np.array([1.0, 0.0, 0.0, 0.0]))
+    reached = np.zeros((4, 3))
+    bench = box_bench()
+    (motion,) = bench.run([replace(paths.closing(), pose=pose, reached=reached)])
+    assert not motion.faults
+    assert motion.moved[0] == pytest.approx(pose.moved, abs=1e-6)
+    assert motion.forces[-1] == pytest.approx(box_scene().layout.pushes, abs=0.05)
+
+
+def test_a_finger_that_meets_nothing_pushes_nothing():
+    """Its base stands away from the object; its spring moves it freely by push over stiffness."""
+    layout = box_scene().layout
+    reached = np.zeros((4, 3))
+    reached[0] = -0.02 * layout.axes[0].T @ layout.frames[0, :, 0]
+    bench = box_bench()
+    (motion,) = bench.run([replace(paths.closing(0.5), reached=reached)])
+    assert not motion.faults
+    assert not motion.forces[:, 0].any()
+    travel = motion.tips[-1, 0] - reached[0]
+    assert np.linalg.norm(travel) == pytest.approx(5.0 / 2000.0, rel=1e-3)
+
+
+def test_a_sample_must_be_a_number_of_steps():
+    physics = replace(box_scene().physics, timestep=0.002)
+    scene = scenes.build_held_scene(box(), box_grip(), MASS, physics=physics)
+    with pytest.raises(gc.InputError, match=r"timestep must divide .* 0\.00125"):
+        HeldBench(scene)

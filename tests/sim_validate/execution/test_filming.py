@@ -1,0 +1,126 @@
+"""Clips of executions: which trials are filmed, and what a clip shows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import grasp_core as gc
+from scenes.drawing.clips import GraphicsError
+from sim_validate.execution import filming
+from sim_validate.execution.filming import FRAMES, film, worth_seeing
+from sim_validate.execution.jobs import ExecutionJob
+from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.execution.verdict import Execution, ExecutionTrial
+from tests.sim_validate.rigs import grasps
+
+SETTINGS = ExecutionSettings(0.2, trials=("lift", "shake"), shake_g=1.0)
+FRICTION = 0.5
+
+
+def trial(kind, name, simulated=2.0, *, survived=True, fate="stuck", slip_m=0.0):
+    return ExecutionTrial(kind, name, survived, fate, slip_m, 0.0, 0.0, 2.0, simulated)
+
+
+def chosen(*trials):
+    found = Execution(0.2, np.ones((4, 3)), 2.0, trials, (), ())
+    return [each.name for each in worth_seeing(found)]
+
+
+LIFT, EASY = trial("lift", "lift"), trial("shake", "shake along x", 1.8)
+HARD = trial("shake", "shake about z", 1.2)
+
+
+def test_the_lift_and_the_worst_shake_are_filmed():
+    assert chosen(LIFT, EASY, HARD, trial("stop", "stop +x", 1.1)) == ["lift", "shake about z"]
+    lost = replace(EASY, survived=False)
+    assert chosen(trial("weight", "weight"), HARD, lost) == ["shake along x"]
+    alike = replace(EASY, predicted_first_slip=1.5), replace(EASY, name="y", predicted_first_slip=1)
+    assert chosen(*alike) == ["y"]
+    assert chosen() == []
+
+
+def test_the_worst_slip_is_filmed_once():
+    slid = trial("stop", "stop +x", fate="slipped", slip_m=2e-3)
+    less = trial("stop", "stop -x", fate="slipped", slip_m=1e-3)
+    dropped = trial("knock", "knock +x", fate="dropped", slip_m=1e-4)
+    unseen = trial("stop", "stop -x", fate="slipped", slip_m=1e-6)
+    assert chosen(EASY, unseen) == ["shake along x"]
+    assert chosen(EASY, less, slid) == ["shake along x", "stop +x"]
+    assert chosen(EASY, slid, less, dropped) == ["shake along x", "knock +x"]
+    assert chosen(replace(HARD, fate="slipped"), EASY) == ["shake about z"]
+
+
+@pytest.fixture(scope="module")
+def held():
+    """A grasp of which no fingertip is in the way of a table."""
+    body, (_, grasp) = grasps("wedge", FRICTION, 2, ("concurrent",), "tilted")
+    return body, grasp
+
+
+def test_a_trial_that_there_is_not_is_refused(held, tmp_path):
+    with pytest.raises(gc.InputError, match=r"name must be .*shake along x.*got 'stop"):
+        film(ExecutionJob(*held, FRICTION, SETTINGS), "stop +x", tmp_path / "clip.gif")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture(scope="module")
+def asked(held):
+    """What is drawn of a shake, without graphics."""
+    found = {}
+
+    def write(scene, joints, path, caption, **more):
+        found.update(scene=scene, joints=joints, caption=caption, **more)
+        return path
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(filming, "write_held_clip", write)
+        film(ExecutionJob(*held, FRICTION, SETTINGS), "shake along z", held[0].name)
+    return found
+
+
+def test_a_short_trial_is_slowed_down_and_its_caption_says_so(asked):
+    """A shake of 0.75 s: its time is that of the frames over the factor."""
+    count = len(asked["joints"])
+    assert count >= FRAMES
+    name, _, slower = asked["caption"].partition(", ")
+    assert name == "shake along z"
+    factor = float(slower.removesuffix(" times slower"))
+    assert count / 25.0 / factor == pytest.approx(0.15 + 3.0 / SETTINGS.shake_hz, rel=0.03)
+
+
+def test_what_is_filmed_is_the_motion_in_its_true_size(asked):
+    """The palm follows the shake: a over omega squared to either side of its middle."""
+    palm = asked["joints"][:, 7:10]
+    assert np.abs(palm[:, :2]).max() < 1e-4
+    reach = 9.80665 / (2.0 * np.pi * SETTINGS.shake_hz) ** 2
+    assert 1.5 * reach < np.ptp(palm[:, 2]) < 2.5 * reach
+    np.testing.assert_allclose(asked["joints"][:, :3], palm, atol=3e-3)
+    np.testing.assert_allclose(asked["up"], [0.0, 0.0, 1.0], atol=1e-12)
+    assert asked["table"] is None
+
+
+def test_a_trial_is_filmed_with_the_physics_of_its_execution(held, asked, monkeypatch, tmp_path):
+    drawn = []
+    monkeypatch.setattr(filming, "write_held_clip", lambda scene, *_, **__: drawn.append(scene))
+    job = ExecutionJob(*held, FRICTION, SETTINGS, {"timestep": 0.001})
+    film(job, "shake along z", tmp_path / "clip.gif")
+    assert drawn[0].physics == replace(asked["scene"].physics, timestep=0.001)
+    other = replace(job, physics={"gravity": (0.0, 0.0, 9.0)})
+    with pytest.raises(gc.InputError, match="gravity must be that of the settings"):
+        film(other, "shake along z", tmp_path / "clip.gif")
+
+
+@pytest.mark.slow
+def test_a_clip_of_a_lift_shows_the_object_rising(held, tmp_path):
+    try:
+        path = film(ExecutionJob(*held, FRICTION, SETTINGS), "lift", tmp_path / "lift.gif")
+    except GraphicsError as error:
+        pytest.skip(str(error))
+    with Image.open(path) as clip:
+        assert clip.n_frames > FRAMES // 2  # equal frames at the start and at the end are one
+        first = np.asarray(clip.convert("RGB")).astype(int)
+        clip.seek(clip.n_frames - 1)
+        last = np.asarray(clip.convert("RGB")).astype(int)
+    assert (np.abs(first - last).max(axis=2) > 30).mean() > 0.01

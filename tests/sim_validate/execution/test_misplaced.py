@@ -1,0 +1,112 @@
+"""Misplaced objects: fingertips stop where they touch, and where they first touch."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from grasp_core.execution.grips import unsqueezed
+from scenes.execution.held import TOUCH, held_layout
+from scenes.fingertips import fitting_radius
+from sim_validate.execution.misplaced import ROOM, met, misplacements
+from tests.sim_validate.execution.held_rigs import planned
+
+OFF_M, OFF_RAD = 0.002, np.radians(3.0)
+
+
+def layout_of(name):
+    body, grasp = planned(name)
+    radius = fitting_radius(body, grasp.positions, grasp.normals)
+    grip = unsqueezed(body, grasp, 0.5, stiffness=2000.0, tip_radius_m=radius)
+    return held_layout(body, grip, 0.3)
+
+
+def turn_of(quaternion):
+    return trimesh.transformations.quaternion_matrix(quaternion)[:3, :3]
+
+
+def distances(layout, points):
+    """From the mesh, by trimesh: the least over all triangles, (n,)."""
+    corners = layout.vertices[layout.triangles]
+    found = np.full(len(points), np.inf)
+    for triangle in corners:
+        nearest = trimesh.triangles.closest_point(np.tile(triangle, (len(points), 1, 1)), points)
+        found = np.minimum(found, np.linalg.norm(nearest - points, axis=1))
+    return found
+
+
+def tip_paths(layout, pose, reached, count=200):
+    """Centres of the fingertips on their ways to where they stop, in the object's frame."""
+    room = ROOM * (OFF_M + OFF_RAD * layout.radius_m)
+    stop = layout.tip_centers + np.einsum("kij,kj->ki", layout.axes, reached)
+    start = layout.tip_centers - room * layout.frames[:, :, 0]
+    way = start + np.linspace(0.0, 1.0, count)[:, None, None] * (stop - start)
+    return (way - pose.moved) @ turn_of(pose.quaternion)
+
+
+@pytest.fixture(scope="module", params=["box", "dodecahedron", "l-bracket"])
+def misplaced(request):
+    layout = layout_of(request.param)
+    poses = misplacements(layout, OFF_M, OFF_RAD, 12, 0)
+    return layout, poses, met(layout, poses, OFF_M, OFF_RAD)
+
+
+def test_objects_are_off_by_what_is_stated():
+    layout = layout_of("box")
+    poses = misplacements(layout, OFF_M, OFF_RAD, 200, 5)
+    shifts = np.array([pose.moved for pose in poses])
+    assert np.linalg.norm(shifts, axis=1) == pytest.approx(OFF_M, rel=1e-6)
+    turns = np.array([turn_of(pose.quaternion) for pose in poses])
+    angles = np.arccos(0.5 * (np.trace(turns, axis1=1, axis2=2) - 1.0))
+    assert angles == pytest.approx(OFF_RAD, rel=1e-5)
+    # uniform directions have the mean zero, to three standard errors
+    assert np.abs(shifts.mean(axis=0)).max() < 3.0 * OFF_M / np.sqrt(3.0 * 200)
+
+
+def test_seeds_and_counts_draw_poses():
+    layout = layout_of("box")
+    one, same, other = (misplacements(layout, OFF_M, OFF_RAD, 5, seed) for seed in (1, 1, 2))
+    fewer = misplacements(layout, OFF_M, OFF_RAD, 2, 1)
+    for a, b in [*zip(one, same, strict=True), *zip(one[:2], fewer, strict=True)]:
+        np.testing.assert_array_equal(a.moved, b.moved)
+        np.testing.assert_array_equal(a.quaternion, b.quaternion)
+    assert not any(np.array_equal(a.moved, b.moved) for a, b in zip(one, other, strict=True))
+
+
+def test_fingertips_touch_where_they_stop_and_nowhere_before(misplaced):
+    """The judge is trimesh: its distance from the mesh along the whole way, densely."""
+    layout, poses, reached = misplaced
+    radii = layout.tip_radius_m - TOUCH * layout.radius_m
+    touched = 0
+    for pose, own in zip(poses, reached, strict=True):
+        ways = tip_paths(layout, pose, own)
+        for finger, way in enumerate(ways.transpose(1, 0, 2)):
+            gaps = distances(layout, way)
+            assert gaps.min() >= radii[finger] - 1e-9
+            assert gaps[-1] == pytest.approx(radii[finger], abs=1e-6 * layout.radius_m)
+            touched += 1
+    assert touched == 4 * 12
+
+
+def test_fingertips_come_along_their_normals(misplaced):
+    layout, _, reached = misplaced
+    moved = np.einsum("kij,pkj->pki", layout.axes, reached)
+    along = np.einsum("pki,ki->pk", moved, layout.frames[:, :, 0])
+    np.testing.assert_allclose(moved, along[..., None] * layout.frames[:, :, 0], atol=1e-12)
+    assert np.abs(along).max() <= ROOM * (OFF_M + OFF_RAD * layout.radius_m) + 1e-12
+
+
+def test_a_finger_that_meets_nothing_stops_beyond_its_place():
+    """The object is far aside: all fingers pass it."""
+    layout = layout_of("box")
+    (pose,) = misplacements(layout, 10.0 * layout.radius_m, 0.0, 1, 0)
+    reached = met(layout, (pose,), OFF_M, 0.0)
+    moved = np.einsum("kij,pkj->pki", layout.axes, reached)[0]
+    assert moved == pytest.approx(ROOM * OFF_M * layout.frames[:, :, 0], abs=1e-12)
+
+
+def test_an_object_in_its_place_is_met_in_the_planned_places():
+    layout = layout_of("wedge")
+    poses = misplacements(layout, 0.0, 0.0, 3, 0)
+    assert met(layout, poses, OFF_M, OFF_RAD) == pytest.approx(
+        np.zeros((3, 4, 3)), abs=1e-6 * layout.radius_m
+    )

@@ -1,0 +1,209 @@
+"""What is read off motions that are made by hand: rolled, slid, carried, dropped."""
+
+import numpy as np
+import pytest
+
+from sim_validate.execution.bench import HeldMotion
+from sim_validate.execution.drives import idle
+from sim_validate.execution.slips import SLID, outcome, rotations, seen, slides
+from tests.judges import random_rotation
+from tests.sim_validate.execution.held_rigs import box_scene
+
+COUNT = 400
+FRICTION = np.full(4, 0.5)
+
+
+def turn_about(axis, angle):
+    axis = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    c = np.cross(np.eye(3), axis)
+    return np.eye(3) + np.sin(angle) * c + (1 - np.cos(angle)) * c @ c
+
+
+def quaternions(axis, angles):
+    axis = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    half = 0.5 * np.asarray(angles)
+    return np.column_stack([np.cos(half), np.sin(half)[:, None] * axis])
+
+
+def motion_of(moved=None, turned=None, palm=None, centers=None, forces=None):
+    """A motion with these parts, all else at rest; centres of tips are (n, k, 3) in the palm."""
+    layout = box_scene().layout
+    rest = np.broadcast_to(layout.tip_centers, (COUNT, 4, 3))
+    centers = rest if centers is None else centers
+    if forces is None:
+        forces = np.broadcast_to(layout.pushes, (COUNT, 4, 3))
+    return HeldMotion(
+        moved=np.zeros((COUNT, 3)) if moved is None else moved,
+        turned=np.tile([1.0, 0, 0, 0], (COUNT, 1)) if turned is None else turned,
+        palm=np.zeros((COUNT, 6)) if palm is None else palm,
+        tips=np.einsum("kij,nki->nkj", layout.axes, centers - rest),
+        forces=forces,
+        table=np.zeros((COUNT, 3)),
+        faults=(),
+    )
+
+
+def loaded():
+    drive = idle(COUNT)
+    object.__setattr__(drive, "shares", np.linspace(0.0, 1.0, COUNT))
+    return drive
+
+
+def judged(motion, drive=None):
+    return outcome(motion, box_scene().layout, drive or loaded(), FRICTION)
+
+
+def test_rotations_of_quaternions_are_those_about_axes():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        axis, angle = rng.normal(size=3), rng.uniform(-3, 3)
+        assert rotations(quaternions(axis, [angle]))[0] == pytest.approx(turn_about(axis, angle))
+
+
+def test_nothing_that_moves_has_slipped():
+    found = judged(motion_of())
+    assert (found.slip_m, found.displacement_m, found.turn_rad) == (0.0, 0.0, 0.0)
+    assert not found.slipped
+    assert not found.dropped
+    assert found.first_slip > 1.0
+
+
+def test_a_palm_that_carries_everything_along_shows_no_motion():
+    """Along a path and about each of its hinges, in whose order the palm turns."""
+    layout = box_scene().layout
+    u = np.linspace(0.0, 1.0, COUNT)
+    angles = u[:, None] * [0.3, -0.5, 0.7]
+    path = u[:, None] * [0.1, 0.2, -0.3]
+    R = np.array(
+        [turn_about([1, 0, 0], a) @ turn_about([0, 1, 0], b) @ turn_about([0, 0, 1], c)
+         for a, b, c in angles]
+    )  # fmt: skip
+    w = 0.5 * np.sqrt(1.0 + np.einsum("nii->n", R))
+    parts = [R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]]
+    turned = np.column_stack([w, np.array(parts).T / (4.0 * w)[:, None]])
+    motion = motion_of(moved=path, turned=turned, palm=np.hstack([path, angles]))
+    found = seen(motion, layout)
+    assert found.moved == pytest.approx(np.zeros((COUNT, 3)), abs=1e-15)
+    assert found.tips - layout.tip_centers == pytest.approx(np.zeros((COUNT, 4, 3)), abs=1e-15)
+    assert slides(found, layout).max() == pytest.approx(0.0, abs=1e-12)
+    assert judged(motion).turn_rad == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("axis", [[0, 1, 0], [0, 0, 1], [0, 1, -2], [1, 0, 0], [1, 2, 3]])
+def test_rolling_without_sliding_is_no_slip(axis):
+    """An object turns under a fingertip that does not: the tip's centre, seen from the object,
+    advances by rho dt x n for the turn dt in the object's frame. Summed exactly, by a fine
+    integration of the no-slip condition."""
+    layout = box_scene().layout
+    angles = np.linspace(0.0, 0.3, COUNT)
+    unit = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    n, rho = layout.frames[:, :, 0], layout.tip_radius_m[:, None]
+    own = layout.tip_centers + angles[:, None, None] * rho * np.cross(unit, n)  # object's frame
+    R = np.array([turn_about(unit, angle) for angle in angles])
+    centers = np.einsum("nij,nkj->nki", R, own)
+    # the velocity of the touching point of the tip, which does not spin, is that of the object's
+    step = (centers[1] - centers[0]) / (angles[1] - angles[0])
+    touching = layout.contacts
+    across = step - np.cross(unit, touching)
+    across -= np.einsum("ki,ki->k", across, n)[:, None] * n
+    if abs(unit @ [1, 0, 0]) < 1e-12:  # otherwise the point of contact twists, which is no slip
+        assert np.abs(across).max() < 1e-3 * layout.radius_m
+    motion = motion_of(turned=quaternions(unit, angles), centers=centers)
+    assert slides(seen(motion, layout), layout).max() < 1e-3 * SLID * layout.radius_m
+    found = judged(motion)
+    assert found.turn_rad == pytest.approx(0.3, rel=1e-9)
+    assert not found.slipped
+
+
+@pytest.mark.parametrize("along", [[0, 1, 0], [0, 0, -1], [0, 0.6, 0.8]])
+def test_a_fingertip_that_slides_by_a_millimetre_has_slipped_by_it(along):
+    layout = box_scene().layout
+    centers = np.tile(layout.tip_centers, (COUNT, 1, 1))
+    centers[:, 2] += 1e-3 * np.linspace(0.0, 1.0, COUNT)[:, None] * np.array(along)
+    found = judged(motion_of(centers=centers))
+    assert found.slip_m == pytest.approx(1e-3, rel=1e-9)
+    assert found.slipped
+    assert found.first_slip <= 1.0
+
+
+def test_a_fingertip_that_leaves_the_surface_has_not_slid():
+    layout = box_scene().layout
+    centers = (
+        layout.tip_centers - 1e-3 * np.linspace(0, 1, COUNT)[:, None, None] * layout.frames[:, :, 0]
+    )
+    assert judged(motion_of(centers=centers)).slip_m == pytest.approx(0.0, abs=1e-15)
+
+
+def test_an_object_that_slides_through_the_fingers_is_displaced_by_as_much():
+    moved = np.linspace(0.0, 2e-3, COUNT)[:, None] * np.array([0.0, 0.0, -1.0])
+    found = judged(motion_of(moved=moved))
+    assert found.slip_m == found.displacement_m == pytest.approx(2e-3)
+
+
+def test_what_happened_before_the_trial_began_does_not_count():
+    moved = np.zeros((COUNT, 3))
+    moved[:100, 1] = np.linspace(3e-3, 0.0, 100)
+    motion, layout = motion_of(moved=moved), box_scene().layout
+    late = outcome(motion, layout, loaded(), FRICTION, begun=100)
+    assert (late.slip_m, late.displacement_m) == (0.0, 0.0)
+    assert judged(motion).displacement_m == pytest.approx(3e-3)
+
+
+def test_an_object_that_no_finger_touches_is_dropped():
+    forces = np.tile(box_scene().layout.pushes, (COUNT, 1, 1))
+    forces[-1, 1:] = 0.0
+    assert not judged(motion_of(forces=forces)).dropped
+    forces[-1] = 0.0
+    found = judged(motion_of(forces=forces))
+    assert found.dropped
+    assert found.slipped
+
+
+def tangential(largest):
+    """Forces that grow with the load: tangential ones of this share of friction times normal."""
+    layout = box_scene().layout
+    forces = np.tile(layout.pushes, (COUNT, 1, 1))
+    world = np.einsum("kij,nkj->nki", layout.axes, forces)
+    world[:, 0, 2] += largest * 0.5 * 5.0 * np.linspace(0.0, 1.0, COUNT)
+    return np.einsum("kij,nki->nkj", layout.axes, world)
+
+
+@pytest.mark.parametrize("largest", [0.2, 0.5, 0.9])
+def test_slip_that_stays_away_is_as_far_away_as_forces_say(largest):
+    found = judged(motion_of(forces=tangential(largest)))
+    assert not found.slipped
+    assert found.first_slip == pytest.approx(1.0 / largest, rel=1e-9)
+
+
+@pytest.mark.parametrize("largest", [1.25, 2.0, 8.0])
+def test_the_first_slip_is_where_forces_reach_the_cone(largest):
+    found = judged(motion_of(forces=tangential(largest)))
+    assert found.slipped
+    assert found.first_slip == pytest.approx(1.0 / largest, abs=1.0 / COUNT)
+
+
+def test_what_is_seen_does_not_depend_on_where_the_palm_is():
+    """A motion with all of it moved and turned with the palm gives the same outcome."""
+    layout = box_scene().layout
+    centers = np.tile(layout.tip_centers, (COUNT, 1, 1))
+    centers[:, 1, 1] += np.linspace(0.0, 1e-3, COUNT)
+    here = motion_of(centers=centers, forces=tangential(0.5))
+    rng = np.random.default_rng(1)
+    R = random_rotation(rng)
+    b = np.arcsin(R[0, 2])
+    a, c = np.arctan2(-R[1, 2], R[2, 2]), np.arctan2(-R[0, 1], R[0, 0])
+    place = rng.normal(size=3)
+    axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    angle = np.arctan2(np.linalg.norm(axis), np.trace(R) - 1.0)
+    there = HeldMotion(
+        moved=here.moved + place,
+        turned=quaternions(axis, np.full(COUNT, angle)),
+        palm=np.tile(np.append(place, [a, b, c]), (COUNT, 1)),
+        tips=here.tips,
+        forces=here.forces,
+        table=here.table,
+        faults=(),
+    )
+    one, other = judged(here), judged(there)
+    assert (other.slip_m, other.first_slip) == pytest.approx((one.slip_m, one.first_slip), rel=1e-6)
+    assert one.slip_m == pytest.approx(1e-3)

@@ -1,0 +1,110 @@
+"""Tests of somebody else's that demand that objects survive their execution."""
+
+import json
+
+import pytest
+
+import grasp_core as gc
+import sim_validate as sv
+from grasp_core.records.grasps_json import plan_to_json
+from scenes.example_objects import example_object
+from sim_validate.files.reading import write_text
+from sim_validate.records.grasps import read_grasps
+from tests.sim_validate.plugin.project import run_pytest
+
+CODE = """
+import pytest
+import sim_validate as sv
+
+pytestmark = pytest.mark.grasp("grasps.json")
+
+def test_light(grasp_case, assert_survives):
+    settings = sv.ExecutionSettings(mass_kg=0.1, trials=("weight",))
+    assert assert_survives(grasp_case, settings).survived
+    case = grasp_case
+    assert assert_survives(case.body, case.grasp, case.friction, settings=settings).survived
+
+def test_heavy(grasp_case, assert_survives):
+    settings = sv.ExecutionSettings(mass_kg=1.0, trials=("weight",))
+    assert_survives(grasp_case.body, grasp_case.grasp, grasp_case.friction, settings)
+"""
+SUITE = """
+grasps = "grasps.json"
+survives = true
+
+[execution]
+mass_kg = {mass_kg}
+trials = ["weight"]
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("survival")
+    body = example_object("wedge")
+    plan = gc.plan(body, 0.5, families=("concurrent",), limit=1)
+    write_text(folder / "grasps.json", plan_to_json(body, plan))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(folder):
+    """What comes out where the wedge weighs one kilogram."""
+    saved = read_grasps(folder / "grasps.json")
+    settings = sv.ExecutionSettings(mass_kg=1.0, trials=("weight",))
+    return sv.execute(saved.body, saved.grasps[0], saved.friction, settings)
+
+
+def predicted(found):
+    return f"first slip predicted at {found.trials[0].predicted_first_slip:.3g} of the load"
+
+
+def test_an_assertion_names_the_trial_the_numbers_and_the_prediction(folder, found, tmp_path):
+    write_text(folder / "test_it.py", CODE)
+    code, said = run_pytest(folder, "test_it.py", "--grasp-report", str(tmp_path / "report"))
+    assert code == 1, said
+    assert "1 failed, 1 passed" in said
+    assert "with 1 kg: 1 of 1 trials lost; its squeeze is certified for" in said
+    assert f"{found.load_multiple:.4g} times the weight" in said
+    assert "weight: slipped, moved " in said
+    assert predicted(found) in said
+    lines = json.loads((tmp_path / "report" / "report.json").read_text())["grasps"]
+    assert sorted({line["status"] for line in lines}) == ["lost", "survived"]
+
+
+def test_a_suite_demands_survival_whatever_its_baseline_says(folder, found):
+    suite = folder / "wedge.grasps.toml"
+    write_text(suite, SUITE.format(mass_kg=1.0))
+    code, said = run_pytest(folder, "--grasp-bless", str(suite))
+    assert code == 0, said
+    baseline = json.loads((folder / "wedge.baseline.json").read_text())
+    assert baseline["settings"]["execution"]["mass_kg"] == 1.0
+    assert baseline["grasps"][0]["execution"]["lost"] == ["weight"]
+    code, said = run_pytest(folder, str(suite))
+    assert code == 1
+    assert "the grasp must survive its execution, but does not" in said
+    assert "executed: lost weight" in said
+    assert predicted(found) in said
+
+
+@pytest.mark.slow
+def test_a_suite_whose_grasps_survive_passes_and_others_are_not_comparable(folder):
+    suite = folder / "wedge.grasps.toml"
+    write_text(suite, SUITE.format(mass_kg=0.1))
+    code, said = run_pytest(folder, "--grasp-bless", str(suite))
+    assert code == 0, said
+    code, said = run_pytest(folder, str(suite))
+    assert code == 0, said
+    write_text(suite, SUITE.format(mass_kg=0.2))
+    code, said = run_pytest(folder, str(suite))
+    assert code == 1
+    assert "not comparable" in said
+    assert "execution.mass_kg: 0.1 -> 0.2" in said
+
+
+def test_a_suite_that_does_not_say_how_to_execute_is_refused(folder, tmp_path):
+    (tmp_path / "grasps.json").write_bytes((folder / "grasps.json").read_bytes())
+    write_text(tmp_path / "wedge.grasps.toml", 'grasps = "grasps.json"\nsurvives = true\n')
+    code, said = run_pytest(tmp_path, "--grasp-bless")
+    assert code == 1
+    assert "survives: expected a table [execution] too" in " ".join(said.split())

@@ -1,0 +1,350 @@
+"""Reports show what executions found; the executions here are written by hand."""
+
+import math
+import shlex
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.errors import InputError
+from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from scenes.drawing.canvas import encoded
+from scenes.execution.held import HeldSettings
+from sim_validate import main as commands
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.commands.asked.executions import execution_settings
+from sim_validate.execution.jobs import ExecutedGrasp
+from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.execution.trials import Skipped
+from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
+from sim_validate.files.stale_results import remove_executions
+from sim_validate.main import main
+from sim_validate.records.executions_json import Executions, executions_to_json, read_executions
+from sim_validate.records.grasps import read_grasps
+from sim_validate.reports import drawn_grasps
+from sim_validate.reports import report as reports
+from sim_validate.reports.drawn_grasps import Drawn
+from sim_validate.reports.executed_grasps import execute_command
+from sim_validate.reports.report import write_report
+from sim_validate.reports.run_folder import runs_in
+from sim_validate.reports.survival_charts import (
+    accelerations_g,
+    certified_multiples,
+    survival_figure,
+    survival_sentence,
+    survivals,
+    ticks_up_to,
+)
+from tests.scenes.drawing.test_pictures import assert_inside
+from tests.sim_validate.reports.test_report import EVIL, Page, changed
+
+SETTINGS = ExecutionSettings(0.3, shake_g=0.5, stop_m_per_s2=2.0 * GRAVITY_M_PER_S2,
+                             stop_from_m_per_s=1.0, knock_n_s=0.02)  # fmt: skip
+
+
+def trial(kind, name, *, predicted=2.0, simulated=2.0, survived=True, fate="stuck"):
+    return ExecutionTrial(kind, name, survived, fate, 1.25e-3, 2.5e-3, math.radians(3.5),
+                          predicted, simulated)  # fmt: skip
+
+
+TRIALS = (
+    trial("weight", "weight", predicted=math.inf, simulated=math.inf),
+    trial("shake", "shake along x", predicted=1.31, simulated=1.32),
+    trial("shake", "shake about x", predicted=0.72, simulated=0.73, fate="slipped"),
+    trial("stop", "stop +x", predicted=0.91, simulated=0.92, survived=False, fate="dropped"),
+)
+KEPT = tuple(replace(each, survived=True, fate="stuck") for each in TRIALS)
+SKIPPED = (Skipped("lift", "a fingertip is in the way"),)
+
+
+def execution(multiple, trials, *, let_go=True, skipped=()):
+    controls = (ExecutionControl("friction 0.9", let_go, 0.96 if let_go else math.inf),)
+    return Execution(0.3, np.full((4, 3), 2.0), multiple, trials, controls, skipped)
+
+
+def executed(saved, found):
+    return tuple(
+        ExecutedGrasp(grasp.id, grasp.family, contacts_sha256(grasp.contacts), each,
+                      None if each else "no squeeze survives the loads")
+        for grasp, each in zip(saved.grasps, found, strict=True)
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A folder with three grasps: one loses the object, one survives, one has no squeeze."""
+    folder = tmp_path_factory.mktemp("executed")
+    assert main(["plan", "wedge", "--limit", "3", "--out", str(folder), "-q"]) == Exit.GOOD
+    saved = read_grasps(folder / "grasps.json")
+    found = executed(saved, [execution(2.5, TRIALS, skipped=SKIPPED), execution(3.5, KEPT), None])
+    text = executions_to_json(saved.body, 0.4, SETTINGS, found, complete=True)
+    (folder / "executions.json").write_text(text)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def report(run):
+    return write_report(run, run.parent / "report of executions", jobs=1).index.parent
+
+
+@pytest.fixture
+def copy(run, tmp_path):
+    return shutil.copytree(run, tmp_path / "copy")
+
+
+@pytest.fixture
+def no_pictures(monkeypatch):
+    """Pages without their pictures, which take a second."""
+    monkeypatch.setattr(reports, "draw", lambda task: Drawn(f"pictures/{task.name}", None, None))
+
+
+def cells_of(page, heading):
+    """The texts of a table's row that begins with a heading."""
+    row = page[page.index(heading) :]
+    return [text for text in Page(row[: row.index("</tr>")]).said if text.strip()][1:]
+
+
+def test_the_first_page_has_a_row_for_each_grasp(run, report):
+    text = (report / "index.html").read_text()
+    table = text[text.index('id="executions"') :]
+    names = [grasp.id for grasp in read_grasps(run / "grasps.json").grasps]
+    assert cells_of(table, f"{names[0]}</a></th>")[-5:] == [
+        "failed 1 of 4 trials", "3 of 4", "2.5", "0.72", "0.73",
+    ]  # fmt: skip
+    assert cells_of(table, f"{names[1]}</a></th>")[-5:-2] == ["survived", "4 of 4", "3.5"]
+    assert cells_of(table, f"{names[2]}</a></th>")[-5:] == ["no squeeze", "0 of 0", "-", "-", "-"]
+    said = " ".join(Page(text).said)
+    assert "with 0.3 kg at friction 0.4, 1 of 3 grasps survived every trial; 2 of 2" in said
+    assert "no squeeze holds the object in 1 of them" in said
+    assert (report / "survival.svg").stat().st_size > 5000
+    for name in names:
+        assert f"grasps/{name}.html#executed" in text
+
+
+def test_the_page_of_a_grasp_has_all_of_its_execution(run, report):
+    lost, kept, none = (
+        (report / "grasps" / f"{grasp.id}.html").read_text()
+        for grasp in read_grasps(run / "grasps.json").grasps
+    )
+    assert cells_of(lost, ">stop +x<")[-7:] == [
+        "failed", "dropped", "1.2", "2.5", "3.5", "0.91", "0.92",
+    ]  # fmt: skip
+    assert cells_of(lost, ">weight<")[-2:] == ["never", "never"]
+    assert cells_of(lost, ">friction 0.9<")[-2:] == ["let go", "0.96"]
+    said = " ".join(Page(lost).said)
+    for part in ("0.3 kg, at friction 0.4", "at most 10 N", "2000 N/m, fingertips of 50 g",
+                 "2.5 times the weight", "1.5 g in any direction",
+                 "No lift: a fingertip is in the way."):  # fmt: skip
+        assert part in said
+    assert "No lift" not in kept
+    assert "No squeeze: no squeeze survives the loads." in " ".join(Page(none).said)
+    assert all("magnified" not in page for page in (lost, kept, none))
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_without_executions_nothing_is_said_of_them(copy, tmp_path):
+    (copy / "executions.json").unlink()
+    report = write_report(copy, tmp_path / "out", jobs=1, limit=1).index.parent
+    assert not (report / "survival.svg").exists()
+    for path in report.rglob("*.html"):
+        assert "xecuted" not in path.read_text()
+
+
+def test_grasps_that_were_lost_are_drawn_first(run):
+    """The second grasp is the only one that survives."""
+    (folder,) = runs_in(run)
+    ids = [grasp.id for grasp in folder.saved.grasps]
+    assert [folder.alarms(name) for name in ids] == [True, False, True]
+    assert [grasp.id for grasp in folder.first(2).saved.grasps] == [ids[0], ids[2]]
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_a_control_that_held_is_bad_news_and_its_grasp_counts_in_no_mark(copy, tmp_path):
+    saved = read_grasps(copy / "grasps.json")
+    found = executed(saved, [execution(2.5, KEPT, let_go=False), execution(3.5, KEPT), None])
+    assert {mark.grasps for mark in survivals([Executions("", 0.5, SETTINGS, True, found)])} == {2}
+    text = executions_to_json(saved.body, 0.4, SETTINGS, found, complete=False)
+    (copy / "executions.json").write_text(text)
+    said = Page(write_report(copy, tmp_path / "out", jobs=1, limit=1).index.read_text()).said
+    assert said.count("a negative control held") == 2
+    assert "the executions were interrupted" in " ".join(said)
+
+
+def test_marks_stand_at_the_acceleration_of_their_trials(run):
+    found = read_executions(run / "executions.json")
+    peaks = accelerations_g(SETTINGS)
+    assert peaks["weight"] == peaks["misplaced"] == 0.0
+    assert peaks["shake along"] == pytest.approx(0.5, rel=0.02)
+    assert peaks["stop"] == pytest.approx(2.0, rel=1e-9)
+    # the path of least jerk reaches 10 / sqrt(3) of its height over its time squared
+    lift = 10.0 / math.sqrt(3.0) * SETTINGS.lift_m / SETTINGS.lift_s**2 / GRAVITY_M_PER_S2
+    assert peaks["lift"] == pytest.approx(lift, rel=0.01)
+    # half a sine of 20 ms, whose four samples miss its top
+    knock = 0.5 * math.pi * SETTINGS.knock_n_s / 0.02 / SETTINGS.mass_kg / GRAVITY_M_PER_S2
+    assert 0.89 * knock < peaks["knock"] < knock
+    marks = {mark.kind: mark for mark in survivals([found]) if mark.grasps == len(found.grasps)}
+    assert list(marks) == ["weight", "shake along", "shake about", "stop"]
+    assert [mark.survived for mark in marks.values()] == [2, 2, 2, 1]
+    assert [mark.predicted for mark in marks.values()] == [2, 2, 0, 0]
+
+
+def test_the_curve_is_the_share_of_grasps_that_are_certified(run):
+    """At each multiple of the weight, by counting."""
+    found = read_executions(run / "executions.json")
+    multiples = [0.5, 1.0, 1.0, 2.0, 2.0, 7.0]
+    grasp = found.grasps[0]
+    many = replace(found, grasps=tuple(
+        replace(grasp, execution=replace(grasp.execution, load_multiple=each))
+        for each in multiples
+    ))  # fmt: skip
+    np.testing.assert_array_equal(certified_multiples([many]), multiples)
+    figure = survival_figure([many])
+    steps, shares = figure.axes[0].lines[0].get_data()
+    assert steps[0] == 1.0
+    assert steps[-1] > 7.0
+    for multiple in (1.0, 1.5, 1.999, 2.001, 3.0, 6.999, 7.001):
+        drawn = shares[np.searchsorted(steps, multiple, side="right") - 1]
+        if multiple > 1.0:
+            assert drawn == np.mean(np.array(multiples) >= multiple)
+    assert shares.max() == 5.0 / 6.0
+
+
+def test_one_sentence_says_what_the_chart_shows(run):
+    found = read_executions(run / "executions.json")
+    said = survival_sentence([found])
+    assert said.startswith("1 of 3 grasps are certified to carry the weight while the palm")
+    assert "by 2 g in any direction, and in simulation 1 of 3 survived every trial" in said
+    assert "“stop”" in said
+    nothing = replace(found, grasps=found.grasps[2:])
+    assert survival_sentence([nothing]) == "0 of 1 grasps are certified to carry the weight."
+
+
+@pytest.mark.parametrize("end", [2.0, 5.0, 60.0, 1001.0])
+def test_ticks_are_apart(end):
+    ticks = ticks_up_to(end)
+    assert ticks[0] == 0.0
+    assert len(ticks) >= 3
+    gaps = np.diff(np.log1p(ticks)) / math.log(end)
+    assert gaps.min() > 0.08
+    assert ticks[-1] <= end - 1.0
+
+
+@pytest.mark.parametrize("largest", [0.5, 3.0, 200.0, 1e6])
+def test_labels_of_the_chart_are_whole(run, largest):
+    found = read_executions(run / "executions.json")
+    grasp = found.grasps[0]
+    kinds = (*TRIALS, trial("knock", "knock +x"), trial("lift", "lift"),
+             trial("misplaced", "misplaced 0"))  # fmt: skip
+    wide = replace(grasp, execution=execution(largest, kinds))
+    for executions in ([replace(found, grasps=(wide, *found.grasps[1:]))],
+                       [replace(found, grasps=found.grasps[2:])]):  # fmt: skip
+        figure = survival_figure(executions)
+        encoded(figure, "png")
+        assert_inside(figure)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda each: each["object"].update(content_sha256="0"), "another object than grasps.json"),
+        (lambda each: each["executions"][0].update(contacts_sha256="0"), "contacts of .* differ"),
+        (lambda each: each["executions"][0].update(id="c-9-9-9-9"), "not in that file"),
+        (lambda each: each["executions"].append(each["executions"][0]), "summary.grasps: expected"),
+        (lambda each: each.pop("summary") and each["executions"].append(each["executions"][0]),
+         "two records of one grasp"),
+        (lambda each: each["executions"][0].update(survived=True), r"executions\[0\].survived"),
+        (lambda each: each["summary"].update(trials_survived=9), r"summary.trials_survived: exp"),
+        (lambda each: each["settings"].update(mass_kg=-1), "mass_kg"),
+        (lambda each: each["executions"][0]["trials"][0].update(fate="fine"), "fate"),
+        (lambda each: each.update(schema=2), "schema"),
+    ],
+)  # fmt: skip
+def test_files_of_other_runs_are_refused(copy, change, says):
+    changed(copy / "executions.json", change)
+    with pytest.raises(InputError, match=f"executions.json: .*{says}"):
+        write_report(copy, jobs=1)
+    assert not (copy / "report").exists()
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_names_and_reasons_are_escaped(copy, tmp_path):
+    def spoiled(document):
+        first = document["executions"][0]
+        first["trials"][0]["name"] = first["skipped"][0]["reason"] = EVIL
+        document["executions"][2]["reason"] = EVIL
+
+    changed(copy / "executions.json", spoiled)
+    report = write_report(copy, tmp_path / "out", jobs=1, limit=2).index.parent
+    pages = [path.read_text() for path in (report / "grasps").iterdir()]
+    assert len(pages) == 2
+    assert all("<script>document" not in page for page in pages)
+    assert all(EVIL.replace("\x1b", " ") in "".join(Page(page).said) for page in pages)
+
+
+def test_a_trial_that_there_is_not_is_not_filmed(copy):
+    changed(copy / "executions.json",
+            lambda each: each["executions"][0]["trials"][2].update(name="../x"))  # fmt: skip
+    with pytest.raises(InputError, match=r"executions.json: .*name .*\.\./x"):
+        write_report(copy, jobs=1, clips=1)
+
+
+def test_clips_that_were_made_are_shown(copy, tmp_path, monkeypatch):
+    changed(copy / "executions.json",
+            lambda each: each["executions"][0].update(physics={"timestep": 0.001}))  # fmt: skip
+
+    def film(job, name, path):
+        assert (job.friction, job.settings, job.physics["timestep"]) == (0.4, SETTINGS, 0.001)
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(name)
+
+    monkeypatch.setattr(drawn_grasps, "film", film)
+    report = write_report(copy, tmp_path / "out", jobs=1, limit=1, clips=1).index.parent
+    clips = {path.name: path.read_text() for path in (report / "clips").iterdir()}
+    first = read_grasps(copy / "grasps.json").grasps[0].id
+    assert clips == {
+        f"{first}-executed-0.webp": "shake about x", f"{first}-executed-1.webp": "stop +x",
+    }  # fmt: skip
+    page = Page((report / "grasps" / f"{first}.html").read_text())
+    assert {f"../clips/{name}" for name in clips} <= set(page.links)
+    assert "it is not magnified" in " ".join(page.said)
+    assert "stop +x: dropped" in page.said
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        SETTINGS,
+        ExecutionSettings(
+            0.1, 7.5, 950.0, 0.004, HeldSettings(0.02, 0.7, (0.1, -0.25, -1e-3)),
+            ("weight", "misplaced"), 0.1, 0.4, 2.0, 7.0, 9.0, 0.4, 0.01, 1.5, 3.0, 4, 17, 6.0, 7.0,
+        ),
+    ],
+)  # fmt: skip
+def test_the_command_executes_a_grasp_with_the_same_settings(run, settings, monkeypatch):
+    asked = []
+    monkeypatch.setattr(commands, "execute", lambda command: asked.append(command) or Exit.GOOD)
+    executions = Executions("", 0.35, settings, True, ())
+    line = execute_command(executions, str(run / "grasps.json"), "c-0-1-2-7")
+    assert main(shlex.split(line)[1:]) == Exit.GOOD
+    (flags,) = asked
+    assert (flags.friction, flags.grasp) == (0.35, "c-0-1-2-7")
+    saved = replace(read_grasps(flags.grasps), seed=flags.seed)
+    assert execution_settings(saved, flags.executing, flags.trials, flags.down) == settings
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_new_executions_remove_pages_that_show_old_ones(copy):
+    write_report(copy, jobs=1, limit=1)
+    remove_executions(copy)
+    assert not (copy / "executions.json").exists()
+    assert not (copy / "report").exists()
+
+
+def test_without_graphics_the_report_says_so(copy, tmp_path, monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "no-such-library")
+    report = write_report(copy, tmp_path / "out", jobs=1, limit=1, clips=1)
+    assert "no-such-library" in report.no_clip
+    assert not (tmp_path / "out" / "clips").exists()
