@@ -28,53 +28,52 @@ def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Ar
         triangles: Indices of the vertices of each triangle, (t, 3).
         points: Points to start from, (n, 3) [m].
     """
-    corners = vertices[triangles]
-    nearest = np.empty((len(points), 3))
-    for place, point in enumerate(points):
-        candidates = nearest_on_triangles(corners, point)
-        nearest[place] = candidates[first_best(-np.linalg.norm(candidates - point, axis=1))]
-    return nearest
+    candidates = nearest_on_triangles(vertices[triangles], points)
+    distances = np.linalg.norm(candidates - points[:, None], axis=2)
+    chosen = [first_best(-own) for own in distances]
+    return candidates[np.arange(len(points)), chosen]
 
 
-def nearest_on_triangles(corners: Array, point: Array) -> Array:
-    """Find the point of each of several triangles nearest to a point, (t, 3) [m].
+def nearest_on_triangles(corners: Array, points: Array) -> Array:
+    """Find the point of each of several triangles nearest to points, (..., t, 3) [m].
 
     Args:
         corners: Corners of the triangles, (t, 3, 3) [m].
-        point: Point to start from, (3,) [m].
+        points: Points to start from, (..., 3) [m].
     """
-    candidates = np.stack([*_on_edges(corners, point), _foot(corners, point)])
-    nearest = np.linalg.norm(candidates - point, axis=2).argmin(axis=0)
-    return candidates[nearest, np.arange(len(corners))]
+    points = points[..., None, :]
+    candidates = np.stack([*_on_edges(corners, points), _foot(corners, points)])
+    nearest = np.linalg.norm(candidates - points, axis=-1).argmin(axis=0)
+    found: Array = np.take_along_axis(candidates, nearest[None, ..., None], axis=0)[0]
+    return found
 
 
-def _on_edges(corners: Array, point: Array) -> list[Array]:
-    """Return the point of each edge nearest to a point, three times (t, 3)."""
+def _on_edges(corners: Array, points: Array) -> list[Array]:
+    """Return the point of each edge nearest to points (..., 1, 3), three times (..., t, 3)."""
     found: list[Array] = []
     for start, end in ((0, 1), (1, 2), (2, 0)):
         tails = corners[:, start]
         along = corners[:, end] - tails
-        shares = np.clip(_divided(_dots(point - tails, along), _dots(along, along)), 0.0, 1.0)
-        found.append(tails + shares[:, None] * along)
+        shares = np.clip(_divided(_dots(points - tails, along), _dots(along, along)), 0.0, 1.0)
+        found.append(tails + shares[..., None] * along)
     return found
 
 
-def _foot(corners: Array, point: Array) -> Array:
-    """Return the foot of a point on each triangle if that is inside, else a corner, (t, 3)."""
+def _foot(corners: Array, points: Array) -> Array:
+    """Return the foot of points (..., 1, 3) on each triangle if inside, else a corner."""
     tails = corners[:, 0]
-    one, other, away = corners[:, 1] - tails, corners[:, 2] - tails, point - tails
+    one, other, away = corners[:, 1] - tails, corners[:, 2] - tails, points - tails
     normals = np.cross(one, other)
     squares = _dots(normals, normals)
     v = _divided(_dots(normals, np.cross(away, other)), squares)
     w = _divided(_dots(normals, np.cross(one, away)), squares)
     inside = (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0)
-    return (
-        tails + np.where(inside, v, 0.0)[:, None] * one + np.where(inside, w, 0.0)[:, None] * other
-    )
+    v, w = np.where(inside, v, 0.0), np.where(inside, w, 0.0)
+    return tails + v[..., None] * one + w[..., None] * other
 
 
 def _dots(a: Array, b: Array) -> Array:
-    return np.einsum("ti,ti->t", a, b)
+    return np.einsum("...i,...i->...", a, b)
 
 
 def _divided(a: Array, b: Array) -> Array:
@@ -82,4 +81,4 @@ def _divided(a: Array, b: Array) -> Array:
 
     The divisor is zero for a triangle or an edge without size, whose corners are candidates anyway.
     """
-    return np.divide(a, b, out=np.zeros_like(a), where=b > 0.0)
+    return np.divide(a, b, out=np.zeros_like(a), where=np.broadcast_to(b > 0.0, a.shape))

@@ -127,6 +127,15 @@ class HeldLayout:
         return math.sqrt(max(own, float(self.stiffness.max()) / cube))
 
     @property
+    def fastest_tip(self) -> float:
+        """Return the largest rate at which a loose fingertip swings or comes to rest [1/s].
+
+        They are sqrt(k / m_t) and c / m_t of its springs and dampers.
+        """
+        swing = math.sqrt(float(self.stiffness.max()) / self.tip_mass_kg)
+        return max(swing, float(self.damping.max()) / self.tip_mass_kg)
+
+    @property
     def pushes(self) -> Array:
         """Return the squeeze along the axes of the springs, (k, 3) [N]."""
         return np.einsum("kij,ki->kj", self.axes, self.squeeze)

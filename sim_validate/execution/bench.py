@@ -54,6 +54,13 @@ class HeldMotion:
         return np.concatenate([self.moved, self.turned, self.palm, tips], axis=1)
 
 
+def motions_joined(first: HeldMotion, second: HeldMotion) -> HeldMotion:
+    """Return one motion after another, with the faults of both."""
+    names = ("moved", "turned", "palm", "tips", "forces", "table")
+    both = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names}
+    return HeldMotion(**both, faults=first.faults + second.faults)
+
+
 class HeldBench:
     """A compiled scene of execution on which many trials run at once."""
 
@@ -92,7 +99,8 @@ class HeldBench:
             drives: What is applied in each trial.
             start: State at the end of an earlier motion (see `settled`); None for fingertips at
                 their contacts that do not push yet.
-            friction: Coulomb coefficient of each contact, (k,); None for those of the scene.
+            friction: Coulomb coefficient of each contact, (k,) for all trials or (n, k); None for
+                those of the scene.
         """
         trials = self._begun(drives, start, friction)
         lengths = np.array([len(drive) for drive in drives])
@@ -106,9 +114,9 @@ class HeldBench:
             for place, drive in enumerate(drives)
         )  # fmt: skip
 
-    def settled(self, drive: Drive, friction: Array | None = None) -> tuple[HeldMotion, Array]:
+    def settled(self, drive: Drive, start: Array | None = None) -> tuple[HeldMotion, Array]:
         """Simulate one trial; return its motion and the simulator's complete state at its end."""
-        trials = self._begun([drive], None, friction)
+        trials = self._begun([drive], start, None)
         lengths = np.array([len(drive)])
         moved, forces = self._recorded(trials, lengths)
         errors = self._stepped(trials, [drive], lengths, moved, forces)
@@ -204,6 +212,8 @@ class HeldBench:
         return loads, motors, commands
 
     def _motion(self, joints: Array, forces: Array, faults: tuple[str, ...]) -> HeldMotion:
+        # what has no end is no number either: angles beyond all bounds have no cosine
+        joints = np.where(np.isfinite(joints), joints, np.nan)
         shape = (len(joints), *self.scene.layout.stiffness.shape)
         own = -forces[:, PALM:].reshape(shape)
         axes = self.scene.layout.axes

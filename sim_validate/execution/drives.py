@@ -71,6 +71,16 @@ def idle(count: int) -> Drive:
 
 def joined(first: Drive, second: Drive) -> Drive:
     """Return one drive after another; start and table are those of the first."""
-    names = ("accelerations", "gravity", "wrenches", "grasping", "shares")
-    both = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names}
+    both = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in SERIES}
     return replace(first, **both)
+
+
+def parted(drive: Drive, count: int) -> tuple[Drive, Drive]:
+    """Return the first samples of a drive, and the others; both have its start and table."""
+    first = {name: getattr(drive, name)[:count] for name in SERIES}
+    second = {name: getattr(drive, name)[count:] for name in SERIES}
+    return replace(drive, **first), replace(drive, **second)
+
+
+SERIES = ("accelerations", "gravity", "wrenches", "grasping", "shares")
+"""Fields that have a row for each sample."""

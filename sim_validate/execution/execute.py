@@ -5,7 +5,7 @@ with the largest push allowed. Every trial then runs with it. Before, the simula
 cases whose answers are known (see `gate`).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -29,8 +29,8 @@ from scenes.execution.held_mjcf import HeldScene, build_held_scene
 from scenes.fingertips import fitting_radius
 from scenes.physics import PhysicsSettings
 from sim_validate.execution import paths
-from sim_validate.execution.bench import HeldBench, HeldMotion
-from sim_validate.execution.drives import Drive
+from sim_validate.execution.bench import HeldBench, HeldMotion, motions_joined
+from sim_validate.execution.drives import joined, parted
 from sim_validate.execution.gate.gate import require_faithful_execution
 from sim_validate.execution.predictions import held_dynamics, predicted_slips
 from sim_validate.execution.settings import ExecutionSettings
@@ -149,15 +149,33 @@ def held_scene(
 
 
 def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> tuple[HeldMotion, ...]:
-    """Simulate trials: those of a squeezed object from one state, the others from open fingers."""
+    """Simulate trials: some with open fingers, others from a squeezed object or its weight."""
     _, squeezed = bench.settled(paths.closing())
-    found: dict[str, HeldMotion] = {}
-    for apart, start in ((False, squeezed), (True, None)):
-        own = [trial for trial in trials if trial.apart == apart]
+    weighing = [trial for trial in trials if trial.weighing]
+    apart = [trial for trial in trials if trial.apart]
+    others = [trial for trial in trials if not (trial.weighing or trial.apart)]
+    found = dict(zip(weighing, _weighed(bench, weighing, squeezed), strict=True))
+    for own, start in ((apart, None), (others, squeezed)):
         if own:
             motions = bench.run([trial.drive for trial in own], start)
-            found |= {trial.name: motion for trial, motion in zip(own, motions, strict=True)}
-    return tuple(found[trial.name] for trial in trials)
+            found |= dict(zip(own, motions, strict=True))
+    return tuple(found[trial] for trial in trials)
+
+
+def _weighed(
+    bench: HeldBench, trials: Sequence[Trial], squeezed: Array
+) -> Iterator[HeldMotion]:  # fmt: skip
+    """Simulate trials of an object whose weight has come, which is simulated once for all.
+
+    Hand and object get the speed that they start with when it has come: uniform motion changes
+    nothing.
+    """
+    if not trials:
+        return
+    parts = [parted(trial.drive, trial.weighing) for trial in trials]
+    weight, state = bench.settled(replace(parts[0][0], velocity=np.zeros(3)), squeezed)
+    for motion in bench.run([after for _, after in parts], state):
+        yield motions_joined(weight, motion)
 
 
 def _judged(
@@ -192,7 +210,10 @@ def _controls(
     layout, friction = bench.scene.layout, best.grip.friction
     rise_s = min(max(2.0 * paths.RISE_S, FOLLOWED / lowest_frequency), LONGEST_RISE_S)
     share = paths.smooth(paths.samples(rise_s))
-    drive = replace(paths.loaded(share, np.zeros(3)), wrenches=share[:, None] * slipping_load(best))
+    loading = replace(
+        paths.loaded(share, np.zeros(3)), wrenches=share[:, None] * slipping_load(best)
+    )
+    closing = paths.closing()
     all_push = np.ones(len(friction))
     one_idle = all_push.copy()
     one_idle[int(np.argmax(layout.pushes.max(axis=1)))] = 0.0
@@ -201,7 +222,21 @@ def _controls(
         f"squeeze {CONTROL_SQUEEZE:g}": (friction, CONTROL_SQUEEZE * all_push),
         "a finger that does not push": (friction, one_idle),
     }
-    return tuple(_control(bench, name, drive, *weak) for name, weak in weaker.items())
+    whole = joined(closing, loading)
+    drives = [
+        replace(whole, grasping=np.outer(whole.grasping, pushing)) for _, pushing in weaker.values()
+    ]
+    frictions = np.array([own for own, _ in weaker.values()])
+    found = [
+        outcome(motion, layout, drive, own, len(closing) - 1)
+        for motion, drive, own in zip(
+            bench.run(drives, friction=frictions), drives, frictions, strict=True
+        )
+    ]
+    return tuple(
+        ExecutionControl(name, one.slipped, one.first_slip)
+        for name, one in zip(weaker, found, strict=True)
+    )
 
 
 def slipping_load(best: BestSqueeze) -> Array:
@@ -215,14 +250,3 @@ def slipping_load(best: BestSqueeze) -> Array:
     contact = first_best(-scales)
     direction = reactions.worst_of(contact, float(angles[contact]))
     return best.loads.offset + float(scales[contact]) * best.loads.axes @ direction
-
-
-def _control(
-    bench: HeldBench, name: str, drive: Drive, friction: Array, pushing: Array
-) -> ExecutionControl:
-    close = paths.closing()
-    _, state = bench.settled(replace(close, grasping=np.outer(close.grasping, pushing)), friction)
-    weak = replace(drive, grasping=np.outer(np.ones(len(drive)), pushing))
-    (motion,) = bench.run([weak], state, friction)
-    found = outcome(motion, bench.scene.layout, weak, friction)
-    return ExecutionControl(name, found.slipped, found.first_slip)

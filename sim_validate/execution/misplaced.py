@@ -55,17 +55,18 @@ def met(layout: HeldLayout, poses: tuple[Pose, ...], off_m: float, off_rad: floa
     ways = np.einsum("pji,kj->pki", turned, ways)
     radii = layout.tip_radius_m - TOUCH * layout.radius_m
     gone = np.zeros(starts.shape[:2])
-    middles = (starts + room * ways).reshape(-1, 3)
-    near = [_near(layout, middle, room) for middle in middles]
+    middles = starts + room * ways
+    near = [_near(layout, middles[:, finger], room) for finger in range(len(radii))]
     for _ in range(MOST_STEPS):
         centers = starts + gone[..., None] * ways
-        nearest = np.concatenate(
+        nearest = np.stack(
             [
-                nearest_on_surface(layout.vertices, triangles, center[None])
-                for triangles, center in zip(near, centers.reshape(-1, 3), strict=True)
-            ]
+                nearest_on_surface(layout.vertices, triangles, centers[:, finger])
+                for finger, triangles in enumerate(near)
+            ],
+            axis=1,
         )
-        gaps = np.linalg.norm(nearest.reshape(centers.shape) - centers, axis=2) - radii
+        gaps = np.linalg.norm(nearest - centers, axis=2) - radii
         open_ = (gaps > MET * layout.radius_m) & (gone < 2.0 * room)
         if not open_.any():
             break
@@ -74,15 +75,16 @@ def met(layout: HeldLayout, poses: tuple[Pose, ...], off_m: float, off_rad: floa
     return np.einsum("kij,pki->pkj", layout.axes, back)
 
 
-def _near(layout: HeldLayout, middle: Array, room: float) -> Indices:
-    """Return the triangles, (t, 3), that can be the nearest to a point within `room` of another.
+def _near(layout: HeldLayout, middles: Array, room: float) -> Indices:
+    """Return the triangles, (t, 3), that can be the nearest to a point within `room` of others.
 
-    If the surface is at a distance d from the middle, it is at most d + room from such a point, so
+    If the surface is at a distance d from a middle, it is at most d + room from such a point, so
     that a triangle farther than d + 2 room from the middle is not the nearest.
     """
     corners = layout.vertices[layout.triangles]
-    nearest = nearest_on_surface(layout.vertices, layout.triangles, middle[None])[0]
-    reach = float(np.linalg.norm(nearest - middle)) + 2.0 * room + MET * layout.radius_m
+    nearest = nearest_on_surface(layout.vertices, layout.triangles, middles)
+    reach = np.linalg.norm(nearest - middles, axis=1) + 2.0 * room + MET * layout.radius_m
     centers = corners.mean(axis=1)
     extents = np.linalg.norm(corners - centers[:, None], axis=2).max(axis=1)
-    return layout.triangles[np.linalg.norm(centers - middle, axis=1) - extents <= reach]
+    distances = np.linalg.norm(centers - middles[:, None], axis=2) - extents
+    return layout.triangles[(distances <= reach[:, None]).any(axis=0)]

@@ -34,7 +34,7 @@ RISE_S = 0.15
 """Time in which a load grows [s]."""
 SPACING = 0.55
 """Angle between neighbouring turns of gravity's spiral [rad]."""
-TURNING = (1.0, 10.0)
+TURNING = (1.0, 20.0)
 """Least and largest speed of gravity's direction [rad/s]."""
 SLOW = 0.15
 """Speed of gravity's direction, relative to the held object's lowest natural frequency: it lags
@@ -58,6 +58,10 @@ def smoother(count: int) -> Array:
     """Return shares that rise from 0 to 1 without a jump of speed or acceleration, (count,)."""
     u = np.arange(1, count + 1) / count
     return u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
+
+
+WEIGHING = samples(RISE_S)
+"""Samples in which the weight comes, before the load of `shake`, `stop` and `knock`."""
 
 
 def closing(after_s: float = REST_S) -> Drive:
@@ -122,15 +126,14 @@ def shake(gravity: Array, axis: Array, frequency_hz: float) -> Drive:
     rate = 2.0 * math.pi * frequency_hz
     grow, hold = 1.0 / frequency_hz, CYCLES / frequency_hz
     wave = samples(grow + hold)
-    weight = samples(RISE_S)
     times = SAMPLE_S * np.arange(wave + 1)
     size = np.clip(times / grow, 0.0, 1.0)
     size = size * size * (3.0 - 2.0 * size)
     # velocity of a sinusoid about a middle that rests: -cos, whose start is slow as its size is 0
     speeds = -size * np.cos(rate * times) / rate
-    accelerations = np.zeros((weight + wave, 6))
-    accelerations[weight:] = np.diff(speeds)[:, None] / SAMPLE_S * axis
-    share = np.concatenate([smooth(weight), np.ones(wave)])
+    accelerations = np.zeros((WEIGHING + wave, 6))
+    accelerations[WEIGHING:] = np.diff(speeds)[:, None] / SAMPLE_S * axis
+    share = np.concatenate([smooth(WEIGHING), np.ones(wave)])
     return replace(loaded(share, gravity), accelerations=accelerations)
 
 
@@ -143,7 +146,7 @@ def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> Drive
         deceleration: Largest deceleration [m/s^2].
         speed: Speed before [m/s].
     """
-    weight, rest = samples(RISE_S), samples(REST_S)
+    rest = samples(REST_S)
     whole = speed / deceleration / SAMPLE_S  # samples at the full deceleration
     rise = max(1, int(min(STOP_RISE_S / SAMPLE_S, whole) + WHOLE))
     flat = max(0, int(whole - rise + WHOLE))
@@ -151,10 +154,10 @@ def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> Drive
     left = min(max(whole - rise - flat, 0.0), 1.0)
     fall = np.sort(np.append(1.0 - smooth(rise), left))[::-1]
     shape = np.concatenate([smooth(rise), np.ones(flat), fall])
-    accelerations = np.zeros((weight + len(shape) + rest, 6))
+    accelerations = np.zeros((WEIGHING + len(shape) + rest, 6))
     size = speed / (SAMPLE_S * float(shape.sum()))  # the deceleration, but for the shortest stops
-    accelerations[weight : weight + len(shape), :3] = -size * shape[:, None] * way
-    share = np.concatenate([smooth(weight), np.ones(len(shape) + rest)])
+    accelerations[WEIGHING : WEIGHING + len(shape), :3] = -size * shape[:, None] * way
+    share = np.concatenate([smooth(WEIGHING), np.ones(len(shape) + rest)])
     under = loaded(share, gravity)
     return replace(under, accelerations=accelerations, velocity=speed * way)
 
@@ -167,13 +170,13 @@ def knock(gravity: Array, impulse: Array, point: Array) -> Drive:
         impulse: Force over time, (3,) [N s].
         point: Where it strikes, from the centre of mass, (3,) [m].
     """
-    weight, strike, rest = samples(RISE_S), samples(STRIKE_S), samples(REST_S)
-    wrenches = np.zeros((weight + strike + rest, 6))
+    strike, rest = samples(STRIKE_S), samples(REST_S)
+    wrenches = np.zeros((WEIGHING + strike + rest, 6))
     shape = np.sin(np.pi * (np.arange(strike) + 0.5) / strike)
     force = impulse / (SAMPLE_S * shape.sum())
     whole = np.concatenate([force, np.cross(point, force)])
-    wrenches[weight : weight + strike] = shape[:, None] * whole
-    share = np.concatenate([smooth(weight), np.ones(strike + rest)])
+    wrenches[WEIGHING : WEIGHING + strike] = shape[:, None] * whole
+    share = np.concatenate([smooth(WEIGHING), np.ones(strike + rest)])
     return replace(loaded(share, gravity), wrenches=wrenches)
 
 

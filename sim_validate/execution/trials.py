@@ -31,6 +31,8 @@ class Trial:
     """Index of the sample after which the load comes."""
     apart: bool = False
     """Whether the trial starts with open fingers, not from the squeezed object."""
+    weighing: int = 0
+    """Number of samples at the start in which the weight comes, as in other trials of the grasp."""
     expected: Drive | None = None
     """What the prediction is for, if not for the drive itself."""
 
@@ -93,14 +95,15 @@ def _shakes(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
     sizes = np.repeat([size, size / layout.radius_m], len(AXES))
     names = [f"shake {how} {axis}" for how in ("along", "about") for axis in AXES]
     for name, axis in zip(names, np.diag(sizes), strict=True):
-        yield Trial("shake", name, paths.shake(layout.gravity, axis, settings.shake_hz), 0)
+        drive = paths.shake(layout.gravity, axis, settings.shake_hz)
+        yield Trial("shake", name, drive, 0, weighing=paths.WEIGHING)
 
 
 def _stops(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
     for sign, axis in SIDES:
         way = sign * np.eye(3)[axis]
         drive = paths.stop(layout.gravity, way, settings.stop_m_per_s2, settings.stop_from_m_per_s)
-        yield Trial("stop", f"stop {_side(sign, axis)}", drive, 0)
+        yield Trial("stop", f"stop {_side(sign, axis)}", drive, 0, weighing=paths.WEIGHING)
 
 
 def _knocks(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
@@ -110,7 +113,7 @@ def _knocks(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
     for sign, axis in SIDES:
         point = 0.5 * layout.radius_m * np.eye(3)[(axis + 1) % 3]
         drive = paths.knock(layout.gravity, sign * settings.knock_n_s * np.eye(3)[axis], point)
-        yield Trial("knock", f"knock {_side(sign, axis)}", drive, 0)
+        yield Trial("knock", f"knock {_side(sign, axis)}", drive, 0, weighing=paths.WEIGHING)
 
 
 def _misplaced(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:

@@ -28,7 +28,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from scenes.execution.held import HeldLayout
-from scenes.execution.held_mjcf import SAMPLE_S, STEP_RAD
+from scenes.execution.held_mjcf import SAMPLE_S, held_physics
 from sim_validate.execution import paths
 from sim_validate.execution.bench import HeldBench, HeldMotion
 from sim_validate.execution.drives import Drive, idle
@@ -52,8 +52,7 @@ error of a load of slip: a fifth of a percent."""
 OBLIQUE = math.radians(30.0)
 """Angle from z of a weight across contacts whose cones may have edges."""
 RING_DAMPING = 0.01
-"""Damping ratio of the ring, lowered so that it lasts. Steps of h make it slower by (w h)^2 / 3 and
-by this times w h (see `held_physics`): two thirds of a percent at the usual steps at most."""
+"""Damping ratio of the ring, lowered so that it lasts."""
 KNOCKED = 0.05
 """Amplitude of each of the six rings, relative to the springs' displacement by the push (times
 friction where that is below one)."""
@@ -180,15 +179,14 @@ def _jumps(case: HeldCase, motion: HeldMotion, layout: HeldLayout) -> Check:
     right = load * (applied - share * np.array(accelerations))
     carried = -np.einsum("kj,nkj->n", layout.axes[:, 0], motion.forces)
     off = float(np.abs(carried - right).max()) / load
-    alone = math.sqrt(case.stiffness_n_per_m / case.tip_mass_kg)
-    late = 2.0 * (1.0 + 2.0 * zeta) * STEP_RAD * w / alone * share
+    late = (1.0 + 2.0 * zeta) * w * held_physics(layout).timestep * share
     name = "error of contact forces while a load comes and goes suddenly, over the load"
     return Check(name, known(motion, off), 0.0, late)
 
 
 def _period(case: HeldCase) -> int:
-    """Return the samples of one period of the box along an axis."""
-    return paths.samples(2.0 * math.pi / case.frequency)
+    """Return the samples of one period of the box along an axis, two at least."""
+    return max(2, paths.samples(2.0 * math.pi / case.frequency))
 
 
 def _rings(case: HeldCase) -> list[Check]:

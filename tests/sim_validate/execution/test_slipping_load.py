@@ -39,7 +39,7 @@ def test_fingertips_meet_the_same_points_of_triangles_nearby_as_of_all(bracket, 
     body, grasps = bracket
     best = chosen_squeeze(body, grasps[0], FRICTION, SETTINGS)
     layout = held_layout(body, best.grip, SETTINGS.mass_kg)
-    near = misplaced._near(layout, layout.tip_centers[0], 1e-3)
+    near = misplaced._near(layout, layout.tip_centers[:1], 1e-3)
     assert 0 < len(near) < len(layout.triangles)
     poses = misplaced.misplacements(layout, 2e-3, 0.03, 20, seed=1)
     few = misplaced.met(layout, poses, 2e-3, 0.03)

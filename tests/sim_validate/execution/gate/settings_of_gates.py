@@ -21,20 +21,19 @@ def held_case(mass_kg, stiffness_n_per_m, radius_m, **more):
 
 DEFAULTS = {
     "cone": "pyramidal", "impratio": 1.0, "integrator": "Euler", "tolerance": 1e-8,
-    "solref": (0.02, 1.0), "solimp": (0.9, 0.95, 0.001, 0.5, 2.0), "timestep": 0.002,
+    "solref": (0.02, 1.0), "solimp": (0.9, 0.95, 0.001, 0.5, 2.0), "timestep": 0.0025,
 }  # fmt: skip
-"""MuJoCo's own defaults; executions are refused with them."""
+"""MuJoCo's own defaults, with the nearest step that divides a sample; executions are refused."""
 BROKEN = (
     (USUAL, {"timestep": 0.005}),
     (STIFF, {"timestep": 0.005}),
     (STIFF, {"timestep": 0.0025}),
     (STIFF, {"timestep": 0.00125}),
-    (USUAL, {"timestep": 0.0025}),
-    (USUAL, {"timestep": 0.002}),
     (SOFT, {"timestep": 0.005}),
-    (SOFT, {"integrator": "implicitfast"}),
-    (SOFT, {"integrator": "implicit"}),
-    (USUAL, {"integrator": "implicitfast", "timestep": 0.00125}),
+    (USUAL, {"integrator": "implicitfast"}),
+    (USUAL, {"integrator": "implicit"}),
+    (USUAL, {"integrator": "discrete"}),
+    (STIFF, {"integrator": "discrete"}),
     (USUAL, {"cone": "pyramidal"}),
     (USUAL, {"impratio": 0.1}),
     (STIFF, {"impratio": 1.0}),
@@ -50,6 +49,7 @@ BROKEN = (
     (USUAL, {"tolerance": 1e-7}),
     (USUAL, {"solver": "CG"}),
     (STIFF, {"solver": "PGS", "iterations": 10}),
+    (STIFF, {"impratio": 10.0}),
     (USUAL, {"condim": 1}),
     (USUAL, {"margin": 1e-2}),
     (USUAL, {"margin": 1e-3}),
@@ -66,7 +66,6 @@ BROKEN = (
 RIGHT = (
     (USUAL, {}),
     (USUAL, {"timestep": 0.0005}),
-    (USUAL, {"integrator": "Euler"}),
     (USUAL, {"integrator": "RK4"}),
     (USUAL, {"impratio": 1000.0}),
     (USUAL, {"solver": "PGS"}),
