@@ -5,6 +5,9 @@ normal of either, or a cross product of an edge of each (separating axes of conv
 depth is halved until every triangle that comes near is separated.
 """
 
+import importlib
+from typing import Any
+
 import numpy as np
 
 from grasp_core.arrays import Array
@@ -30,6 +33,9 @@ class Surface:
         self.corners, self.slack = corners, TOUCHING * radius
         self.middles = corners.mean(axis=1)
         self.extents = np.linalg.norm(corners - self.middles[:, None], axis=2).max(axis=1)
+        self.widest = float(self.extents.max())
+        spatial: Any = importlib.import_module("scipy.spatial")
+        self.tree = spatial.KDTree(self.middles)
 
     def clear_depth(self, base: Array, inward: Array, depth: float) -> float:
         """Return the largest of depth, depth / 2, depth / 4, ... at which a pyramid is inside.
@@ -41,14 +47,17 @@ class Surface:
         """
         middle = base.mean(axis=0)
         extent = float(np.linalg.norm(base - middle, axis=1).max())
-        near = np.linalg.norm(self.middles - middle, axis=1) <= self.extents + extent + depth
-        triangles = self.corners[near]
+        reach = extent + depth
+        found = np.sort(self.tree.query_ball_point(middle, reach + self.widest)).astype(np.int64)
+        away = np.linalg.norm(self.middles[found] - middle, axis=1)
+        triangles = self.corners[found[away <= self.extents[found] + reach]]
         depths = (triangles - middle) @ inward
         below = (depths.max(axis=1) > self.slack) & (depths.min(axis=1) < depth)
         triangles = triangles[below]
         for _ in range(MOST_HALVINGS):
-            apart = self._separated(base, inward, depth, triangles)
-            triangles = triangles[np.logical_not(apart)]
+            if len(triangles):
+                apart = self._separated(base, inward, depth, triangles)
+                triangles = triangles[np.logical_not(apart)]
             if not len(triangles):
                 break
             depth *= 0.5

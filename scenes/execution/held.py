@@ -32,8 +32,6 @@ DAMPING_RATIO = 0.5
 """Damping ratio of the held object, unless stated: it overshoots once, by a sixth."""
 UPRIGHT = (0.0, 0.0, -1.0)
 """Direction of gravity in the frame of an object that stands upright."""
-REACH = 1.0
-"""How far from the contacts the surface is there to be touched, in object radii."""
 TOUCH = 1e-6
 """Depth of fingertips in their faces at the start, in object radii. Meshes are stored in single
 precision by the simulator, and a fingertip that does not touch yet would arrive with speed."""
@@ -142,8 +140,9 @@ class HeldLayout:
 
 
 def held_layout(
-    body: Polyhedron, grip: Grip, mass_kg: float, settings: HeldSettings | None = None
-) -> HeldLayout:
+    body: Polyhedron, grip: Grip, mass_kg: float, settings: HeldSettings | None = None,
+    reach_m: float | None = None,
+) -> HeldLayout:  # fmt: skip
     """Place an object of a given mass between the springs of a grip.
 
     Args:
@@ -151,13 +150,16 @@ def held_layout(
         grip: Contacts, squeeze and springs (see `gc.grip`), of this object.
         mass_kg: Mass of the object [kg].
         settings: Masses and damping of the fingers, and the direction of gravity.
+        reach_m: Distance from the contacts up to which the surface is there to be touched; None for
+            the object's radius [m].
 
     Raises:
-        InputError: The mass is out of range, or a fingertip has no size.
+        InputError: The mass or the reach is out of range, or a fingertip has no size.
     """
     check_body(body)
     check_grip(grip)
     mass = positive(mass_kg, "mass_kg")
+    reach = body.radius if reach_m is None else positive(reach_m, "reach_m")
     settings = HeldSettings() if settings is None else instance(settings, HeldSettings, "settings")
     if not (grip.tip_radius_m > 0.0).all():
         raise InputError("tip_radius_m must be above zero: points cannot be simulated")
@@ -171,7 +173,7 @@ def held_layout(
         name=body.name,
         vertices=to_digits(body.vertices - body.center_of_mass),
         triangles=body.triangles,
-        solids=touched_solids(body, contacts, REACH * body.radius),
+        solids=touched_solids(body, contacts, reach),
         radius_m=body.radius,
         mass_kg=mass,
         inertia_kg_m2=to_digits(mass / body.volume * body.inertia),

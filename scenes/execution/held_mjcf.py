@@ -108,6 +108,7 @@ def build_held_scene(
     *,
     settings: HeldSettings | None = None,
     physics: PhysicsSettings | None = None,
+    reach_m: float | None = None,
 ) -> HeldScene:
     """Make a MuJoCo scene of an object with its true mass, held by a grip.
 
@@ -117,11 +118,13 @@ def build_held_scene(
         mass_kg: Mass of the object [kg].
         settings: Masses and damping of the fingers, and the direction of gravity.
         physics: Simulation settings; None for those of `held_physics`.
+        reach_m: Distance from the contacts up to which the surface is there to be touched; None for
+            the object's radius. Scans with thousands of triangles are slow where it is large [m].
 
     Raises:
         InputError: A number is out of range.
     """
-    layout = held_layout(body, grip, mass_kg, settings)
+    layout = held_layout(body, grip, mass_kg, settings, reach_m)
     if physics is None:
         physics = held_physics(layout)
     elif not np.array_equal(instance(physics, PhysicsSettings, "physics").gravity, layout.gravity):

@@ -5,6 +5,7 @@ with the largest push allowed. Every trial then runs with it. Before, the simula
 cases whose answers are known (see `gate`).
 """
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -46,6 +47,8 @@ FOLLOWED = 12.0
 """Duration of a rise that the held object follows, in reciprocals of its lowest frequency."""
 LONGEST_RISE_S = 10.0
 """Longest rise that is simulated: objects of tonnes on soft springs would take minutes [s]."""
+SPARE = 0.05
+"""How much farther a curved surface is there than fingertips come, in object radii."""
 
 
 def execute(
@@ -144,8 +147,18 @@ def held_scene(
     body: Polyhedron, grip: Grip, settings: ExecutionSettings,
     physics: PhysicsSettings | None = None,
 ) -> HeldScene:  # fmt: skip
-    """Build the scene in which a grip is executed."""
-    return build_held_scene(body, grip, settings.mass_kg, settings=settings.hand, physics=physics)
+    """Build the scene in which a grip is executed.
+
+    A curved surface is there as far as fingertips come before the object counts as lost.
+    """
+    reach = None
+    if body.patches is not None:
+        turn = settings.most_rad + math.radians(settings.off_deg)
+        moved = settings.most_m + settings.off_mm / 1000.0
+        reach = moved + (turn + SPARE) * body.radius + float(grip.tip_radius_m.max())
+    return build_held_scene(
+        body, grip, settings.mass_kg, settings=settings.hand, physics=physics, reach_m=reach
+    )
 
 
 def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> tuple[HeldMotion, ...]:

@@ -95,6 +95,7 @@ CALLS = [
         "mass_kg": POSITIVE,
         "settings": optional(VALUE),
         "physics": optional(VALUE) | {"other gravity": tilted()},
+        "reach_m": optional(POSITIVE),
     }),
     Call("scenes.write_held_scene", lambda: {"scene": held_scene(), "path": "no/such/a.xml"}, {
         "scene": VALUE, "path": PATH,

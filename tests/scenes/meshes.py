@@ -1,6 +1,8 @@
-"""Meshes to try pictures on."""
+"""Meshes to try pictures and surfaces on."""
 
 import numpy as np
+
+import grasp_core as gc
 
 
 def sphere_mesh(levels):
@@ -19,3 +21,10 @@ def sphere_mesh(levels):
         vertices, index = np.unique(np.round(flat, 12), axis=0, return_inverse=True)
         triangles = index.reshape(-1, 3)
     return vertices, triangles
+
+
+def dented_ball():
+    """A ball of 50 mm with a dent on its top, all of it curved."""
+    points, triangles = sphere_mesh(3)
+    points = 0.05 * points * (1.0 - 0.6 * np.clip(points[:, 2:] - 0.3, 0.0, None))
+    return gc.Polyhedron.from_mesh(points, triangles, name="dented ball", faces="patches")

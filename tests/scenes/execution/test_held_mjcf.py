@@ -170,3 +170,13 @@ def test_a_scene_is_written_as_it_is(tmp_path):
     path = scenes.write_held_scene(scene, tmp_path / "held.xml")
     assert path.read_text() == scene.xml
     assert mujoco.MjModel.from_xml_path(str(path)).nu == 12
+
+
+def test_the_surface_is_there_as_far_as_asked():
+    body, grip, whole, _ = held("mug")
+    near = scenes.build_held_scene(body, grip, MASS, reach_m=0.1 * body.radius)
+    assert 0 < len(near.layout.solids) < len(whole.layout.solids)
+    kept = {corners.tobytes() for corners in whole.layout.solids}
+    assert kept > {corners.tobytes() for corners in near.layout.solids}
+    with pytest.raises(gc.InputError, match="reach_m"):
+        scenes.build_held_scene(body, grip, MASS, reach_m=0.0)

@@ -11,8 +11,9 @@ from scipy.spatial import ConvexHull
 
 import grasp_core as gc
 import scenes
+from scenes.execution.clearance import Surface
 from scenes.execution.surface import touched_solids
-from tests.scenes.meshes import sphere_mesh
+from tests.scenes.meshes import dented_ball
 
 NEAR = 1e-6
 """How far beside the surface points are asked for, in object radii."""
@@ -28,13 +29,6 @@ def thin_bracket():
     walls = np.vstack([np.column_stack([i, j, j + 6]), np.column_stack([i, j + 6, i + 6])])
     triangles = np.vstack([flat[:, ::-1], flat + 6, walls])
     return gc.Polyhedron.from_mesh(np.vstack([low, high]), triangles, name="thin bracket")
-
-
-def dented_ball():
-    """A ball of 50 mm with a dent on its top, all of it curved."""
-    points, triangles = sphere_mesh(3)
-    points = 0.05 * points * (1.0 - 0.6 * np.clip(points[:, 2:] - 0.3, 0.0, None))
-    return gc.Polyhedron.from_mesh(points, triangles, name="dented ball", faces="patches")
 
 
 MADE = {"thin bracket": thin_bracket, "dented ball": dented_ball}
@@ -142,3 +136,10 @@ def test_only_what_is_within_reach_is_there():
     for corners in left:
         points = rng.dirichlet(np.ones(len(corners) - 1), 50) @ corners[:-1]
         assert np.linalg.norm(points - contact, axis=1).min() > reach
+
+
+def test_a_pyramid_below_a_flat_sheet_is_as_deep_as_it_may_be():
+    """Nothing is near it but the triangles of its own plane."""
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    sheet = Surface(square[np.array([[0, 1, 2], [0, 2, 3]])], 1.0)
+    assert sheet.clear_depth(square, np.array([0.0, 0.0, -1.0]), 0.05) == 0.05

@@ -44,7 +44,7 @@ def test_grasps_that_survive_are_shown_and_written(here, capsys):
     shown = capsys.readouterr().out
     for part in (
         "wrote e/executions.json", "controls let go", "2.78", "3 of 3", "6 of 6", "1 of 1",
-        "first slips, predicted/simulated", "2.77/2.77", "no lift for 2 of 2 grasps: a fingertip",
+        "first slips, predicted/simulated", "2.75/2.75", "no lift for 2 of 2 grasps: a fingertip",
         "2 of 2 grasps survived every trial with 0.3 kg; 14 of 14 trials were survived; 6 of 6",
     ):  # fmt: skip
         assert part in shown, shown
@@ -199,7 +199,7 @@ def test_a_file_of_flags_and_a_file_of_physics(here):
     document = json.loads((here / "executions.json").read_text())
     (execution,) = document["executions"]
     assert execution["physics"]["timestep"] == 0.001
-    assert execution["physics"]["impratio"] == 100.0
+    assert execution["physics"]["impratio"] == 300.0
 
 
 REFUSED = {

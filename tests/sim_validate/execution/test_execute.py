@@ -8,8 +8,10 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
+from sim_validate.execution.execute import chosen_squeeze, held_scene
 from sim_validate.execution.settings import KINDS
 from tests.grasp_core.execution.held import box
+from tests.scenes.meshes import dented_ball
 from tests.sim_validate.execution.held_rigs import G, opposed, planned
 
 LIGHT = sv.ExecutionSettings(0.1)
@@ -197,3 +199,26 @@ def test_gravity_points_where_the_settings_say():
 def test_contacts_without_stiffness_are_refused():
     with pytest.raises((gc.InputError, gc.NoForcesError), match=r"stiffness|squeeze"):
         sv.execute(box(), opposed()[:2], 0.5, LIGHT)
+
+
+def test_a_curved_surface_is_there_as_far_as_fingertips_come_and_no_farther():
+    """What lies beyond does not change what becomes of an object that is held."""
+    body = dented_ball()
+    grasp = gc.plan(body, 0.5, limit=1).grasps[0]
+    settings = sv.ExecutionSettings(mass_kg=0.1, trials=("weight", "misplaced"), off_mm=1.0)
+    best = chosen_squeeze(body, grasp, 0.5, settings)
+    near = held_scene(body, best.grip, settings).layout
+    all_of_it = replace(settings, most_deg=80.0)
+    whole = held_scene(body, best.grip, all_of_it).layout
+    assert 0 < len(near.solids) < 0.8 * len(whole.solids)
+    away = settings.most_m + (settings.most_rad + 0.01) * body.radius
+    kept = {corners.tobytes() for corners in near.solids}
+    for corners in whole.solids:
+        if corners.tobytes() not in kept:
+            gaps = np.linalg.norm(corners[:, None] - near.contacts, axis=2)
+            assert gaps.min() > away
+    one, other = (sv.execute(body, grasp, 0.5, given) for given in (settings, all_of_it))
+    assert one.survived
+    assert other.survived
+    for trial, same in zip(one.trials, other.trials, strict=True):
+        assert trial.simulated_first_slip == pytest.approx(same.simulated_first_slip, rel=1e-3)
