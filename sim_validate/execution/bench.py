@@ -8,6 +8,7 @@ the fingers would not carry what they hold along.
 # pyright: basic, reportAttributeAccessIssue=false
 # MuJoCo ships no types for its core; plain arrays and numbers leave this module.
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -64,18 +65,23 @@ def motions_joined(first: HeldMotion, second: HeldMotion) -> HeldMotion:
 class HeldBench:
     """A compiled scene of execution on which many trials run at once."""
 
-    def __init__(self, scene: HeldScene, *, threads: int = 1, sample_s: float = SAMPLE_S) -> None:
+    def __init__(
+        self, scene: HeldScene, *, threads: int = 1, sample_s: float = SAMPLE_S,
+        lost_m: float = math.inf,
+    ) -> None:  # fmt: skip
         """Compile a scene.
 
         Args:
             scene: What to simulate.
             threads: Number of the simulator's threads; results do not depend on it.
             sample_s: Duration of a sample, rounded to whole steps [s].
+            lost_m: Distance of the object from its place in the hand at which it is lost and its
+                trial ends: it stays there, and nothing touches it [m].
 
         Raises:
             InputError: The simulator refuses the scene, or a sample is not a number of its steps.
         """
-        self.scene, self.threads = scene, threads
+        self.scene, self.threads, self.lost_m = scene, threads, lost_m
         self.model = compiled(scene.xml)
         step_s = float(self.model.opt.timestep)
         self.chunk = max(1, round(sample_s / step_s))
@@ -183,15 +189,23 @@ class HeldBench:
         servos, pushed = trials.bind("ctrl"), trials.bind("qfrc_constraint")
         joints = trials.bind("qpos")
         errors: dict[int, str] = {}
+        lost = np.zeros(len(drives), dtype=bool)
         with unlogged():
             for sample in range(len(loads)):
-                going = np.flatnonzero(lengths > sample)
+                going = np.flatnonzero((lengths > sample) & ~lost)
+                if not len(going):
+                    break
                 applied[:, self.body] = loads[sample]
                 palm[:, FREE:PALM] = motors[sample]
                 servos[:] = commands[sample]
                 step(trials, errors, self.chunk, going)
                 moved[going, sample] = joints[going]
                 forces[going, sample] = pushed[going]
+                away = np.linalg.norm(joints[going, :3] - joints[going, 7:10], axis=1)
+                for trial in going[away > self.lost_m]:
+                    lost[trial] = True
+                    moved[trial, sample:] = joints[trial]
+                    forces[trial, sample:] = 0.0
         return errors
 
     def _applied(self, drives: Sequence[Drive], most: int) -> tuple[Array, Array, Array]:

@@ -47,6 +47,8 @@ FOLLOWED = 12.0
 """Duration of a rise that the held object follows, in reciprocals of its lowest frequency."""
 LONGEST_RISE_S = 10.0
 """Longest rise that is simulated: objects of tonnes on soft springs would take minutes [s]."""
+LOST = 3.0
+"""How far an object is from its place when its trial ends, in its radii: no finger reaches it."""
 SPARE = 0.05
 """How much farther a curved surface is there than fingertips come, in object radii."""
 
@@ -81,7 +83,8 @@ def execute(
     best = chosen_squeeze(body, grasp, friction, settings)
     scene = held_scene(body, best.grip, settings, physics)
     require_faithful_execution(scene.layout, scene.physics, settings.hand, settings.push_n)
-    bench = HeldBench(scene, threads=threads)
+    lost_m = max(LOST * body.radius, 2.0 * settings.most_m)
+    bench = HeldBench(scene, threads=threads, lost_m=lost_m)
     dynamics = held_dynamics(best.grip, scene.layout)
     trials, skipped = trials_of(body, scene.layout, settings, dynamics.lowest_frequency)
     predicted = predicted_slips(dynamics, [trial.expected or trial.drive for trial in trials])

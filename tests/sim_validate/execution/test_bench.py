@@ -226,3 +226,22 @@ def test_a_sample_must_be_a_number_of_steps():
     scene = scenes.build_held_scene(box(), box_grip(), MASS, physics=physics)
     with pytest.raises(gc.InputError, match=r"timestep must divide .* 0\.00125"):
         HeldBench(scene)
+
+
+def test_a_trial_ends_where_the_object_is_lost():
+    """It falls from open fingers; another trial goes on."""
+    falling = replace(paths.held_weight(DOWN), grasping=np.zeros(60))
+    held = paths.closing(0.2)
+    scene = box_scene()
+    whole = HeldBench(scene).run([falling, held])
+    lost_m = 0.5 * float(np.abs(whole[0].moved[-1]).max())
+    assert lost_m > 0.01
+    ended = HeldBench(scene, lost_m=lost_m).run([falling, held])
+    away = np.linalg.norm(whole[0].moved, axis=1)
+    last = int(np.argmax(away > lost_m))
+    np.testing.assert_array_equal(ended[0].moved[: last + 1], whole[0].moved[: last + 1])
+    assert (ended[0].moved[last:] == whole[0].moved[last]).all()
+    assert not ended[0].forces[last:].any()
+    np.testing.assert_array_equal(ended[1].forces, whole[1].forces)
+    (alone,) = HeldBench(scene, lost_m=lost_m).run([falling])
+    np.testing.assert_array_equal(alone.joints, ended[0].joints)
