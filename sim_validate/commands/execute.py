@@ -152,7 +152,7 @@ def _row(each: ExecutedGrasp) -> tuple[str, ...]:
     let_go = sum(control.let_go for control in found.controls)
     return (
         each.id, each.family, f"{found.load_multiple:.3g}", "yes" if found.survived else "no",
-        f"{1e3 * moved:.2g}", f"{let_go} of {len(found.controls)}",
+        f"{1e3 * moved:.3g}", f"{let_go} of {len(found.controls)}",
     )  # fmt: skip
 
 
