@@ -45,6 +45,8 @@ def test_grasps_that_survive_are_shown_and_written(here, capsys):
     for part in (
         "wrote e/executions.json", "controls let go", "2.78", "3 of 3", "6 of 6", "1 of 1",
         "first slips, predicted/simulated", "2.75/2.75", "no lift for 2 of 2 grasps: a fingertip",
+        "load: multiple of the weight, in any direction, that the squeeze is certified for\n",
+        "at which a contact slips; above one none does\n",
         "2 of 2 grasps survived every trial with 0.3 kg; 14 of 14 trials were survived; 6 of 6",
     ):  # fmt: skip
         assert part in shown, shown
