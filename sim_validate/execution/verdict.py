@@ -69,6 +69,7 @@ class Execution:
     trials: tuple[ExecutionTrial, ...]
     controls: tuple[ExecutionControl, ...]
     skipped: tuple[Skipped, ...]
+    """Kinds of trials that were asked for and left out, with the reasons."""
     physics: PhysicsSettings | None = None
     """Settings of the simulator, where they are known."""
 

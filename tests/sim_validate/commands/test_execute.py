@@ -110,6 +110,18 @@ def test_where_no_trial_is_possible_nothing_was_survived(capsys):
 
 
 @pytest.mark.usefixtures("here")
+def test_trials_of_no_size_are_told_and_written_as_left_out(capsys):
+    words = ["execute", "grasps.json", "--mass-kg", "0.3", "--trials", "weight,shake,knock"]
+    assert main([*words, "--shake-g", "0", "--knock-n-s", "0", "--out", "."]) == Exit.GOOD
+    said = capsys.readouterr().out
+    for kind, flag in (("shake", "shake_g, --shake-g"), ("knock", "knock_n_s, --knock-n-s")):
+        assert f"no {kind} for 2 of 2 grasps: its size is 0 ({flag})\n" in said
+    for grasp in sv.read_executions("executions.json").grasps:
+        assert [each.kind for each in grasp.execution.skipped] == ["shake", "knock"]
+        assert [each.kind for each in grasp.execution.trials] == ["weight"]
+
+
+@pytest.mark.usefixtures("here")
 def test_a_control_that_holds_is_a_fault_of_the_simulator(capsys, monkeypatch):
     def kept(*given, **more):
         found = execute(*given, **more)
