@@ -46,6 +46,12 @@ AT_REST = 1e-5
 """Share of the friction that the search leaves unused at rest, where rows are met to less."""
 SAFE = (1e-9, 1e-8, 1e-7, 1e-6)
 """Shares of the scale that are given away, tried in turn, so that rounding spoils no proof."""
+SMALLER_PUSH = (
+    "a smaller limit of pushes, with which it may be stable (max_push_n; of executions push_n, or "
+    "--push-n)"
+)
+SMALLER_LOADS = "smaller loads, whose smaller pushes may leave it stable"
+"""Advice where the best squeeze is unstable; commands and executions call the limit otherwise."""
 
 
 def best_squeeze(  # noqa: PLR0913 - each is a quantity of its own
@@ -109,7 +115,7 @@ def searched(start: Grip, loads: LoadSet, most: float | None) -> BestSqueeze:
         raise NoForcesError(
             "the grip is unstable under the best squeeze, whatever its force closure: its least "
             f"stiffness is {best.grip.least_stiffness:.3g} N/m; use stiffer or larger fingertips, "
-            "or a smaller max_push_n"
+            f"or {SMALLER_LOADS if most is None else SMALLER_PUSH}"
         )
     return _certified(best, loads)
 

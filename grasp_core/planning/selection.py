@@ -7,15 +7,17 @@ import numpy as np
 
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.errors import NoForcesError
-from grasp_core.execution.best_squeeze import GAP, searched
+from grasp_core.execution.best_squeeze import GAP, best_squeeze, searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, Grip
 from grasp_core.execution.loads import any_direction
 from grasp_core.execution.springs import springs
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.certify import Certified
-from grasp_core.planning.request import FAMILIES, PlanRequest
+from grasp_core.planning.reach import Finger
+from grasp_core.planning.request import FAMILIES, PlanRequest, RankBy
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.solvers.ties import SAME_SHARE, first_best, ranks
+from grasp_core.values import Grasp
 
 PUSH_N = 10.0
 """Largest push of a finger under which payloads and first slips are compared [N]."""
@@ -57,8 +59,41 @@ def _measure(body: Polyhedron, request: PlanRequest) -> tuple[Callable[[Certifie
     if request.rank_by == "ferrari-canny":
         return _weakness(request.friction), SAME_SHARE
     # the best squeeze is searched to a gap, so equal grasps may come out as far apart
-    mass = 1.0 if request.rank_by == "payload" else DENSITY_KG_PER_M3 * body.volume
-    return _looseness(body, request, mass), 2.0 * GAP
+    return _looseness(body, request, _mass(body, request.rank_by)), 2.0 * GAP
+
+
+def _mass(body: Polyhedron, rank_by: RankBy) -> float:
+    """Return the mass whose weight grows until a contact slips [kg]."""
+    return 1.0 if rank_by == "payload" else DENSITY_KG_PER_M3 * body.volume
+
+
+def _tip_radius(body: Polyhedron, finger: Finger | None) -> float:
+    """Return the radius of the fingertips [m]."""
+    return TIP_RADIUS * body.radius if finger is None else finger.radius_m
+
+
+def carried(
+    body: Polyhedron, grasp: Grasp, friction: float, rank_by: RankBy, finger: Finger | None = None
+) -> float:
+    """Return what a planned grasp carries under one squeeze, as grasps are ranked by it.
+
+    Args:
+        body: The object.
+        grasp: A grasp of it.
+        friction: Coulomb coefficient.
+        rank_by: `payload` for a mass [kg], `first-slip` for a multiple of the object's weight.
+        finger: The finger that was planned for, if any.
+
+    Returns:
+        The mass or the multiple; 0 if no squeeze holds the object stably.
+    """
+    loads = any_direction(_mass(body, rank_by))
+    tip = _tip_radius(body, finger)
+    try:
+        found = best_squeeze(body, grasp, friction, loads, max_push_n=PUSH_N, tip_radius_m=tip)
+    except NoForcesError:
+        return 0.0
+    return found.scale
 
 
 def _largest_first(found: Iterable[Certified]) -> list[Certified]:
@@ -100,8 +135,7 @@ def _looseness(
     The weight is that of the mass, in any direction, and the multiple is certified in the linear
     model. A grasp that no squeeze holds stably has the largest value, zero.
     """
-    loads, finger = any_direction(mass_kg), request.finger
-    tip = TIP_RADIUS * body.radius if finger is None else finger.radius_m
+    loads, tip = any_direction(mass_kg), _tip_radius(body, request.finger)
 
     def measure(found: Certified) -> float:
         count = len(found.normals)

@@ -105,6 +105,10 @@ class HeldLayout:
         height = self.tip_radius_m - TOUCH * self.radius_m
         return self.contacts - height[:, None] * self.frames[:, :, 0]
 
+    def stiffness_along(self, way: Array) -> float:
+        """Return the stiffness of all springs against a motion along a unit vector [N/m]."""
+        return float(((way @ self.axes) ** 2 * self.stiffness).sum())
+
     @property
     def fastest_ring(self) -> float:
         """Return a bound on the natural frequencies of the held object [rad/s].

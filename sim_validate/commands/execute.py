@@ -30,6 +30,11 @@ from sim_validate.records.grasps import grasp_with_id
 from sim_validate.records.setup_toml import physics_from_file
 
 ABSENT = "-"
+LOAD_MEANS = "load: multiple of the weight, in any direction, that the squeeze is certified for"
+SLIPS = "first slips, predicted/simulated"
+SLIPS_MEAN = (
+    "first slip: least multiple of the trials' loads at which a contact slips; above one none does"
+)
 
 
 def execute_file(command: execution_flags.Execute, reporter: Reporter) -> int:
@@ -108,11 +113,11 @@ def _show(found: Sequence[ExecutedGrasp], settings: ExecutionSettings, reporter:
     kinds, shown = settings.trials, found[:TABLE_ROWS]
     columns = ("grasp", "family", "load", "survived", "mm moved", "controls let go")
     reporter.table("executions", columns, [_row(each) for each in shown])
-    for title, cell in (
-        ("trials survived", _survived), ("first slips, predicted/simulated", _slips)
-    ):  # fmt: skip
+    reporter.say(LOAD_MEANS)
+    for title, cell in (("trials survived", _survived), (SLIPS, _slips)):
         rows = [(each.id, *(cell(each.execution, kind) for kind in kinds)) for each in shown]
         reporter.table(title, ("grasp", *kinds), rows)
+    reporter.say(SLIPS_MEAN)
     say_cut(len(found), reporter)
     _say_totals(found, settings, reporter)
     lines = list(_losses(found))
@@ -125,11 +130,7 @@ def _show(found: Sequence[ExecutedGrasp], settings: ExecutionSettings, reporter:
 def _say_totals(
     found: Sequence[ExecutedGrasp], settings: ExecutionSettings, reporter: Reporter
 ) -> None:
-    """Say what the columns mean, which trials were left out, and how many were survived."""
-    reporter.say(
-        "load: multiple of the weight, in any direction, that the squeeze is certified for; first "
-        "slips: least multiple of the trials' loads at which a contact slips"
-    )
+    """Say which trials were left out, and how many were survived."""
     left_out = Counter(
         (each.kind, each.reason) for one in found if one.execution for each in one.execution.skipped
     )
@@ -152,7 +153,7 @@ def _row(each: ExecutedGrasp) -> tuple[str, ...]:
     let_go = sum(control.let_go for control in found.controls)
     return (
         each.id, each.family, f"{found.load_multiple:.3g}", "yes" if found.survived else "no",
-        f"{1e3 * moved:.2g}", f"{let_go} of {len(found.controls)}",
+        f"{1e3 * moved:.3g}", f"{let_go} of {len(found.controls)}",
     )  # fmt: skip
 
 

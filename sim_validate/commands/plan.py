@@ -11,8 +11,9 @@ import numpy as np
 
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planner import plan
-from grasp_core.planning.request import methods_for
+from grasp_core.planning.request import RankBy, methods_for
 from grasp_core.planning.result import Plan
+from grasp_core.planning.selection import carried
 from grasp_core.records.grasps_json import Moved, plan_to_json
 from grasp_core.values import FaceQuadruple, Grasp
 from sim_validate.cli import command_flags, flag_groups
@@ -25,6 +26,9 @@ from sim_validate.files.stale_results import remove_results
 from sim_validate.parallel.certifying import Asked, Found, certified, wider
 from sim_validate.parallel.improving import improved
 from sim_validate.records.regions import write_regions
+
+CARRIED = {"payload": "payload kg", "first-slip": "first slip"}
+"""Column of what grasps carry, by the rank that orders them."""
 
 
 def plan_object(
@@ -105,18 +109,37 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
     if found.absence:
         reporter.say(found.absence)
         return Exit.NONE
-    rows = [
-        (g.id, g.family, f"{1e3 * g.radius:.3g}" if g.radius else "-", f"{g.critical_friction:.4f}",
-         f"{math.degrees(g.span_angle):.2f}", f"{g.closure_margin:.4f}",
-         f"{g.ferrari_canny[0]:.4f}")
-        for g in found.grasps[:TABLE_ROWS]
-    ]  # fmt: skip
-    columns = ("grasp", "family", "radius mm", "mu*", "theta* deg", "margin", "quality N")
+    columns, rows = _table(body, found, command.planning.rank_by)
     reporter.table(f"{len(found.grasps)} grasps of {body.name}", columns, rows)
     say_cut(len(found.grasps), reporter)
     if moves:
         show_gains(moves, reporter)
     return Exit.GOOD
+
+
+def _table(
+    body: Polyhedron, found: Plan, rank_by: RankBy
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return the columns and rows that show the best grasps.
+
+    What grasps carry is not kept with them. Where they are ordered by it, it is computed again, and
+    stands in the place of the margin, for which there would be no room.
+    """
+    shown = found.grasps[:TABLE_ROWS]
+    friction, finger = found.friction, found.finger
+    heading = CARRIED.get(rank_by, "margin")
+    columns = ("grasp", "family", "radius mm", "mu*", "theta* deg", heading, "quality N")
+    figures = [
+        f"{carried(body, g, friction, rank_by, finger):.4g}" if rank_by in CARRIED
+        else f"{g.closure_margin:.4f}"
+        for g in shown
+    ]  # fmt: skip
+    rows = [
+        (g.id, g.family, f"{1e3 * g.radius:.3g}" if g.radius else "-", f"{g.critical_friction:.4f}",
+         f"{math.degrees(g.span_angle):.2f}", figure, f"{g.ferrari_canny[0]:.4f}")
+        for g, figure in zip(shown, figures, strict=True)
+    ]  # fmt: skip
+    return columns, rows
 
 
 def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:

@@ -45,6 +45,8 @@ STRIKE_S = 0.02
 """Duration of a knock [s]."""
 WHOLE = 1e-9
 """Difference from a whole number that is rounding."""
+TINY_M = 1e-12
+"""Rise by which fingers that do not give have taken the weight [m]."""
 STOP_RISE_S = 0.02
 """Time in which the deceleration of a stop grows and goes [s]."""
 
@@ -180,13 +182,15 @@ def knock(gravity: Array, impulse: Array, point: Array) -> Drive:
     return replace(loaded(share, gravity), wrenches=wrenches)
 
 
-def lift(up: Array, height: float, duration_s: float) -> tuple[Drive, int]:
+def lift(up: Array, height: float, duration_s: float, give_m: float = 0.0) -> tuple[Drive, int]:
     """Return the drive of a lift from a table, and the sample at which it begins.
 
     Args:
         up: Unit vector against gravity, (3,).
         height: Height of the lift [m].
         duration_s: Its duration [s].
+        give_m: Rise of the palm by which the fingers take the weight from the table: as far as the
+            weight bends their springs.
     """
     laid = samples(LAY_S)
     before, count, rest = laid + samples(CLOSE_S + REST_S), samples(duration_s), samples(REST_S)
@@ -197,9 +201,10 @@ def lift(up: Array, height: float, duration_s: float) -> tuple[Drive, int]:
     total = len(accelerations)
     close = smooth(samples(CLOSE_S))
     grasping = np.concatenate([np.zeros(laid), close, np.ones(total - laid - len(close))])
-    share = np.zeros(total)
-    share[before : before + samples(RISE_S)] = smooth(samples(RISE_S))
-    share[before + samples(RISE_S) :] = 1.0
+    risen = height * u[1:] ** 3 * (10.0 - 15.0 * u[1:] + 6.0 * u[1:] ** 2)
+    share = np.ones(total)
+    share[:before] = 0.0
+    share[before : before + count] = np.minimum(risen / max(min(give_m, height), TINY_M), 1.0)
     still = idle(total)
     weight = np.concatenate([smooth(laid), np.ones(total - laid)])
     gravity = -GRAVITY_M_PER_S2 * weight[:, None] * up

@@ -29,7 +29,7 @@ class ExecutionSettings:
     """
 
     mass_kg: float
-    """Mass of the object [kg]."""
+    """Mass of the object [kg]; `body.mass_at(density_kg_m3)` gives it from a density."""
     push_n: float = 10.0
     """Largest normal force of a finger, at rest and under the loads that are planned for [N]."""
     stiffness_n_per_m: float = STIFFNESS_N_PER_M

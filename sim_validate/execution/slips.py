@@ -12,11 +12,17 @@ s (a, b) as long as motions are small. The least s that brings a contact to its 
 share of the load that is applied, is the multiple of the load at which the first contact slips. It
 is taken in the sample before the first contact is on its cone. If none ever is, the least of all
 samples under the full load says how far away slip stayed.
+
+An object that leaves a table rocks on its last edge and rings, so that a contact may touch its cone
+for some milliseconds, slide by micrometres, and hold. Such a touch is no slip: a row of samples on
+the cone counts only if the contact slides by more than `TOUCHED` in it, or if the row reaches the
+full load.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.execution.first_slip import slip_steps
@@ -30,6 +36,9 @@ cone: the simulator's contacts approach it within as much."""
 SLID = 2e-3
 """Distance that counts as slipped, in object radii: between two samples a contact may slip and
 hold again, and rolling over large turns is known to about a tenth of it."""
+TOUCHED = 1e-4
+"""Distance that a contact on its cone may slide while an object leaves a table and still count as
+held, in object radii: contacts that stick creep by a twentieth of it in a lift."""
 IDLE = 1e-3
 """Normal force at rest, relative to the largest, below which a fingertip does not push."""
 FULL = 0.999
@@ -98,7 +107,8 @@ def outcome(
     cosines = 0.5 * (np.einsum("nii->n", relative) - 1.0)
     touching = found.forces[-1, :, 0] > 0.0
     slid = float(slides(found, layout, begun).max(initial=0.0))
-    multiple = _first_slip(found, drive.shares, friction, begun)
+    leaving = None if drive.table is None else _slid(found, layout, begun) / layout.radius_m
+    multiple = _first_slip(found, drive.shares, friction, begun, leaving)
     slipped = multiple <= 1.0 or slid > SLID * layout.radius_m
     return Outcome(
         slip_m=slid,
@@ -114,6 +124,11 @@ def outcome(
 
 def slides(found: Seen, layout: HeldLayout, begun: int = 0) -> Array:
     """Return how far each point of contact has slid by (1) since a sample, (n, k) [m]."""
+    return np.linalg.norm(_slid(found, layout, begun), axis=2)
+
+
+def _slid(found: Seen, layout: HeldLayout, begun: int) -> Array:
+    """Return the displacement of each point of contact by (1) since a sample, (n, k, 3) [m]."""
     normals = layout.frames[:, :, 0]
     steps = np.diff(found.tips[begun:], axis=0)
     turned = found.turned[begun:]
@@ -125,19 +140,33 @@ def slides(found: Seen, layout: HeldLayout, begun: int = 0) -> Array:
     rolled = layout.tip_radius_m[:, None] * np.cross(turns[:, None], normals)
     slid = steps - rolled
     slid -= np.einsum("nki,ki->nk", slid, normals)[..., None] * normals
-    total = np.concatenate([np.zeros((1, *slid.shape[1:])), np.cumsum(slid, axis=0)])
-    return np.linalg.norm(total, axis=2)
+    return np.concatenate([np.zeros((1, *slid.shape[1:])), np.cumsum(slid, axis=0)])
 
 
-def _first_slip(found: Seen, shares: Array, friction: Array, begun: int) -> float:
+def _first_slip(
+    found: Seen, shares: Array, friction: Array, begun: int, leaving: Array | None = None
+) -> float:
+    """Return the multiple of the load at first slip.
+
+    Args:
+        found: The motion.
+        shares: Share of the load in each sample, (n,).
+        friction: Coulomb coefficient of each contact, (k,).
+        begun: Index of the sample in which the object is at rest.
+        leaving: Displacements of the points of contact since then, in object radii, where the
+            object leaves a table, (n - begun, k, 3); None for other trials.
+    """
     rest_n = found.forces[begun, :, 0]
     pushing = rest_n > IDLE * rest_n.max()  # a fingertip that pushes at nothing cannot slip
     if not pushing.any():
         return 0.0
     found, friction = replace(found, forces=found.forces[:, pushing]), friction[pushing]
     n, across = found.forces[..., 0], np.linalg.norm(found.forces[..., 1:], axis=2)
-    slipping = (across >= ON_CONE * friction * n).any(axis=1)
-    slipping[: begun + 1] = False
+    on_cone = across >= ON_CONE * friction * n
+    on_cone[: begun + 1] = False
+    if leaving is not None:
+        on_cone[begun:] &= ~_touches(on_cone[begun:], shares[begun:], leaving[:, pushing])
+    slipping = on_cone.any(axis=1)
     if not slipping.any():
         loaded = np.flatnonzero(shares >= FULL)
         return float(_extrapolated(found, shares, friction, begun, loaded).min(initial=np.inf))
@@ -145,6 +174,19 @@ def _first_slip(found: Seen, shares: Array, friction: Array, begun: int) -> floa
     before, after = sorted((float(shares[at - 1]), float(shares[at])))
     (multiple,) = _extrapolated(found, shares, friction, begun, np.array([at - 1]))
     return min(max(float(multiple), before), after)
+
+
+def _touches(on_cone: NDArray[np.bool_], shares: Array, slid: Array) -> NDArray[np.bool_]:
+    """Return which samples on the cone only touch it before the full load comes, (n, k)."""
+    found = np.zeros_like(on_cone)
+    last = len(on_cone) - 1
+    for contact, own in enumerate(on_cone.T):
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], own, [0]])))
+        for first, end in edges.reshape(-1, 2):
+            by = slid[min(end, last), contact] - slid[first - 1, contact]
+            little = np.linalg.norm(by) <= TOUCHED
+            found[first:end, contact] = little and shares[end - 1] < FULL
+    return found
 
 
 def _extrapolated(found: Seen, shares: Array, friction: Array, begun: int, at: Indices) -> Array:

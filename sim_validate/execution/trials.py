@@ -1,7 +1,7 @@
 """Which trials an execution consists of, and what each applies."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,8 @@ from sim_validate.execution.settings import ExecutionSettings, TrialKind
 AXES = ("x", "y", "z")
 SIDES = tuple((sign, axis) for axis in range(3) for sign in (1.0, -1.0))
 """Sign and axis of the six directions of stops and knocks."""
+OF_NO_SIZE: dict[TrialKind, str] = {"shake": "shake_g", "knock": "knock_n_s"}
+"""Setting whose zero leaves no trial of a kind."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +41,7 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class Skipped:
-    """A trial that this grasp cannot go through, and why."""
+    """A kind of trial that was asked for and left out, and why."""
 
     kind: TrialKind
     reason: str
@@ -48,7 +50,7 @@ class Skipped:
 def trials_of(
     body: Polyhedron, layout: HeldLayout, settings: ExecutionSettings, lowest_frequency: float
 ) -> tuple[tuple[Trial, ...], tuple[Skipped, ...]]:
-    """Return the trials that are asked for, and those that are not possible.
+    """Return the trials that are asked for, and the kinds that are left out with the reasons.
 
     Args:
         body: The object.
@@ -56,25 +58,35 @@ def trials_of(
         settings: Which trials, and how large.
         lowest_frequency: Lowest natural frequency of the held object [rad/s].
     """
-    found, skipped = list[Trial](), list[Skipped]()
-    for kind in settings.trials:
-        if kind == "weight":
-            found.append(Trial(kind, kind, paths.turned_weight(lowest_frequency), 0))
-        elif kind == "lift":
-            lifted = _lift(body, layout, settings)
-            if isinstance(lifted, Skipped):
-                skipped.append(lifted)
-            else:
-                found.append(lifted)
-        elif kind == "shake":
-            found += _shakes(layout, settings)
-        elif kind == "stop":
-            found += _stops(layout, settings)
-        elif kind == "knock":
-            found += _knocks(layout, settings)
-        else:
-            found += _misplaced(layout, settings)
-    return tuple(found), tuple(skipped)
+    every = [
+        each
+        for kind in settings.trials
+        for each in _of_kind(kind, body, layout, settings, lowest_frequency)
+    ]
+    return (
+        tuple(each for each in every if isinstance(each, Trial)),
+        tuple(each for each in every if isinstance(each, Skipped)),
+    )
+
+
+def _of_kind(
+    kind: TrialKind, body: Polyhedron, layout: HeldLayout, settings: ExecutionSettings,
+    lowest_frequency: float,
+) -> Iterable[Trial | Skipped]:  # fmt: skip
+    """Return the trials of a kind, or why there is none."""
+    if kind in OF_NO_SIZE and getattr(settings, OF_NO_SIZE[kind]) == 0.0:
+        return [Skipped(kind, _no_size(OF_NO_SIZE[kind]))]
+    if kind == "weight":
+        return [Trial(kind, kind, paths.turned_weight(lowest_frequency), 0)]
+    if kind == "lift":
+        return [_lift(body, layout, settings)]
+    sized = {"shake": _shakes, "stop": _stops, "knock": _knocks, "misplaced": _misplaced}
+    return sized[kind](layout, settings)
+
+
+def _no_size(setting: str) -> str:
+    """Say that a setting is zero, under its name in Python and as a flag."""
+    return f"its size is 0 ({setting}, --{setting.replace('_', '-')})"
 
 
 def _lift(body: Polyhedron, layout: HeldLayout, settings: ExecutionSettings) -> Trial | Skipped:
@@ -83,15 +95,14 @@ def _lift(body: Polyhedron, layout: HeldLayout, settings: ExecutionSettings) -> 
         return Skipped(
             "lift", "a fingertip is in the way of the table on every face that the object rests on"
         )
-    drive, begun = paths.lift(-rest.down, settings.lift_m, settings.lift_s)
+    give_m = layout.mass_kg * GRAVITY_M_PER_S2 / layout.stiffness_along(rest.down)
+    drive, begun = paths.lift(-rest.down, settings.lift_m, settings.lift_s, give_m)
     table = Table(rest.height * rest.down, -rest.down)
     return Trial("lift", "lift", replace(drive, table=table), begun - 1, apart=True)
 
 
 def _shakes(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
     size = GRAVITY_M_PER_S2 * settings.shake_g
-    if size == 0.0:
-        return
     sizes = np.repeat([size, size / layout.radius_m], len(AXES))
     names = [f"shake {how} {axis}" for how in ("along", "about") for axis in AXES]
     for name, axis in zip(names, np.diag(sizes), strict=True):
@@ -108,8 +119,6 @@ def _stops(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
 
 def _knocks(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
     """Yield knocks along both sides of each axis, half the object's radius beside its middle."""
-    if settings.knock_n_s == 0.0:
-        return
     for sign, axis in SIDES:
         point = 0.5 * layout.radius_m * np.eye(3)[(axis + 1) % 3]
         drive = paths.knock(layout.gravity, sign * settings.knock_n_s * np.eye(3)[axis], point)

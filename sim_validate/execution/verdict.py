@@ -1,5 +1,6 @@
 """What an execution found: each trial with its outcome and prediction, and whether all survived."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -68,6 +69,7 @@ class Execution:
     trials: tuple[ExecutionTrial, ...]
     controls: tuple[ExecutionControl, ...]
     skipped: tuple[Skipped, ...]
+    """Kinds of trials that were asked for and left out, with the reasons."""
     physics: PhysicsSettings | None = None
     """Settings of the simulator, where they are known."""
 
@@ -94,9 +96,10 @@ class Execution:
 def trial_in_words(trial: ExecutionTrial) -> str:
     """Say how a trial of an execution ended, and what was predicted."""
     return (
-        f"{trial.name}: {trial.fate}, moved {1e3 * trial.displacement_m:.2g} mm and turned "
-        f"{trial.turn_rad:.2g} rad; first slip predicted at {trial.predicted_first_slip:.3g} of "
-        f"the load, simulated at {trial.simulated_first_slip:.3g}"
+        f"{trial.name}: {trial.fate}, moved {1e3 * trial.displacement_m:.3g} mm and turned "
+        f"{math.degrees(trial.turn_rad):.3g} degrees; first slip predicted at "
+        f"{trial.predicted_first_slip:.3g} of the load, simulated at "
+        f"{trial.simulated_first_slip:.3g}"
     )
 
 

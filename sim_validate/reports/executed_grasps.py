@@ -3,6 +3,7 @@
 import math
 import shlex
 from collections.abc import Iterable
+from dataclasses import asdict
 from operator import attrgetter
 from typing import cast
 
@@ -12,7 +13,7 @@ from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import Execution, ExecutionTrial
 from sim_validate.records.executions_json import Executions, executions_summary
-from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record
+from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record, said_of
 from sim_validate.reports.pages import NOTHING, number
 
 MILLI = 1e3
@@ -28,6 +29,8 @@ FLAGS = {
 """Flag of `graspproof execute` for each setting."""
 ALWAYS = ("mass_kg", "seed")
 """Settings whose usual value depends on the object or on the plan."""
+FAILED, LOST = "failed", "lost"
+"""Word that begins how many trials were not survived, and the one word for it."""
 NEVER = "never"
 """Text that stands for a first slip that no multiple of a load brings about."""
 
@@ -44,8 +47,30 @@ def said_of_execution(found: ExecutedGrasp | None) -> tuple[str, str]:
         return "no trial is possible", BAD
     lost = sum(not trial.survived for trial in found.execution.trials)
     if lost:
-        return f"failed {lost} of {len(found.execution.trials)} trials", BAD
+        return f"{FAILED} {lost} of {len(found.execution.trials)} trials", BAD
     return "survived", GOOD
+
+
+def said_of_both(
+    verdict: Record | None, executions: Executions | None, found: ExecutedGrasp | None
+) -> tuple[str, str]:
+    """Say in words how a grasp ended in the test of its closure and, if any was, in its execution.
+
+    Args:
+        verdict: Verdict on the grasp's closure; None if it was not simulated.
+        executions: Executions of the run's grasps; None if there are none.
+        found: That of the grasp; None if it was not executed.
+
+    Returns:
+        The words, and the tone: good, bad or neither; bad if either ending is.
+    """
+    closure, tone = said_of(verdict)
+    if executions is None:
+        return closure, tone
+    ended, other = said_of_execution(found)
+    tones = {tone, other}
+    worst = next(each for each in (BAD, GOOD, QUIET) if each in tones)
+    return f"closure: {closure}; execution: {LOST if ended.startswith(FAILED) else ended}", worst
 
 
 def execution_row(found: ExecutedGrasp | None) -> Record:
@@ -75,6 +100,17 @@ def described_executions(executions: Executions) -> str:
     )
     said += f"; no squeeze holds the object in {lost} of them" if lost else ""
     return said + ("." if executions.complete else "; the executions were interrupted.")
+
+
+def execution_settings(executions: Executions) -> Iterable[tuple[str, str]]:
+    """Yield names and values of everything that the executions of a run were asked for."""
+    yield "execution.friction", f"{executions.friction:g}"
+    for name, value in asdict(executions.settings).items():
+        if isinstance(value, dict):
+            inner = cast("dict[str, object]", value)
+            yield from ((f"execution.{name}.{each}", str(own)) for each, own in inner.items())
+        else:
+            yield f"execution.{name}", str(value)
 
 
 def execution_section(executions: Executions | None, found: ExecutedGrasp | None) -> Record | None:

@@ -14,11 +14,14 @@ from sim_validate.reports.agreement import (
     Record,
     as_predicted,
     let_go,
-    said_of,
     wrench_size,
 )
 from sim_validate.reports.drawn_grasps import Drawn, certified, largest_push
-from sim_validate.reports.executed_grasps import execute_command, execution_section
+from sim_validate.reports.executed_grasps import (
+    execute_command,
+    execution_section,
+    said_of_both,
+)
 from sim_validate.reports.pages import NOTHING, number, page
 from sim_validate.reports.run_folder import GRASPS, RunFolder
 from sim_validate.reports.turntable import as_text, grasp_data
@@ -42,7 +45,7 @@ def grasp_page(
     """Write the text of the page about one grasp."""
     verdict = run.verdicts.get(grasp.id)
     shown = certified(grasp, run.shaded.get(grasp.id))
-    said, tone = said_of(verdict)
+    said, tone = said_of_both(verdict, run.executions, run.executed(grasp.id))
     return page(
         "grasp.html",
         grasp=grasp,

@@ -14,10 +14,14 @@ from sim_validate.reports.agreement import (
     let_go,
     limits_in,
     quadrants_in,
-    said_of,
     wrench_size,
 )
-from sim_validate.reports.executed_grasps import described_executions, execution_row
+from sim_validate.reports.executed_grasps import (
+    described_executions,
+    execution_row,
+    execution_settings,
+    said_of_both,
+)
 from sim_validate.reports.grasp_page import MILLI
 from sim_validate.reports.pages import page
 from sim_validate.reports.run_folder import RunFolder
@@ -86,7 +90,8 @@ def agreements(verdicts: Sequence[Record]) -> list[Agreement]:
 
 def _card(shown: Shown) -> dict[str, Any]:
     grasp, verdict = shown.grasp, shown.run.verdicts.get(shown.grasp.id)
-    said, tone = said_of(verdict)
+    executed = shown.run.executed(grasp.id)
+    said, tone = said_of_both(verdict, shown.run.executions, executed)
     return {
         "id": grasp.id,
         "object": shown.run.saved.body.name,
@@ -98,7 +103,7 @@ def _card(shown: Shown) -> dict[str, Any]:
         "radius_mm": round(MILLI * grasp.radius, 6),
         "quality": grasp.ferrari_canny[0],
         "critical_friction": grasp.critical_friction,
-        "executed": execution_row(shown.run.executed(grasp.id)) if shown.run.executions else None,
+        "executed": execution_row(executed) if shown.run.executions else None,
         "weakest": None if verdict is None else _weakest(verdict),
     }
 
@@ -153,6 +158,8 @@ def _about(run: RunFolder) -> Iterable[tuple[str, str]]:
                 yield f"{table}.{name}", str(value)
         else:
             yield table, str(values)
+    if run.executions is not None:
+        yield from execution_settings(run.executions)
     for name, version in (versions() if first is None else first["versions"]).items():
         yield f"version of {name}", str(version)
 

@@ -193,10 +193,23 @@ def test_without_friction_nothing_is_survived():
 
 def test_unstable_grips_are_reported():
     assert HALF > ASIDE
-    with pytest.raises(gc.NoForcesError, match="unstable under the best squeeze"):
-        gc.best_squeeze(
-            box(), opposed(), 0.5, ANY, max_push_n=100.0, stiffness=100.0, tip_radius_m=0.0
-        )
+    soft = {"stiffness": 100.0, "tip_radius_m": 0.0}
+    with pytest.raises(gc.NoForcesError, match="unstable under the best squeeze") as failed:
+        gc.best_squeeze(box(), opposed(), 0.5, ANY, max_push_n=100.0, **soft)
+    # under the names of functions, of the settings of executions, and of flags
+    said = (
+        "a smaller limit of pushes, with which it may be stable (max_push_n; of executions push_n"
+    )
+    assert str(failed.value).endswith(f"or {said}, or --push-n)")
+    assert gc.best_squeeze(box(), opposed(), 0.5, ANY, max_push_n=0.5, **soft).grip.stable
+
+
+def test_an_unstable_grip_without_a_limit_of_pushes_needs_smaller_loads():
+    heavy, light = gc.any_direction(5.0), gc.any_direction(0.01)
+    with pytest.raises(gc.NoForcesError, match="or smaller loads, whose smaller pushes may leave"):
+        gc.best_squeeze(box(), opposed(), 0.5, heavy, stiffness=100.0, tip_radius_m=0.0)
+    found = gc.best_squeeze(box(), opposed(), 0.5, light, stiffness=100.0, tip_radius_m=0.0)
+    assert found.grip.stable
 
 
 def test_two_fingers_cannot_be_a_grip():

@@ -45,6 +45,8 @@ def test_grasps_that_survive_are_shown_and_written(here, capsys):
     for part in (
         "wrote e/executions.json", "controls let go", "2.78", "3 of 3", "6 of 6", "1 of 1",
         "first slips, predicted/simulated", "2.75/2.75", "no lift for 2 of 2 grasps: a fingertip",
+        "load: multiple of the weight, in any direction, that the squeeze is certified for\n",
+        "at which a contact slips; above one none does\n",
         "2 of 2 grasps survived every trial with 0.3 kg; 14 of 14 trials were survived; 6 of 6",
     ):  # fmt: skip
         assert part in shown, shown
@@ -105,6 +107,18 @@ def test_where_no_trial_is_possible_nothing_was_survived(capsys):
     assert main(words) == Exit.NEGATIVE
     assert "no trial is possible, so nothing was survived" in capsys.readouterr().err
     assert not sv.read_executions("executions.json").grasps[0].survived
+
+
+@pytest.mark.usefixtures("here")
+def test_trials_of_no_size_are_told_and_written_as_left_out(capsys):
+    words = ["execute", "grasps.json", "--mass-kg", "0.3", "--trials", "weight,shake,knock"]
+    assert main([*words, "--shake-g", "0", "--knock-n-s", "0", "--out", "."]) == Exit.GOOD
+    said = capsys.readouterr().out
+    for kind, flag in (("shake", "shake_g, --shake-g"), ("knock", "knock_n_s, --knock-n-s")):
+        assert f"no {kind} for 2 of 2 grasps: its size is 0 ({flag})\n" in said
+    for grasp in sv.read_executions("executions.json").grasps:
+        assert [each.kind for each in grasp.execution.skipped] == ["shake", "knock"]
+        assert [each.kind for each in grasp.execution.trials] == ["weight"]
 
 
 @pytest.mark.usefixtures("here")

@@ -51,6 +51,18 @@ def test_predictions_are_near_what_is_simulated(light):
     assert checked == 1 + 1 + 6 + 6 + 6
 
 
+@pytest.mark.parametrize(("height", "duration"), [(0.05, 0.2), (0.3, 0.5)])
+def test_quick_lifts_are_predicted_with_the_load_of_their_take_off(light, height, duration):
+    """The weight has come before the palm is fastest, and both loads come together."""
+    body, grasp = planned("box")
+    quick = replace(LIGHT, trials=("lift",), lift_m=height, lift_s=duration)
+    (trial,) = sv.execute(body, grasp, 0.5, quick).trials
+    (slow,) = light.of_kind("lift")
+    assert trial.predicted_first_slip < 0.9 * slow.predicted_first_slip
+    ratio = trial.simulated_first_slip / trial.predicted_first_slip
+    assert ratio == pytest.approx(1.0, abs=0.02)
+
+
 def test_the_controls_let_go(light):
     assert len(light.controls) == 3
     assert light.controls_let_go

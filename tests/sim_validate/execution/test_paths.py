@@ -53,6 +53,19 @@ def test_the_table_carries_the_object_until_it_is_lifted():
     drive, begun = paths.lift(UP, 0.2, 0.6)
     assert not drive.shares[: begun - 1].any()
     assert (drive.grasping[begun - 10 :] == 1.0).all()
+    assert (drive.shares[begun:] == 1.0).all()
+
+
+@pytest.mark.parametrize("give", [2e-4, 1e-3, 1.0])
+def test_fingers_take_the_weight_as_far_as_the_palm_has_risen(give):
+    """Springs that the weight bends by `give` carry z / give of it at the height z; those that it
+    bends farther than the lift goes carry all of it at the end."""
+    drive, begun = paths.lift(UP, 0.2, 0.6, give)
+    risen = positions(drive)[begun : begun + 120, 2]
+    wanted = np.minimum(risen / min(give, 0.2), 1.0)
+    off = 1.01 * SAMPLE_S**2 / 12 * np.abs(drive.accelerations).max() / min(give, 0.2)
+    assert drive.shares[begun : begun + 120] == pytest.approx(wanted, abs=off)
+    assert (np.diff(drive.shares) >= 0.0).all()
     assert drive.shares[-1] == 1.0
 
 

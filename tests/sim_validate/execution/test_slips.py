@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from sim_validate.execution.bench import HeldMotion
-from sim_validate.execution.drives import idle
-from sim_validate.execution.slips import SLID, outcome, rotations, seen, slides
+from sim_validate.execution.drives import Table, idle
+from sim_validate.execution.slips import SLID, TOUCHED, outcome, rotations, seen, slides
 from tests.judges import random_rotation
 from tests.sim_validate.execution.held_rigs import box_scene
 
@@ -207,3 +207,47 @@ def test_what_is_seen_does_not_depend_on_where_the_palm_is():
     one, other = judged(here), judged(there)
     assert (other.slip_m, other.first_slip) == pytest.approx((one.slip_m, one.first_slip), rel=1e-6)
     assert one.slip_m == pytest.approx(1e-3)
+
+
+def taken_off(samples, by):
+    """A lift in which a contact is on its cone in these samples, and slides by so many object radii
+    in the first of them."""
+    layout = box_scene().layout
+    forces = np.tile(layout.pushes, (COUNT, 1, 1))
+    world = np.einsum("kij,nkj->nki", layout.axes, forces)
+    world[1:, 0, 2] += 0.1 * 0.5 * 5.0
+    world[samples, 0, 2] = 0.5 * 5.0
+    centers = np.tile(layout.tip_centers, (COUNT, 1, 1))
+    centers[samples[0] :, 0, 1] += by * layout.radius_m
+    drive = loaded()
+    object.__setattr__(drive, "shares", np.minimum(np.linspace(0.0, 4.0, COUNT), 1.0))
+    object.__setattr__(drive, "table", Table(np.array([0, 0, -0.03]), np.array([0, 0, 1.0])))
+    return motion_of(centers=centers, forces=np.einsum("kij,nki->nkj", layout.axes, world)), drive
+
+
+@pytest.mark.parametrize("samples", [[40], [40, 41, 42]])
+def test_a_contact_that_touches_its_cone_at_a_take_off_and_holds_has_not_slipped(samples):
+    found = judged(*taken_off(samples, 0.5 * TOUCHED))
+    assert not found.slipped
+    assert found.first_slip == pytest.approx(10.0, rel=1e-6)
+
+
+def test_a_contact_that_slides_on_its_cone_at_a_take_off_has_slipped():
+    found = judged(*taken_off([40, 41], 2.0 * TOUCHED))
+    assert found.slip_m < SLID * box_scene().layout.radius_m
+    assert found.slipped
+    assert 0.38 < found.first_slip <= 40 * 4 / 399
+
+
+def test_a_contact_that_is_on_its_cone_when_the_full_load_has_come_has_slipped():
+    """However little it slides, and whether it came to its cone before or after."""
+    for samples in ([*range(60, 110)], [150]):
+        found = judged(*taken_off(samples, 0.5 * TOUCHED))
+        assert found.slipped
+        assert found.first_slip == pytest.approx(min(samples[0] * 4 / 399, 1.0), abs=0.02)
+
+
+def test_only_a_take_off_may_touch_a_cone():
+    motion, drive = taken_off([40], 0.5 * TOUCHED)
+    object.__setattr__(drive, "table", None)
+    assert judged(motion, drive).slipped

@@ -7,7 +7,7 @@ import pytest
 
 import sim_validate as sv
 from scenes.execution.held_mjcf import SAMPLE_S
-from sim_validate.execution.trials import trials_of
+from sim_validate.execution.trials import Skipped, trials_of
 from tests.grasp_core.execution.held import box
 from tests.sim_validate.execution.held_rigs import G, box_scene
 
@@ -34,9 +34,16 @@ def test_only_the_trials_asked_for_are_there():
         assert {trial.kind for trial in trials} == {kind}
 
 
-def test_shakes_and_knocks_of_no_size_are_none():
-    trials, _ = listed(trials=("shake", "knock"), shake_g=0.0, knock_n_s=0.0)
-    assert trials == ()
+@pytest.mark.parametrize(("kind", "setting"), [("shake", "shake_g"), ("knock", "knock_n_s")])
+def test_trials_of_no_size_are_left_out_with_a_reason(kind, setting):
+    trials, skipped = listed(trials=("weight", kind), **{setting: 0.0})
+    assert [trial.kind for trial in trials] == ["weight"]
+    (left_out,) = skipped
+    flag = setting.replace("_", "-")
+    assert left_out == Skipped(kind, f"its size is 0 ({setting}, --{flag})")
+    trials, skipped = listed(trials=("weight", kind), **{setting: 1e-6})
+    assert len(trials) == 7
+    assert not skipped
 
 
 def test_trials_begin_before_their_load_comes():

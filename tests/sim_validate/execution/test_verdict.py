@@ -1,10 +1,18 @@
 """What an execution says of its trials."""
 
+import math
+
 import numpy as np
 import pytest
 
 from sim_validate.execution.trials import Skipped
-from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
+from sim_validate.execution.verdict import (
+    Execution,
+    ExecutionControl,
+    ExecutionTrial,
+    losses_in_words,
+    trial_in_words,
+)
 
 
 def trial(kind, survived, fate="stuck"):
@@ -42,3 +50,14 @@ def test_controls_let_go_only_if_all_do():
 def test_only_a_dropped_object_is_dropped():
     fates = {fate: trial("knock", False, fate).dropped for fate in ("stuck", "slipped", "dropped")}
     assert fates == {"stuck": False, "slipped": False, "dropped": True}
+
+
+def test_losses_are_told_in_millimetres_and_degrees_as_limits_are_given():
+    lost = ExecutionTrial(
+        "knock", "knock -y", False, "slipped", 2e-3, 0.123, math.radians(107.5), 0.8, 0.75
+    )
+    assert losses_in_words(execution(trial("weight", True), lost)) == [trial_in_words(lost)]
+    assert trial_in_words(lost) == (
+        "knock -y: slipped, moved 123 mm and turned 108 degrees; first slip predicted at 0.8 of "
+        "the load, simulated at 0.75"
+    )
