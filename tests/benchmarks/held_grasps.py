@@ -36,6 +36,8 @@ RADIANS = 180.0
 object lags behind the load by the inverse of that, times twice the damping ratio, and grips become
 softer as they turn: with a third of the time soft fingertips seem to hold 5 to 15 % more."""
 HELD_S = 0.1
+LOST = 3.0
+"""Distance at which an object is lost and its trial ends, in its radii."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,7 @@ def squeezed(
 
 def bench_of(body: gc.Polyhedron, grip: gc.Grip, mass_kg: float) -> HeldBench:
     """Compile the scene of a squeezed object."""
-    return HeldBench(build_held_scene(body, grip, mass_kg))
+    return HeldBench(build_held_scene(body, grip, mass_kg), lost_m=LOST * body.radius)
 
 
 def slowness(bench: HeldBench, grip: gc.Grip) -> float:
