@@ -201,7 +201,8 @@ class HeldBench:
                 step(trials, errors, self.chunk, going)
                 moved[going, sample] = joints[going]
                 forces[going, sample] = pushed[going]
-                away = np.linalg.norm(joints[going, :3] - joints[going, 7:10], axis=1)
+                with np.errstate(over="ignore", invalid="ignore"):  # where the simulator diverges
+                    away = np.linalg.norm(joints[going, :3] - joints[going, 7:10], axis=1)
                 for trial in going[away > self.lost_m]:
                     lost[trial] = True
                     moved[trial, sample:] = joints[trial]

@@ -13,13 +13,13 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def velocities(drive):
-    """Of the palm after each sample, (n, 6)."""
+    """Return the speeds of the palm after each sample, (n, 6)."""
     start = np.append(drive.velocity, np.zeros(3))
     return start + SAMPLE_S * np.cumsum(drive.accelerations, axis=0)
 
 
 def positions(drive):
-    """Of the palm after each sample: accelerations are constant within one, (n, 6)."""
+    """Return where the palm is after each sample, as accelerations are constant in one, (n, 6)."""
     after = velocities(drive)
     before = np.vstack([np.append(drive.velocity, np.zeros(3)), after[:-1]])
     return SAMPLE_S * np.cumsum(0.5 * (before + after), axis=0)

@@ -9,7 +9,6 @@ import scenes
 import sim_validate as sv
 from scenes.execution.held import HeldSettings
 from sim_validate.execution.gate.gate import cases_of, measured_case, require_faithful_execution
-from tests.marks import MORE
 from tests.sim_validate.execution.gate.settings_of_gates import (
     BROKEN,
     RIGHT,
@@ -74,7 +73,7 @@ def test_so_it_is_with_other_pushes_frictions_fingertips_and_dampers():
 @pytest.mark.parametrize(
     ("where", "numbers"),
     [
-        pytest.param(*case, marks=() if place in EVERYDAY else MORE)
+        pytest.param(*case, marks=() if place in EVERYDAY else pytest.mark.slow)
         for place, case in enumerate(BROKEN)
     ],
 )
@@ -83,7 +82,7 @@ def test_broken_settings_are_refused(where, numbers):
 
 
 @pytest.mark.parametrize(
-    ("where", "numbers"), [pytest.param(*case, marks=MORE) for case in RIGHT[1:]]
+    ("where", "numbers"), [pytest.param(*case, marks=pytest.mark.slow) for case in RIGHT[1:]]
 )
 def test_settings_that_change_nothing_are_accepted(where, numbers):
     assert not refused(where, numbers)
