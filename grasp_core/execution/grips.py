@@ -203,6 +203,11 @@ class Grip:
         """W_i of (5), (k, 6, 3): from a force at each arm to its wrench."""
         return grasp_map(self.arms).reshape(WRENCH, -1, 3).transpose(1, 0, 2)
 
+    @cached_property
+    def local_maps(self) -> Array:
+        """W_i F_i: from a force along the axes of each contact to its wrench, (k, 6, 3)."""
+        return self._maps @ self.frames
+
     @property
     def local_squeeze(self) -> Array:
         """The squeeze in the frames of the contacts, (k, 3) [N]: normal, tangent, tangent."""

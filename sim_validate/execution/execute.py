@@ -33,7 +33,7 @@ from sim_validate.execution import paths
 from sim_validate.execution.bench import HeldBench, HeldMotion, motions_joined
 from sim_validate.execution.drives import joined, parted
 from sim_validate.execution.gate.gate import require_faithful_execution
-from sim_validate.execution.predictions import held_dynamics, predicted_slips
+from sim_validate.execution.predictions import held_dynamics, predicted_losses
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.slips import outcome
 from sim_validate.execution.trials import Trial, trials_of
@@ -87,11 +87,14 @@ def execute(
     bench = HeldBench(scene, threads=threads, lost_m=lost_m)
     dynamics = held_dynamics(best.grip, scene.layout)
     trials, skipped = trials_of(body, scene.layout, settings, dynamics.lowest_frequency)
-    predicted = predicted_slips(dynamics, [trial.expected or trial.drive for trial in trials])
+    slips, losses = predicted_losses(
+        dynamics, [trial.expected or trial.drive for trial in trials],
+        [trial.turning for trial in trials], settings.most_m, settings.most_rad,
+    )  # fmt: skip
     motions = run_trials(bench, trials)
     judged = tuple(
-        _judged(trial, motion, float(multiple), scene.layout, best.grip, settings)
-        for trial, motion, multiple in zip(trials, motions, predicted, strict=True)
+        _judged(trial, motion, (float(slip), float(loss)), scene.layout, best.grip, settings)
+        for trial, motion, slip, loss in zip(trials, motions, slips, losses, strict=True)
     )
     return Execution(
         mass_kg=settings.mass_kg,
@@ -195,9 +198,10 @@ def _weighed(
 
 
 def _judged(
-    trial: Trial, motion: HeldMotion, predicted: float, layout: HeldLayout, grip: Grip,
-    settings: ExecutionSettings,
+    trial: Trial, motion: HeldMotion, predicted: tuple[float, float], layout: HeldLayout,
+    grip: Grip, settings: ExecutionSettings,
 ) -> ExecutionTrial:  # fmt: skip
+    """Judge a trial beside its predicted multiples of first slip and of loss."""
     if motion.faults:
         raise UnfaithfulError(f"{trial.name}: {'; '.join(motion.faults)}")
     found = outcome(motion, layout, trial.drive, grip.friction, trial.begun)
@@ -211,7 +215,8 @@ def _judged(
         slip_m=found.slip_m,
         displacement_m=found.displacement_m,
         turn_rad=found.turn_rad,
-        predicted_first_slip=predicted,
+        predicted_first_slip=predicted[0],
+        predicted_loss=predicted[1],
         simulated_first_slip=found.first_slip,
     )
 

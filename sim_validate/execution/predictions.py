@@ -1,4 +1,4 @@
-"""The first slip that the analysis predicts for a trial, from small motions of the held object.
+"""What the analysis predicts for a trial: first slip and loss, from the held object's motion.
 
 While no contact slips, the fingertips move with the surface, and the object moves by x = (d, t)
 against the palm as a mass on springs:
@@ -23,6 +23,11 @@ and along axes that turn with the object by -t x f_i more. The whole load is sca
 multiple at which a contact reaches its cone at any time is the predicted one. A trial whose
 multiple is above one holds without slip. (1) is solved exactly for loads that are constant in each
 sample.
+
+A slip is not yet a loss. The object is predicted to be lost at the least multiple at which x passes
+what is allowed, or at which the steady load with the x of the sample of first slip carries the
+object away once contacts slip (see `beyond_slip`). A load that turns all the time makes contacts
+slip in every round, and then the first slip counts instead.
 """
 
 import importlib
@@ -34,8 +39,10 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure.wrenches import cross_matrix, grasp_map
+from grasp_core.execution.beyond_slip import loss_multiples
 from grasp_core.execution.first_slip import slip_steps
 from grasp_core.execution.grips import Grip
+from grasp_core.solvers.ties import first_best
 from scenes.execution.held import HeldLayout
 from scenes.execution.held_mjcf import SAMPLE_S
 from sim_validate.execution.drives import Drive
@@ -80,32 +87,85 @@ def held_dynamics(grip: Grip, layout: HeldLayout) -> HeldDynamics:
     return HeldDynamics(grip, layout, maps, own, mass, damping, dampers)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Expected:
+    """The motion that a drive's load causes while no contact slips."""
+
+    first_slip: float
+    """Least multiple of the load at which a contact slips; infinite where none ever does."""
+    slipping: Array
+    """Motion x in the sample of the first slip, under the load once, (6,) [m, rad]."""
+    moved_m: float
+    """Largest displacement under the load once [m]."""
+    turn_rad: float
+    """Largest turn under the load once [rad]."""
+
+
 def predicted_slips(dynamics: HeldDynamics, drives: Sequence[Drive]) -> Array:
     """Return the least multiple of each drive's load at which a contact slips, (drives,).
 
     Infinite where none ever does; zero where the grip is unstable at rest.
     """
-    if not drives or not dynamics.grip.stable:
+    if not dynamics.grip.stable:
         return np.zeros(len(drives))
+    return np.array([each.first_slip for each in expected(dynamics, drives)])
+
+
+def predicted_losses(
+    dynamics: HeldDynamics, drives: Sequence[Drive], turning: Sequence[bool], most_m: float,
+    most_rad: float,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return the multiples of each drive's load of the first slip, and of loss, (drives,) each.
+
+    Args:
+        dynamics: The held object.
+        drives: What is applied.
+        turning: Whether the load keeps turning, so that the first slip counts as a loss, for each.
+        most_m: Displacement from which on the object is lost [m].
+        most_rad: Turn from which on it is [rad].
+
+    Returns:
+        Both, zero where the grip is unstable at rest.
+    """
+    if not drives or not dynamics.grip.stable:
+        return np.zeros(len(drives)), np.zeros(len(drives))
+    found = expected(dynamics, drives)
+    slips = np.array([each.first_slip for each in found])
+    loads = np.array([each.slipping for each in found]) @ dynamics.grip.grasp_stiffness.T
+    moved = np.array([max(each.moved_m / most_m, each.turn_rad / most_rad) for each in found])
+    with np.errstate(divide="ignore"):
+        sticking = 1.0 / moved
+    beyond = np.maximum(slips, loss_multiples(dynamics.grip, loads, most_m, most_rad))
+    return slips, np.minimum(sticking, np.where(turning, slips, beyond))
+
+
+def expected(dynamics: HeldDynamics, drives: Sequence[Drive]) -> list[Expected]:
+    """Solve (1) for each drive of a grip that is stable at rest."""
+    if not drives:
+        return []
     lengths = [len(drive) for drive in drives]
     loads = np.zeros((len(drives), max(lengths), POSE))
     bases = np.zeros((len(drives), max(lengths), *dynamics.layout.contacts.shape))
     for place, drive in enumerate(drives):
         loads[place, : len(drive)], bases[place, : len(drive)] = _load(dynamics, drive)
-    changes = _force_changes(dynamics, loads, bases)
-    rest = dynamics.grip.local_squeeze
-    return np.array(
-        [
-            _least(rest, change[:length], dynamics.grip.friction)
-            for change, length in zip(changes, lengths, strict=True)
-        ]
-    )
+    motion, changes = _responses(dynamics, loads, bases)
+    return [
+        _expected(dynamics.grip, own[:length], change[:length])
+        for own, change, length in zip(motion, changes, lengths, strict=True)
+    ]
 
 
-def _least(rest: Array, changes: Array, friction: Array) -> float:
+def _expected(grip: Grip, motion: Array, changes: Array) -> Expected:
+    """Sum up the motion x, (n, 6), and the changes of the contact forces, (n, k, 3), of a drive."""
     count = len(changes)
-    flat = slip_steps(np.tile(rest, (count, 1)), changes.reshape(-1, 3), np.tile(friction, count))
-    return float(flat.min())
+    rest, friction = np.tile(grip.local_squeeze, (count, 1)), np.tile(grip.friction, count)
+    slips = slip_steps(rest, changes.reshape(-1, 3), friction).reshape(count, -1).min(axis=1)
+    return Expected(
+        first_slip=float(slips.min()),
+        slipping=motion[first_best(-slips)],
+        moved_m=float(np.linalg.norm(motion[:, :3], axis=1).max()),
+        turn_rad=float(np.linalg.norm(motion[:, 3:], axis=1).max()),
+    )
 
 
 def _load(dynamics: HeldDynamics, drive: Drive) -> tuple[Array, Array]:
@@ -151,8 +211,8 @@ def _rates(accelerations: Array) -> Array:
     return SAMPLE_S * (np.cumsum(turning, axis=0) - 0.5 * turning)
 
 
-def _force_changes(dynamics: HeldDynamics, loads: Array, bases: Array) -> Array:
-    """Return the change of the contact forces by (3), in their frames, (drives, n, k, 3)."""
+def _responses(dynamics: HeldDynamics, loads: Array, bases: Array) -> tuple[Array, Array]:
+    """Return x, (drives, n, 6), and the contact forces' changes by (3), (drives, n, k, 3)."""
     grip, layout = dynamics.grip, dynamics.layout
     motion, speed, acceleration = _solved(dynamics, loads)
     turned_maps = dynamics.maps.transpose(0, 2, 1)
@@ -160,7 +220,7 @@ def _force_changes(dynamics: HeldDynamics, loads: Array, bases: Array) -> Array:
     forces = grip.stiffness @ turned_maps @ motion + dynamics.dampers @ turned_maps @ speed
     turns = np.array([cross_matrix(force) for force in grip.squeeze])
     changes = turns @ motion[..., 3:, :] - forces - inertia
-    return np.einsum("kij,...kil->...kj", grip.frames, changes)
+    return motion[:, :, 0, :, 0], np.einsum("kij,...kil->...kj", grip.frames, changes)
 
 
 def _solved(dynamics: HeldDynamics, loads: Array) -> tuple[Array, Array, Array]:

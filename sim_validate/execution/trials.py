@@ -35,6 +35,8 @@ class Trial:
     """Whether the trial starts with open fingers, not from the squeezed object."""
     weighing: int = 0
     """Number of samples at the start in which the weight comes, as in other trials of the grasp."""
+    turning: bool = False
+    """Whether the load keeps turning, so that small slips add up."""
     expected: Drive | None = None
     """What the prediction is for, if not for the drive itself."""
 
@@ -77,7 +79,7 @@ def _of_kind(
     if kind in OF_NO_SIZE and getattr(settings, OF_NO_SIZE[kind]) == 0.0:
         return [Skipped(kind, _no_size(OF_NO_SIZE[kind]))]
     if kind == "weight":
-        return [Trial(kind, kind, paths.turned_weight(lowest_frequency), 0)]
+        return [Trial(kind, kind, paths.turned_weight(lowest_frequency), 0, turning=True)]
     if kind == "lift":
         return [_lift(body, layout, settings)]
     sized = {"shake": _shakes, "stop": _stops, "knock": _knocks, "misplaced": _misplaced}

@@ -35,6 +35,10 @@ class ExecutionTrial:
     predicted_first_slip: float
     """Multiple of the trial's load at which the first contact slips, predicted; for `misplaced`,
     that of the weight in the planned place."""
+    predicted_loss: float
+    """Multiple of the trial's load at which the object is lost, predicted: it moves or turns
+    farther than the settings allow, or nothing balances the load; for `misplaced`, that of the
+    weight in the planned place."""
     simulated_first_slip: float
     """Multiple of the trial's load at which the first contact slips, from the simulated contact
     forces: one or less if a contact slipped, else how far away slip stayed."""
@@ -99,7 +103,7 @@ def trial_in_words(trial: ExecutionTrial) -> str:
         f"{trial.name}: {trial.fate}, moved {1e3 * trial.displacement_m:.3g} mm and turned "
         f"{math.degrees(trial.turn_rad):.3g} degrees; first slip predicted at "
         f"{trial.predicted_first_slip:.3g} of the load, simulated at "
-        f"{trial.simulated_first_slip:.3g}"
+        f"{trial.simulated_first_slip:.3g}; loss predicted at {trial.predicted_loss:.3g}"
     )
 
 

@@ -143,6 +143,7 @@ def _trial_record(trial: ExecutionTrial) -> ExecutionTrialRecord:
         "displacement_m": trial.displacement_m,
         "turn_rad": trial.turn_rad,
         "predicted_first_slip": trial.predicted_first_slip,
+        "predicted_loss": trial.predicted_loss,
         "simulated_first_slip": trial.simulated_first_slip,
     }
 
@@ -260,6 +261,7 @@ def _execution(record: ExecutionRecord, settings: ExecutionSettings, where: Wher
                 displacement_m=each["displacement_m"],
                 turn_rad=each["turn_rad"],
                 predicted_first_slip=_or_infinite(each["predicted_first_slip"]),
+                predicted_loss=_or_infinite(each["predicted_loss"]),
                 simulated_first_slip=_or_infinite(each["simulated_first_slip"]),
             )
             for each in record["trials"]

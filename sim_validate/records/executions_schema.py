@@ -15,7 +15,7 @@ Force = tuple[Finite, Finite, Finite]
 
 
 class ExecutionTrialRecord(TypedDict):
-    """Fields about one trial; first slips are multiples of its load, null where nothing slips."""
+    """Fields about one trial; slips and losses are multiples of its load, null where none comes."""
 
     kind: TrialKind
     name: str
@@ -25,6 +25,7 @@ class ExecutionTrialRecord(TypedDict):
     displacement_m: Finite
     turn_rad: Finite
     predicted_first_slip: Finite | None
+    predicted_loss: Finite | None
     simulated_first_slip: Finite | None
 
 

@@ -201,6 +201,7 @@ def _trial(trial: ExecutionTrial) -> Record:
         "displacement": number(MILLI * trial.displacement_m, 2),
         "turn": number(math.degrees(trial.turn_rad), 2),
         "predicted": _slip(trial.predicted_first_slip),
+        "loss": _slip(trial.predicted_loss),
         "simulated": _slip(trial.simulated_first_slip),
     }
 

@@ -12,7 +12,7 @@ Printed are
   the fingers expect it, and whether contacts inside certified regions are in force closure;
 * executions per second and core.
 
-Ends with an error if the least predicted first slip ranks worse than .98, or closure is lost inside
+Ends with an error if the least predicted loss ranks worse than .98, or closure is lost inside
 a certified region. The quality of DexGraspBench is the mean, over six forces along the axes, of the
 least wrench that is left when contact forces balance it, each normal force up to one and at least
 one in all; torques are about the middle of the contacts.
@@ -57,7 +57,8 @@ MASS_KG, OFF_MM = 0.55, 1.0
 OFFS_MM = (0.0, 1.0, 2.0, 4.0, 8.0)
 TURN, MISPLACED = 4, 3
 """Grasps come in turns of `TURN`, and each `MISPLACED`th turn is misplaced by all of `OFFS_MM`."""
-OURS = "least predicted first slip"
+OURS = "least predicted loss"
+SLIP = "least predicted first slip"
 RANKED = 0.98
 BAR = 5.0
 """Executions per second and core."""
@@ -117,10 +118,10 @@ def measure(unit):
 
 def qualities(body, grasp, done):
     """Return what is known before an execution, the higher the better."""
-    planned = [one.predicted_first_slip for one in done.trials]
     about = {"center": body.center_of_mass, "torque_scale": body.radius}
     return {
-        OURS: min(planned),
+        OURS: min(one.predicted_loss for one in done.trials),
+        SLIP: min(one.predicted_first_slip for one in done.trials),
         "certified load multiple": done.load_multiple,
         "Ferrari-Canny quality": grasp.ferrari_canny[0],
         "least critical friction": -grasp.critical_friction,
@@ -236,16 +237,17 @@ def list_ranks(real, good):
     for name, own in areas.items():
         print(f"  {name:28s} ranks survival at {own:.3f}")
     stuck = np.array([all(trial.fate == "stuck" for trial in one.done.trials) for one in real])
-    slips = np.array([one.qualities[OURS] for one in real])
-    print(f"  {OURS} ranks executions without any slip at {area(slips, stuck):.4f}")
+    slips = np.array([one.qualities[SLIP] for one in real])
+    print(f"  {SLIP} ranks executions without any slip at {area(slips, stuck):.4f}")
     trials = [trial for one in real for trial in one.done.trials]
-    predicted = np.array([trial.predicted_first_slip for trial in trials])
-    for what, labels in (
-        ("survival", [trial.survived for trial in trials]),
-        ("lack of slip", [trial.fate == "stuck" for trial in trials]),
-    ):
-        by_trial = area(predicted, np.array(labels))
-        print(f"  predicted first slip of a trial ranks its {what} at {by_trial:.4f}")
+    for what, predicted, labels in (
+        ("loss of a trial ranks its survival", [trial.predicted_loss for trial in trials],
+         [trial.survived for trial in trials]),
+        ("first slip of a trial ranks its lack of slip",
+         [trial.predicted_first_slip for trial in trials],
+         [trial.fate == "stuck" for trial in trials]),
+    ):  # fmt: skip
+        print(f"  predicted {what} at {area(np.array(predicted), np.array(labels)):.4f}")
     return areas[OURS]
 
 

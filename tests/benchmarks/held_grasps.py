@@ -36,6 +36,8 @@ RADIANS = 180.0
 object lags behind the load by the inverse of that, times twice the damping ratio, and grips become
 softer as they turn: with a third of the time soft fingertips seem to hold 5 to 15 % more."""
 HELD_S = 0.1
+REACH = 0.6
+"""How far fingertips may move on a curved surface, in its radii: loads end at the first slip."""
 LOST = 3.0
 """Distance at which an object is lost and its trial ends, in its radii."""
 
@@ -113,8 +115,10 @@ def squeezed(
 
 
 def bench_of(body: gc.Polyhedron, grip: gc.Grip, mass_kg: float) -> HeldBench:
-    """Compile the scene of a squeezed object."""
-    return HeldBench(build_held_scene(body, grip, mass_kg), lost_m=LOST * body.radius)
+    """Compile the scene of a squeezed object; a curved surface is there where fingertips come."""
+    reach = REACH * body.radius + float(grip.tip_radius_m.max()) if body.patches else None
+    scene = build_held_scene(body, grip, mass_kg, reach_m=reach)
+    return HeldBench(scene, lost_m=LOST * body.radius)
 
 
 def slowness(bench: HeldBench, grip: gc.Grip) -> float:

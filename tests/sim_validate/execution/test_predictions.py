@@ -13,7 +13,12 @@ from grasp_core.closure.wrenches import cross_matrix
 from scenes.execution.held_mjcf import SAMPLE_S
 from sim_validate.execution import paths
 from sim_validate.execution.drives import Table, idle
-from sim_validate.execution.predictions import held_dynamics, predicted_slips
+from sim_validate.execution.predictions import (
+    expected,
+    held_dynamics,
+    predicted_losses,
+    predicted_slips,
+)
 from tests.grasp_core.execution.held import planned_grips
 from tests.sim_validate.execution.held_rigs import MASS, G, box_dynamics
 
@@ -46,7 +51,7 @@ def slip_multiple(rest, change, friction):
 
 
 def integrated(dynamics, drive):
-    """The least multiple of all samples, by integrating the motion that is seen in the palm.
+    """The least multiple of all samples and the farthest motion, integrated as the palm sees it.
 
     The kinetic energy of the object and of tips that move with their contacts gives the mass
     matrix; springs and dampers act at the contacts. Each tip obeys Newton's law by itself.
@@ -61,7 +66,8 @@ def integrated(dynamics, drive):
     ]
     mass = inertia + m_t * sum(J.T @ J for J in jacobians)
     damping = sum(J.T @ C @ J for J, C in zip(jacobians, dampers, strict=True))
-    least, state, turning = np.inf, np.zeros(12), np.zeros(3)
+    least, farthest = np.inf, np.zeros(2)
+    state, turning = np.zeros(12), np.zeros(3)
     for sample in range(len(drive)):
         palm = drive.accelerations[sample]
         o = turning + 0.5 * SAMPLE_S * palm[3:]
@@ -87,7 +93,8 @@ def integrated(dynamics, drive):
             world = -spring - m_t * (J @ force + bases[i]) - np.cross(moved[3:], grip.squeeze[i])
             change.append(grip.frames[i].T @ world)
         least = min(least, slip_multiple(grip.local_squeeze, np.array(change), grip.friction))
-    return least
+        farthest = np.maximum(farthest, np.linalg.norm(moved.reshape(2, 3), axis=1))
+    return least, *farthest
 
 
 def drives():
@@ -103,9 +110,10 @@ def drives():
 @pytest.mark.parametrize("name", ["box", "wedge"])
 def test_predictions_are_those_of_a_fine_integration(name, kind):
     dynamics, drive = dynamics_of(name), drives()[kind]
-    (found,) = predicted_slips(dynamics, [drive])
-    assert found == pytest.approx(integrated(dynamics, drive), rel=1e-5)
-    assert found < 1e3
+    (found,) = expected(dynamics, [drive])
+    seen = (found.first_slip, found.moved_m, found.turn_rad)
+    assert seen == pytest.approx(integrated(dynamics, drive), rel=1e-5)
+    assert found.first_slip < 1e3
 
 
 @pytest.mark.parametrize("name", ["box", "dodecahedron", "wedge"])
@@ -205,3 +213,37 @@ def test_an_unstable_grip_slips_at_once():
     dynamics = box_dynamics(push=500.0, stiffness=1000.0)
     assert not dynamics.grip.stable
     assert predicted_slips(dynamics, list(drives().values())).tolist() == [0.0] * 4
+
+
+def losses_of(dynamics, drives, most_m=5e-3, most_rad=0.09, turning=False):
+    return predicted_losses(dynamics, drives, [turning] * len(drives), most_m, most_rad)
+
+
+@pytest.mark.parametrize("name", ["box", "wedge"])
+def test_an_object_is_lost_after_the_first_slip_and_before_it_moves_too_far_without_any(name):
+    dynamics, several = dynamics_of(name), list(drives().values())
+    slips, losses = losses_of(dynamics, several)
+    assert slips == pytest.approx(predicted_slips(dynamics, several), rel=1e-12)
+    found = expected(dynamics, several)
+    sticking = [1.0 / max(one.moved_m / 5e-3, one.turn_rad / 0.09) for one in found]
+    assert (losses <= np.array(sticking) * (1 + 1e-9)).all()
+    assert (losses >= np.minimum(slips, sticking)).all()
+    assert (losses > 1.01 * np.minimum(slips, sticking)).any()
+    (_, safer) = losses_of(dynamics, several, turning=True)
+    assert safer == pytest.approx(np.minimum(slips, sticking), rel=1e-12)
+
+
+def test_narrow_limits_lose_the_object_before_it_slips():
+    dynamics, several = dynamics_of("box"), list(drives().values())
+    slips, losses = losses_of(dynamics, several, most_m=1e-6)
+    found = expected(dynamics, several)
+    assert losses == pytest.approx([1e-6 / one.moved_m for one in found], rel=1e-9)
+    assert (losses < slips).all()
+    (_, twice) = losses_of(dynamics, several, most_m=2e-6)
+    assert twice == pytest.approx(2.0 * losses, rel=1e-9)
+
+
+def test_a_load_that_never_comes_loses_nothing():
+    slips, losses = losses_of(box_dynamics(), [idle(20)])
+    assert (slips.tolist(), losses.tolist()) == ([np.inf], [np.inf])
+    assert [part.tolist() for part in losses_of(box_dynamics(), [])] == [[], []]

@@ -16,7 +16,7 @@ from sim_validate.execution.verdict import (
 
 
 def trial(kind, survived, fate="stuck"):
-    return ExecutionTrial(kind, kind, survived, fate, 0.0, 0.0, 0.0, 2.0, 2.0)
+    return ExecutionTrial(kind, kind, survived, fate, 0.0, 0.0, 0.0, 2.0, 3.0, 2.0)
 
 
 def execution(*trials, controls=()):
@@ -54,10 +54,10 @@ def test_only_a_dropped_object_is_dropped():
 
 def test_losses_are_told_in_millimetres_and_degrees_as_limits_are_given():
     lost = ExecutionTrial(
-        "knock", "knock -y", False, "slipped", 2e-3, 0.123, math.radians(107.5), 0.8, 0.75
+        "knock", "knock -y", False, "slipped", 2e-3, 0.123, math.radians(107.5), 0.8, 0.9, 0.75
     )
     assert losses_in_words(execution(trial("weight", True), lost)) == [trial_in_words(lost)]
     assert trial_in_words(lost) == (
         "knock -y: slipped, moved 123 mm and turned 108 degrees; first slip predicted at 0.8 of "
-        "the load, simulated at 0.75"
+        "the load, simulated at 0.75; loss predicted at 0.9"
     )

@@ -1,0 +1,205 @@
+"""How far a load can grow past the first slip before the object leaves its place.
+
+A contact that slips still pushes, and still rubs with as much as its friction allows: the others
+take the rest, and the grip becomes softer. While a load s w grows slowly, the object's small motion
+x = (d, t) and the contact forces g_i along the axes of their contacts follow
+
+    g'_i = g_i + D_i dx,   D_i = F_i' (-K_i W_i' + [0, [f_i x]]),                         (1)
+
+as in `grips` (6), where the contact sticks. Outside its cone g'_i is brought back along the
+tangent, to |t| = mu n, and a normal force below zero to none. The object is in balance where
+
+    sum_i W_i F_i (g_i - f_i) - C x + s w = 0,   C = K_g + sum_i W_i [0, [f_i x]],        (2)
+
+with g and f both along the contacts' axes; if nothing slips, this is (4) of `grips`. Newton's
+method solves (2) with the exact derivative of (1), at multiples in equal ratios, from that of first
+slip to that at which the object without any slip would leave its place. The object is *lost* where
+its motion passes what is allowed, or where balance ends; halving the ratio shows where.
+
+The load comes once. One that keeps turning makes contacts slip a little in each round, which adds
+up; for it the first slip is the safer answer.
+
+Source of the return to the cone: Simo and Hughes, "Computational Inelasticity", 1998, section 3.3.
+Following a structure until it yields everywhere is the pushover analysis of earthquake engineers.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.arrays import Array
+from grasp_core.closure.wrenches import WRENCH
+from grasp_core.execution.first_slip import slip_steps
+from grasp_core.execution.grips import Grip
+
+RATIOS = 10
+"""Number of equal ratios from the first slip to the farthest load: ranks of grasps do not improve
+with more."""
+BEFORE = 0.98
+"""Where the first multiple is, in first slips."""
+FARTHEST = 100.0
+"""Largest ratio of the farthest load to the first slip: slips at less are told from none there."""
+HALVINGS = 4
+MOST_STEPS = 12
+MET = 1e-7
+"""Wrench that is left of (2), relative to the largest force at rest."""
+SINGULAR = 1e-9
+"""Stiffness added to (2) where everything slips, relative to the largest."""
+
+
+def loss_multiples(grip: Grip, loads: Array, most_m: float, most_rad: float) -> Array:
+    """Find the multiples of loads, each of which comes once, at which the object is lost.
+
+    Args:
+        grip: The squeezed contacts, inside their cones.
+        loads: External (force, torque), (m, 6) [N, N m], about the centre of mass.
+        most_m: Displacement from which on the object is lost [m].
+        most_rad: Turn from which on it is [rad].
+
+    Returns:
+        The multiples, (m,): at most those at which the object without slip would be lost; zero if
+        the grip is unstable at rest.
+    """
+    if not grip.stable or not len(loads):
+        return np.zeros(len(loads))
+    change = np.einsum("kij,mj->mki", grip.response, loads)
+    count = len(loads)
+    slips = slip_steps(
+        np.tile(grip.local_squeeze, (count, 1)), change.reshape(-1, 3),
+        np.tile(grip.friction, count),
+    ).reshape(count, -1).min(axis=1)  # fmt: skip
+    with np.errstate(divide="ignore"):
+        sticking = 1.0 / _moved(loads @ grip.compliance.T, most_m, most_rad)
+    found = sticking.copy()
+    beyond = slips < sticking
+    if beyond.any():
+        begun = np.maximum(slips, sticking / FARTHEST)[beyond]
+        found[beyond] = _followed(grip, loads[beyond], begun, sticking[beyond], most_m, most_rad)
+    return found
+
+
+def _moved(motion: Array, most_m: float, most_rad: float) -> Array:
+    """Return small motions, (m, 6), as parts of what is allowed, (m,)."""
+    moved, turned = (np.linalg.norm(motion[:, part], axis=1) for part in (slice(3), slice(3, 6)))
+    return np.maximum(moved / most_m, turned / most_rad)
+
+
+@dataclass(slots=True, eq=False)
+class _Followed:
+    """Loads on their way: the last balance of each, and where each was lost first."""
+
+    multiples: Array
+    """Multiple of the last balance, (m,)."""
+    forces: Array
+    """Contact forces then, (m, k, 3) [N]."""
+    motion: Array
+    """Motion then, (m, 6) [m, rad]."""
+    share: Array
+    """That motion as a part of what is allowed, (m,)."""
+    lost: Array
+    """Least multiple at which the object is known to be lost, (m,); infinite if none is."""
+    beyond: Array
+    """Motion there as a part of what is allowed, (m,); infinite where nothing balances."""
+
+
+def _followed(
+    grip: Grip, loads: Array, begun: Array, last: Array, most_m: float, most_rad: float
+) -> Array:
+    """Follow loads past their first slips; return where each is lost, at most at the last, (m,)."""
+    count = len(loads)
+    rest = np.tile(grip.local_squeeze, (count, 1, 1))
+    way = _Followed(
+        np.zeros(count), rest, np.zeros((count, WRENCH)), np.zeros(count), np.full(count, np.inf),
+        np.full(count, np.inf),
+    )  # fmt: skip
+    first = BEFORE * begun
+    for part in np.linspace(0.0, 1.0, RATIOS + 1):
+        _try(grip, way, loads, first * (last / first) ** part, most_m, most_rad)
+    for _ in range(HALVINGS):
+        _try(grip, way, loads, 0.5 * (way.multiples + way.lost), most_m, most_rad)
+    between = np.full(count, 0.5)
+    np.divide(1.0 - way.share, way.beyond - way.share, out=between, where=np.isfinite(way.beyond))
+    lost = np.where(np.isinf(way.lost), last, way.lost)
+    return np.minimum(way.multiples + between * (lost - way.multiples), last)
+
+
+def _try(
+    grip: Grip, way: _Followed, loads: Array, multiples: Array, most_m: float, most_rad: float
+) -> None:
+    """Raise loads to multiples, (m,), where they are below those at which the object is lost."""
+    own = np.flatnonzero(multiples < way.lost)
+    if not len(own):
+        return
+    tried = multiples[own]
+    reach = np.array([most_m, most_m, most_m, most_rad, most_rad, most_rad])
+    forces, motion, met = _balanced(
+        grip, way.forces[own], way.motion[own], tried[:, None] * loads[own], reach
+    )
+    share = np.where(met, _moved(motion, most_m, most_rad), np.inf)
+    kept = share < 1.0
+    held, gone = own[kept], own[~kept]
+    way.multiples[held], way.share[held] = tried[kept], share[kept]
+    way.forces[held], way.motion[held] = forces[kept], motion[kept]
+    way.lost[gone], way.beyond[gone] = tried[~kept], share[~kept]
+
+
+def _balanced(
+    grip: Grip, forces: Array, start: Array, loads: Array, reach: Array
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Solve (2) for loads, (m, 6), from known forces, (m, k, 3), and motions, (m, 6).
+
+    No step of Newton's method is longer than a reach, (6,): near the end of balance it would fly.
+
+    Returns:
+        The forces, the motions, and which were found, (m,).
+    """
+    scale = np.repeat([1.0, 1.0 / grip.size], 3)
+    rest = grip.local_squeeze
+    stiff, maps, softening = _small_motions(grip)
+    most = MET * float(np.abs(rest).max())
+    motion = start.copy()
+    found = np.zeros(len(loads), dtype=bool)
+    after = forces
+    for _ in range(MOST_STEPS):
+        tried = forces + np.einsum("kij,mj->mki", stiff, motion - start)
+        after, slope = _returned(tried, grip.friction)
+        left = np.einsum("kij,mkj->mi", maps, after - rest) - motion @ softening.T + loads
+        found = (np.abs(left * scale) <= most).all(axis=1)
+        if found.all():
+            break
+        tangent = (maps @ slope @ stiff).sum(axis=1) - softening
+        tangent *= scale[:, None] * scale
+        size = np.abs(tangent).max(axis=(1, 2), keepdims=True)
+        tangent -= SINGULAR * size * np.eye(WRENCH)
+        solved = np.asarray(np.linalg.solve(tangent, -(left * scale)[..., None]), dtype=float)
+        step = np.where(found[:, None], 0.0, solved[..., 0] * scale)
+        motion = motion + step / np.maximum(np.abs(step / reach).max(axis=1, keepdims=True), 1.0)
+    return after, motion, found
+
+
+def _small_motions(grip: Grip) -> tuple[Array, Array, Array]:
+    """Return D_i of (1), (k, 3, 6), W_i F_i, (k, 6, 3), and C of (2), (6, 6)."""
+    stiff = grip.response @ grip.grasp_stiffness
+    maps = grip.local_maps
+    return stiff, maps, grip.grasp_stiffness + np.einsum("kij,kjl->il", maps, stiff)
+
+
+def _returned(tried: Array, friction: Array) -> tuple[Array, Array]:
+    """Bring contact forces, (m, k, 3), back to their cones along the tangent.
+
+    Returns:
+        The forces, and their derivatives by those given, (m, k, 3, 3).
+    """
+    pushing = tried[..., 0] > 0.0
+    n = np.where(pushing, tried[..., 0], 0.0)
+    across = np.linalg.norm(tried[..., 1:], axis=-1)
+    slipping = across > friction * n
+    along = tried[..., 1:] / np.where(across > 0.0, across, 1.0)[..., None]
+    kept = np.where(slipping, friction * n / np.where(slipping, across, 1.0), 1.0)
+    slope = np.zeros((*tried.shape, 3))
+    slope[..., 0, 0] = pushing
+    slope[..., 1:, 0] = (slipping & pushing)[..., None] * friction[:, None] * along
+    sideways = np.eye(2) - slipping[..., None, None] * along[..., :, None] * along[..., None, :]
+    slope[..., 1:, 1:] = kept[..., None, None] * sideways
+    return np.concatenate([n[..., None], kept[..., None] * tried[..., 1:]], axis=-1), slope
