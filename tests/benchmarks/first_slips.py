@@ -6,7 +6,8 @@ and a wrench with torque grows in 24 directions until a contact slips. `gc.first
 multiple, rolling and large motions included. Listed apart are directions in which the object turns
 by more than half a radian before it slips, and those in which a fingertip may roll over an edge of
 its face, as it rolls by its radius times the turn: predictions are for faces that go on. Ends with
-an error if the median error of the others is above 1 %, or 99 % of them are not within 3 %.
+an error if the median error of the others is above 1 %, or 99 % of them are not within 3 %; a
+failure of the simulator counts as the largest error.
 
     python -m tests.benchmarks.first_slips [--quick] [--meshes FOLDER] [--jobs N] [--worst N]
 
@@ -85,7 +86,8 @@ def measure(unit):
     ends = [(slip, way) for slip, way in zip(slips, ways, strict=True) if slip.event == "slip"]
     if not ends:
         return nothing(name, case, stiffness, mass, "no direction ends in a slip")
-    bench = held.bench_of(body, best.grip, mass)
+    moved = max(slip.displacement_m + body.radius * slip.turn_rad for slip, _ in ends)
+    bench = held.bench_of(body, best.grip, mass, moved)
     time_s = held.slowness(bench, best.grip)
     drives = [held.ramp(slip.multiple * way, BEYOND, time_s) for slip, way in ends]
     ratios = np.array(list(held.first_slips(bench, best.grip, drives)))
@@ -147,7 +149,7 @@ def report(found, worst):
     beyond = errors >= BEYOND - 1.0 - 1e-9
     print(f"{failed.sum()} failures of the simulator; {beyond.sum()} do not slip up to {BEYOND:g}")
     far = np.concatenate([one.rolls for one in real]) > 1.0
-    small = ~failed & ~far & (turns <= TURNED)
+    small = ~far & (turns <= TURNED)
     list_groups(real, errors, small)
     apart = {"rolled to an edge before": far, f"turned by more than {TURNED:g} rad": turns > TURNED}
     for what, which in apart.items():
@@ -155,13 +157,13 @@ def report(found, worst):
         if len(own):
             print(f"{what}: {len(own)}, {held.spread(own)}")
     own = errors[small]
-    print(f"all others: {len(own)}, {held.spread(own)}")
+    print(f"all others: {len(own)}, {failed[small].sum()} of them fail, {held.spread(own)}")
     names = np.repeat([f"{one.case} {one.stiffness:g} N/m {one.mass_kg:.2f} kg" for one in real],
                       sizes)  # fmt: skip
     for place in np.argsort(-np.where(small, np.abs(errors), -1.0))[:worst]:
         print(f"  {names[place]}: {100 * errors[place]:+.2f} %, turned {turns[place]:.2f} rad")
-    size = np.abs(own)
-    return bool(not failed.any() and np.median(size) <= MEDIAN and np.quantile(size, 0.99) <= MOST)
+    size = np.where(np.isnan(own), np.inf, np.abs(own))
+    return bool(np.median(size) <= MEDIAN and np.quantile(size, 0.99) <= MOST)
 
 
 def list_groups(real, errors, small):

@@ -36,8 +36,8 @@ RADIANS = 180.0
 object lags behind the load by the inverse of that, times twice the damping ratio, and grips become
 softer as they turn: with a third of the time soft fingertips seem to hold 5 to 15 % more."""
 HELD_S = 0.1
-REACH = 0.6
-"""How far fingertips may move on a curved surface, in its radii: loads end at the first slip."""
+SPARE = 0.1
+"""How much farther a curved surface is there than fingertips come, in its radii."""
 LOST = 3.0
 """Distance at which an object is lost and its trial ends, in its radii."""
 
@@ -114,9 +114,16 @@ def squeezed(
         return None
 
 
-def bench_of(body: gc.Polyhedron, grip: gc.Grip, mass_kg: float) -> HeldBench:
-    """Compile the scene of a squeezed object; a curved surface is there where fingertips come."""
-    reach = REACH * body.radius + float(grip.tip_radius_m.max()) if body.patches else None
+def bench_of(
+    body: gc.Polyhedron, grip: gc.Grip, mass_kg: float, moved_m: float | None = None
+) -> HeldBench:
+    """Compile the scene of a squeezed object.
+
+    A curved surface is there where fingertips come if no point of it moves by more than a distance.
+    """
+    reach = None
+    if moved_m is not None and body.patches is not None:
+        reach = min(moved_m + SPARE * body.radius, body.radius) + float(grip.tip_radius_m.max())
     scene = build_held_scene(body, grip, mass_kg, reach_m=reach)
     return HeldBench(scene, lost_m=LOST * body.radius)
 
@@ -183,9 +190,10 @@ def seconds(drive: Drive) -> float:
 
 
 def spread(values: np.ndarray) -> str:
-    """Say where most of some relative errors lie."""
-    size = np.abs(values)
+    """Say where most of some relative errors lie; NaN, where the simulator failed, is the worst."""
+    size = np.where(np.isnan(values), np.inf, np.abs(values))
+    most = np.quantile(size, 0.99, method="higher")
     return (
-        f"median {100 * np.median(size):.2f} %, 99 % within {100 * np.quantile(size, 0.99):.2f} %, "
-        f"from {100 * values.min():+.2f} to {100 * values.max():+.2f} %"
+        f"median {100 * np.median(size):.2f} %, 99 % within {100 * most:.2f} %, "
+        f"from {100 * np.nanmin(values):+.2f} to {100 * np.nanmax(values):+.2f} %"
     )
