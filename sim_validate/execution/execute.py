@@ -20,10 +20,8 @@ from grasp_core.errors import InputError, NoForcesError, UnfaithfulError
 from grasp_core.execution.best_squeeze import BestSqueeze, best_squeeze
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import any_direction
-from grasp_core.execution.worst_loads import Reactions
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
 from scenes.execution.held import HeldLayout
 from scenes.execution.held_mjcf import HeldScene, build_held_scene
@@ -31,22 +29,16 @@ from scenes.fingertips import fitting_radius
 from scenes.physics import PhysicsSettings
 from sim_validate.execution import paths
 from sim_validate.execution.bench import HeldBench, HeldMotion, motions_joined
-from sim_validate.execution.drives import joined, parted
+from sim_validate.execution.controls import run_controls
+from sim_validate.execution.drives import parted
 from sim_validate.execution.gate.gate import require_faithful_execution
 from sim_validate.execution.predictions import held_dynamics, predicted_losses
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.slips import outcome
 from sim_validate.execution.trials import Trial, trials_of
-from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
+from sim_validate.execution.verdict import Execution, ExecutionTrial
 from sim_validate.simulation.setup import MOST_THREADS
 
-CONTROL_FRICTION = 0.9
-CONTROL_SQUEEZE = 0.9
-"""Friction and squeeze of the controls, relative to the trials'."""
-FOLLOWED = 12.0
-"""Duration of a rise that the held object follows, in reciprocals of its lowest frequency."""
-LONGEST_RISE_S = 10.0
-"""Longest rise that is simulated: objects of tonnes on soft springs would take minutes [s]."""
 LOST = 3.0
 """How far an object is from its place when its trial ends, in its radii: no finger reaches it."""
 SPARE = 0.05
@@ -101,7 +93,7 @@ def execute(
         squeeze=best.grip.squeeze,
         load_multiple=best.scale,
         trials=judged,
-        controls=_controls(bench, best, dynamics.lowest_frequency),
+        controls=run_controls(bench, best, dynamics.lowest_frequency),
         skipped=skipped,
         physics=scene.physics,
     )
@@ -219,55 +211,3 @@ def _judged(
         predicted_loss=predicted[1],
         simulated_first_slip=found.first_slip,
     )
-
-
-def _controls(
-    bench: HeldBench, best: BestSqueeze, lowest_frequency: float
-) -> tuple[ExecutionControl, ...]:
-    """Put the least load that slips on grips that are weaker than certified; each must slip.
-
-    The load grows so slowly that the held object follows it.
-    """
-    layout, friction = bench.scene.layout, best.grip.friction
-    rise_s = min(max(2.0 * paths.RISE_S, FOLLOWED / lowest_frequency), LONGEST_RISE_S)
-    share = paths.smooth(paths.samples(rise_s))
-    loading = replace(
-        paths.loaded(share, np.zeros(3)), wrenches=share[:, None] * slipping_load(best)
-    )
-    closing = paths.closing()
-    all_push = np.ones(len(friction))
-    one_idle = all_push.copy()
-    one_idle[int(np.argmax(layout.pushes.max(axis=1)))] = 0.0
-    weaker = {
-        f"friction {CONTROL_FRICTION:g}": (CONTROL_FRICTION * friction, all_push),
-        f"squeeze {CONTROL_SQUEEZE:g}": (friction, CONTROL_SQUEEZE * all_push),
-        "a finger that does not push": (friction, one_idle),
-    }
-    whole = joined(closing, loading)
-    drives = [
-        replace(whole, grasping=np.outer(whole.grasping, pushing)) for _, pushing in weaker.values()
-    ]
-    frictions = np.array([own for own, _ in weaker.values()])
-    found = [
-        outcome(motion, layout, drive, own, len(closing) - 1)
-        for motion, drive, own in zip(
-            bench.run(drives, friction=frictions), drives, frictions, strict=True
-        )
-    ]
-    return tuple(
-        ExecutionControl(name, one.slipped, one.first_slip)
-        for name, one in zip(weaker, found, strict=True)
-    )
-
-
-def slipping_load(best: BestSqueeze) -> Array:
-    """Return the least load of a set that makes a contact slip, (6,) [N, N m].
-
-    It is larger than the worst certified load where a finger reaches its largest push before any
-    contact slips: the simulated fingers push as hard as their springs do.
-    """
-    reactions = Reactions.of(best.grip, best.loads)
-    angles, scales = reactions.worst_angles()
-    contact = first_best(-scales)
-    direction = reactions.worst_of(contact, float(angles[contact]))
-    return best.loads.offset + float(scales[contact]) * best.loads.axes @ direction

@@ -8,7 +8,8 @@ import sim_validate as sv
 from scenes.example_objects import example_object
 from scenes.execution.held import held_layout
 from sim_validate.execution import misplaced, slips
-from sim_validate.execution.execute import chosen_squeeze, slipping_load
+from sim_validate.execution.controls import slipping_load
+from sim_validate.execution.execute import chosen_squeeze
 
 FRICTION = 0.5
 SETTINGS = sv.ExecutionSettings(mass_kg=0.55)

@@ -1,0 +1,71 @@
+"""Grips that are weaker than chosen must slip, by analysis and in simulation."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import sim_validate as sv
+from grasp_core.closure.wrenches import cross_matrix
+from scenes.example_objects import example_object
+from sim_validate.execution.controls import SURE, idle, slipping_load, weaker_grips
+from sim_validate.execution.execute import chosen_squeeze, held_scene
+from tests.grasp_core.execution.held import planned_grips
+
+FRICTION = 0.5
+SETTINGS = sv.ExecutionSettings(mass_kg=0.55, trials=("weight",))
+
+
+def squeezed(name):
+    body = example_object(name)
+    for grasp in gc.plan(body, FRICTION, limit=4).grasps:
+        best = chosen_squeeze(body, grasp, FRICTION, SETTINGS)
+        yield best, held_scene(body, best.grip, SETTINGS).layout
+
+
+def test_springs_share_what_an_idle_finger_leaves():
+    """The forces balance, and but for the push that is missing they are those of one motion."""
+    for grip in planned_grips(limit=2, push=6.0):
+        for finger, push in enumerate(0.5 * grip.squeeze):
+            left = idle(grip, finger, push)
+            assert left.balanced
+            change = left.squeeze - grip.squeeze
+            change[finger] += push
+            jacobian = np.vstack([
+                -stiffness @ np.hstack([np.eye(3), -cross_matrix(arm)])
+                for stiffness, arm in zip(grip.stiffness, grip.arms, strict=True)
+            ])  # fmt: skip
+            _, residual, rank, _ = np.linalg.lstsq(jacobian, change.ravel(), rcond=None)
+            assert (rank, float(residual[0])) == (6, pytest.approx(0.0, abs=1e-18))
+            assert np.linalg.norm(left.squeeze[finger]) < np.linalg.norm(grip.squeeze[finger])
+
+
+@pytest.mark.parametrize("name", ["wedge", "dodecahedron", "l-bracket"])
+def test_loads_of_controls_slip_by_analysis_with_a_quarter_to_spare(name):
+    followed = 0
+    for best, layout in squeezed(name):
+        least = slipping_load(best)
+        for weaker in weaker_grips(best, layout):
+            share = np.linalg.norm(weaker.load) / np.linalg.norm(least)
+            assert share >= 1.0 - 1e-12
+            assert weaker.load == pytest.approx(share * least, rel=1e-12)
+            if weaker.pushing.min() > 0.0:
+                squeeze = weaker.pushing[:, None] * best.grip.squeeze
+                grip = replace(best.grip, squeeze=squeeze, friction=weaker.friction)
+                slip = gc.first_slip(grip, least)
+                assert share == pytest.approx(max(1.0, SURE * slip.multiple), rel=1e-9)
+                followed += 1
+    assert followed >= 8
+
+
+def test_an_object_that_slides_while_fingers_close_is_let_go():
+    """Without its strongest finger this grasp slides at once, and then would carry the load."""
+    body = example_object("box")
+    grasps = gc.plan(body, FRICTION, families=("concurrent",), limit=8).grasps
+    sliding = 0
+    for grasp in grasps[:4]:
+        found = sv.execute(body, grasp, FRICTION, SETTINGS)
+        assert found.controls_let_go
+        sliding += found.controls[2].first_slip == 0.0
+    assert sliding > 0
