@@ -157,14 +157,15 @@ def _balanced(
     scale = np.repeat([1.0, 1.0 / grip.size], 3)
     rest = grip.local_squeeze
     stiff, maps, softening = _small_motions(grip)
+    rows, columns = stiff.reshape(-1, WRENCH), maps.transpose(1, 0, 2).reshape(WRENCH, -1)
     most = MET * float(np.abs(rest).max())
     motion = start.copy()
     found = np.zeros(len(loads), dtype=bool)
     after = forces
     for _ in range(MOST_STEPS):
-        tried = forces + np.einsum("kij,mj->mki", stiff, motion - start)
+        tried = forces + ((motion - start) @ rows.T).reshape(forces.shape)
         after, slope = _returned(tried, grip.friction)
-        left = np.einsum("kij,mkj->mi", maps, after - rest) - motion @ softening.T + loads
+        left = (after - rest).reshape(len(loads), -1) @ columns.T - motion @ softening.T + loads
         found = (np.abs(left * scale) <= most).all(axis=1)
         if found.all():
             break

@@ -113,7 +113,8 @@ def test_losses_are_after_the_slip_and_before_the_limit_without_slip():
         assert (found >= 0.97 * np.minimum(slips, sticking)).all()
         assert loss_multiples(grip, 3.0 * loads, 1e-3, FAR) == pytest.approx(found / 3.0, rel=1e-6)
         wider = loss_multiples(grip, loads, 2e-3, FAR)
-        assert (wider >= found * (1 - 1e-9)).mean() > 0.9
+        assert (wider >= 0.9 * found).all()  # paths in large steps differ a little
+        assert (wider > 1.05 * found).any()
         count += int((np.array(slips) < found).sum())
     assert count >= 30
 
@@ -123,7 +124,7 @@ def test_each_load_is_followed_by_itself():
     loads = directions(12, np.random.default_rng(9), 6) * np.repeat([1.0, grip.size], 3)
     together = loss_multiples(grip, loads, 1e-3, 0.05)
     alone = [loss_multiples(grip, load[None], 1e-3, 0.05)[0] for load in loads]
-    assert together == pytest.approx(alone, rel=1e-9)
+    assert together == pytest.approx(alone, rel=1e-6)
 
 
 def test_unstable_grips_hold_nothing_and_no_load_is_never_lost():
