@@ -39,7 +39,7 @@ def keep(loop: Any, function: Callable[..., Any]) -> None:
     folder = folder_for(function.__module__, function.__code__.co_filename)
     if folder is not None:
         # numba has no public way to give one function a folder of its own
-        loop._cache = _kinds()(function, folder)  # noqa: SLF001
+        loop._cache = _kinds()(function, folder)
 
 
 @cache
@@ -104,7 +104,7 @@ def _kinds() -> Callable[[Callable[..., Any], Path], Any]:
     caching: Any = importlib.import_module("numba.core.caching")
 
     def cache_in(function: Callable[..., Any], folder: Path) -> Any:
-        class Here(caching._CacheLocator):  # noqa: SLF001
+        class Here(caching._CacheLocator):
             def get_cache_path(self) -> str:
                 return str(folder)
 
