@@ -10,7 +10,9 @@ import importlib
 import io
 import logging
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
@@ -46,6 +48,10 @@ OPTIONS: dict[str, dict[str, Any]] = {
 """Compression options of each picture format: lines keep their colours, and files stay small."""
 
 
+_IN_STYLE = ContextVar("_IN_STYLE", default=False)
+"""Whether the style of this module is set already."""
+
+
 def _part(name: str) -> Any:
     """Import a module of matplotlib.
 
@@ -69,11 +75,29 @@ def in_style(make: Callable[Given, Made]) -> Callable[Given, Made]:
 
     @wraps(make)
     def styled(*args: Given.args, **kwargs: Given.kwargs) -> Made:
-        style: Any = _part("style")
-        with style.context(["default", STYLE]):
+        with own_style():
             return make(*args, **kwargs)
 
     return styled
+
+
+@contextmanager
+def own_style() -> Generator[None]:
+    """Hide users' own style settings from figures made in a `with` block.
+
+    A block inside another one changes nothing. Setting the style takes as long as a small chart,
+    so that code that draws several figures sets it once for all of them.
+    """
+    if _IN_STYLE.get():
+        yield
+        return
+    style: Any = _part("style")
+    with style.context(["default", STYLE]):
+        token = _IN_STYLE.set(True)
+        try:
+            yield
+        finally:
+            _IN_STYLE.reset(token)
 
 
 @dataclass(frozen=True, slots=True)
