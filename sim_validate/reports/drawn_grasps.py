@@ -16,7 +16,7 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import ContactRegion, Grasp, four
-from scenes.drawing.canvas import own_style, write_figure
+from scenes.drawing.canvas import own_style_and_sheets, write_figure
 from scenes.drawing.clips import GraphicsError, magnified, write_clip
 from scenes.drawing.pictures import grasp_figure
 from scenes.drawing.views import best_view
@@ -139,7 +139,7 @@ def draw(task: Task) -> Drawn:
         InputError: The verdict is about other contacts than those of the grasp, or the execution
             has a trial or settings that do not fit the grasp.
     """
-    with own_style():
+    with own_style_and_sheets():
         return _drawn(task)
 
 
