@@ -247,7 +247,7 @@ def test_a_figure_that_is_used_again_is_drawn_as_a_new_one(wedge, trial, tmp_pat
         "picture": lambda each, mu: grasp_figure(body, each, mu, legend=False),
         "wrenches": lambda each, mu: wrench_figure(body, each, mu),
         "margins": lambda each, mu: margin_figure(body, each, mu),
-        "motion": lambda each, mu: motion_figure(trial, mu * 1e-5),
+        "motion": lambda _, mu: motion_figure(trial, mu * 1e-5),
     }
     for name, make in makers.items():
         expected = encoded(make(grasp, FRICTION), "png")
