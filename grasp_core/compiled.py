@@ -12,13 +12,15 @@ the same texts find again.
 """
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, Literal, TypeVar, cast
 
 from grasp_core.errors import InputError
 from grasp_core.kept_loops import keep
 
+_AWAITED: dict[str, Callable[[], object]] = {}
+"""Functions that return when a kernel is compiled elsewhere, by the kernel's name."""
 Loop = TypeVar("Loop", bound=Callable[..., Any])
 
 
@@ -41,6 +43,17 @@ def loop(division: Literal["python", "numpy"] = "python") -> Callable[[Loop], Lo
     return declared
 
 
+def wait_for(kernels: Mapping[str, Callable[[], object]]) -> None:
+    """Make the first use of kernels wait, as for another process that compiles them.
+
+    Args:
+        kernels: By the name of each kernel to wait for, a function that returns when it is
+            compiled; they replace those of an earlier call.
+    """
+    _AWAITED.clear()
+    _AWAITED.update(kernels)
+
+
 @cache
 def compiled(name: str) -> Any:
     """Load a kernel module.
@@ -51,6 +64,8 @@ def compiled(name: str) -> Any:
     Raises:
         InputError: Numba refuses its settings or cannot be loaded.
     """
+    if wait := _AWAITED.pop(name, None):
+        wait()
     try:
         return importlib.import_module(name)
     except (ImportError, RuntimeError, OSError, ValueError) as error:

@@ -9,6 +9,7 @@ compiled it. Numba itself looks at the processor.
 
 import hashlib
 import importlib
+import importlib.util
 import os
 import re
 import tempfile
@@ -40,6 +41,17 @@ def keep(loop: Any, function: Callable[..., Any]) -> None:
     if folder is not None:
         # numba has no public way to give one function a folder of its own
         loop._cache = _kinds()(function, folder)
+
+
+def is_kept(module: str) -> bool:
+    """Return whether loops of a kernel are kept already, or can be kept nowhere.
+
+    Args:
+        module: The kernel's full name.
+    """
+    found = importlib.util.find_spec(module)
+    folder = None if found is None else folder_for(module, str(found.origin))
+    return folder is None or any(folder.glob("*.nbi"))
 
 
 @cache
