@@ -204,7 +204,8 @@ def _frame(body: Polyhedron, face: int, corner: int) -> Array:
     toward = body.faces[face].polygon[corner] - body.faces[face].centroid
     toward = toward - normal * float(normal @ toward)
     toward = toward / np.linalg.norm(toward)
-    return np.column_stack([toward, np.cross(normal, toward), normal])
+    columns = [toward, np.cross(normal, toward), normal]
+    return np.asarray(np.column_stack(columns), dtype=np.float64)
 
 
 def _marks(body: Polyhedron) -> tuple[Array, Array]:

@@ -34,6 +34,10 @@ def _closure(points: Array, normals: Array) -> None:
     critical_friction(points, normals)
 
 
+def _last_family(_points: Array, _normals: Array) -> None:
+    plan(example_object("tetrahedron"), FRICTION, families=("regulus",), limit=1)
+
+
 BESIDE: Mapping[str, Callable[[Array, Array], object]] = {
     "grasp_core.solvers.nearest_point_kernel": (
         lambda points, _: least_distance(points[:3], -np.ones((1, 3)))
@@ -42,9 +46,7 @@ BESIDE: Mapping[str, Callable[[Array, Array], object]] = {
     "grasp_core.quality.ferrari_canny_kernel": (
         lambda points, normals: ferrari_canny(points, normals, FRICTION, torque_scale=1.0)
     ),
-    "grasp_core.families.regulus_kernel": (
-        lambda *_: plan(example_object("tetrahedron"), FRICTION, families=("regulus",), limit=1)
-    ),
+    "grasp_core.families.regulus_kernel": _last_family,
 }
 """For each kernel to compile beside a plan, in the order in which the plan needs them, a call that
 compiles it."""
