@@ -50,6 +50,10 @@ FIRST = 4
 """Number of cards that are drawn before the first page is written for the first time; it is written
 again whenever twice as many are drawn, and at the end."""
 
+CARDS_PER_PROCESS = 24
+"""Number of cards for which one more process is worth starting: a process that draws takes as long
+to start as eight cards take to draw."""
+
 Runs: TypeAlias = tuple[RunFolder, ...]
 
 
@@ -160,6 +164,7 @@ def _written(cards: Sequence[_Card], runs: Runs, out: Path, jobs: int, steps: St
     tasks = [card.task for card in cards]
     shown = list[Shown]()
     no_clip, next_index = "", min(FIRST, len(cards))
+    jobs = min(jobs, max(1, len(tasks) // CARDS_PER_PROCESS))
     results = chain(each(draw, tasks[:FIRST], jobs=1), each(draw, tasks[FIRST:], jobs=jobs))
     for card, drawn in zip(cards, results, strict=True):
         around = _neighbours(cards, len(shown))
