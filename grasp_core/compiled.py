@@ -7,26 +7,28 @@ that asks for it; what fails the check goes to a solver such as HiGHS or Clarabe
 say where to search are not checked: spanning quadruples, tilted cones, and bounds on discs, whose
 multipliers are checked in compiled code. Tests compare these with reference implementations.
 
-Numba keeps a compiled module together with what it calls from others, and looks only at the file
-of that module to see whether it changed: after a change of one kernel, remove the files kept for
-the others (`*.nbi` and `*.nbc` in `__pycache__`).
+Compiled code is kept on disk by `kept_loops`, in a folder of the user that other environments with
+the same texts find again.
 """
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, cast
 
 from grasp_core.errors import InputError
+from grasp_core.kept_loops import keep
 
+_AWAITED: dict[str, Callable[[], object]] = {}
+"""Functions that return when a kernel is compiled elsewhere, by the kernel's name."""
 Loop = TypeVar("Loop", bound=Callable[..., Any])
 
 
 def loop(division: Literal["python", "numpy"] = "python") -> Callable[[Loop], Loop]:
     """Declare a function that numba compiles on first use and keeps for later processes.
 
-    Where no folder can be written, neither `__pycache__` beside the module nor a cache folder of
-    the user, every process compiles the function again.
+    Where no folder can be written, neither a cache folder of the user nor `__pycache__` beside the
+    module, every process compiles the function again.
 
     Args:
         division: What dividing by zero does: raise an error, or give infinity or NaN as NumPy does.
@@ -34,12 +36,22 @@ def loop(division: Literal["python", "numpy"] = "python") -> Callable[[Loop], Lo
     numba: Any = importlib.import_module("numba")
 
     def declared(function: Loop) -> Loop:
-        try:
-            return numba.njit(function, cache=True, error_model=division)
-        except RuntimeError:  # numba found no folder
-            return numba.njit(function, error_model=division)
+        made = numba.njit(function, error_model=division)
+        keep(made, function)
+        return cast("Loop", made)
 
     return declared
+
+
+def wait_for(kernels: Mapping[str, Callable[[], object]]) -> None:
+    """Make the first use of kernels wait, as for another process that compiles them.
+
+    Args:
+        kernels: By the name of each kernel to wait for, a function that returns when it is
+            compiled; they replace those of an earlier call.
+    """
+    _AWAITED.clear()
+    _AWAITED.update(kernels)
 
 
 @cache
@@ -52,6 +64,8 @@ def compiled(name: str) -> Any:
     Raises:
         InputError: Numba refuses its settings or cannot be loaded.
     """
+    if wait := _AWAITED.pop(name, None):
+        wait()
     try:
         return importlib.import_module(name)
     except (ImportError, RuntimeError, OSError, ValueError) as error:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import grasp_core as gc
 import scenes
-from scenes.drawing.canvas import Around, entitle, in_style, new_figure, panels, write_figure
+from scenes.drawing.canvas import Around, entitle, figure_with_panels, in_style, write_figure
 from scenes.drawing.pictures import draw_grasp, grasp_figure
 from scenes.drawing.views import best_view
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
@@ -41,9 +41,9 @@ def best(name, family, friction, cones="tilted"):
 @in_style
 def families():
     """A grasp of each of the paper's families, side by side."""
-    figure = new_figure(12.0, 4.3)
     around = Around(left=0.0, right=0.0, below=0.0, above=0.07, between=0.02)
-    for axes, case in zip(panels(figure, 3, around=around), FAMILIES, strict=True):
+    figure, places = figure_with_panels(12.0, 4.3, 3, around=around)
+    for axes, case in zip(places, FAMILIES, strict=True):
         body, grasp = best(*case)
         draw_grasp(axes, body, grasp, case[2], best_view(body, grasp))
         entitle(axes, case[1])

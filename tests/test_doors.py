@@ -18,7 +18,7 @@ ROOT = Path(__file__).parent.parent
 DOORS = {
     "manifold3d": "grasp_core/objects/booleans.py",
     "trimesh": "grasp_core/objects/conversion.py",
-    "numba": "grasp_core/compiled.py",
+    "numba": ("grasp_core/compiled.py", "grasp_core/kept_loops.py"),
     "highspy": "grasp_core/solvers/lp.py",
     "clarabel": "grasp_core/solvers/conic.py",
     "qpsolvers": "grasp_core/solvers/qp.py",

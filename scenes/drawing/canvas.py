@@ -10,11 +10,14 @@ import importlib
 import io
 import logging
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -40,10 +43,23 @@ INTERVALS = 4
 """Largest number of intervals between ticks of an axis; ticks are the slowest part of drawing."""
 DOTS_PER_INCH = 100.0
 OPTIONS: dict[str, dict[str, Any]] = {
-    "webp": {"quality": 70, "method": 3},
+    "webp": {"quality": 70, "method": 2},
     "jpg": {"quality": 90},
 }
 """Compression options of each picture format: lines keep their colours, and files stay small."""
+
+
+_IN_STYLE = ContextVar("_IN_STYLE", default=False)
+"""Whether the style of this module is set already."""
+_REUSED = ContextVar("_REUSED", default=False)
+"""Whether figures that were written are used again."""
+_MAKER: ContextVar[object] = ContextVar("_MAKER", default=None)
+"""The function that makes a figure; only figures of the same function are used again for it, so
+that scales and labels stay."""
+_SHEETS: dict[tuple[object, ...], list[tuple[Any, list[Any]]]] = {}
+"""Figures to use again, with their axes, by maker, size and panels."""
+_PANELS: "WeakKeyDictionary[Any, tuple[tuple[object, ...], list[Any]]]" = WeakKeyDictionary()
+"""Maker, size and panels of each figure that is in use, with its axes."""
 
 
 def _part(name: str) -> Any:
@@ -69,11 +85,49 @@ def in_style(make: Callable[Given, Made]) -> Callable[Given, Made]:
 
     @wraps(make)
     def styled(*args: Given.args, **kwargs: Given.kwargs) -> Made:
-        style: Any = _part("style")
-        with style.context(["default", STYLE]):
-            return make(*args, **kwargs)
+        token = _MAKER.set(make)
+        try:
+            with own_style():
+                return make(*args, **kwargs)
+        finally:
+            _MAKER.reset(token)
 
     return styled
+
+
+@contextmanager
+def own_style() -> Generator[None]:
+    """Hide users' own style settings from figures made in a `with` block.
+
+    A block inside another one changes nothing. Setting the style takes as long as a small chart,
+    so that code that draws several figures sets it once for all of them.
+    """
+    if _IN_STYLE.get():
+        yield
+        return
+    style: Any = _part("style")
+    with style.context(["default", STYLE]):
+        token = _IN_STYLE.set(True)
+        try:
+            yield
+        finally:
+            _IN_STYLE.reset(token)
+
+
+@contextmanager
+def own_style_and_sheets() -> Generator[None]:
+    """Set the style for a `with` block in which each figure is given up once it is written.
+
+    `write_figure` then keeps the figure, and the next one of the same size and panels is drawn into
+    its axes: making axes and ticks anew takes as long as drawing a chart. Nobody may use a figure
+    after it is written in such a block.
+    """
+    token = _REUSED.set(True)
+    try:
+        with own_style():
+            yield
+    finally:
+        _REUSED.reset(token)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,20 +141,58 @@ class Around:
     between: float = 0.3
 
 
+def figure_with_panels(
+    width_in: float, height_in: float, count: int, *, around: Around = Around(),
+    widths: tuple[float, ...] | None = None,
+) -> tuple[Any, list[Any]]:  # fmt: skip
+    """Make a figure with axes side by side at given places.
+
+    An automatic layout would take twice as long.
+
+    Args:
+        width_in: Width of the figure [inches].
+        height_in: Its height [inches].
+        count: Number of axes.
+        around: Margins around the axes and between them.
+        widths: Relative width of each of the axes; equal ones if None.
+
+    Returns:
+        The figure, and its axes from left to right.
+    """
+    kind = _MAKER.get(), width_in, height_in, count, around, widths
+    if _REUSED.get() and (kept := _SHEETS.get(kind)):
+        figure, found = kept.pop()
+        for axes in found:
+            _cleared(axes)
+    else:
+        figure = new_figure(width_in, height_in)
+        room = {"left": around.left, "right": 1.0 - around.right, "bottom": around.below,
+                "top": 1.0 - around.above, "wspace": around.between}  # fmt: skip
+        found = list(
+            figure.subplots(1, count, squeeze=False, width_ratios=widths, gridspec_kw=room)[0]
+        )
+        for axes in found:
+            axes.locator_params(nbins=INTERVALS)
+    _PANELS[figure] = kind, found
+    return figure, found
+
+
+def _cleared(axes: Any) -> None:
+    """Remove from axes what was drawn into them, and let the next drawing choose their range."""
+    for artist in axes.get_children():
+        if artist not in (axes.title, axes.patch, axes.xaxis, axes.yaxis, *axes.spines.values()):
+            with suppress(NotImplementedError):  # the titles at the sides stay, and are empty
+                artist.remove()
+    axes.dataLim.set_points(np.array([[np.inf, np.inf], [-np.inf, -np.inf]]))
+    axes.ignore_existing_data_limits = True
+    axes.set_prop_cycle(None)
+    axes.autoscale(True)
+
+
 def new_figure(width_in: float, height_in: float) -> Any:
     """Make an empty figure of a size in inches."""
     figure: Any = _part("figure")
     return figure.Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout=None)
-
-
-def panels(figure: Any, count: int, *, around: Around = Around()) -> list[Any]:
-    """Make axes side by side at given places; an automatic layout would take twice as long."""
-    room = {"left": around.left, "right": 1.0 - around.right, "bottom": around.below,
-            "top": 1.0 - around.above, "wspace": around.between}  # fmt: skip
-    found = list(figure.subplots(1, count, squeeze=False, gridspec_kw=room)[0])
-    for axes in found:
-        axes.locator_params(nbins=INTERVALS)
-    return found
 
 
 def entitle(axes: Any, title: str) -> None:
@@ -176,7 +268,11 @@ def write_figure(figure: Any, path: Path) -> Path:
     Raises:
         InputError: The ending is unknown.
     """
-    return write_parts(path, [encoded(figure, format_of(path))])
+    written = write_parts(path, [encoded(figure, format_of(path))])
+    if _REUSED.get() and figure in _PANELS:
+        kind, axes = _PANELS.pop(figure)
+        _SHEETS.setdefault(kind, []).append((figure, axes))
+    return written
 
 
 def format_of(path: Path) -> str:

@@ -14,12 +14,11 @@ from grasp_core.values import Grasp
 from scenes.drawing.canvas import (
     Around,
     add_polygons,
+    figure_with_panels,
     format_of,
     in_style,
     legend_line,
     legend_patch,
-    new_figure,
-    panels,
     write_figure,
 )
 from scenes.drawing.drawings import BAR_LENGTH, drawing_of
@@ -108,9 +107,10 @@ def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | No
 
 def empty_picture(*, legend: bool = False) -> tuple[Any, Any]:
     """Make a figure for a grasp, perhaps with a legend, and return it with its axes."""
-    figure = new_figure(SIDE_IN, SIDE_IN + (LEGEND_IN if legend else 0.0))
+    height = SIDE_IN + (LEGEND_IN if legend else 0.0)
     below = LEGEND_IN / (SIDE_IN + LEGEND_IN) if legend else 0.0
-    (axes,) = panels(figure, 1, around=Around(0.0, 0.0, below, 0.0))
+    around = Around(0.0, 0.0, below, 0.0)
+    figure, (axes,) = figure_with_panels(SIDE_IN, height, 1, around=around)
     return figure, axes
 
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import Self
 
 import numpy as np
@@ -54,8 +55,7 @@ class View:
         """Project points (n, 3) to the picture, (n, 2) [m], with their nearness, (n,) [m]."""
         turned = (points - self.center) @ self.axes.T
         nearness = turned[:, 2]
-        scale = self.distance / np.maximum(self.distance - nearness, 0.1 * self.distance)
-        return turned[:, :2] * scale[:, None], nearness
+        return turned[:, :2] * _enlarged(nearness, self.distance)[:, None], nearness
 
 
 def _axes(azimuth: float, elevation: float) -> Array:
@@ -71,22 +71,33 @@ def best_view(body: Polyhedron, grasp: Grasp) -> View:
     outward = -grasp.normals if grasp.approach_directions is None else -grasp.approach_directions
     ends = grasp.positions + body.radius * outward
     areas = np.array([face.area for face in body.faces])
+    angles, axes = _views()
+    towards = axes[:, 2]
+    fingers = towards @ outward.T
+    apart = _least_gaps(axes, np.vstack([grasp.positions, ends]), body) / body.radius
+    pointing = np.maximum(np.abs(fingers) - FORESHORTENED, 0.0).sum(axis=1)
+    lines = (np.abs(towards @ body.normals.T) < EDGE_ON) @ areas / areas.sum()
+    in_front = (fingers > SAME_MERIT).mean(axis=1)
+    merits = apart + 0.1 * in_front - 2.0 * pointing - 0.5 * lines
+    return View.of_angles(*angles[first_best(merits, SAME_MERIT)], body)
+
+
+@cache
+def _views() -> tuple[list[tuple[int, int]], Array]:
+    """Return the angles of the views to choose from [deg], and their axes, (n, 3, 3)."""
     angles = [(azimuth, elevation) for elevation in ELEVATIONS for azimuth in AZIMUTHS]
-
-    def merit(angle: tuple[int, int]) -> float:
-        view = View.of_angles(*angle, body)
-        towards = view.axes[2]
-        apart = _least_gap(view.seen(np.vstack([grasp.positions, ends]))[0]) / body.radius
-        pointing = np.maximum(np.abs(outward @ towards) - FORESHORTENED, 0.0).sum()
-        lines = areas @ (np.abs(body.normals @ towards) < EDGE_ON) / areas.sum()
-        in_front = (outward @ towards > SAME_MERIT).mean()
-        return apart + 0.1 * in_front - 2.0 * float(pointing) - 0.5 * float(lines)
-
-    best = first_best([merit(angle) for angle in angles], SAME_MERIT)
-    return View.of_angles(*angles[best], body)
+    axes = [_axes(math.radians(azimuth), math.radians(elevation)) for azimuth, elevation in angles]
+    return angles, np.array(axes)
 
 
-def _least_gap(points: Array) -> float:
-    """Return the smallest distance between any two of several points, (n, 2) [m]."""
-    gaps = np.linalg.norm(points[:, None] - points[None], axis=2)
-    return float(gaps[np.triu_indices(len(points), 1)].min())
+def _least_gaps(axes: Array, points: Array, body: Polyhedron) -> Array:
+    """Return the smallest distance between any two points (p, 3) in each picture, (n,) [m]."""
+    turned = (points - body.center_of_mass) @ axes.transpose(0, 2, 1)
+    flat = turned[..., :2] * _enlarged(turned[..., 2], DISTANCE * body.radius)[..., None]
+    first, second = np.triu_indices(len(points), 1)
+    return np.linalg.norm(flat[:, first] - flat[:, second], axis=2).min(axis=1)
+
+
+def _enlarged(nearness: Array, distance: float) -> Array:
+    """Return by which factor perspective enlarges what is at some nearness [m], of any shape."""
+    return distance / np.maximum(distance - nearness, 0.1 * distance)

@@ -33,8 +33,8 @@ USUAL_KERNEL = "grasp_core.solvers.lp_kernel"
 LOOPS = {
     "kept": "yes",
     "not kept": (
-        "yes, but each process spends a minute on compiling them again: make the packages' "
-        "__pycache__ or NUMBA_CACHE_DIR writable"
+        "yes, but each process spends half a minute on compiling them again: make the user's "
+        "cache folder or NUMBA_CACHE_DIR writable"
     ),
     "interpreted": "no, NUMBA_DISABLE_JIT says so: unset it, planning is a hundred times slower",
 }

@@ -24,6 +24,7 @@ from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.reading import write_text
 from sim_validate.files.stale_results import remove_results
 from sim_validate.parallel.certifying import Asked, Found, certified, wider
+from sim_validate.parallel.compiling import compiled_beside
 from sim_validate.parallel.improving import improved
 from sim_validate.records.regions import write_regions
 
@@ -39,7 +40,7 @@ def plan_object(
     Raises:
         InputError: A setting is refused.
     """
-    with reporter.progress("planning") as steps:
+    with reporter.progress("planning") as steps, compiled_beside(jobs):
         found = plan(
             body,
             planning.friction,

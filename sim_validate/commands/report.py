@@ -1,5 +1,7 @@
 """Runs the command `report`, which writes the results of a run as pages for a browser."""
 
+from pathlib import Path
+
 from sim_validate.cli import showing_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
@@ -19,6 +21,13 @@ def report_folder(command: showing_flags.Report, reporter: Reporter) -> int:
 
 def shown_report(asked: showing_flags.Report, reporter: Reporter) -> Report:
     """Write the pages of a run, and say where they are."""
+
+    def say_ready(index: Path, drawn: int, total: int) -> None:
+        reporter.say(
+            f"report: {index} can be opened now; {drawn} of {total} cards are drawn, "
+            "the others follow"
+        )
+
     with reporter.progress("drawing") as steps:
         report = write_report(
             asked.folder,
@@ -26,7 +35,9 @@ def shown_report(asked: showing_flags.Report, reporter: Reporter) -> Report:
             jobs=asked.jobs,
             limit=asked.limit,
             clips=asked.clips,
+            every_copy=asked.every_copy,
             progress=steps.update,
+            ready=say_ready,
         )
     if report.no_clip:
         reporter.warn(f"no clips: {report.no_clip}")

@@ -5,6 +5,7 @@ simulated again. This gives bit for bit the motion that was judged, unless the t
 early. Clips of an executed grasp show its lift, its worst shake, and a trial in which it slipped.
 """
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import ContactRegion, Grasp, four
-from scenes.drawing.canvas import write_figure
+from scenes.drawing.canvas import own_style_and_sheets, write_figure
 from scenes.drawing.clips import GraphicsError, magnified, write_clip
 from scenes.drawing.pictures import grasp_figure
 from scenes.drawing.views import best_view
@@ -92,9 +93,10 @@ class Drawn:
     """Reason why no clip could be drawn; empty if there is a clip or none was asked for."""
 
 
-def tasks_of(run: RunFolder, folder: Path, prefix: str, clips: int) -> list[Task]:
-    """List the grasps of a run to draw, with clips of some, those with problems first."""
-    grasps = run.saved.grasps
+def tasks_of(
+    run: RunFolder, grasps: Sequence[Grasp], folder: Path, prefix: str, clips: int
+) -> list[Task]:
+    """List grasps of a run as tasks to draw, with clips of some, those with problems first."""
     filmed = {each.id for each in sorted(grasps, key=lambda each: not run.alarms(each.id))[:clips]}
     return [
         Task(
@@ -137,6 +139,11 @@ def draw(task: Task) -> Drawn:
         InputError: The verdict is about other contacts than those of the grasp, or the execution
             has a trial or settings that do not fit the grasp.
     """
+    with own_style_and_sheets():
+        return _drawn(task)
+
+
+def _drawn(task: Task) -> Drawn:
     body, grasp = task.saved.body, task.grasp
     view = best_view(body, grasp)
     picture = _written(

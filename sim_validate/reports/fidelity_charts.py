@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.drawing.canvas import Around, entitle, in_style, new_figure, panels
+from scenes.drawing.canvas import Around, entitle, figure_with_panels, in_style
 from scenes.drawing.palette import BAD, GOOD, NEUTRAL
 from sim_validate.reports.agreement import Agreement
 from sim_validate.validation.wrench_verdict import AGREEMENT
@@ -28,9 +28,9 @@ def fidelity_figure(agreements: Sequence[Agreement]) -> Any:
     Returns:
         A matplotlib figure.
     """
-    figure = new_figure(4.2 * len(agreements), 3.7)
     around = Around(left=0.2 / len(agreements), below=0.14, between=0.3)
-    places = panels(figure, len(agreements), around=around)
+    width = 4.2 * len(agreements)
+    figure, places = figure_with_panels(width, 3.7, len(agreements), around=around)
     for axes, agreement in zip(places, agreements, strict=True):
         _panel(axes, agreement)
     return figure

@@ -27,6 +27,10 @@ from sim_validate.reports.run_folder import GRASPS, RunFolder
 from sim_validate.reports.turntable import as_text, grasp_data
 
 MILLI, MICRO = 1e3, 1e6
+ROTATED, MIRRORED = "rotated", "mirrored"
+"""Kinds of copies of a grasp, as the pages call them."""
+DRAW_ALL = "graspproof report . --every-copy"
+"""Command that draws copies, too."""
 LESS = 1e-9
 """Size below which a component of a vector is printed as zero, as a share of a given size."""
 
@@ -39,10 +43,43 @@ class Neighbours:
     after: str | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Copy:
+    """A grasp that a symmetry of the object makes from another."""
+
+    id: str
+    page: str
+    """Path of its page, relative to the report's folder."""
+    kind: str
+    """`ROTATED`, or `MIRRORED` if only a reflection makes it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kin:
+    """The grasps that symmetries of the object make from a grasp, or the one that it is made from.
+
+    Either is empty.
+    """
+
+    copies: tuple[Copy, ...] = ()
+    first: Copy | None = None
+    """The grasp that stands for its copies and has pictures; its `kind` is that of this copy."""
+
+
 def grasp_page(
-    run: RunFolder, grasp: Grasp, drawn: Drawn, object_script: str, neighbours: Neighbours
-) -> str:
-    """Write the text of the page about one grasp."""
+    run: RunFolder, grasp: Grasp, drawn: Drawn | None, object_script: str, neighbours: Neighbours,
+    kin: Kin = Kin(),
+) -> str:  # fmt: skip
+    """Write the text of the page about one grasp.
+
+    Args:
+        run: The run that the grasp is from.
+        grasp: The grasp.
+        drawn: Paths of its pictures; None for a copy, whose page leads to those of the first.
+        object_script: Name of the script with the object's drawing.
+        neighbours: Pages before and after this one.
+        kin: Its copies by symmetry, or the grasp of which it is a copy.
+    """
     verdict = run.verdicts.get(grasp.id)
     shown = certified(grasp, run.shaded.get(grasp.id))
     said, tone = said_of_both(verdict, run.executions, run.executed(grasp.id))
@@ -57,21 +94,18 @@ def grasp_page(
         tone=tone,
         before=neighbours.before,
         after=neighbours.after,
-        picture=drawn.picture,
+        kin=kin,
+        drawn=drawn,
         push=largest_push(verdict),
-        charts=drawn if drawn.wrenches else None,
-        shown=drawn.trial,
-        shown_outcome=drawn.outcome,
-        clip=drawn.clip,
         executed=execution_section(run.executions, run.executed(grasp.id)),
-        executed_clips=drawn.executed,
+        executed_clips=drawn.executed if drawn else (),
         object_script=object_script,
         facts=list(_facts(run, grasp, verdict)),
         contacts=list(_contacts(shown, run.saved.body.radius)),
         certified=_certified(run, grasp),
         trials=[] if verdict is None else [_trial(verdict, each) for each in verdict["wrenches"]],
         controls=[] if verdict is None else _controls(verdict["controls"]),
-        commands=list(_commands(run, grasp, verdict)),
+        commands=[*_commands(run, grasp, verdict), *([DRAW_ALL] if kin.first else [])],
         drawing=as_text(grasp_data(run.saved.body, shown, run.friction)),
     )
 

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
+from grasp_core.objects.symmetries import Copies, copies_of
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
 from sim_validate.records.executions_json import Executions
@@ -22,7 +23,7 @@ from sim_validate.reports.executed_grasps import (
     execution_settings,
     said_of_both,
 )
-from sim_validate.reports.grasp_page import MILLI
+from sim_validate.reports.grasp_page import MILLI, MIRRORED, Copy
 from sim_validate.reports.pages import page
 from sim_validate.reports.run_folder import RunFolder
 from sim_validate.reports.survival_charts import survival_sentence
@@ -30,16 +31,55 @@ from sim_validate.reports.survival_charts import survival_sentence
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """A grasp in the gallery of the first page."""
+    """A card in the gallery of the first page: a grasp, and its copies by symmetry."""
 
     run: RunFolder
     grasp: Grasp
     page: str
     picture: str
+    copies: tuple[Copy, ...] = ()
 
 
-def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown]) -> str:
-    """Write the text of the report's first page."""
+def cards_of(run: RunFolder, *, every_copy: bool) -> tuple[Copies, ...]:
+    """Sort the grasps of a run into cards: each is a grasp and those that symmetries make of it.
+
+    Only grasps whose tests ended alike share a card, so that no problem is hidden behind another
+    grasp.
+
+    Args:
+        run: The run.
+        every_copy: Whether every grasp gets a card of its own.
+
+    Returns:
+        Places of the grasps in the run, by card, in the order of the cards' first grasps.
+    """
+    grasps = run.saved.grasps
+    if every_copy:
+        return tuple(map(Copies, range(len(grasps))))
+    ended: dict[object, list[int]] = {}
+    for place, grasp in enumerate(grasps):
+        found = run.executed(grasp.id)
+        said = said_of_both(run.verdicts.get(grasp.id), run.executions, found)
+        executed = execution_row(found)["said"] if run.executions else None
+        ended.setdefault((said, executed), []).append(place)
+    cards = list[Copies]()
+    for places in ended.values():
+        for card in copies_of(run.saved.body, [grasps[place] for place in places]):
+            rotated, mirrored = (
+                tuple(places[each] for each in found) for found in (card.rotated, card.mirrored)
+            )
+            cards.append(Copies(places[card.first], rotated, mirrored))
+    return tuple(sorted(cards, key=lambda card: card.first))
+
+
+def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int = 0) -> str:
+    """Write the text of the report's first page.
+
+    Args:
+        runs: The runs.
+        shown: Cards of the gallery.
+        waiting: Number of cards that are still being drawn.
+    """
     verdicts = all_verdicts(runs)
     cards = [_card(each) for each in shown]
     found = agreements(verdicts)
@@ -48,6 +88,7 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown]) -> str:
         names=", ".join(dict.fromkeys(run.saved.body.name for run in runs)),
         runs=[_described(run) for run in runs],
         cards=cards,
+        waiting=waiting,
         choices={
             name: sorted({str(card[name]) for card in cards})
             for name in ("object", "family", "verdict")
@@ -98,6 +139,8 @@ def _card(shown: Shown) -> dict[str, Any]:
         "family": grasp.family,
         "page": shown.page,
         "picture": shown.picture,
+        "copies": shown.copies,
+        "mirrored": sum(copy.kind == MIRRORED for copy in shown.copies),
         "verdict": said,
         "tone": tone,
         "radius_mm": round(MILLI * grasp.radius, 6),

@@ -15,7 +15,7 @@ from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.wrench_limits import wrench_limits
 from grasp_core.values import Grasp
-from scenes.drawing.canvas import Around, entitle, in_style, new_figure, panels
+from scenes.drawing.canvas import Around, entitle, figure_with_panels, in_style
 from scenes.drawing.palette import BAD, INK, NEUTRAL
 from scenes.drawing.pictures import check_drawn
 from scenes.fingertips import FingerSettings
@@ -24,6 +24,8 @@ LONGITUDES, LATITUDES = 21, 11
 """Numbers of a map's nodes: around, where the first is also the last, and from pole to pole."""
 COLOURS = "cividis"
 """Name of the colour map from small to large values; its colours differ in brightness, too."""
+WIDTHS = (1.0, 0.03, 1.0, 0.03)
+"""Relative widths of the two maps, each with the scale of its colours."""
 MILLI = 1e3
 USUAL_PUSH_N = FingerSettings().max_normal_force_n
 SAME = 12
@@ -61,16 +63,16 @@ def margin_figure(
             f"{grasp.id} is not in force closure at friction {friction:g}, so it resists nothing "
             f"in some direction; draw it at a friction above {grasp.critical_friction:.4g}"
         )
-    figure = new_figure(9.0, 2.5)
-    around = Around(left=0.01, right=0.02, below=0.02, above=0.12, between=0.05)
-    forces, torques = panels(figure, 2, around=around)
+    around = Around(left=0.01, right=0.05, below=0.02, above=0.12, between=0.12)
+    figure, places = figure_with_panels(9.0, 2.5, 4, around=around, widths=WIDTHS)
+    forces, force_scale, torques, torque_scale = places
     ways = np.zeros((LATITUDES * LONGITUDES, 6))
     ways[:, :3] = directions_of_map().reshape(-1, 3)
     limits = _limits(body, grasp, friction, max_normal_force_n, ways)
-    _map(figure, forces, limits, "largest force resisted [N]")
+    _map(forces, force_scale, limits, "largest force resisted [N]")
     ways = np.roll(ways, 3, axis=1) * body.radius
     limits = MILLI * body.radius * _limits(body, grasp, friction, max_normal_force_n, ways)
-    _map(figure, torques, limits, "largest torque resisted [mN m]")
+    _map(torques, torque_scale, limits, "largest torque resisted [mN m]")
     return figure
 
 
@@ -108,9 +110,10 @@ def on_map(longitudes: Array, latitudes: Array) -> tuple[Array, Array]:
     return 2.0 * np.cos(latitudes) * np.sin(0.5 * longitudes) / scale, np.sin(latitudes) / scale
 
 
-def _map(figure: Any, axes: Any, values: Array, title: str) -> None:
+def _map(axes: Any, scale: Any, values: Array, title: str) -> None:
+    """Draw a map into axes, and its colours beside it."""
     x, y = on_map(*_nodes())
-    drawn = axes.pcolormesh(x, y, values, cmap=COLOURS, shading="gouraud")
+    axes.pcolormesh(x, y, values, cmap=COLOURS, shading="gouraud")
     least = int(values.argmin())
     axes.plot(
         x.flat[least],
@@ -131,6 +134,13 @@ def _map(figure: Any, axes: Any, values: Array, title: str) -> None:
     axes.set_aspect("equal")
     axes.set_axis_off()
     entitle(axes, f"{title}: least {values.min():.3g} (circle)")
-    bar = figure.colorbar(drawn, ax=axes, shrink=0.85, pad=0.02)
-    bar.ax.locator_params(nbins=4)
-    bar.outline.set_edgecolor(NEUTRAL)
+    heights = np.array([values.min(), max(values.max(), np.nextafter(values.min(), np.inf))])
+    scale.pcolormesh(
+        np.array([0.0, 1.0]), heights, np.repeat(heights[:, None], 2, axis=1), cmap=COLOURS,
+        shading="gouraud",
+    )  # fmt: skip
+    scale.set_xticks([])
+    scale.yaxis.tick_right()
+    scale.set_ylim(*heights)
+    for spine in scale.spines.values():
+        spine.set(visible=True, edgecolor=NEUTRAL)

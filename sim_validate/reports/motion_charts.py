@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.drawing.canvas import entitle, in_style, new_figure, panels
+from scenes.drawing.canvas import entitle, figure_with_panels, in_style
 from scenes.drawing.palette import BAD, FINGERS, INK, NEUTRAL
 from sim_validate.replaying.replay import Replayed
 
@@ -28,8 +28,7 @@ def motion_figure(found: Replayed, threshold_m: float) -> Any:
     Returns:
         A matplotlib figure. Friction is lowered to the one under test at time zero.
     """
-    figure = new_figure(9.0, 2.8)
-    moved, pushed, used = panels(figure, 3)
+    figure, (moved, pushed, used) = figure_with_panels(9.0, 2.8, 3)
     watched, trace = found.watched, found.watched.trace
     times = trace.times_s
     moved.plot(times, MICRO * trace.displacements_m, color=INK, label="object")

@@ -1,10 +1,12 @@
 """Turns the folder of a run into a folder of pages that open from disk and need no network."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
+from typing import TypeAlias
 
-from grasp_core.checked import function, path_of, whole
+from grasp_core.checked import function, path_of, switch, whole
 from scenes.drawing.canvas import write_figure
 from sim_validate.files.reading import write_text
 from sim_validate.files.stale_results import (
@@ -20,14 +22,22 @@ from sim_validate.files.stale_results import (
     require_report_folder,
 )  # fmt: skip
 from sim_validate.parallel.processes import available_cores, each
-from sim_validate.reports.drawn_grasps import Drawn, draw, tasks_of
+from sim_validate.reports.drawn_grasps import Drawn, Task, draw, tasks_of
 from sim_validate.reports.fidelity_charts import fidelity_figure
-from sim_validate.reports.grasp_page import Neighbours, grasp_page
+from sim_validate.reports.grasp_page import (
+    MIRRORED,
+    ROTATED,
+    Copy,
+    Kin,
+    Neighbours,
+    grasp_page,
+)
 from sim_validate.reports.index_page import (
     Shown,
     agreements,
     all_executions,
     all_verdicts,
+    cards_of,
     index_page,
 )
 from sim_validate.reports.pages import asset
@@ -36,6 +46,30 @@ from sim_validate.reports.survival_charts import survival_figure
 from sim_validate.reports.turntable import as_text, object_data
 
 MARKED = "The pages here were written by graspproof, which may replace them.\n"
+FIRST = 4
+"""Number of cards that are drawn before the first page is written for the first time; it is written
+again whenever twice as many are drawn, and at the end."""
+
+CARDS_PER_PROCESS = 24
+"""Number of cards for which one more process is worth starting: a process that draws takes as long
+to start as eight cards take to draw."""
+
+Runs: TypeAlias = tuple[RunFolder, ...]
+
+
+def _nothing(*_: object) -> None:
+    """Take note of nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """What is called while a report is drawn."""
+
+    progress: Callable[[int, int], object] = _nothing
+    """Called with (drawn, total) after each card."""
+    ready: Callable[[Path, int, int], object] = _nothing
+    """Called with (first page, drawn, total) once the first page can be opened, if more cards are
+    to be drawn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,20 +79,28 @@ class Report:
     index: Path
     """Path of the report's first page."""
     grasps: int
+    """Number of grasps with a page."""
     no_clip: str
     """Reason why clips that were asked for are missing; empty if none is missing."""
+    drawn: int
+    """Number of grasps with pictures; the others are copies of these by symmetry."""
 
 
-def write_report(
+def write_report(  # noqa: PLR0913 - what a user may choose
     folder: str | Path,
     out: str | Path | None = None,
     *,
     jobs: int | None = None,
     limit: int | None = None,
     clips: int = 0,
-    progress: Callable[[int, int], None] = lambda _done, _total: None,
+    every_copy: bool = False,
+    progress: Callable[[int, int], object] = _nothing,
+    ready: Callable[[Path, int, int], object] = _nothing,
 ) -> Report:
     """Write the results of a run as pages for a browser.
+
+    Every grasp gets a page. Grasps that a symmetry of the object makes from one another share a
+    card of the first page and one set of pictures, if their tests ended alike.
 
     Args:
         folder: Folder of a run, with its grasps.json; or a folder of such folders.
@@ -67,7 +109,10 @@ def write_report(
         limit: Number of grasps to draw per run, those with problems before others; all if None.
         clips: Number of grasps per run of which trials are filmed, those with problems first, where
             there are graphics.
-        progress: Called with (drawn, total) after each grasp.
+        every_copy: Whether every grasp gets a card and pictures of its own.
+        progress: Called with (drawn, total) after each card.
+        ready: Called with (first page, drawn, total) when the first page can be opened while more
+            cards are drawn.
 
     Returns:
         The paths of the report, and why clips are missing.
@@ -82,58 +127,108 @@ def write_report(
         if value is not None:
             whole(value, name, least=1)
     whole(clips, "clips")
+    switch(every_copy, "every_copy")
     function(progress, "progress")
+    function(ready, "ready")
     runs = tuple(run.first(limit) for run in runs_in(folder))
     require_report_folder(out)
     remove_pages(out)
     write_text(out / MARK, MARKED)
     try:
-        return _written(runs, out, jobs or available_cores(), clips, progress)
+        cards = list(_cards(runs, out, clips, every_copy=every_copy))
+        return _written(cards, runs, out, jobs or available_cores(), Steps(progress, ready))
     except BaseException:
         remove_report(out)
         raise
 
 
-def _written(
-    runs: tuple[RunFolder, ...], out: Path, jobs: int, clips: int,
-    progress: Callable[[int, int], None],
-) -> Report:  # fmt: skip
-    prefixes = [f"{place}-" if len(runs) > 1 else "" for place in range(len(runs))]
-    tasks = [
-        task for run, prefix in zip(runs, prefixes, strict=True)
-        for task in tasks_of(run, out, prefix, clips)
-    ]  # fmt: skip
-    drawn = list[Drawn]()
-    for found in each(draw, tasks, jobs=jobs):
-        drawn.append(found)
-        progress(len(drawn), len(tasks))
-    pages = [f"{task.name}.html" for task in tasks]
-    shown = list(_grasp_pages(runs, out, drawn, pages))
+@dataclass(frozen=True, slots=True)
+class _Card:
+    """One card of the report: a grasp to draw, the grasps that share its card, and their pages."""
+
+    run: RunFolder
+    script: str
+    """Name of the script with the object's drawing."""
+    task: Task
+    copies: tuple[Copy, ...]
+
+    @property
+    def page(self) -> str:
+        """Path of the page of the card's grasp, relative to the report's folder."""
+        return f"{GRASPS}/{self.task.name}.html"
+
+
+def _written(cards: Sequence[_Card], runs: Runs, out: Path, jobs: int, steps: Steps) -> Report:
+    """Draw all cards, and write the first page as soon as `FIRST` of them are drawn."""
+    _shared_files(runs, out)
+    tasks = [card.task for card in cards]
+    shown = list[Shown]()
+    no_clip, next_index = "", min(FIRST, len(cards))
+    jobs = min(jobs, max(1, len(tasks) // CARDS_PER_PROCESS))
+    results = chain(each(draw, tasks[:FIRST], jobs=1), each(draw, tasks[FIRST:], jobs=jobs))
+    for card, drawn in zip(cards, results, strict=True):
+        around = _neighbours(cards, len(shown))
+        shown.append(_pages_of(card, drawn, out, around))
+        no_clip = no_clip or drawn.no_clip
+        if len(shown) == next_index:
+            waiting = len(cards) - len(shown)
+            index = write_text(out / INDEX, index_page(runs, shown, waiting))
+            if next_index == FIRST and waiting:
+                steps.ready(index, len(shown), len(cards))
+            next_index = min(2 * next_index, len(cards))
+        steps.progress(len(shown), len(cards))
+    grasps = sum(1 + len(card.copies) for card in cards)
+    return Report(out / INDEX, grasps, no_clip, len(cards))
+
+
+def _cards(
+    runs: Runs, out: Path, clips: int, *, every_copy: bool
+) -> Iterator[_Card]:  # fmt: skip
+    """Sort the grasps of every run into cards, in the order to draw them."""
+    for number, run in enumerate(runs):
+        prefix = f"{number}-" if len(runs) > 1 else ""
+        grasps = run.saved.grasps
+        classes = cards_of(run, every_copy=every_copy)
+        firsts = [grasps[each.first] for each in classes]
+        for found, task in zip(classes, tasks_of(run, firsts, out, prefix, clips), strict=True):
+            copies = tuple(
+                Copy(grasps[place].id, f"{GRASPS}/{prefix}{grasps[place].id}.html",
+                     MIRRORED if place in found.mirrored else ROTATED)
+                for place in found.places if place != found.first
+            )  # fmt: skip
+            yield _Card(run, f"object-{number}.js", task, copies)
+
+
+def _shared_files(runs: Runs, out: Path) -> None:
+    """Write what pages share: styles, scripts, drawings of the objects, and charts of all runs."""
     for name in STATIC:
         write_text(out / name, asset(name))
+    for number, run in enumerate(runs):
+        data = as_text(object_data(run.saved.body))
+        write_text(out / f"object-{number}.js", f"window.graspproofObject = {data};\n")
     if verdicts := all_verdicts(runs):
         write_figure(fidelity_figure(agreements(verdicts)), out / FIDELITY)
     if executions := all_executions(runs):
         write_figure(survival_figure(executions), out / SURVIVAL)
-    index = write_text(out / INDEX, index_page(runs, shown))
-    return Report(index, len(tasks), next((each.no_clip for each in drawn if each.no_clip), ""))
 
 
-def _grasp_pages(
-    runs: tuple[RunFolder, ...], out: Path, drawn: list[Drawn], pages: list[str]
-) -> Iterator[Shown]:
-    """Write a page for each grasp, and a script with the drawing of each object."""
-    place = 0
-    for number, run in enumerate(runs):
-        script = f"object-{number}.js"
-        data = as_text(object_data(run.saved.body))
-        write_text(out / script, f"window.graspproofObject = {data};\n")
-        for grasp in run.saved.grasps:
-            around = Neighbours(
-                pages[place - 1] if place else None,
-                pages[place + 1] if place + 1 < len(pages) else None,
-            )
-            text = grasp_page(run, grasp, drawn[place], script, around)
-            path = write_text(out / GRASPS / pages[place], text)
-            yield Shown(run, grasp, f"{GRASPS}/{path.name}", drawn[place].picture)
-            place += 1
+def _neighbours(cards: Sequence[_Card], place: int) -> Neighbours:
+    """Return the names of the pages of the cards before and after one."""
+    before, after = (
+        f"{cards[other].task.name}.html" if 0 <= other < len(cards) else None
+        for other in (place - 1, place + 1)
+    )
+    return Neighbours(before, after)
+
+
+def _pages_of(card: _Card, drawn: Drawn, out: Path, around: Neighbours) -> Shown:
+    """Write the page of a card's grasp, and those of its copies, which have no pictures."""
+    grasps = {grasp.id: grasp for grasp in card.run.saved.grasps}
+    first = grasps[card.task.saved.grasps[0].id]
+    text = grasp_page(card.run, first, drawn, card.script, around, Kin(card.copies))
+    write_text(out / card.page, text)
+    for copy in card.copies:
+        kin = Kin(first=Copy(first.id, card.page, copy.kind))
+        text = grasp_page(card.run, grasps[copy.id], None, card.script, Neighbours(), kin)
+        write_text(out / copy.page, text)
+    return Shown(card.run, first, card.page, drawn.picture, card.copies)

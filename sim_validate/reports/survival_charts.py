@@ -18,7 +18,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from scenes.drawing.canvas import LETTERS, Around, in_style, legend_line, new_figure, panels
+from scenes.drawing.canvas import LETTERS, Around, figure_with_panels, in_style, legend_line
 from scenes.drawing.palette import FINGERS, GOOD, INK, NEUTRAL
 from sim_validate.execution import paths
 from sim_validate.execution.jobs import ExecutedGrasp
@@ -175,8 +175,8 @@ def survival_figure(executed: Sequence[Executions]) -> Any:
     multiples, marks = certified_multiples(executed), survivals(executed)
     ends = [NARROWEST, *multiples, *(1.0 + mark.acceleration_g for mark in marks)]
     end = min(BEYOND * max(ends), WIDEST)
-    figure = new_figure(9.0, 3.7)
-    (axes,) = panels(figure, 1, around=Around(left=0.09, right=0.27, below=0.14, above=0.05))
+    around = Around(left=0.09, right=0.27, below=0.14, above=0.05)
+    figure, (axes,) = figure_with_panels(9.0, 3.7, 1, around=around)
     _curve(axes, multiples, end)
     handles = [legend_line(GOOD, "certified in any direction")]
     handles += [_marked(axes, mark) for mark in marks]

@@ -17,7 +17,7 @@ from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.values import Grasp
-from scenes.drawing.canvas import entitle, in_style, new_figure, panels
+from scenes.drawing.canvas import entitle, figure_with_panels, in_style
 from scenes.drawing.palette import BAD, GOOD, INK
 from scenes.drawing.pictures import check_drawn
 from scenes.drawing.views import View, best_view
@@ -54,8 +54,7 @@ def wrench_figure(
     wrenches, radius = quality.wrenches, quality.upper
     right, up = view.axes[0], view.axes[1]
     still = np.zeros(3)
-    figure = new_figure(9.0, 3.1)
-    weakest, forces, torques = panels(figure, 3)
+    figure, (weakest, forces, torques) = figure_with_panels(9.0, 3.1, 3)
     _shadow(weakest, wrenches, _weakest_plane(wrenches, quality.direction), radius)
     weakest.axvline(radius, color=BAD, linewidth=1.2, label="limiting facet")
     weakest.legend(loc="upper left")

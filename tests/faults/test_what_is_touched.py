@@ -20,6 +20,8 @@ LIBRARIES = tuple(
 SYSTEM = ("/sys/", "/proc/", "/dev/null", "/dev/urandom", "/usr/", "/lib", "/etc/", "/dev/shm/")  # noqa: S108 - shared memory of processes
 """What the interpreter and libraries read about the machine; fonts, time zones."""
 CACHES = ("__pycache__", ".pytest_cache")
+KEPT = ROOT / ".pytest_cache" / "kernels"
+"""Where compiled loops are kept, so that the new home does not compile them again."""
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 CHANGING = (
     "os.remove", "os.rename", "os.mkdir", "os.rmdir", "os.link", "os.symlink", "os.chmod",
@@ -48,6 +50,7 @@ class Witness:
         environment = {
             **os.environ, "AUDITED_BY": str(self.pipe), "HOME": str(self.folder / "home"),
             "TMPDIR": str(self.folder / "scratch"), "PYTHONPATH": f"{AUDITING}:{ROOT}",
+            "NUMBA_CACHE_DIR": str(KEPT),
         }  # fmt: skip
         command = [
             sys.executable,

@@ -99,7 +99,9 @@ CALLS = [
         "jobs": optional(AT_LEAST_ONE),
         "limit": optional(AT_LEAST_ONE),
         "clips": COUNT,
+        "every_copy": SWITCH,
         "progress": {"none": None, "number": 3, "text": "a"},
+        "ready": {"none": None, "number": 3, "text": "a"},
     }, succeeds_in="tests/sim_validate/reports/test_report.py"),
     Call("sv.validate", of_grasp(agenda=sv.Agenda(critical_friction=False, controls=False)),
          BODY_AND_GRASP | {

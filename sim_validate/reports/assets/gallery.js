@@ -21,15 +21,16 @@
 
   function update() {
     const order = form.elements.order.value;
-    let shown = 0;
+    let shown = 0, all = 0;
     for (const card of cards) {
       card.hidden = !fits(card);
-      shown += !card.hidden;
+      all += +card.dataset.count;
+      shown += card.hidden ? 0 : +card.dataset.count;
     }
     const sorted = [...cards].sort((a, b) =>
       place(a, order) - place(b, order) || a.dataset.place - b.dataset.place);
     list.append(...sorted);
-    form.querySelector("output").value = `${shown} of ${cards.length} grasps`;
+    form.querySelector("output").value = `${shown} of ${all} grasps`;
   }
 
   form.addEventListener("input", update);

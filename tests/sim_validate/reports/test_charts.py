@@ -9,7 +9,8 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.wrench_sets import WrenchSet
-from scenes.drawing.canvas import encoded
+from scenes.drawing.canvas import encoded, own_style_and_sheets, write_figure
+from scenes.drawing.pictures import grasp_figure
 from sim_validate.replaying.recorded import Recorded
 from sim_validate.replaying.replay import replayed
 from sim_validate.reports.agreement import (
@@ -96,7 +97,7 @@ def test_the_map_shows_what_is_resisted(wedge):
     figure = margin_figure(body, grasp, FRICTION, max_normal_force_n=7.0)
     ways = directions_of_map().reshape(-1, 3)
     rng = np.random.default_rng(0)
-    shown = [axes.collections[0].get_array() for axes in figure.axes[:2]]
+    shown = [axes.collections[0].get_array() for axes in figure.axes[::2]]
     for place in rng.integers(len(ways), size=6):
         for kind, lever, unit in ((0, 1.0, 1.0), (3, body.radius, 1e3)):
             wrench = np.zeros(6)
@@ -228,6 +229,38 @@ def test_figures_do_not_depend_on_what_users_have_set(wedge):
     plain = encoded(wrench_figure(*wedge, FRICTION), "svg")
     with matplotlib.rc_context({"lines.linewidth": 6.0, "font.size": 20.0, "axes.grid": True}):
         assert encoded(wrench_figure(*wedge, FRICTION), "svg") == plain
+
+
+def test_the_scale_of_a_map_ends_at_its_least_and_largest_value(wedge):
+    figure = margin_figure(*wedge, FRICTION)
+    for drawn, scale in zip(figure.axes[::2], figure.axes[1::2], strict=True):
+        values = drawn.collections[0].get_array()
+        assert scale.get_ylim() == (values.min(), values.max())
+        np.testing.assert_array_equal(np.unique(scale.collections[0].get_array()), scale.get_ylim())
+
+
+def test_a_figure_that_is_used_again_is_drawn_as_a_new_one(wedge, trial, tmp_path):
+    """Others before it leave nothing behind: no line, text, range or scale."""
+    body, grasp = wedge
+    other = replace(grasp, contacts=grasp.contacts[::-1], faces=grasp.faces[::-1])
+    makers = {
+        "picture": lambda each, mu: grasp_figure(body, each, mu, legend=False),
+        "wrenches": lambda each, mu: wrench_figure(body, each, mu),
+        "margins": lambda each, mu: margin_figure(body, each, mu),
+        "motion": lambda _, mu: motion_figure(trial, mu * 1e-5),
+    }
+    for name, make in makers.items():
+        expected = encoded(make(grasp, FRICTION), "png")
+        with own_style_and_sheets():
+            first = make(other, 0.9)
+            write_figure(first, tmp_path / "first.png")
+            again = make(grasp, FRICTION)
+            assert again is first, name
+            assert make(grasp, FRICTION) is not again
+            write_figure(again, tmp_path / "again.png")
+        assert (tmp_path / "again.png").read_bytes() == expected, name
+        assert (tmp_path / "first.png").read_bytes() != expected, name
+        assert make(grasp, FRICTION) is not again
 
 
 @pytest.mark.parametrize("kind", ["wrenches", "margins", "motion", "fidelity", "one panel"])

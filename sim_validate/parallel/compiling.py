@@ -1,0 +1,97 @@
+"""Compiles half of the inner loops in another process, while this one plans.
+
+Compiling everything takes half a minute of one core, once. The planner's search begins with other
+loops than the proofs of its grasps, and comes to the last family at the end. So the first use after
+an installation compiles on two cores.
+"""
+
+import importlib
+import signal
+from collections.abc import Callable, Generator, Iterable, Mapping
+from contextlib import contextmanager, suppress
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure.critical_friction import critical_friction
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.compiled import wait_for
+from grasp_core.kept_loops import is_kept
+from grasp_core.planning.planner import plan
+from grasp_core.quality.ferrari_canny import ferrari_canny
+from grasp_core.solvers.nearest_point import least_distance
+from scenes.example_objects import example_object
+
+CONTACTS = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
+"""Contacts in the middles of a tetrahedron's faces, (4, 3) [m]."""
+FRICTION = 0.5
+
+
+def _closure(points: Array, normals: Array) -> None:
+    force_closure(points, normals, FRICTION)
+    critical_friction(points, normals)
+
+
+def _last_family(_points: Array, _normals: Array) -> None:
+    plan(example_object("tetrahedron"), FRICTION, families=("regulus",), limit=1)
+
+
+BESIDE: Mapping[str, Callable[[Array, Array], object]] = {
+    "grasp_core.solvers.nearest_point_kernel": (
+        lambda points, _: least_distance(points[:3], -np.ones((1, 3)))
+    ),
+    "grasp_core.closure.critical_friction_kernel": _closure,
+    "grasp_core.quality.ferrari_canny_kernel": (
+        lambda points, normals: ferrari_canny(points, normals, FRICTION, torque_scale=1.0)
+    ),
+    "grasp_core.families.regulus_kernel": _last_family,
+}
+"""For each kernel to compile beside a plan, in the order in which the plan needs them, a call that
+compiles it."""
+
+
+@contextmanager
+def compiled_beside(jobs: int) -> Generator[None]:
+    """Compile loops in another process during a `with` block, if they are not kept.
+
+    The first use of such a loop in the block waits until that process has compiled it.
+
+    Args:
+        jobs: Largest number of processes; below two, nothing is compiled beside the block.
+    """
+    missing = [name for name in BESIDE if jobs > 1 and not is_kept(name)]
+    if not missing:
+        yield
+        return
+    context: Any = importlib.import_module("multiprocessing").get_context("spawn")
+    ours, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=_compile, args=(theirs, missing), daemon=True)
+    process.start()
+    theirs.close()
+    done = set[str]()
+    wait_for({name: partial(_wait, ours, name, done) for name in missing})
+    try:
+        yield
+    finally:
+        wait_for({})
+        process.terminate()  # what it has written is whole
+        process.join()
+        ours.close()
+
+
+def _wait(pipe: Any, name: str, done: set[str]) -> None:
+    """Wait until a kernel is compiled; the end of the other process ends the wait, too."""
+    with suppress(EOFError, OSError):
+        while name not in done:
+            done.add(pipe.recv())
+
+
+def _compile(pipe: Any, names: Iterable[str]) -> None:
+    """Compile kernels one after the other, and send the name of each that is ready."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt ends it through its parent
+    with suppress(BrokenPipeError):
+        for name in names:
+            BESIDE[name](CONTACTS / 3.0, -CONTACTS / np.sqrt(3.0))
+            pipe.send(name)
