@@ -67,13 +67,13 @@ def released_friction(
     least = max(predicted, 0.5 * protocol.least_friction)
     forces = forces_just_above(positions, normals, least)
     forces *= SQUEEZE * setup.fingers.max_normal_force_n
-    rig = squeezed(bench, setup, forces, predicted, high)
+    rig = squeezed(bench, setup, forces, predicted, high).at_rest(high)
 
     share = min(protocol.threshold, TILT * max(predicted, protocol.least_friction))
 
     def stays(frictions: list[float]) -> list[bool | None]:
         threshold = share * bench.scene.layout.grasp_size_m
-        return [trace.stayed(threshold) for trace in rig.release(high, frictions)]
+        return [trace.stayed(threshold) for trace in rig.release(high, frictions, threshold)]
 
     if predicted < protocol.least_friction:
         (held,) = stays([protocol.least_friction])

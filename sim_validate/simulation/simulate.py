@@ -12,10 +12,11 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
-from grasp_core.arrays import Array, to_digits
+from grasp_core.arrays import Array, Indices, to_digits
 from scenes.mjcf import Scene
 from sim_validate.simulation.engine import batch, compiled, mujoco, step, touched, unlogged
 from sim_validate.simulation.schedules import Clock, Schedule
@@ -45,6 +46,9 @@ class Motion:
     """The simulator's own message if it gave up, otherwise empty."""
     timed_out: bool
     """Whether the trial was stopped before its end."""
+    skipped: int = 0
+    """How many samples of its schedule were left out before friction was lowered, because the
+    object had settled."""
 
     def after(self, earlier: "Motion") -> "Motion":
         """Add the faults of the earlier motion whose end state this motion started from."""
@@ -56,6 +60,16 @@ class Motion:
             error=earlier.error or self.error,
             timed_out=earlier.timed_out or self.timed_out,
         )
+
+
+class Ends(Protocol):
+    """What tells which trials may end before their schedules do."""
+
+    def look(
+        self, places: Indices, samples: Indices, joints: Array, speeds: Array
+    ) -> tuple[Array, Array]:
+        """Tell which trials need not settle any longer, and which are answered, (n,) each."""
+        ...
 
 
 class Bench:
@@ -76,13 +90,16 @@ class Bench:
         self.body = self.model.body("object").id
         self.touching = np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
 
-    def run(self, schedules: Sequence[Schedule], start: Array | None = None) -> tuple[Motion, ...]:
+    def run(
+        self, schedules: Sequence[Schedule], start: Array | None = None, ends: Ends | None = None
+    ) -> tuple[Motion, ...]:
         """Simulate trials of equal length, all from the same state.
 
         Args:
             schedules: What is applied in each trial.
             start: State at the end of an earlier motion; None puts fingertips at their contacts, at
                 rest.
+            ends: What ends trials before their schedules do; None for their full length.
         """
         trials = batch.Batch(self.model, len(schedules), self.threads)
         if start is None:
@@ -91,29 +108,74 @@ class Bench:
             trials.state[:] = start
         clock = trials.bind("time")
         begun = float(clock[0])
-        joints, errors = self._step_through(trials, schedules)
-        steps = CHUNK * np.arange(1, joints.shape[1] + 1)
-        expected = begun + CHUNK * joints.shape[1] * self.model.opt.timestep
-        return tuple(
-            Motion(
-                times_s=self.model.opt.timestep * steps,
-                joints=joints[trial],
-                state=trials.state[trial].copy(),
-                finite=bool(
-                    np.isfinite(trials.state[trial]).all() & np.isfinite(joints[trial]).all()
-                ),
-                warnings=int(trials.warning[trial, :, 1].sum()),
-                clock_error_s=float(clock[trial] - expected),
-                error=errors.get(trial, ""),
-                timed_out=joints.shape[1] < len(schedules[trial].friction),
+        ran = self._step_through(trials, schedules, ends)
+        warned = trials.warning[:, :, 1].sum(axis=1)
+        times = self.model.opt.timestep * (CHUNK * np.arange(1, ran.joints.shape[1] + 1))
+        found: list[Motion] = []
+        for trial, count in enumerate(ran.counts):
+            joints, state = ran.joints[trial, :count], trials.state[trial].copy()
+            expected = begun + CHUNK * int(count) * self.model.opt.timestep
+            found.append(
+                Motion(
+                    times_s=times[:count],
+                    joints=joints,
+                    state=state,
+                    finite=bool(np.isfinite(state).all() and np.isfinite(joints).all()),
+                    warnings=int(warned[trial]),
+                    clock_error_s=float(clock[trial] - expected),
+                    error=ran.errors.get(trial, ""),
+                    timed_out=bool(ran.stopped[trial]),
+                    skipped=int(ran.skipped[trial]),
+                )
             )
-            for trial in range(len(schedules))
-        )
+        return tuple(found)
 
     def _step_through(
-        self, trials: batch.Batch, schedules: Sequence[Schedule]
-    ) -> tuple[Array, dict[int, str]]:
-        """Step m trials; return joint positions so far, (m, n, q), and errors by trial."""
+        self, trials: batch.Batch, schedules: Sequence[Schedule], ends: Ends | None
+    ) -> "_Ran":
+        """Step m trials to their ends."""
+        wrenches, controls, frictions = self._applied(schedules)
+        count, length = frictions.shape
+        watched = np.array([schedule.watched for schedule in schedules])
+        applied, servos = trials.bind("xfrc_applied"), trials.bind("ctrl")
+        friction, joints, speeds = (
+            trials.expand("geom_friction"), trials.bind("qpos"), trials.bind("qvel")
+        )  # fmt: skip
+        ran = _Ran(
+            np.empty((count, length, joints.shape[1])), np.zeros(count, dtype=np.intp),
+            np.zeros(count, dtype=np.intp), np.zeros(count, dtype=bool), {},
+        )  # fmt: skip
+        going, sample = np.arange(count), np.zeros(count, dtype=np.intp)
+        rigid = self.scene.layout.drive.rigid
+        with unlogged():
+            while going.size:
+                if time.monotonic() > self.deadline:
+                    ran.stopped[going] = True
+                    break
+                now = sample[going]
+                applied[going, self.body] = wrenches[going, now]
+                if not rigid:
+                    servos[going] = controls[going, now]
+                friction[going[:, None], self.touching, 0] = frictions[going, now, None]
+                step(trials, ran.errors, CHUNK, going)
+                ran.joints[going, ran.counts[going]] = joints[going]
+                ran.counts[going] += 1
+                if ends is not None:
+                    settled, answered = ends.look(going, now, joints[going], speeds[going])
+                    early = going[settled]
+                    ran.skipped[early] += watched[early] - 1 - sample[early]
+                    sample[early] = watched[early] - 1
+                    going = going[~answered]
+                sample[going] += 1
+                going = going[sample[going] < length]
+        return ran
+
+    def _applied(self, schedules: Sequence[Schedule]) -> tuple[Array, Array, Array]:
+        """Return what is applied in each of n samples of m trials, as the simulator takes it.
+
+        Returns:
+            External wrenches, (m, n, 6), commands of the servos, (m, n, 3k), frictions, (m, n).
+        """
         layout = self.scene.layout
         wrenches = np.array([schedule.wrenches for schedule in schedules])
         wrenches[..., 3:] -= np.cross(layout.center, wrenches[..., :3])
@@ -125,21 +187,23 @@ class Bench:
                 part[...] = to_digits(part)
         controls = pushes.reshape(*pushes.shape[:2], -1) / layout.drive.stiffness_n_per_m
         frictions = np.array([to_digits(schedule.friction) for schedule in schedules])
-        applied, servos = trials.bind("xfrc_applied"), trials.bind("ctrl")
-        friction, joints = trials.expand("geom_friction"), trials.bind("qpos")
-        done: list[Array] = []
-        errors: dict[int, str] = {}
-        with unlogged():
-            for sample in range(frictions.shape[1]):
-                if time.monotonic() > self.deadline:
-                    break
-                applied[:, self.body] = wrenches[:, sample]
-                if not layout.drive.rigid:
-                    servos[:] = controls[:, sample]
-                friction[:, self.touching, 0] = frictions[:, sample, None]
-                step(trials, errors, CHUNK)
-                done.append(joints.copy())
-        return np.array(done).reshape(-1, *joints.shape).transpose(1, 0, 2), errors
+        return wrenches, controls, frictions
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Ran:
+    """What m trials did."""
+
+    joints: Array
+    """Joint positions, (m, n, q), of which each trial has filled in its own number of samples."""
+    counts: Indices
+    """Number of samples of each trial, (m,)."""
+    skipped: Indices
+    """Number of samples that each trial left out, (m,)."""
+    stopped: Array
+    """Whether time ran out, (m,)."""
+    errors: dict[int, str]
+    """The simulator's own messages, by trial."""
 
 
 def first_touch(scene: Scene) -> tuple[Array, Array]:

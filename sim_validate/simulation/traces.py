@@ -71,17 +71,22 @@ class Trace:
         return None if self.fault else bool((self.displacements_m < threshold_m).all())
 
 
-def trace(motion: Motion, layout: Layout, watched: int) -> Trace:
+def trace(
+    motion: Motion, layout: Layout, watched: int, earlier: Motion | None = None
+) -> Trace:
     """Measure displacements, slips and gaps in a motion.
 
     Args:
         motion: Motion of one trial.
         layout: The simulated layout.
         watched: Index of the first sample in which the object had to stay where it was.
+        earlier: The motion from whose end this one started; None for the planned pose.
     """
     before = min(watched, len(motion.joints)) - 1
     planned = np.concatenate([np.zeros(3), [1.0, 0.0, 0.0, 0.0]])
-    at_start = motion.joints[before] if before >= 0 else planned
+    at_start = planned if earlier is None else earlier.joints[-1]
+    if before >= 0:
+        at_start = motion.joints[before]
     joints = motion.joints[before + 1 :]
     shifts, rotations = _moved(joints, at_start, layout)
     start_shift, start_turn = _moved(at_start[None], planned, layout)

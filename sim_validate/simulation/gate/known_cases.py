@@ -171,7 +171,7 @@ def _offset_fingers(case: Case) -> list[Check]:
 def _creep(case: Case) -> Check:
     """Check how fast a tetrahedron held at its face centres creeps under twelve loads."""
     rig, limits = tetrahedron(case)
-    traces = rig.hold([part(rig.idle, limit, CREEP_LOAD) for limit in limits])
+    traces = rig.hold([part(rig.idle, limit, CREEP_LOAD) for limit in limits], whole=True)
     # the maximum is NaN if one speed is
     fastest = np.abs([_speed(trace) for trace in traces]).max()
     speed = float(fastest) / rig.bench.scene.layout.grasp_size_m
@@ -221,7 +221,7 @@ def _speed(trace: Trace) -> float:
 def _blow_up(case: Case) -> Check:
     """Check the simulator's clock after a load so large that numbers overflow."""
     rig, _ = tetrahedron(case)
-    (trace,) = rig.hold([Load(np.full(6, BLOW_UP), rig.idle.forces)])
+    (trace,) = rig.hold([Load(np.full(6, BLOW_UP), rig.idle.forces)], whole=True)
     seen = not trace.finite or trace.warnings > 0
     error = trace.clock_error_s if seen else math.nan
     name = "simulated less stepped time after a blow-up, in seconds"
