@@ -48,7 +48,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array, Indices, cross
 from grasp_core.closure.wrenches import cross_matrix
 from scenes.layout import Layout
 from sim_validate.simulation.schedules import Schedule
@@ -271,7 +271,7 @@ def displaced(poses: Array, starts: Array, layout: Layout) -> Array:
     now, then = poses[:, 3:], starts[:, 3:]
     shifts = poses[:, :3] + rotated(now, layout.center)
     shifts = shifts - starts[:, :3] - rotated(then, layout.center)
-    across = then[:, :1] * now[:, 1:] - now[:, :1] * then[:, 1:] - np.cross(now[:, 1:], then[:, 1:])
+    across = then[:, :1] * now[:, 1:] - now[:, :1] * then[:, 1:] - cross(now[:, 1:], then[:, 1:])
     along = np.abs(np.einsum("ni,ni->n", now, then))
     turns = 2.0 * np.arctan2(_lengths(across), along)
     return _lengths(shifts) + layout.grasp_size_m * turns

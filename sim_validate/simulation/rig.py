@@ -46,6 +46,9 @@ class Rig:
     """The motion of the fingers while they closed; None for rigid fingers, which do not move."""
     settled: bool = False
     """Whether the object also settled in that motion, so that friction may be lowered at once."""
+    whole: bool = False
+    """Whether all trials have the protocols' full length; else each ends as soon as its answer is
+    known (see `early_ends`)."""
 
     def hold(
         self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None, *,
@@ -57,8 +60,7 @@ class Rig:
             loads: The loads to hold.
             settling_frictions: Friction of each load until then; None for the protocol's multiple
                 of the friction to hold at.
-            whole: Whether every trial has the protocol's full length; else each ends as soon as its
-                answer is known (see `early_ends`).
+            whole: Whether these trials have the protocol's full length, whatever others have.
         """
         protocol, size = self.setup.hold, self.bench.scene.layout.grasp_size_m
         limits = Thresholds(protocol.hold_threshold * size, protocol.total_threshold * size)
@@ -152,9 +154,9 @@ class Rig:
         self, trials: Sequence[Schedule], limits: Thresholds | None = None
     ) -> tuple[Trace, ...]:
         bench, ends, closed = self.bench, None, self.closed
-        if limits is not None:
-            start = None if closed is None else closed.joints[-1]
-            ends = EarlyEnds(bench.scene.layout, trials, bench.clock.sample_s, limits, start)
+        if limits is not None and not self.whole:
+            at = None if closed is None or not len(closed.joints) else closed.joints[-1]
+            ends = EarlyEnds(bench.scene.layout, trials, bench.clock.sample_s, limits, at)
         return self._traced(trials, bench.run(trials, closed and closed.state, ends))
 
     def _traced(self, trials: Sequence[Schedule], motions: Sequence[Motion]) -> tuple[Trace, ...]:

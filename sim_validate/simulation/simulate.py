@@ -21,6 +21,8 @@ from scenes.mjcf import Scene
 from sim_validate.simulation.engine import batch, compiled, mujoco, step, touched, unlogged
 from sim_validate.simulation.schedules import Clock, Schedule
 
+FEWEST = 2
+"""Fewest trials that room is made for: one to close the fingers, and most controls have two."""
 CHUNK = 5
 """Simulation steps per sample; loads change, and motion is recorded, once per sample."""
 
@@ -89,6 +91,14 @@ class Bench:
         self.clock = Clock(CHUNK * self.model.opt.timestep)
         self.body = self.model.body("object").id
         self.touching = np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
+        self.batch: batch.Batch | None = None
+
+    def _trials(self, count: int) -> batch.Batch:
+        """Return at least `count` trials at rest at their contacts; they are made only once."""
+        if self.batch is None or self.batch.nsim < count:
+            self.batch = batch.Batch(self.model, max(count, FEWEST), self.threads)
+        self.batch.reset(np.arange(count), stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        return self.batch
 
     def run(
         self, schedules: Sequence[Schedule], start: Array | None = None, ends: Ends | None = None
@@ -101,11 +111,9 @@ class Bench:
                 rest.
             ends: What ends trials before their schedules do; None for their full length.
         """
-        trials = batch.Batch(self.model, len(schedules), self.threads)
-        if start is None:
-            trials.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        else:
-            trials.state[:] = start
+        trials = self._trials(len(schedules))
+        if start is not None:
+            trials.state[: len(schedules)] = start
         clock = trials.bind("time")
         begun = float(clock[0])
         ran = self._step_through(trials, schedules, ends)

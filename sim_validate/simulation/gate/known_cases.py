@@ -13,8 +13,9 @@ With mu the friction and N the normal force of a contact:
 * a solver that goes on to the last digit changes no motion;
 * a blow-up is reported, and does not silently reset the simulation to its start.
 
-The loads and frictions at which the boxes slip are found and judged exactly as those of grasps are,
-by holds, ramps and releases. So thresholds too loose to notice a slip are refused, like settings
+The loads and frictions at which the boxes slip are found and judged as those of grasps are, by
+holds, ramps and releases, but every trial has its full length: that trials of grasps may end early
+presumes that nothing slips later (`early_ends`). So thresholds too loose to notice a slip are refused, like settings
 that slip falsely. The cases have the friction and the size of the object under test.
 """
 
@@ -81,7 +82,7 @@ def _incline(case: Case) -> list[Check]:
     weight = case.setup.fingers.max_normal_force_n
     resting = Load(np.array([0, 0, -weight, 0, 0, 0.0]), np.zeros((4, 3)))
     bench = Bench(rigid.scene(body, contacts, case.friction))
-    rig = Rig(bench, case.setup, case.friction, resting, None)
+    rig = Rig(bench, case.setup, case.friction, resting, None, whole=True)
     pulls = [case.friction * weight * np.array([*way, 0.0]) for way in _ways()]
     torques = [np.cross([0.0, 0.0, -height / 2], pull) for pull in pulls]  # so that it cannot tip
     limits = [
@@ -144,7 +145,9 @@ def _offset_fingers(case: Case) -> list[Check]:
     positions = np.array([contact.position for contact in contacts])
     normals = np.array([contact.normal for contact in contacts])
     bench = Bench(case.setup.scene(body, contacts, critical))
-    released = released_friction(bench, positions, normals, critical, case.setup).simulated
+    released = released_friction(
+        bench, positions, normals, critical, case.setup, whole=True
+    ).simulated
     largest = PUSH * case.setup.fingers.max_normal_force_n
     rig = case.squeezed(
         body, contacts, largest * forces_just_above(positions, normals, critical), critical
@@ -171,7 +174,7 @@ def _offset_fingers(case: Case) -> list[Check]:
 def _creep(case: Case) -> Check:
     """Check how fast a tetrahedron held at its face centres creeps under twelve loads."""
     rig, limits = tetrahedron(case)
-    traces = rig.hold([part(rig.idle, limit, CREEP_LOAD) for limit in limits], whole=True)
+    traces = rig.hold([part(rig.idle, limit, CREEP_LOAD) for limit in limits])
     # the maximum is NaN if one speed is
     fastest = np.abs([_speed(trace) for trace in traces]).max()
     speed = float(fastest) / rig.bench.scene.layout.grasp_size_m
@@ -221,7 +224,7 @@ def _speed(trace: Trace) -> float:
 def _blow_up(case: Case) -> Check:
     """Check the simulator's clock after a load so large that numbers overflow."""
     rig, _ = tetrahedron(case)
-    (trace,) = rig.hold([Load(np.full(6, BLOW_UP), rig.idle.forces)], whole=True)
+    (trace,) = rig.hold([Load(np.full(6, BLOW_UP), rig.idle.forces)])
     seen = not trace.finite or trace.warnings > 0
     error = trace.clock_error_s if seen else math.nan
     name = "simulated less stepped time after a blow-up, in seconds"
