@@ -98,6 +98,7 @@ class EarlyEnds:
         self.layout, self.thresholds, self.sample_s = layout, thresholds, sample_s
         self.resting = np.array([trial.resting for trial in trials])
         self.watched = np.array([trial.watched for trial in trials])
+        # speeds of the sample before give the first acceleration under a constant load
         self.earliest = int(self.resting.min()) - 1
         self.frictions = np.array([trial.friction for trial in trials])
         pushes = np.array([trial.forces[-1] for trial in trials])
@@ -125,8 +126,6 @@ class EarlyEnds:
             its answer is known, (n,) each.
         """
         settled = answered = np.zeros(len(places), dtype=bool)
-        if samples.max() < self.earliest:
-            return settled, answered
         with np.errstate(all="ignore"):  # what diverges is neither settled nor answered
             reach = self._reach(places, speeds)
             after = samples >= self.watched[places]

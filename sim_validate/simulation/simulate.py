@@ -18,7 +18,15 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, to_digits
 from scenes.mjcf import Scene
-from sim_validate.simulation.engine import batch, compiled, mujoco, step, touched, unlogged
+from sim_validate.simulation.engine import (
+    batch,
+    compiled,
+    mujoco,
+    state_parts,
+    step,
+    touched,
+    unlogged,
+)
 from sim_validate.simulation.schedules import Clock, Schedule
 
 FEWEST = 2
@@ -67,6 +75,9 @@ class Motion:
 class Ends(Protocol):
     """What tells which trials may end before their schedules do."""
 
+    earliest: int
+    """The first sample after which it wants to look."""
+
     def look(
         self, places: Indices, samples: Indices, joints: Array, speeds: Array
     ) -> tuple[Array, Array]:
@@ -90,6 +101,7 @@ class Bench:
         self.model = compiled(scene.xml)
         self.clock = Clock(CHUNK * self.model.opt.timestep)
         self.body = self.model.body("object").id
+        self.parts = state_parts(self.model)
         self.touching = np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
         self.batch: batch.Batch | None = None
 
@@ -114,7 +126,7 @@ class Bench:
         trials = self._trials(len(schedules))
         if start is not None:
             trials.state[: len(schedules)] = start
-        clock = trials.bind("time")
+        clock = trials.state[:, self.parts["time"]][:, 0]
         begun = float(clock[0])
         ran = self._step_through(trials, schedules, ends)
         warned = trials.warning[:, :, 1].sum(axis=1)
@@ -145,37 +157,39 @@ class Bench:
         wrenches, controls, frictions = self._applied(schedules)
         count, length = frictions.shape
         watched = np.array([schedule.watched for schedule in schedules])
-        applied, servos = trials.bind("xfrc_applied"), trials.bind("ctrl")
-        friction, joints, speeds = (
-            trials.expand("geom_friction"), trials.bind("qpos"), trials.bind("qvel")
-        )  # fmt: skip
+        applied, servos, joints, speeds = (
+            trials.state[:, self.parts[name]] for name in ("xfrc_applied", "ctrl", "qpos", "qvel")
+        )
+        applied = applied.reshape(len(applied), -1, 6)[:, self.body]
+        friction = trials.expand("geom_friction")[:, :, 0]
         ran = _Ran(
             np.empty((count, length, joints.shape[1])), np.zeros(count, dtype=np.intp),
             np.zeros(count, dtype=np.intp), np.zeros(count, dtype=bool), {},
         )  # fmt: skip
         going, sample = np.arange(count), np.zeros(count, dtype=np.intp)
-        rigid = self.scene.layout.drive.rigid
+        touching = self.touching[None]
         with unlogged():
             while going.size:
                 if time.monotonic() > self.deadline:
                     ran.stopped[going] = True
                     break
-                now = sample[going]
-                applied[going, self.body] = wrenches[going, now]
-                if not rigid:
-                    servos[going] = controls[going, now]
-                friction[going[:, None], self.touching, 0] = frictions[going, now, None]
+                now, done = sample[going], ran.counts[going]
+                applied[going] = wrenches[going, now]
+                servos[going] = controls[going, now]
+                friction[going[:, None], touching] = frictions[going, now, None]
                 step(trials, ran.errors, CHUNK, going)
-                ran.joints[going, ran.counts[going]] = joints[going]
-                ran.counts[going] += 1
-                if ends is not None:
+                ran.joints[going, done] = joints[going]
+                ran.counts[going] = done + 1
+                if ends is not None and now.max() >= ends.earliest:
                     settled, answered = ends.look(going, now, joints[going], speeds[going])
                     early = going[settled]
-                    ran.skipped[early] += watched[early] - 1 - sample[early]
-                    sample[early] = watched[early] - 1
+                    if early.size:
+                        ran.skipped[early] += watched[early] - 1 - sample[early]
+                        sample[early] = watched[early] - 1
                     going = going[~answered]
                 sample[going] += 1
-                going = going[sample[going] < length]
+                if now.max() >= length - 1 or len(going) < len(now):
+                    going = going[sample[going] < length]
         return ran
 
     def _applied(self, schedules: Sequence[Schedule]) -> tuple[Array, Array, Array]:
@@ -194,6 +208,8 @@ class Bench:
             for part in (wrenches[trial, :, :3], wrenches[trial, :, 3:], pushes[trial]):
                 part[...] = to_digits(part)
         controls = pushes.reshape(*pushes.shape[:2], -1) / layout.drive.stiffness_n_per_m
+        if layout.drive.rigid:  # there are no servos
+            controls = controls[..., :0]
         frictions = np.array([to_digits(schedule.friction) for schedule in schedules])
         return wrenches, controls, frictions
 
