@@ -102,7 +102,9 @@ class Bench:
         self.clock = Clock(CHUNK * self.model.opt.timestep)
         self.body = self.model.body("object").id
         self.parts = state_parts(self.model)
-        self.touching = np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
+        touching = np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
+        # what lies between the first and the last may get their friction, too: it touches nothing
+        self.touching = slice(touching[0], touching[-1] + 1)
         self.batch: batch.Batch | None = None
 
     def _trials(self, count: int) -> batch.Batch:
@@ -161,34 +163,38 @@ class Bench:
             trials.state[:, self.parts[name]] for name in ("xfrc_applied", "ctrl", "qpos", "qvel")
         )
         applied = applied.reshape(len(applied), -1, 6)[:, self.body]
-        friction = trials.expand("geom_friction")[:, :, 0]
+        friction = trials.expand("geom_friction")[:, self.touching, 0]
         ran = _Ran(
             np.empty((count, length, joints.shape[1])), np.zeros(count, dtype=np.intp),
             np.zeros(count, dtype=np.intp), np.zeros(count, dtype=bool), {},
         )  # fmt: skip
         going, sample = np.arange(count), np.zeros(count, dtype=np.intp)
-        touching = self.touching[None]
+        # before any may end, all trials are at the same sample: slices are quicker than indices
+        alike = length if ends is None else ends.earliest
         with unlogged():
             while going.size:
                 if time.monotonic() > self.deadline:
                     ran.stopped[going] = True
                     break
-                now, done = sample[going], ran.counts[going]
-                applied[going] = wrenches[going, now]
-                servos[going] = controls[going, now]
-                friction[going[:, None], touching] = frictions[going, now, None]
+                together = sample[0] < alike
+                rows = slice(count) if together else going
+                now = int(sample[0]) if together else sample[going]
+                done = now if together else ran.counts[going]
+                applied[rows] = wrenches[rows, now]
+                servos[rows] = controls[rows, now]
+                friction[rows] = frictions[rows, now, None]
                 step(trials, ran.errors, CHUNK, going)
-                ran.joints[going, done] = joints[going]
-                ran.counts[going] = done + 1
-                if ends is not None and now.max() >= ends.earliest:
+                ran.joints[rows, done] = joints[rows]
+                ran.counts[rows] += 1
+                if ends is not None and not together:
                     settled, answered = ends.look(going, now, joints[going], speeds[going])
                     early = going[settled]
                     if early.size:
                         ran.skipped[early] += watched[early] - 1 - sample[early]
                         sample[early] = watched[early] - 1
                     going = going[~answered]
-                sample[going] += 1
-                if now.max() >= length - 1 or len(going) < len(now):
+                sample[rows] += 1
+                if not together or now == length - 1:
                     going = going[sample[going] < length]
         return ran
 
