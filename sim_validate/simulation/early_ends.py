@@ -145,7 +145,8 @@ class EarlyEnds:
         """Bound the way of each tip to its equilibrium: B of (3), (n,) [m]; None if unknown."""
         if self.springs is None:
             return None
-        momenta = speeds @ self.springs.roots
+        # not by BLAS, whose last digits depend on how many trials there are
+        momenta = np.einsum("ni,ij->nj", speeds, self.springs.roots)
         before = self.momenta
         self.momenta = np.full((len(self.watched), speeds.shape[1]), np.nan)
         self.momenta[places] = momenta
@@ -227,7 +228,7 @@ class _Springs:
 
     def creep(self, speeds: Array, reach: Array) -> Array:
         """Bound the speed with which the object creeps, (5), (n,) [m/s]."""
-        moving = speeds[:, :6] @ self.arms
+        moving = np.einsum("ni,ij->nj", speeds[:, :6], self.arms)
         measured = _lengths(moving[:, :3]) + _lengths(moving[:, 3:])
         return measured + self.share * self.fastest * reach
 
@@ -251,8 +252,8 @@ class _Springs:
         change = (SAFETY * self.spring * (2.0 * self.forces * reach + crept))[:, None]
         normal, across = pushes[..., 0], np.hypot(pushes[..., 1], pushes[..., 2])
         slope = friction[:, None]
-        inside = slope * normal - across >= (1.0 + slope) * change
-        return (inside & (normal >= change) & (normal <= self.largest - change)).all(axis=1)
+        inside = slope * normal - across > (1.0 + slope) * change
+        return (inside & (normal > change) & (normal < self.largest - change)).all(axis=1)
 
 
 def _lengths(vectors: Array) -> Array:
