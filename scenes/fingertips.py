@@ -145,7 +145,7 @@ def _largest_clear(body: Polyhedron, positions: Array, normals: Array, start: fl
     near = _triangles_near(body, positions, normals, start)
     radii = np.full(len(positions), start)
     for finger in _meeting(body, positions - start * normals, start, near):
-        triangles = body.triangles[near[finger]]
+        triangles = body.triangles[np.flatnonzero(near[finger])]
         radii[finger] = _clear_radius(body, positions[finger], normals[finger], start, triangles)
     return radii
 

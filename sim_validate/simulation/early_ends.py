@@ -11,26 +11,26 @@ creep, below), and x is the motion of one rigid assembly on the springs of its k
 M, stiffness K and dampers G. Springs and dampers sit at the same fingertips, alike in all
 directions, so G = (g / s) K for dampers g and springs s. A constant load has a potential, so
 
-    E = x'M x' / 2 + e K e / 2,    e = x - x*,                                            (1)
+    E = x'M x' / 2 + e K e / 2,    e = x - x*,                                           (1)
 
 never grows about the equilibrium x*, and the equation of motion M x'' + G x' + K e = 0 gives e from
 what is measured. With w0^2 = k s / (object's mass + masses of k fingertips), the least square of a
 natural frequency (levers about an axis are at least the grasp size, so turning is no slower),
 
-    |e|_K <= |x''|_M / w0 + (g / s) |x'|_K.                                               (2)
+    |e|_K <= |x''|_M / w0 + (g / s) |x'|_K.                                              (2)
 
 e K e is s times the sum of squares of the tips' ways to their equilibrium. So no fingertip is or
 gets farther from its equilibrium than B = sqrt(2 E / s), and the object, whose shift and size times
-turn have at most sqrt(2 / k) of it, moves by 2 sqrt(2 / k) B at most from here on.               (3)
+turn have at most sqrt(2 / k) of it, moves by 2 sqrt(2 / k) B at most from here on.              (3)
 
 Contact forces are those of the servos less the tips' inertia. With w = sqrt(s / m) for a tip's mass
 m, speeds are at most w B, so forces stay within s B + g w B + m (w^2 B + (g / m) w B) of those at
-equilibrium: (2 + 2 g / sqrt(s m)) s B, now and later.                                            (4)
+equilibrium: (2 + 2 g / sqrt(s m)) s B, now and later.                                           (4)
 
 The simulator's friction is not quite rigid: contacts inside their cones creep, at speeds that are
 proportional to the forces and so constant at rest. Creep hides in measured speeds, which differ
 from it by the speed of the transient, at most w B. So it is at most the measured speed plus that,
-for the time that is left, and tips carry it into the springs.                                    (5)
+for the time that is left, and tips carry it into the springs.                                   (5)
 
 If contacts are deeper in their cones, and servos farther from their limits, than (4) twice and (5)
 together, then no contact ever slips or opens, so (1) to (5) hold to the end. Both bounds are
@@ -52,6 +52,7 @@ from grasp_core.arrays import Array, Indices, cross
 from grasp_core.closure.wrenches import cross_matrix
 from scenes.layout import Layout
 from sim_validate.simulation.schedules import Schedule
+from sim_validate.simulation.simulate import Mask
 from sim_validate.simulation.traces import rotated
 
 SAFETY = 2.0
@@ -112,7 +113,7 @@ class EarlyEnds:
 
     def look(
         self, places: Indices, samples: Indices, joints: Array, speeds: Array
-    ) -> tuple[Array, Array]:
+    ) -> tuple[Mask, Mask]:
         """Look at trials after a sample: have they settled, and are they answered?
 
         Args:
@@ -125,7 +126,7 @@ class EarlyEnds:
             Whether each trial need not settle any longer before friction is lowered, and whether
             its answer is known, (n,) each.
         """
-        settled = answered = np.zeros(len(places), dtype=bool)
+        settled = answered = np.zeros(len(places), dtype=np.bool_)
         with np.errstate(all="ignore"):  # what diverges is neither settled nor answered
             reach = self._reach(places, speeds)
             after = samples >= self.watched[places]
@@ -157,10 +158,10 @@ class EarlyEnds:
 
     def _settled(
         self, places: Indices, samples: Indices, joints: Array, speeds: Array, reach: Array | None
-    ) -> Array:
+    ) -> Mask:
         """Tell whether nothing that counts can come while friction is high, (n,)."""
         if self.springs is None or reach is None:
-            return np.zeros(len(places), dtype=bool)
+            return np.zeros(len(places), dtype=np.bool_)
         calm = self.springs.further(reach) <= SETTLED * self.thresholds.watched_m
         calm &= samples >= self.resting[places]
         if calm.any():
@@ -170,15 +171,16 @@ class EarlyEnds:
 
     def _answered(
         self, places: Indices, samples: Indices, joints: Array, speeds: Array, reach: Array | None
-    ) -> Array:
+    ) -> Mask:
         """Tell whether trials are lost, or held whatever is still to come, (n,)."""
         limits, springs, starts = self.thresholds, self.springs, self.starts[places]
         if np.isnan(self.began_m[places]).any():
-            self.began_m[places] = displaced(starts, np.tile(PLANNED, (len(places), 1)), self.layout)
+            planned = np.tile(PLANNED, (len(places), 1))
+            self.began_m[places] = displaced(starts, planned, self.layout)
         began = self.began_m[places]
         away = joints[:, :7] - starts
         most = _lengths(away[:, :3]) + self.lever * _lengths(away[:, 3:])
-        lost = np.zeros(len(places), dtype=bool)
+        lost = np.zeros(len(places), dtype=np.bool_)
         if not (np.maximum(most / limits.watched_m, (began + most) / limits.total_m) < 1.0).all():
             most = displaced(joints[:, :7], starts, self.layout)
             lost = (most >= limits.watched_m) | (began + most >= limits.total_m)
@@ -235,7 +237,7 @@ class _Springs:
     def stuck(
         self, commands: Array, friction: Array, joints: Array, speeds: Array, reach: Array,
         left_s: Array | float,
-    ) -> Array:  # fmt: skip
+    ) -> Mask:  # fmt: skip
         """Tell whether all contacts stay inside the cones of a friction for a time, (n,).
 
         Args:
@@ -253,7 +255,8 @@ class _Springs:
         normal, across = pushes[..., 0], np.hypot(pushes[..., 1], pushes[..., 2])
         slope = friction[:, None]
         inside = slope * normal - across > (1.0 + slope) * change
-        return (inside & (normal > change) & (normal < self.largest - change)).all(axis=1)
+        good: Mask = inside & (normal > change) & (normal < self.largest - change)
+        return np.logical_and.reduce(good, axis=1)
 
 
 def _lengths(vectors: Array) -> Array:

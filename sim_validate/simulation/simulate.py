@@ -12,9 +12,10 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, to_digits
 from scenes.mjcf import Scene
@@ -29,6 +30,7 @@ from sim_validate.simulation.engine import (
 )
 from sim_validate.simulation.schedules import Clock, Schedule
 
+Mask: TypeAlias = NDArray[np.bool_]
 FEWEST = 2
 """Fewest trials that room is made for: one to close the fingers, and most controls have two."""
 CHUNK = 5
@@ -80,7 +82,7 @@ class Ends(Protocol):
 
     def look(
         self, places: Indices, samples: Indices, joints: Array, speeds: Array
-    ) -> tuple[Array, Array]:
+    ) -> tuple[Mask, Mask]:
         """Tell which trials need not settle any longer, and which are answered, (n,) each."""
         ...
 
@@ -187,7 +189,9 @@ class Bench:
                 ran.joints[rows, done] = joints[rows]
                 ran.counts[rows] += 1
                 if ends is not None and not together:
-                    settled, answered = ends.look(going, now, joints[going], speeds[going])
+                    settled, answered = ends.look(
+                        going, sample[going], joints[going], speeds[going]
+                    )
                     early = going[settled]
                     if early.size:
                         ran.skipped[early] += watched[early] - 1 - sample[early]
@@ -230,7 +234,7 @@ class _Ran:
     """Number of samples of each trial, (m,)."""
     skipped: Indices
     """Number of samples that each trial left out, (m,)."""
-    stopped: Array
+    stopped: Mask
     """Whether time ran out, (m,)."""
     errors: dict[int, str]
     """The simulator's own messages, by trial."""

@@ -71,9 +71,7 @@ class Trace:
         return None if self.fault else bool((self.displacements_m < threshold_m).all())
 
 
-def trace(
-    motion: Motion, layout: Layout, watched: int, earlier: Motion | None = None
-) -> Trace:
+def trace(motion: Motion, layout: Layout, watched: int, earlier: Motion | None = None) -> Trace:
     """Measure displacements, slips and gaps in a motion.
 
     Args:

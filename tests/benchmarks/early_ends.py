@@ -40,8 +40,6 @@ SHARES = (0.5, 0.8, 0.95, 0.99, 0.998, 1.002, 1.01, 1.05, 1.2)
 """Loads, relative to the largest that the analysis says is resisted."""
 NEAR = (0.9, 0.99, 0.997, 0.999, 1.0, 1.0006, 1.001, 1.002, 1.004, 1.01, 1.03, 1.1)
 """Frictions, relative to the critical one."""
-LARGE = 0.02
-"""Change of a held object's displacement that is told, in thresholds."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +149,7 @@ def report(pairs):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="a tenth of the trials")
+    parser.add_argument("--quick", action="store_true", help="a sixth of the trials")
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
     begun = time.perf_counter()

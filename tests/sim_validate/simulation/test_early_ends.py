@@ -143,9 +143,8 @@ def test_a_change_of_speed_keeps_a_trial_going(looking):
     moving = speeds.copy()
     moving[1] = 0.01 * looking.layout.grasp_size_m
     for sample in range(LAST_OF_SETTLING, LAST_OF_SETTLING + 8):
-        _, answered = looking.look(
-            np.array([0]), np.array([sample]), joints[None], (moving if sample % 2 else speeds)[None]
-        )
+        now = moving if sample % 2 else speeds
+        _, answered = looking.look(np.array([0]), np.array([sample]), joints[None], now[None])
         assert not answered.any()
 
 
