@@ -67,7 +67,7 @@ class Rig:
         return self._traces(self._holds(loads, settling_frictions), None if whole else limits)
 
     def watch(self, load: Load, settling_friction: float | None = None) -> Watched:
-        """Simulate one hold as `hold` does, and keep all motion since the fingers closed."""
+        """Simulate one whole hold, and keep all motion since the fingers closed."""
         settling = None if settling_friction is None else [settling_friction]
         (schedule,) = self._holds([load], settling)
         (motion,) = self.bench.run([schedule], self.closed and self.closed.state)
