@@ -138,45 +138,61 @@ def _largest_apart(positions: Array, normals: Array) -> float:
 def _largest_clear(body: Polyhedron, positions: Array, normals: Array, start: float) -> Array:
     """Return up to which radius each fingertip meets nothing beside its contact, (k,).
 
-    The radius is at most `start`.
-    """
-    return np.array(
-        [_clear_radius(body, *contact, start) for contact in zip(positions, normals, strict=True)]
-    )
-
-
-def _clear_radius(body: Polyhedron, position: Array, normal: Array, start: float) -> float:
-    """Return up to which radius one fingertip meets nothing beside its contact.
-
     The radius is at most `start`. Contacts may lie slightly below their faces, because positions in
     files are rounded. The surface of a curved patch does not count near the contact, because a
     fingertip is assumed to touch the plane of the patch.
     """
-    slack, radius = ON_FACE * body.radius, start
-    triangles = _triangles_near(body, position, normal, start)
-    for _ in range(MAX_SHRINKING if len(triangles) else 0):
+    near = _triangles_near(body, positions, normals, start)
+    radii = np.full(len(positions), start)
+    for finger in _meeting(body, positions - start * normals, start, near):
+        triangles = body.triangles[np.flatnonzero(near[finger])]
+        radii[finger] = _clear_radius(body, positions[finger], normals[finger], start, triangles)
+    return radii
+
+
+def _meeting(body: Polyhedron, centers: Array, radius: float, near: Array) -> Indices:
+    """Find the spheres that meet a triangle near them; all are looked at together."""
+    triangles = body.triangles[near.any(axis=0)]
+    if not len(triangles):
+        return np.zeros(0, dtype=np.intp)
+    if body.patches is not None:  # what counts for one contact does not for another
+        return np.flatnonzero(near.any(axis=1))
+    nearest = nearest_on_surface(body.vertices, triangles, centers)
+    return np.flatnonzero(np.linalg.norm(nearest - centers, axis=1) < _touched(body, radius))
+
+
+def _touched(body: Polyhedron, radius: float) -> float:
+    """Return the distance from which on a surface touches a fingertip but does not meet it [m]."""
+    return radius * (1.0 - TOUCHING) - ON_FACE * body.radius
+
+
+def _clear_radius(
+    body: Polyhedron, position: Array, normal: Array, start: float, triangles: Indices
+) -> float:
+    """Shrink one fingertip until it meets none of the triangles beside its contact."""
+    radius = start
+    for _ in range(MAX_SHRINKING):
         center = position - radius * normal
         nearest = nearest_on_surface(body.vertices, triangles, center[None])[0]
-        if np.linalg.norm(nearest - center) >= radius * (1.0 - TOUCHING) - slack:
+        if np.linalg.norm(nearest - center) >= _touched(body, radius):
             break
         away = nearest - position
         radius = float(away @ away) / (-2.0 * float(away @ normal))
     return radius
 
 
-def _triangles_near(body: Polyhedron, position: Array, normal: Array, radius: float) -> Indices:
-    """Find the triangles that a fingertip of at most a given radius may meet, (t, 3).
+def _triangles_near(body: Polyhedron, positions: Array, normals: Array, radius: float) -> Array:
+    """Tell which triangles each fingertip of at most a given radius may meet, (k, t).
 
     Spheres of smaller radius at the same contact lie inside the largest one.
     """
-    face = face_under(body, Contact(position, normal)) if body.patches else None
-    keep = np.ones(len(body.triangles), dtype=np.bool_)
-    if face is not None:
-        keep[face.facets] = False
-    triangles = body.triangles[keep]
-    corners = body.vertices[triangles]
+    corners = body.vertices[body.triangles]
     middles = corners.mean(axis=1)
     extents = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
-    return triangles[
-        np.linalg.norm(middles - position + radius * normal, axis=1) <= radius + extents
-    ]
+    centers = positions - radius * normals
+    near = np.linalg.norm(middles - centers[:, None], axis=2) <= radius + extents
+    for finger, contact in enumerate(zip(positions, normals, strict=True)):
+        face = face_under(body, Contact(*contact)) if body.patches else None
+        if face is not None:
+            near[finger, face.facets] = False
+    return near

@@ -17,7 +17,9 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, to_digits
 from grasp_core.checked import coefficient, number
+from grasp_core.closure.contact_arrays import unit_size
 from grasp_core.closure.force_closure import force_closure
+from grasp_core.closure.margin_program import deepest_forces
 from grasp_core.closure.wrenches import contact_frames
 from grasp_core.errors import UndecidedError
 from grasp_core.objects.on_faces import face_under
@@ -47,6 +49,9 @@ TOUCH = 1e-9
 """Least depth of fingertips in their faces at the start, in grasp sizes: a ten-thousandth of the
 finer thresholds. At depth zero, rounding would decide which fingertips press in the first step, and
 the impact of the others one step later can tilt lightly held objects by 1e-4."""
+OPEN = -1e-6
+"""Margin of closure below which contacts count as open without a proof. It is far beyond the errors
+of compiled code; the worst that could happen is a squeeze along the normals."""
 RETREAT = 0.5
 """Distance from which fingers approach, in grasp sizes; from much farther away they would arrive
 too fast."""
@@ -242,8 +247,13 @@ def _pushes(positions: Array, normals: Array, friction: float) -> Array:
 
     The largest normal part is one. Contacts that are not in force closure push along their normals.
     """
+    arms, _, _ = unit_size(positions)
+    _, _, margins = deepest_forces(arms[None], normals[None], np.array([friction]))
     try:
-        forces = force_closure(positions, normals, friction).forces
+        # a proof takes long, and is not needed where they are open by far
+        forces = (
+            None if margins[0, 1] < OPEN else force_closure(positions, normals, friction).forces
+        )
     except UndecidedError:
         forces = None
     local = np.einsum("kij,ki->kj", contact_frames(normals), normals if forces is None else forces)

@@ -49,6 +49,8 @@ def as_text(value: object) -> str:
     """Write a number in full precision, or a sequence of them separated by blanks."""
     if isinstance(value, str):
         return value
+    if type(value) in (float, int):  # the most frequent ones, and an array would take longer
+        return repr(value)
     return " ".join(repr(number) for number in np.asarray(value).ravel().tolist())
 
 

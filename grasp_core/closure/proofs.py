@@ -27,7 +27,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, cross
 from grasp_core.closure.margin_program import (
     CHECK_SLACK,
     SMALLEST_NORMAL,
@@ -50,7 +50,7 @@ RANK = 1e-9
 
 def supports(twist: Array, arms: Array, normals: Array, friction: Array) -> Array:
     """Compute the support s_i(y) of each friction cone, cut at unit normal force, (..., k)."""
-    velocities = twist[..., None, :3] + np.cross(twist[..., None, 3:], arms)
+    velocities = twist[..., None, :3] + cross(twist[..., None, 3:], arms)
     along, across = normal_and_tangential(velocities, normals)
     return along + friction * across
 
@@ -179,7 +179,7 @@ def margin_ceiling(
     """
     if not refutes_closure(twist, arms, normals, friction):
         return math.inf
-    along, _ = normal_and_tangential(twist[:3] + np.cross(twist[3:], arms), normals)
+    along, _ = normal_and_tangential(twist[:3] + cross(twist[3:], arms), normals)
     rounding = caution * CHECK_SLACK * float(np.linalg.norm(twist)) * np.sqrt(1.0 + friction**2)
     # M of (3), which rounding may raise
     largest = float((supports(twist, arms, normals, friction) + rounding).max())

@@ -16,7 +16,7 @@ instead.
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array, Indices, cross
 from grasp_core.solvers.ties import first_best
 
 
@@ -63,10 +63,10 @@ def _foot(corners: Array, points: Array) -> Array:
     """Return the foot of points (..., 1, 3) on each triangle if inside, else a corner."""
     tails = corners[:, 0]
     one, other, away = corners[:, 1] - tails, corners[:, 2] - tails, points - tails
-    normals = np.cross(one, other)
+    normals = cross(one, other)
     squares = _dots(normals, normals)
-    v = _divided(_dots(normals, np.cross(away, other)), squares)
-    w = _divided(_dots(normals, np.cross(one, away)), squares)
+    v = _divided(_dots(normals, cross(away, other)), squares)
+    w = _divided(_dots(normals, cross(one, away)), squares)
     inside = (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0)
     v, w = np.where(inside, v, 0.0), np.where(inside, w, 0.0)
     return tails + v[..., None] * one + w[..., None] * other

@@ -1,6 +1,8 @@
 """Simulates one trial of a recorded contact set again.
 
 Trials of a scene do not influence each other, so one by itself moves as it did among the others.
+It is simulated twice: until its answer is known, for the verdict as it was recorded, and to the
+protocol's full length, to be looked at.
 """
 
 from collections.abc import Mapping, Sequence
@@ -39,7 +41,9 @@ class Replayed:
     """Friction coefficient that the planned forces need; None if no forces balance the wrench."""
     friction: float
     hold: HoldVerdict
+    """The verdict on the trial, which ends when its answer is known."""
     watched: Watched
+    """The motion of the trial to its full length."""
     scene: Scene
 
 
@@ -81,7 +85,8 @@ def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
     held, rig = case.loads[name], case.rig
     watched = rig.watch(held.load, held.settling)
     scene = rig.bench.scene
-    hold = judge(watched.trace, scene.layout, recorded.setup.hold)
+    (ended,) = rig.hold([held.load], None if held.settling is None else [held.settling])
+    hold = judge(ended, scene.layout, recorded.setup.hold)
     return Replayed(
         name=name,
         load=held.load,

@@ -9,7 +9,7 @@ possible.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,8 +47,9 @@ class CriticalFriction:
 
 
 def released_friction(
-    bench: Bench, positions: Array, normals: Array, predicted: float, setup: Setup
-) -> CriticalFriction:
+    bench: Bench, positions: Array, normals: Array, predicted: float, setup: Setup, *,
+    whole: bool = False,
+) -> CriticalFriction:  # fmt: skip
     """Measure the critical friction of a grasp whose scene is compiled, whatever friction it has.
 
     Args:
@@ -57,6 +58,7 @@ def released_friction(
         normals: Unit normals into the object, (k, 3).
         predicted: The critical friction that the analysis predicts.
         setup: How trials are simulated.
+        whole: Whether all trials have the protocol's full length (see `early_ends`).
 
     Raises:
         UndecidedError: No balanced forces in which every finger pushes were found.
@@ -67,13 +69,13 @@ def released_friction(
     least = max(predicted, 0.5 * protocol.least_friction)
     forces = forces_just_above(positions, normals, least)
     forces *= SQUEEZE * setup.fingers.max_normal_force_n
-    rig = squeezed(bench, setup, forces, predicted, high)
+    rig = replace(squeezed(bench, setup, forces, predicted, high).at_rest(high), whole=whole)
 
     share = min(protocol.threshold, TILT * max(predicted, protocol.least_friction))
 
     def stays(frictions: list[float]) -> list[bool | None]:
         threshold = share * bench.scene.layout.grasp_size_m
-        return [trace.stayed(threshold) for trace in rig.release(high, frictions)]
+        return [trace.stayed(threshold) for trace in rig.release(high, frictions, threshold)]
 
     if predicted < protocol.least_friction:
         (held,) = stays([protocol.least_friction])

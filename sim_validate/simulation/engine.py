@@ -25,6 +25,9 @@ except (ImportError, RuntimeError, AttributeError, OSError) as error:
         "unset it; otherwise reinstall the package"
     ) from error
 
+STATE = ("time", "qpos", "qvel", "ctrl", "xfrc_applied")
+"""Parts of a state, which lie in the order of their bits."""
+
 
 def compiled(xml: str) -> mujoco.MjModel:
     """Compile the text of a scene.
@@ -36,6 +39,23 @@ def compiled(xml: str) -> mujoco.MjModel:
         return mujoco.MjModel.from_xml_string(xml)
     except ValueError as error:
         raise InputError(f"MuJoCo cannot compile the scene: {error}") from error
+
+
+def state_parts(model: mujoco.MjModel) -> dict[str, slice]:
+    """Find where the parts of a state lie that a trial sets or reads, by their names in MuJoCo.
+
+    A batch finds them too, but needs a whole `MjData` for it, which takes longer than most trials.
+    """
+    ends = {}
+    for name in STATE:
+        upto = 2 * int(getattr(mujoco.mjtState, f"mjSTATE_{name.upper()}")) - 1
+        upto &= int(mujoco.mjtState.mjSTATE_INTEGRATION)
+        ends[name] = mujoco.mj_stateSize(model, upto)
+    sizes = {
+        name: mujoco.mj_stateSize(model, int(getattr(mujoco.mjtState, f"mjSTATE_{name.upper()}")))
+        for name in STATE
+    }
+    return {name: slice(end - sizes[name], end) for name, end in ends.items()}
 
 
 def step(

@@ -1,13 +1,14 @@
 """Holds an object between squeezing fingers; wrench holds, ramps and releases start from there."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from scenes.layout import Layout
 from sim_validate.simulation import schedules
+from sim_validate.simulation.early_ends import EarlyEnds, Thresholds
 from sim_validate.simulation.schedules import Load, Schedule
 from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.simulate import Bench, Motion
@@ -43,21 +44,30 @@ class Rig:
     """The load without a wrench: only the forces that squeeze the object."""
     closed: Motion | None
     """The motion of the fingers while they closed; None for rigid fingers, which do not move."""
+    settled: bool = False
+    """Whether the object also settled in that motion, so that friction may be lowered at once."""
+    whole: bool = False
+    """Whether all trials have the protocols' full length; else each ends as soon as its answer is
+    known (see `early_ends`)."""
 
     def hold(
-        self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None
-    ) -> tuple[Trace, ...]:
+        self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None, *,
+        whole: bool = False,
+    ) -> tuple[Trace, ...]:  # fmt: skip
         """Simulate a hold under each load, and trace it from the moment friction is lowered.
 
         Args:
             loads: The loads to hold.
             settling_frictions: Friction of each load until then; None for the protocol's multiple
                 of the friction to hold at.
+            whole: Whether these trials have the protocol's full length, whatever others have.
         """
-        return self._traces(self._holds(loads, settling_frictions))
+        protocol, size = self.setup.hold, self.bench.scene.layout.grasp_size_m
+        limits = Thresholds(protocol.hold_threshold * size, protocol.total_threshold * size)
+        return self._traces(self._holds(loads, settling_frictions), None if whole else limits)
 
     def watch(self, load: Load, settling_friction: float | None = None) -> Watched:
-        """Simulate one hold as `hold` does, and keep all motion since the fingers closed."""
+        """Simulate one whole hold, and keep all motion since the fingers closed."""
         settling = None if settling_friction is None else [settling_friction]
         (schedule,) = self._holds([load], settling)
         (motion,) = self.bench.run([schedule], self.closed and self.closed.state)
@@ -95,16 +105,38 @@ class Rig:
         ]
         return self._traces([schedule for schedule, _ in rises]), rises[0][1]
 
-    def release(self, settling_friction: float, frictions: Sequence[float]) -> tuple[Trace, ...]:
-        """Lower the friction of the unloaded object to several values, and trace its motion."""
-        return self._traces(self._releases(settling_friction, frictions))
+    def at_rest(self, settling_friction: float) -> "Rig":
+        """Let the unloaded object settle, so that it need not before each release."""
+        assert self.closed is not None  # noqa: S101 - rigid fingers have not closed
+        trial = schedules.settle(
+            self.idle.forces, settling_friction, self.bench.clock, self.setup.friction
+        )
+        (motion,) = self.bench.run([trial], self.closed.state)
+        return replace(self, closed=motion.after(self.closed), settled=True)
+
+    def release(
+        self, settling_friction: float, frictions: Sequence[float], threshold_m: float | None = None
+    ) -> tuple[Trace, ...]:
+        """Lower the friction of the unloaded object to several values, and trace its motion.
+
+        Args:
+            settling_friction: Friction until then.
+            frictions: The values.
+            threshold_m: Displacement that answers a trial, which then may end early [m]; None for
+                trials of full length.
+        """
+        limits = None if threshold_m is None else Thresholds(threshold_m)
+        return self._traces(self._releases(settling_friction, frictions), limits)
 
     def _releases(self, settling_friction: float, frictions: Sequence[float]) -> list[Schedule]:
         clock, protocol = self.bench.clock, self.setup.friction
         return [
-            schedules.release(self.idle.forces, settling_friction, friction, clock, protocol)
+            schedules.release(
+                self.idle.forces, settling_friction, friction, clock, protocol,
+                settled=self.settled,
+            )
             for friction in frictions
-        ]
+        ]  # fmt: skip
 
     def motions_of_holds(self, loads: Sequence[Load]) -> Array:
         """Return joint positions under each load, from closed fingers on, (trials, n, 7 + 3k)."""
@@ -118,15 +150,24 @@ class Rig:
         motions = self.bench.run(trials, self.closed and self.closed.state)
         return np.array([motion.joints for motion in motions])
 
-    def _traces(self, trials: Sequence[Schedule]) -> tuple[Trace, ...]:
-        return self._traced(trials, self.bench.run(trials, self.closed and self.closed.state))
+    def _traces(
+        self, trials: Sequence[Schedule], limits: Thresholds | None = None
+    ) -> tuple[Trace, ...]:
+        bench, ends, closed = self.bench, None, self.closed
+        if limits is not None and not self.whole:
+            at = None if closed is None or not len(closed.joints) else closed.joints[-1]
+            ends = EarlyEnds(bench.scene.layout, trials, bench.clock.sample_s, limits, at)
+        return self._traced(trials, bench.run(trials, closed and closed.state, ends))
 
     def _traced(self, trials: Sequence[Schedule], motions: Sequence[Motion]) -> tuple[Trace, ...]:
-        layout = self.bench.scene.layout
+        layout, closed = self.bench.scene.layout, self.closed
         return tuple(
-            trace(motion.after(self.closed) if self.closed else motion, layout, trial.watched)
+            trace(
+                motion.after(closed) if closed else motion, layout,
+                trial.watched - motion.skipped, closed if self.settled else None,
+            )
             for motion, trial in zip(motions, trials, strict=True)
-        )
+        )  # fmt: skip
 
 
 def pushes(planned: Array, joints: Array, layout: Layout) -> Array:

@@ -34,6 +34,8 @@ class Schedule:
     """Friction coefficient in each sample, (n,)."""
     watched: int
     """Index of the first sample from which the object must stay where it is."""
+    resting: int
+    """Index of the first sample from which load and finger forces no longer change."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,7 @@ def squeeze(forces: Array, friction: float, clock: Clock, protocol: HoldProtocol
     shares = smooth(clock.samples(protocol.squeeze_s))
     closing = shares[:, None, None] * forces
     count = len(shares)
-    return Schedule(np.zeros((count, 6)), closing, np.full(count, friction), count)
+    return Schedule(np.zeros((count, 6)), closing, np.full(count, friction), count, count)
 
 
 def hold(
@@ -61,7 +63,7 @@ def hold(
     """Schedule a hold: load the squeezed object at high friction, settle, lower friction, watch."""
     rise, rest = clock.samples(protocol.load_s), clock.samples(protocol.settle_s)
     shares = np.concatenate([smooth(rise), np.ones(rest + clock.samples(protocol.hold_s))])
-    return _between(idle, load, shares, frictions, rise + rest)
+    return _between(idle, load, shares, frictions, rise + rest, rise)
 
 
 def ramp(
@@ -83,18 +85,36 @@ def ramp(
     climb = lower + (upper - lower) * np.arange(1, count + 1) / count
     applied = np.concatenate([lower * smooth(rise), np.full(rest, lower), climb])
     high = hold_protocol.settling_friction * friction
-    return _between(idle, limit, applied, (high, friction), rise + rest), climb
+    return _between(idle, limit, applied, (high, friction), rise + rest, len(applied)), climb
 
 
 def release(
     forces: Array, settling_friction: float, friction: float, clock: Clock,
-    protocol: FrictionProtocol,
+    protocol: FrictionProtocol, *, settled: bool = False,
 ) -> Schedule:  # fmt: skip
-    """Schedule a release: lower the friction of a squeezed object without load, and watch."""
-    rest, watched = clock.samples(protocol.settle_s), clock.samples(protocol.hold_s)
+    """Schedule a release: lower the friction of a squeezed object without load, and watch.
+
+    Args:
+        forces: Planned forces, (k, 3) [N].
+        settling_friction: Friction until then.
+        friction: Friction under test.
+        clock: The duration of a sample.
+        protocol: The durations.
+        settled: Whether the object has settled already, as `settle` schedules it.
+    """
+    rest = 0 if settled else clock.samples(protocol.settle_s)
+    shares = np.ones(rest + clock.samples(protocol.hold_s))
     still = Load(np.zeros(6), forces)
-    shares = np.ones(rest + watched)
-    return _between(still, still, shares, (settling_friction, friction), rest)
+    return _between(still, still, shares, (settling_friction, friction), rest, 0)
+
+
+def settle(
+    forces: Array, settling_friction: float, clock: Clock, protocol: FrictionProtocol
+) -> Schedule:
+    """Schedule what comes before a release: a squeezed object without load settles."""
+    still = Load(np.zeros(6), forces)
+    count = clock.samples(protocol.settle_s)
+    return _between(still, still, np.ones(count), (settling_friction, settling_friction), count, 0)
 
 
 def smooth(count: int) -> Array:
@@ -104,8 +124,9 @@ def smooth(count: int) -> Array:
 
 
 def _between(
-    start: Load, end: Load, shares: Array, frictions: tuple[float, float], watched: int
-) -> Schedule:
+    start: Load, end: Load, shares: Array, frictions: tuple[float, float], watched: int,
+    resting: int,
+) -> Schedule:  # fmt: skip
     friction = np.full(len(shares), frictions[0])
     friction[watched:] = frictions[1]
     return Schedule(
@@ -113,4 +134,5 @@ def _between(
         forces=start.forces + shares[:, None, None] * (end.forces - start.forces),
         friction=friction,
         watched=watched,
+        resting=resting,
     )

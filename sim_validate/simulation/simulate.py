@@ -12,14 +12,27 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from grasp_core.arrays import Array, to_digits
+from grasp_core.arrays import Array, Indices, to_digits
 from scenes.mjcf import Scene
-from sim_validate.simulation.engine import batch, compiled, mujoco, step, touched, unlogged
+from sim_validate.simulation.engine import (
+    batch,
+    compiled,
+    mujoco,
+    state_parts,
+    step,
+    touched,
+    unlogged,
+)
 from sim_validate.simulation.schedules import Clock, Schedule
 
+Mask: TypeAlias = NDArray[np.bool_]
+FEWEST = 2
+"""Fewest trials that room is made for: one to close the fingers, and most controls have two."""
 CHUNK = 5
 """Simulation steps per sample; loads change, and motion is recorded, once per sample."""
 
@@ -45,6 +58,9 @@ class Motion:
     """The simulator's own message if it gave up, otherwise empty."""
     timed_out: bool
     """Whether the trial was stopped before its end."""
+    skipped: int = 0
+    """How many samples of its schedule were left out before friction was lowered, because the
+    object had settled."""
 
     def after(self, earlier: "Motion") -> "Motion":
         """Add the faults of the earlier motion whose end state this motion started from."""
@@ -56,6 +72,19 @@ class Motion:
             error=earlier.error or self.error,
             timed_out=earlier.timed_out or self.timed_out,
         )
+
+
+class Ends(Protocol):
+    """What tells which trials may end before their schedules do."""
+
+    earliest: int
+    """The first sample after which it wants to look."""
+
+    def look(
+        self, places: Indices, samples: Indices, joints: Array, speeds: Array
+    ) -> tuple[Mask, Mask]:
+        """Tell which trials need not settle any longer, and which are answered, (n,) each."""
+        ...
 
 
 class Bench:
@@ -74,46 +103,111 @@ class Bench:
         self.model = compiled(scene.xml)
         self.clock = Clock(CHUNK * self.model.opt.timestep)
         self.body = self.model.body("object").id
-        self.touching = np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
+        self.parts = state_parts(self.model)
+        touching = np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
+        # what lies between the first and the last may get their friction, too: it touches nothing
+        self.touching = slice(touching[0], touching[-1] + 1)
+        self.batch: batch.Batch | None = None
 
-    def run(self, schedules: Sequence[Schedule], start: Array | None = None) -> tuple[Motion, ...]:
+    def _trials(self, count: int) -> batch.Batch:
+        """Return at least `count` trials at rest at their contacts; they are made only once."""
+        if self.batch is None or self.batch.nsim < count:
+            self.batch = batch.Batch(self.model, max(count, FEWEST), self.threads)
+        self.batch.reset(np.arange(count), stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        return self.batch
+
+    def run(
+        self, schedules: Sequence[Schedule], start: Array | None = None, ends: Ends | None = None
+    ) -> tuple[Motion, ...]:
         """Simulate trials of equal length, all from the same state.
 
         Args:
             schedules: What is applied in each trial.
             start: State at the end of an earlier motion; None puts fingertips at their contacts, at
                 rest.
+            ends: What ends trials before their schedules do; None for their full length.
         """
-        trials = batch.Batch(self.model, len(schedules), self.threads)
-        if start is None:
-            trials.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        else:
-            trials.state[:] = start
-        clock = trials.bind("time")
+        trials = self._trials(len(schedules))
+        if start is not None:
+            trials.state[: len(schedules)] = start
+        clock = trials.state[:, self.parts["time"]][:, 0]
         begun = float(clock[0])
-        joints, errors = self._step_through(trials, schedules)
-        steps = CHUNK * np.arange(1, joints.shape[1] + 1)
-        expected = begun + CHUNK * joints.shape[1] * self.model.opt.timestep
-        return tuple(
-            Motion(
-                times_s=self.model.opt.timestep * steps,
-                joints=joints[trial],
-                state=trials.state[trial].copy(),
-                finite=bool(
-                    np.isfinite(trials.state[trial]).all() & np.isfinite(joints[trial]).all()
-                ),
-                warnings=int(trials.warning[trial, :, 1].sum()),
-                clock_error_s=float(clock[trial] - expected),
-                error=errors.get(trial, ""),
-                timed_out=joints.shape[1] < len(schedules[trial].friction),
+        ran = self._step_through(trials, schedules, ends)
+        warned = trials.warning[:, :, 1].sum(axis=1)
+        times = self.model.opt.timestep * (CHUNK * np.arange(1, ran.joints.shape[1] + 1))
+        found: list[Motion] = []
+        for trial, count in enumerate(ran.counts):
+            joints, state = ran.joints[trial, :count], trials.state[trial].copy()
+            expected = begun + CHUNK * int(count) * self.model.opt.timestep
+            found.append(
+                Motion(
+                    times_s=times[:count],
+                    joints=joints,
+                    state=state,
+                    finite=bool(np.isfinite(state).all() and np.isfinite(joints).all()),
+                    warnings=int(warned[trial]),
+                    clock_error_s=float(clock[trial] - expected),
+                    error=ran.errors.get(trial, ""),
+                    timed_out=bool(ran.stopped[trial]),
+                    skipped=int(ran.skipped[trial]),
+                )
             )
-            for trial in range(len(schedules))
-        )
+        return tuple(found)
 
     def _step_through(
-        self, trials: batch.Batch, schedules: Sequence[Schedule]
-    ) -> tuple[Array, dict[int, str]]:
-        """Step m trials; return joint positions so far, (m, n, q), and errors by trial."""
+        self, trials: batch.Batch, schedules: Sequence[Schedule], ends: Ends | None
+    ) -> "_Ran":
+        """Step m trials to their ends."""
+        wrenches, controls, frictions = self._applied(schedules)
+        count, length = frictions.shape
+        watched = np.array([schedule.watched for schedule in schedules])
+        applied, servos, joints, speeds = (
+            trials.state[:, self.parts[name]] for name in ("xfrc_applied", "ctrl", "qpos", "qvel")
+        )
+        applied = applied.reshape(len(applied), -1, 6)[:, self.body]
+        friction = trials.expand("geom_friction")[:, self.touching, 0]
+        ran = _Ran(
+            np.empty((count, length, joints.shape[1])), np.zeros(count, dtype=np.intp),
+            np.zeros(count, dtype=np.intp), np.zeros(count, dtype=bool), {},
+        )  # fmt: skip
+        going, sample = np.arange(count), np.zeros(count, dtype=np.intp)
+        # before any may end, all trials are at the same sample: slices are quicker than indices
+        alike = length if ends is None else ends.earliest
+        with unlogged():
+            while going.size:
+                if time.monotonic() > self.deadline:
+                    ran.stopped[going] = True
+                    break
+                together = sample[0] < alike
+                rows = slice(count) if together else going
+                now = int(sample[0]) if together else sample[going]
+                done = now if together else ran.counts[going]
+                applied[rows] = wrenches[rows, now]
+                servos[rows] = controls[rows, now]
+                friction[rows] = frictions[rows, now, None]
+                step(trials, ran.errors, CHUNK, going)
+                ran.joints[rows, done] = joints[rows]
+                ran.counts[rows] += 1
+                if ends is not None and not together:
+                    settled, answered = ends.look(
+                        going, sample[going], joints[going], speeds[going]
+                    )
+                    early = going[settled]
+                    if early.size:
+                        ran.skipped[early] += watched[early] - 1 - sample[early]
+                        sample[early] = watched[early] - 1
+                    going = going[~answered]
+                sample[rows] += 1
+                if not together or now == length - 1:
+                    going = going[sample[going] < length]
+        return ran
+
+    def _applied(self, schedules: Sequence[Schedule]) -> tuple[Array, Array, Array]:
+        """Return what is applied in each of n samples of m trials, as the simulator takes it.
+
+        Returns:
+            External wrenches, (m, n, 6), commands of the servos, (m, n, 3k), frictions, (m, n).
+        """
         layout = self.scene.layout
         wrenches = np.array([schedule.wrenches for schedule in schedules])
         wrenches[..., 3:] -= np.cross(layout.center, wrenches[..., :3])
@@ -124,22 +218,26 @@ class Bench:
             for part in (wrenches[trial, :, :3], wrenches[trial, :, 3:], pushes[trial]):
                 part[...] = to_digits(part)
         controls = pushes.reshape(*pushes.shape[:2], -1) / layout.drive.stiffness_n_per_m
+        if layout.drive.rigid:  # there are no servos
+            controls = controls[..., :0]
         frictions = np.array([to_digits(schedule.friction) for schedule in schedules])
-        applied, servos = trials.bind("xfrc_applied"), trials.bind("ctrl")
-        friction, joints = trials.expand("geom_friction"), trials.bind("qpos")
-        done: list[Array] = []
-        errors: dict[int, str] = {}
-        with unlogged():
-            for sample in range(frictions.shape[1]):
-                if time.monotonic() > self.deadline:
-                    break
-                applied[:, self.body] = wrenches[:, sample]
-                if not layout.drive.rigid:
-                    servos[:] = controls[:, sample]
-                friction[:, self.touching, 0] = frictions[:, sample, None]
-                step(trials, errors, CHUNK)
-                done.append(joints.copy())
-        return np.array(done).reshape(-1, *joints.shape).transpose(1, 0, 2), errors
+        return wrenches, controls, frictions
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Ran:
+    """What m trials did."""
+
+    joints: Array
+    """Joint positions, (m, n, q), of which each trial has filled in its own number of samples."""
+    counts: Indices
+    """Number of samples of each trial, (m,)."""
+    skipped: Indices
+    """Number of samples that each trial left out, (m,)."""
+    stopped: Mask
+    """Whether time ran out, (m,)."""
+    errors: dict[int, str]
+    """The simulator's own messages, by trial."""
 
 
 def first_touch(scene: Scene) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, cross
 from grasp_core.closure.wrenches import normal_and_tangential
 from scenes.layout import Layout
 from sim_validate.simulation.simulate import Motion
@@ -71,27 +71,35 @@ class Trace:
         return None if self.fault else bool((self.displacements_m < threshold_m).all())
 
 
-def trace(motion: Motion, layout: Layout, watched: int) -> Trace:
+def trace(motion: Motion, layout: Layout, watched: int, earlier: Motion | None = None) -> Trace:
     """Measure displacements, slips and gaps in a motion.
 
     Args:
         motion: Motion of one trial.
         layout: The simulated layout.
         watched: Index of the first sample in which the object had to stay where it was.
+        earlier: The motion from whose end this one started; None for the planned pose.
     """
     before = min(watched, len(motion.joints)) - 1
     planned = np.concatenate([np.zeros(3), [1.0, 0.0, 0.0, 0.0]])
-    at_start = motion.joints[before] if before >= 0 else planned
+    at_start = planned
+    if before >= 0:
+        at_start = motion.joints[before]
+    elif earlier is not None and len(earlier.joints):
+        at_start = earlier.joints[-1]
     joints = motion.joints[before + 1 :]
     shifts, rotations = _moved(joints, at_start, layout)
     start_shift, start_turn = _moved(at_start[None], planned, layout)
-    normals = layout.frames[:, :, 0]
-    tips = _tips(joints, layout)
-    _, slips = normal_and_tangential(tips - _tips(at_start[None], layout), normals)
+    # the pose at the start first, then all others
+    rows = np.zeros((1 + len(joints), joints.shape[1]))
+    rows[0, : len(at_start)], rows[1:] = at_start, joints
+    normals, tips = layout.frames[:, :, 0], _tips(rows, layout)
+    _, slips = normal_and_tangential(tips[1:] - tips[:1], normals)
+    tips = tips[1:]
     heights = np.einsum("ki,nki->nk", normals, layout.contacts - tips)
     size = layout.grasp_size_m
     return Trace(
-        times_s=motion.times_s[: len(joints)],
+        times_s=motion.times_s[: len(shifts)],
         displacements_m=shifts + size * rotations,
         shifts_m=shifts,
         rotations_rad=rotations,
@@ -129,13 +137,13 @@ def _tips(joints: Array, layout: Layout) -> Array:
 def rotated(quaternions: Array, vectors: Array) -> Array:
     """Turn vectors (..., 3) by quaternions (..., 4) wxyz of any length but zero."""
     w, v = quaternions[..., :1], quaternions[..., 1:]
-    twice = 2.0 * np.cross(v, vectors) / np.sum(quaternions**2, axis=-1, keepdims=True)
-    return vectors + w * twice + np.cross(v, twice)
+    twice = 2.0 * cross(v, vectors) / np.sum(quaternions**2, axis=-1, keepdims=True)
+    return vectors + w * twice + cross(v, twice)
 
 
 def rotation_angles(quaternions: Array, start: Array) -> Array:
     """Compute angles between orientations (n, 4) and one (4,), exact when small, (n,) [rad]."""
     w, v = quaternions[:, 0], quaternions[:, 1:]
     along = np.abs(quaternions @ start)
-    across = start[0] * v - w[:, None] * start[1:] - np.cross(v, start[1:])
+    across = start[0] * v - w[:, None] * start[1:] - cross(v, start[1:])
     return 2.0 * np.arctan2(np.linalg.norm(across, axis=1), along)

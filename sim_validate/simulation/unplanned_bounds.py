@@ -105,7 +105,8 @@ def _rigid_friction(
     high = protocol.settling_friction * max(frictions)
     rig = _rigid(body, grasp, high, setup, INDENTATION)
     size = rig.bench.scene.layout.grasp_size_m
-    stays = [trace.stayed(protocol.threshold * size) for trace in rig.release(high, frictions)]
+    threshold = protocol.threshold * size
+    stays = [trace.stayed(threshold) for trace in rig.release(high, frictions, threshold)]
     first = stays.index(True) if True in stays else len(stays)
     slipped = frictions[first - 1] if first and stays[first - 1] is False else None
     return slipped, frictions[first] if first < len(stays) else None

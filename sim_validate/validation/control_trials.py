@@ -6,6 +6,7 @@ even the bare squeeze, it is also tried without a load. The fingers do their bes
 forces that need the least friction or, if none balance, those closest to balance.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -90,20 +91,25 @@ def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup
     rig, loads = control_case(body, control, setup)
     rules = rules_named(agenda.rules)
     pulls = _pulls(body, control, setup) if rules else ()
-    every = (*loads, *pulls)
-    traces = rig.hold([each.load for each in every], [each.settling for each in every])
+    traces = _held(rig, loads)
     layout = rig.bench.scene.layout
     tried = tuple(
         ControlTrial(
             each.name, each.load.wrench, each.required_friction, judge(trace, layout, setup.hold),
             trace if agenda.keep_traces else None,
         )
-        for each, trace in zip(loads, traces, strict=False)
+        for each, trace in zip(loads, traces, strict=True)
     )  # fmt: skip
-    others = traces[len(loads) :]
+    # other tools look at where the object ends, so their trials end no earlier
+    others = _held(rig, pulls, whole=True) if rules else ()
     return ControlVerdict(
         control, tried, {rule.name: accepted(rule, others, layout, setup.hold) for rule in rules}
     )
+
+
+def _held(rig: Rig, loads: Sequence[ControlLoad], *, whole: bool = False) -> tuple[Trace, ...]:
+    settling = [each.settling for each in loads]
+    return rig.hold([each.load for each in loads], settling, whole=whole)
 
 
 def control_case(
@@ -125,7 +131,9 @@ def control_case(
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
     rig = squeezed(bench, setup, idle.load.forces, control.friction, idle.settling)
     hopeless = _hopeless(body, control, setup)
-    return rig, tuple(plan.load(name, wrench) for name, wrench in hopeless)
+    return rig, tuple(
+        idle if name == UNLOADED else plan.load(name, wrench) for name, wrench in hopeless
+    )
 
 
 def _hopeless(body: Polyhedron, control: Control, setup: Setup) -> list[tuple[str, Array]]:

@@ -11,6 +11,7 @@ use them.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -23,7 +24,7 @@ from grasp_core.families.regulus_program import LEAST_DEPTH
 from grasp_core.objects.face_pieces import FacePiece, unit_pieces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
-from grasp_core.values import Contact, ForceCone, Grasp
+from grasp_core.values import ForceCone
 
 LEAST = 1e-3
 """Smallest disc radius accepted from the printed pencil program, in object radii."""
@@ -53,44 +54,57 @@ class Lines:
 
 
 def uncorrected_contacts(
-    body: Polyhedron, grasp: Grasp, friction: float
-) -> Iterator[tuple[float, tuple[Contact, ...]]]:
+    body: Polyhedron, faces: Sequence[int], friction: float
+) -> Iterator[tuple[float, Array, Array]]:
     """Yield contacts that the printed programs take for grasps, with the friction they suppose.
 
     Args:
         body: The object.
-        grasp: The grasp whose faces are used.
+        faces: Indices of the four faces, in any order; the programs try all their pairs.
         friction: Friction whose cones the programs may use, as far as the faces' normals span with
             them.
+
+    Yields:
+        The friction that is supposed; positions of several sets of contacts, (g, 4, 3) [m]; and the
+        normals of all these sets, (4, 3).
     """
-    theta = min(math.atan(friction), BELOW_SPAN * span_angle(grasp.normals))
+    pieces = _first_pieces(body)
+    normals = np.array([body.faces[face].normal for face in faces])
+    theta = min(math.atan(friction), BELOW_SPAN * span_angle(normals))
     if theta <= 0.0:
         return
-    pieces = unit_pieces(body)
     for order in PAIRINGS:
-        chosen = [grasp.faces[finger] for finger in order]
-        quad = [next(piece for piece in pieces if piece.face == face) for face in chosen]
+        quad = [pieces[faces[finger]] for finger in order]
+        units = np.array([piece.normal for piece in quad])
         cones = [ForceCone(piece.normal, theta) for piece in quad]
         if (lines := printed_regulus(quad, cones, LEAST_DEPTH)) is not None:
-            yield math.tan(theta), _contacts(body, quad, lines.positions)
+            yield math.tan(theta), _true(body, lines.positions[None]), units
         discs = printed_pencil(quad, theta)
         if discs is not None and focus_gap(quad, discs.foci) < 0.0:
-            for border in _border_points(quad, discs):
-                yield math.tan(theta), _contacts(body, quad, border)
+            borders = np.array(list(_border_points(quad, discs)))
+            yield math.tan(theta), _true(body, borders), units
 
 
-def _contacts(body: Polyhedron, quad: Sequence[FacePiece], positions: Array) -> tuple[Contact, ...]:
-    true = body.center_of_mass + body.radius * positions
-    return tuple(Contact(at, piece.normal) for at, piece in zip(true, quad, strict=True))
+@lru_cache(maxsize=8)
+def _first_pieces(body: Polyhedron) -> dict[int, FacePiece]:
+    """The first convex piece of each face, by the face's index, at object size one."""
+    pieces: dict[int, FacePiece] = {}
+    for piece in unit_pieces(body):
+        pieces.setdefault(piece.face, piece)
+    return pieces
+
+
+def _true(body: Polyhedron, positions: Array) -> Array:
+    return body.center_of_mass + body.radius * positions
 
 
 def _border_points(quad: Sequence[FacePiece], discs: Discs) -> Iterator[Array]:
     """Contacts on the borders of the discs that push farthest out of the plane of each pair."""
     N, _ = focus_line(quad)
+    flat = [piece.frame @ (piece.frame.T @ N[i]) for i, piece in zip(PAIR, quad, strict=True)]
+    ways = discs.radii[:, None] * np.array([unit(way) for way in flat])
     for signs in product((1.0, -1.0), repeat=4):
-        flat = [piece.frame @ (piece.frame.T @ N[i]) for i, piece in zip(PAIR, quad, strict=True)]
-        away = np.array([sign * unit(way) for sign, way in zip(signs, flat, strict=True)])
-        yield discs.centers + discs.radii[:, None] * away
+        yield discs.centers + np.array(signs)[:, None] * ways
 
 
 def focus_line(quad: Sequence[FacePiece]) -> tuple[list[Array], Array]:

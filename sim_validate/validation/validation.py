@@ -214,8 +214,10 @@ class _Bout:
         return robustness(self.body, self.grasp, self.friction, loads, self.agenda, setup)
 
     def accepted_by(self) -> dict[str, bool]:
-        """Apply the rules of other tools to the same traces."""
-        pulled = [trace for planned, trace in zip(self.loads, self.traces, strict=True)
-                  if planned.name in FORCE_AXES]  # fmt: skip
+        """Apply the rules of other tools, which look at where the object ends, to whole trials."""
         rules = rules_named(self.agenda.rules)
+        if not rules:
+            return {}
+        pulls = [planned.load for planned in self.loads if planned.name in FORCE_AXES]
+        pulled = self.rig.hold(pulls, whole=True)
         return {rule.name: accepted(rule, pulled, self.layout, self.setup.hold) for rule in rules}

@@ -30,7 +30,7 @@ FRICTIONS = (0.3, 0.5)
 PROFILED = 3
 """One object out of so many."""
 KINDS = {
-    "metrics": [("certified.py", "_quality"), ("certified.py", "_critical")],
+    "metrics": [("certify.py", "_quality"), ("certify.py", "_critical")],
     "planning": [("planner.py", "plan")],
     "stepping": [("simulate.py", "run")],
     "rest of validation": [("validation.py", "validate")],

@@ -18,16 +18,14 @@ WRENCHES = (0, 13, 39, 91)
 """Random ones beside the thirteen of every agenda."""
 KINDS = {
     "stepping": [("simulate.py", "run")],
-    "building": [("mjcf.py", "build_scene"), ("rig.py", "squeezed")],
+    "building": [("mjcf.py", "build_scene"), ("engine.py", "compiled")],
     "analysis": [
-        ("closure.py", "force_closure"),
-        ("critical.py", "critical_friction"),
-        ("forces.py", "contact_forces"),
-        ("forces.py", "least_friction_forces"),
-        ("resisted_wrenches.py", "wrench_limits"),
-        ("uncorrected.py", "uncorrected_contacts"),
+        ("controls.py", "negative_controls"),
+        ("loads.py", "planned_loads"),
+        ("contact_forces.py", "least_friction_forces"),
+        ("critical_friction.py", "forces_just_above"),
     ],
-    "reading motions": [("traces.py", "trace")],
+    "reading motions": [("traces.py", "trace"), ("hold_verdict.py", "judge")],
 }
 
 

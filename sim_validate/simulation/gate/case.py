@@ -1,7 +1,7 @@
 """The settings with which the simulator is checked on known cases, and results of the checks."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -66,9 +66,9 @@ class Case:
     def squeezed(
         self, body: Polyhedron, contacts: Sequence[Contact], forces: Array, friction: float
     ) -> Rig:
-        """Close fingers on a body with planned forces."""
+        """Close fingers on a body with planned forces, for trials of full length."""
         bench = Bench(self.setup.scene(body, contacts, friction))
-        return squeezed(bench, self.setup, forces, friction)
+        return replace(squeezed(bench, self.setup, forces, friction), whole=True)
 
 
 def tetrahedron(case: Case) -> tuple[Rig, list[Load]]:

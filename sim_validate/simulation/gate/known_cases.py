@@ -13,9 +13,11 @@ With mu the friction and N the normal force of a contact:
 * a solver that goes on to the last digit changes no motion;
 * a blow-up is reported, and does not silently reset the simulation to its start.
 
-The loads and frictions at which the boxes slip are found and judged exactly as those of grasps are,
-by holds, ramps and releases. So thresholds too loose to notice a slip are refused, like settings
-that slip falsely. The cases have the friction and the size of the object under test.
+The loads and frictions at which the boxes slip are found and judged as those of grasps are, by
+holds, ramps and releases, but every trial has its full length: that trials of grasps may end early
+presumes that nothing slips later (`early_ends`). So thresholds too loose to notice a slip are
+refused, like settings that slip falsely. The cases have the friction and the size of the object
+under test.
 """
 
 import math
@@ -81,7 +83,7 @@ def _incline(case: Case) -> list[Check]:
     weight = case.setup.fingers.max_normal_force_n
     resting = Load(np.array([0, 0, -weight, 0, 0, 0.0]), np.zeros((4, 3)))
     bench = Bench(rigid.scene(body, contacts, case.friction))
-    rig = Rig(bench, case.setup, case.friction, resting, None)
+    rig = Rig(bench, case.setup, case.friction, resting, None, whole=True)
     pulls = [case.friction * weight * np.array([*way, 0.0]) for way in _ways()]
     torques = [np.cross([0.0, 0.0, -height / 2], pull) for pull in pulls]  # so that it cannot tip
     limits = [
@@ -144,7 +146,9 @@ def _offset_fingers(case: Case) -> list[Check]:
     positions = np.array([contact.position for contact in contacts])
     normals = np.array([contact.normal for contact in contacts])
     bench = Bench(case.setup.scene(body, contacts, critical))
-    released = released_friction(bench, positions, normals, critical, case.setup).simulated
+    released = released_friction(
+        bench, positions, normals, critical, case.setup, whole=True
+    ).simulated
     largest = PUSH * case.setup.fingers.max_normal_force_n
     rig = case.squeezed(
         body, contacts, largest * forces_just_above(positions, normals, critical), critical

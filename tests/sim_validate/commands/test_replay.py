@@ -111,7 +111,9 @@ def test_files_are_written(folder, replay, tmp_path, monkeypatch):
     assert head[:4] == ["time_s", "displacement_m", "shift_m", "rotation_rad"]
     assert len(head) == 12
     largest = max(float(row.split(",")[1]) for row in rows[1:])
-    assert largest == found["displacement_m"]
+    # the file has the whole trial, the verdict is known before
+    assert len(rows) == 1 + 40
+    assert largest >= found["displacement_m"] > 0.0
 
 
 def test_a_trial_that_ends_otherwise_than_recorded_is_negative(folder, tmp_path, replay):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from sim_validate.simulation.engine import batch, compiled, step, unlogged
+from sim_validate.simulation.engine import STATE, batch, compiled, state_parts, step, unlogged
 
 FALLING = """<mujoco><option integrator="discrete"/><worldbody><body><freejoint/>
 <geom size=".1" mass="1"/></body></worldbody></mujoco>"""
@@ -15,6 +15,19 @@ def test_text_that_is_no_scene_is_refused():
     for text in ("", "<mujoco", "<mujoco><nonsense/></mujoco>"):
         with pytest.raises(gc.InputError, match="MuJoCo cannot compile the scene"):
             compiled(text)
+
+
+def test_parts_of_a_state_lie_where_a_batch_has_them():
+    model = compiled(FALLING)
+    trials, parts = batch.Batch(model, 2, 1), state_parts(model)
+    assert set(parts) == set(STATE)
+    for place, name in enumerate(STATE):
+        trials.state[:] = 0.0
+        trials.state[:, parts[name]] = 1.0 + place
+        bound = trials.bind(name)
+        assert bound.size == trials.state[:, parts[name]].size
+        assert (bound == 1.0 + place).all()
+        assert (trials.state != 0.0).sum() == bound.size
 
 
 def test_many_trials_are_each_what_a_plain_loop_gives():

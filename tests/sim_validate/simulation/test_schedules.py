@@ -31,6 +31,28 @@ def test_a_hold_loads_at_high_friction_and_watches_at_the_one_under_test():
     np.testing.assert_array_equal(schedule.forces[-1], LOAD.forces)
 
 
+def test_schedules_say_from_where_their_loads_are_constant():
+    made = (
+        schedules.hold(IDLE, LOAD, (1.5, 0.5), CLOCK, HoldProtocol()),
+        schedules.release(LOAD.forces, 2.0, 0.3, CLOCK, FrictionProtocol()),
+        schedules.ramp(IDLE, LOAD, (0.9, 1.1), 0.5, CLOCK, (HoldProtocol(), LimitProtocol()))[0],
+    )
+    assert [each.resting for each in made] == [16, 0, len(made[2].friction)]
+    for each in made:
+        rest = each.forces[each.resting :]
+        np.testing.assert_array_equal(rest, np.broadcast_to(each.forces[-1], rest.shape))
+
+
+def test_settling_and_a_settled_release_are_a_release():
+    whole = schedules.release(LOAD.forces, 2.0, 0.3, CLOCK, FrictionProtocol())
+    rest = schedules.settle(LOAD.forces, 2.0, CLOCK, FrictionProtocol())
+    left = schedules.release(LOAD.forces, 2.0, 0.3, CLOCK, FrictionProtocol(), settled=True)
+    assert (rest.watched, left.watched) == (10, 0)
+    for name in ("forces", "wrenches", "friction"):
+        parts = [getattr(each, name) for each in (rest, left)]
+        np.testing.assert_array_equal(np.concatenate(parts), getattr(whole, name))
+
+
 def test_a_squeeze_applies_no_wrench_and_ends_with_the_planned_forces():
     schedule = schedules.squeeze(LOAD.forces, 1.5, CLOCK, HoldProtocol())
     assert not schedule.wrenches.any()

@@ -14,6 +14,7 @@ from sim_validate.simulation import schedules
 from sim_validate.simulation.other_rules import RULES
 from sim_validate.simulation.protocol import HoldProtocol
 from sim_validate.simulation.setup import Agenda, Setup
+from sim_validate.validation import controls
 from sim_validate.validation.control_trials import try_control
 from sim_validate.validation.controls import negative_controls
 from sim_validate.validation.paper_as_printed import uncorrected_contacts
@@ -111,13 +112,42 @@ def test_what_the_paper_prints_lies_on_the_faces_of_the_grasp():
     for name in ("random-16-1", "double-wedge-bar"):
         body, found = grasps(name, 0.17, 3, ("pencil", "regulus"))
         for grasp in found:
-            for friction, contacts in uncorrected_contacts(body, grasp, 0.17):
+            for friction, sets, normals in uncorrected_contacts(body, grasp.faces, 0.17):
                 assert 0.0 < friction <= 0.17 + 1e-12
                 faces = [body.faces[face] for face in grasp.faces]
-                for contact in contacts:
-                    assert face_under(body, contact) in faces
-                    tested += 1
+                for positions in sets:
+                    for at, normal in zip(positions, normals, strict=True):
+                        assert face_under(body, gc.Contact(at, normal)) in faces
+                        tested += 1
     assert tested >= 8
+
+
+def test_grasps_on_the_same_faces_share_their_uncorrected_control():
+    body, found = grasps("random-16-1", 0.17, 12, FAMILIES)
+    by_faces = {}
+    for grasp in found:
+        exact = replace(grasp, critical_friction=gc.critical_friction(grasp))
+        made = negative_controls(body, exact, 0.17, 0)
+        own = [control for control in made if control.name == "uncorrected"]
+        by_faces.setdefault(tuple(sorted(grasp.faces)), []).append(own)
+    assert any(len(every) > 1 and every[0] for every in by_faces.values())
+    for first, *others in by_faces.values():
+        assert all(other == first for other in others)  # the very same value
+
+
+def test_leaving_out_what_compiled_code_finds_closed_changes_no_control(monkeypatch):
+    body, found = grasps("random-16-1", 0.17, 3, ("pencil", "regulus"))
+    quads = {tuple(sorted(grasp.faces)) for grasp in found}
+    make = controls._uncorrected_on.__wrapped__
+    before = [make(body, faces, 0.17) for faces in quads]
+    monkeypatch.setattr(controls, "_may_be_open", lambda sets, *_: np.arange(len(sets)))
+    after = [make(body, faces, 0.17) for faces in quads]
+    assert any(control is not None for control in before)
+    for one, other in zip(before, after, strict=True):
+        assert (one is None) == (other is None)
+        if one is not None:
+            for contact, same in zip(one.contacts, other.contacts, strict=True):
+                np.testing.assert_array_equal(contact.position, same.position)
 
 
 @pytest.mark.parametrize("every", [2, *more(1)])

@@ -124,8 +124,8 @@ def test_what_contradicts_the_analysis_is_said(monkeypatch):
     def slippery_hold(idle, load, frictions, clock, protocol):
         return hold(idle, load, tuple(0.5 * mu for mu in frictions), clock, protocol)
 
-    def slippery_release(forces, high, friction, clock, protocol):
-        return release(forces, high, 0.3 * friction, clock, protocol)
+    def slippery_release(forces, high, friction, *rest, **settled):
+        return release(forces, high, 0.3 * friction, *rest, **settled)
 
     body, (grasp, *_) = grasps("random-12-1", 0.4, 1, ("regulus",))
     sv.validate(body, grasp, 0.4, agenda=WITHOUT_CONTROLS)  # the gate is measured before
@@ -275,8 +275,8 @@ def _weaker(kind):
 
     faithful = getattr(schedules, kind)
 
-    def weakened(*arguments):
-        made = faithful(*arguments)
+    def weakened(*arguments, **settled):
+        made = faithful(*arguments, **settled)
         plan, *rest = made if isinstance(made, tuple) else (made,)
         friction = plan.friction.copy()
         friction[plan.watched :] *= 0.7
