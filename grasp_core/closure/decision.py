@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.closure.margin_program import (
@@ -107,6 +108,31 @@ def _decided_quickly(arms: Array, normals: Array, friction: Array) -> Answer | N
     if upper < -DECIDED and refutes_closure(twists[0], arms, normals, friction):
         return Answer(lower, forces[0], twists[0], closed=False)
     return None
+
+
+def closing_forces_of_many(
+    arms: Array, normals: Array, friction: float
+) -> tuple[NDArray[np.bool_], Array]:
+    """Find forces that prove closure of many sets of contacts, in compiled code alone.
+
+    Args:
+        arms: Contacts at unit size, (g, k, 3).
+        normals: Inward unit normals, (g, k, 3).
+        friction: Coulomb coefficient of all contacts, positive.
+
+    Returns:
+        Where compiled code decides for closure as `decide` does, and is proved right, (g,); and the
+        forces that prove it there, (g, k, 3). Elsewhere nothing is decided.
+    """
+    every = np.full(len(arms), friction)
+    forces, _, margins = deepest_forces(arms, normals, every, PRECISE)
+    forces = without_giants(forces, 2)
+    lower, upper = margins.T
+    with np.errstate(invalid="ignore"):  # a search that broke down ends with NaN
+        close = np.abs(upper - lower) <= DECIDED * np.maximum(friction, np.abs(lower))
+        close &= (lower > DECIDED) & (lower <= FAR * friction)
+    close &= proves_closure(forces, arms, normals, every[:, None])
+    return close, forces
 
 
 def _apart(arms: Array, normals: Array, friction: Array) -> Answer:

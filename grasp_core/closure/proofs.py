@@ -157,6 +157,40 @@ def proved_margin(
     return left / pushes if pushes > 0.0 else -math.inf
 
 
+def proved_margins(
+    forces: Array, arms: Array, normals: Array, friction: float, caution: float = 1.0
+) -> Array:
+    """Compute the margins (1) that the forces of many sets of contacts prove, (g,).
+
+    `proved_margin` explains them; friction has to be positive, and one for all contacts.
+
+    Args:
+        forces: Nearly balanced contact forces, (g, k, 3).
+        arms: Contacts at unit size, (g, k, 3).
+        normals: Inward unit normals, (g, k, 3).
+        friction: Coulomb coefficient.
+        caution: Factor on the length c of the correction.
+
+    Returns:
+        Lower bounds of the optima of the margin programs; minus infinity where there is none.
+    """
+    maps = grasp_map(arms)
+    if not maps.size:
+        return np.full(len(arms), -math.inf)
+    along, across = normal_and_tangential(forces, normals)
+    stacked = forces.reshape(len(forces), maps.shape[-1])
+    imbalance = np.linalg.norm(np.einsum("gwj,gj->gw", maps, stacked), axis=-1)
+    least = np.linalg.svd(maps, compute_uv=False)[..., WRENCH - 1]
+    full = least > RANK
+    # c of (1); its normal parts sum to at most sqrt(k) c
+    corrected = caution * (imbalance + CHECK_SLACK) / np.where(full, least, 1.0)
+    pushes = along.sum(axis=-1) + math.sqrt(arms.shape[-2]) * corrected
+    depths = friction * along - across
+    left = depths.min(axis=-1) - math.sqrt(1.0 + friction**2) * corrected
+    usable = full & (pushes > 0.0)
+    return np.where(usable, left / np.where(usable, pushes, 1.0), -math.inf)
+
+
 def margin_ceiling(
     twist: Array, arms: Array, normals: Array, friction: Array, caution: float = 1.0
 ) -> float:

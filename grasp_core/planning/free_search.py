@@ -16,6 +16,12 @@ import numpy as np
 
 from grasp_core.cones.tilting import toward, widened
 from grasp_core.errors import SolverError
+from grasp_core.families.batches.settling import (
+    MOST_CHOICES,
+    Attempt,
+    Cones,
+    chosen_shapes,
+)
 from grasp_core.families.constructions import (
     CONSTRUCTIONS,
     MIXED,
@@ -28,17 +34,15 @@ from grasp_core.families.placements import Placement
 from grasp_core.families.true_surface import on_true_surface
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, choices_near
 from grasp_core.objects.standard_order import Standard
-from grasp_core.planning.certify import Certified, certify, named
+from grasp_core.planning.certify import Candidate, Certified, certify, named
 from grasp_core.planning.family_search import (
-    MOST_CHOICES,
     MethodSearch,
+    Tries,
     best_first,
-    chosen_shapes,
-    tried,
 )
 from grasp_core.planning.planned_cones import BELOW_SPAN_ANGLE, LEAST_SPAN_ANGLE, usable_half_angles
-from grasp_core.planning.quadruples import Attempt, Cones
 from grasp_core.planning.request import COMPLETE_PARTS, FAMILIES, PlanRequest
+from grasp_core.planning.result import Tally
 from grasp_core.values import FINGERS, FaceQuadruple, ForceCone, four
 
 BATCH = 64
@@ -250,10 +254,9 @@ def _certified(
         if better := _upgraded(faces, pieces, construction, cones, request.friction):
             return better
     cones = four(ForceCone(piece.normal, request.theta) for piece in pieces)
-    certified = certify(
-        named("f", faces), faces, "regulus", pieces, cones, placement, request.friction,
-        regions_of(point_region, pieces, cones, placement),
-    )  # fmt: skip
+    points = regions_of(point_region, pieces, cones, placement)
+    candidate = Candidate(named("f", faces), faces, "regulus", pieces, cones, placement, points)
+    certified = certify(candidate, request.friction)
     if certified is None:
         search.tally.count("rejected")
     return certified
@@ -263,11 +266,17 @@ def _upgraded(
     faces: FaceQuadruple, pieces: Pieces, construction: Construction, cones: Cones, friction: float
 ) -> Certified | None:
     """Find the best grasp of a construction on the same pieces with given cones, or None."""
-    found: list[Certified] = []
-    for order in construction.orders:
-        around = four(cones[finger] for finger in order)
-        shapes = [FaceShape((pieces[finger],), pieces[finger]) for finger in order]
-        attempt = Attempt(four(faces[finger] for finger in order), (around,), (math.inf,))
-        one, _ = tried(construction, attempt, shapes, friction, construction.least)
-        found += [one] if one else []
-    return min(found, key=best_first, default=None)
+    shapes: list[FaceShape | None] = [None] * (max(faces) + 1)
+    for face, piece in zip(faces, pieces, strict=True):
+        shapes[face] = FaceShape((piece,), piece)
+    attempts = [
+        Attempt(
+            four(faces[finger] for finger in order),
+            (four(cones[finger] for finger in order),),
+            (math.inf,),
+        )
+        for order in construction.orders
+    ]
+    tries = Tries(construction, shapes, friction)
+    found = tries.certified(attempts, construction.least, Tally())
+    return min((one for one in found if one), key=best_first, default=None)
