@@ -9,7 +9,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.closure.margin_program import (
@@ -26,11 +25,7 @@ from grasp_core.closure.proofs import (
     without_giants,
 )
 from grasp_core.closure.wrench_sets import WrenchSet, nearest_wrench
-from grasp_core.closure.wrenches import (
-    WRENCH,
-    grasp_map,
-    normal_and_tangential,
-)
+from grasp_core.closure.wrenches import WRENCH, cross, grasp_map, normal_and_tangential
 from grasp_core.errors import SolverError
 
 DECIDED = 1e-9
@@ -110,31 +105,6 @@ def _decided_quickly(arms: Array, normals: Array, friction: Array) -> Answer | N
     return None
 
 
-def closing_forces_of_many(
-    arms: Array, normals: Array, friction: float
-) -> tuple[NDArray[np.bool_], Array]:
-    """Find forces that prove closure of many sets of contacts, in compiled code alone.
-
-    Args:
-        arms: Contacts at unit size, (g, k, 3).
-        normals: Inward unit normals, (g, k, 3).
-        friction: Coulomb coefficient of all contacts, positive.
-
-    Returns:
-        Where compiled code decides for closure as `decide` does, and is proved right, (g,); and the
-        forces that prove it there, (g, k, 3). Elsewhere nothing is decided.
-    """
-    every = np.full(len(arms), friction)
-    forces, _, margins = deepest_forces(arms, normals, every, PRECISE)
-    forces = without_giants(forces, 2)
-    lower, upper = margins.T
-    with np.errstate(invalid="ignore"):  # a search that broke down ends with NaN
-        close = np.abs(upper - lower) <= DECIDED * np.maximum(friction, np.abs(lower))
-        close &= (lower > DECIDED) & (lower <= FAR * friction)
-    close &= proves_closure(forces, arms, normals, every[:, None])
-    return close, forces
-
-
 def _apart(arms: Array, normals: Array, friction: Array) -> Answer:
     """Refute closure by the twist towards the nearest wrench, or leave it undecided."""
     wrenches = WrenchSet.at(arms, normals, friction)
@@ -151,7 +121,7 @@ def _touching_twist(twist: Array, arms: Array, normals: Array, friction: Array) 
     """
     twist = twist / max(float(np.linalg.norm(twist)), SMALLEST_NORMAL)
     for _ in range(NEWTON_STEPS):
-        velocities = twist[:3] + np.cross(twist[3:], arms)
+        velocities = twist[:3] + cross(twist[3:], arms)
         along, across = normal_and_tangential(velocities, normals)
         excess = along + friction * across
         touched = excess > -TOUCHING
@@ -160,7 +130,7 @@ def _touching_twist(twist: Array, arms: Array, normals: Array, friction: Array) 
             :, None
         ]
         forces = (normals + friction[:, None] * sideways)[touched]
-        slopes = np.hstack([forces, np.cross(arms[touched], forces)])
+        slopes = np.hstack([forces, cross(arms[touched], forces)])
         step, *_ = np.linalg.lstsq(slopes, excess[touched], rcond=RANK)
         twist = twist - np.asarray(step, dtype=np.float64)
     return twist

@@ -29,13 +29,13 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from grasp_core.arrays import SMALLEST_SIZE, UNIT_SLACK, Array, real_array
+from grasp_core.arrays import SMALLEST_SIZE, Array, real_array
 from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions, unit_size
-from grasp_core.closure.decision import closing_forces_of_many, decide
-from grasp_core.closure.proofs import margin_ceiling, proved_margin, proved_margins
-from grasp_core.closure.wrenches import normal_and_tangential
+from grasp_core.closure.decision import decide
+from grasp_core.closure.proofs import margin_ceiling, proved_margin
+from grasp_core.closure.wrenches import cross, normal_and_tangential
 from grasp_core.errors import UndecidedError
 from grasp_core.fields import are_frictions, are_units, is_array, is_number
 from grasp_core.values import Grasp
@@ -140,7 +140,7 @@ class ClosureCertificate:
         if not is_array(wrench, 6):
             return math.inf
         # the twist of (4), moved from the frame's origin to the mean contact, at unit size
-        turned = np.asarray(np.cross(wrench[3:], center), dtype=np.float64)
+        turned = cross(wrench[3:], center)
         twist = np.concatenate([wrench[:3] + turned, wrench[3:] * size])
         ceiling = margin_ceiling(twist, arms, normals, self.friction, caution)
         return -math.inf if ceiling <= FAR_BELOW else ceiling
@@ -148,7 +148,7 @@ class ClosureCertificate:
 
 def _balance(forces: Array, arms: Array, normals: Array) -> bool:
     """Return whether forces balance at unit size, (1), and their normal parts sum to 1, (2)."""
-    wrench = np.concatenate([forces.sum(axis=0), np.cross(arms, forces).sum(axis=0)])
+    wrench = np.concatenate([forces.sum(axis=0), cross(arms, forces).sum(axis=0)])
     pushes = float(np.einsum("ki,ki->", forces, normals))
     return float(np.abs(wrench).max()) <= SUMMED and abs(pushes - 1.0) <= SUMMED
 
@@ -189,48 +189,6 @@ def force_closure(
     raise UndecidedError(_why_undecided(answer.margin))
 
 
-def closing_margins(positions: Array, normals: Array, friction: float) -> Array:
-    """Compute the margins of certificates of force closure for many sets of contacts, (g,).
-
-    Each is the margin of the certificate that `force_closure` gives: its forces are found and
-    checked in the same way, on arrays of all sets.
-
-    Args:
-        positions: Contact points, (g, k, 3) [m].
-        normals: Inward unit normals, (g, k, 3).
-        friction: Coulomb coefficient of all contacts.
-
-    Returns:
-        Proved margins, above zero; NaN where compiled code does not prove closure, which tells
-        nothing: `force_closure` decides such contacts.
-    """
-    margins = np.full(len(positions), math.nan)
-    if not (friction > 0.0 and len(positions)):
-        return margins
-    arms, _, _ = unit_size(positions)
-    closed, forces = closing_forces_of_many(arms, normals, friction)
-    closed &= (np.abs(np.linalg.norm(normals, axis=-1) - 1.0) <= UNIT_SLACK).all(axis=-1)
-    arms, units, forces = arms[closed], normals[closed], forces[closed]
-    # (2) exactly: scaling forces leaves (1) and the sign of (3) alone
-    forces = forces / np.einsum("gki,gki->g", forces, units)[:, None, None]
-    units = units / np.linalg.norm(units, axis=-1, keepdims=True)
-    found = proved_margins(forces, arms, units, friction, CAUTION)
-    # as `verify` does
-    verified = (found > 0.0) & (found <= proved_margins(forces, arms, units, friction))
-    verified &= _balance_each(forces, arms, units)
-    margins[closed] = np.where(verified, found, math.nan)
-    return margins
-
-
-def _balance_each(forces: Array, arms: Array, normals: Array) -> NDArray[np.bool_]:
-    """Return which sets of forces pass `_balance`, (g,)."""
-    torques = np.cross(arms, forces).sum(axis=1)
-    wrenches = np.concatenate([forces.sum(axis=1), torques], axis=1)
-    pushes = np.einsum("gki,gki->g", forces, normals)
-    balanced = np.abs(wrenches).max(axis=1, initial=0.0) <= SUMMED
-    return balanced & (np.abs(pushes - 1.0) <= SUMMED)
-
-
 def _why_undecided(margin: float) -> str:
     if abs(margin) < UNSAFE:
         return (
@@ -245,4 +203,4 @@ def _why_undecided(margin: float) -> str:
 
 def _about_origin(twist: Array, center: Array, size: Array) -> Array:
     turning = twist[3:] / size
-    return np.concatenate([twist[:3] - np.cross(turning, center), turning])
+    return np.concatenate([twist[:3] - cross(turning, center), turning])

@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import SMALLEST_SIZE, Array, frozen
 from grasp_core.closure.contact_arrays import check_spread
+from grasp_core.closure.wrenches import cross
 from grasp_core.errors import InputError
 
 LineClass: TypeAlias = Literal["planar", "concurrent", "pencil", "regulus", "independent"]
@@ -42,7 +43,7 @@ REGULUS = 3
 
 def plucker_vectors(points: Array, directions: Array) -> Array:
     """Return the Pluecker vectors (d, x x d) of lines, (k, 6)."""
-    return np.hstack([directions, np.cross(points, directions)])
+    return np.hstack([directions, cross(points, directions)])
 
 
 def classify_lines(points: ArrayLike, directions: ArrayLike) -> LineClass:
@@ -109,7 +110,7 @@ def classify_each(points: Array, directions: Array) -> list[LineClass]:
     usual &= spreads > ONE_POINT * np.abs(points).max(axis=(1, 2), initial=0.0)
     rows = np.flatnonzero(usual)
     units, arms = directions[rows] / lengths[rows], arms[rows] / spreads[rows, None, None]
-    vectors = np.concatenate([units, np.cross(arms, units)], axis=-1)
+    vectors = np.concatenate([units, cross(arms, units)], axis=-1)
     _, sizes, basis = np.linalg.svd(vectors, full_matrices=False)
     ranks = (sizes > ON_CLASS).sum(axis=-1)
     # (1): sets of another rank are rare

@@ -36,6 +36,7 @@ from grasp_core.closure.margin_program import (
 from grasp_core.closure.wrenches import (
     WRENCH,
     contact_frames,
+    cross,
     grasp_map,
     in_frames,
     normal_and_tangential,
@@ -50,7 +51,7 @@ RANK = 1e-9
 
 def supports(twist: Array, arms: Array, normals: Array, friction: Array) -> Array:
     """Compute the support s_i(y) of each friction cone, cut at unit normal force, (..., k)."""
-    velocities = twist[..., None, :3] + np.cross(twist[..., None, 3:], arms)
+    velocities = twist[..., None, :3] + cross(twist[..., None, 3:], arms)
     along, across = normal_and_tangential(velocities, normals)
     return along + friction * across
 
@@ -157,40 +158,6 @@ def proved_margin(
     return left / pushes if pushes > 0.0 else -math.inf
 
 
-def proved_margins(
-    forces: Array, arms: Array, normals: Array, friction: float, caution: float = 1.0
-) -> Array:
-    """Compute the margins (1) that the forces of many sets of contacts prove, (g,).
-
-    `proved_margin` explains them; friction has to be positive, and one for all contacts.
-
-    Args:
-        forces: Nearly balanced contact forces, (g, k, 3).
-        arms: Contacts at unit size, (g, k, 3).
-        normals: Inward unit normals, (g, k, 3).
-        friction: Coulomb coefficient.
-        caution: Factor on the length c of the correction.
-
-    Returns:
-        Lower bounds of the optima of the margin programs; minus infinity where there is none.
-    """
-    maps = grasp_map(arms)
-    if not maps.size:
-        return np.full(len(arms), -math.inf)
-    along, across = normal_and_tangential(forces, normals)
-    stacked = forces.reshape(len(forces), maps.shape[-1])
-    imbalance = np.linalg.norm(np.einsum("gwj,gj->gw", maps, stacked), axis=-1)
-    least = np.linalg.svd(maps, compute_uv=False)[..., WRENCH - 1]
-    full = least > RANK
-    # c of (1); its normal parts sum to at most sqrt(k) c
-    corrected = caution * (imbalance + CHECK_SLACK) / np.where(full, least, 1.0)
-    pushes = along.sum(axis=-1) + math.sqrt(arms.shape[-2]) * corrected
-    depths = friction * along - across
-    left = depths.min(axis=-1) - math.sqrt(1.0 + friction**2) * corrected
-    usable = full & (pushes > 0.0)
-    return np.where(usable, left / np.where(usable, pushes, 1.0), -math.inf)
-
-
 def margin_ceiling(
     twist: Array, arms: Array, normals: Array, friction: Array, caution: float = 1.0
 ) -> float:
@@ -213,7 +180,7 @@ def margin_ceiling(
     """
     if not refutes_closure(twist, arms, normals, friction):
         return math.inf
-    along, _ = normal_and_tangential(twist[:3] + np.cross(twist[3:], arms), normals)
+    along, _ = normal_and_tangential(twist[:3] + cross(twist[3:], arms), normals)
     rounding = caution * CHECK_SLACK * float(np.linalg.norm(twist)) * np.sqrt(1.0 + friction**2)
     # M of (3), which rounding may raise
     largest = float((supports(twist, arms, normals, friction) + rounding).max())

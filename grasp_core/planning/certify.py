@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, frozen_copy
+from grasp_core.closure.batches.certificates import closing_margins
 from grasp_core.closure.critical_friction import critical_friction
-from grasp_core.closure.force_closure import closing_margins, force_closure
+from grasp_core.closure.force_closure import force_closure
 from grasp_core.closure.lines import classify_each, classify_lines
 from grasp_core.closure.wrenches import grasp_map, normal_and_tangential
 from grasp_core.cones.many_quadruples import span_angles
@@ -225,7 +226,8 @@ class LateFigures:
 def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:
     """Convert a certified placement to a grasp in the object's frame, which has late figures."""
     placement, normals = found.placement, frozen_copy(found.normals)
-    positions = _at(body, placement.positions)
+    center, radius = body.center_of_mass, body.radius
+    positions = _at(center, radius, placement.positions)
     return trusted(
         Grasp,
         id=found.id,
@@ -235,18 +237,18 @@ def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:
             trusted(Contact, position=position, normal=normal)
             for position, normal in zip(positions, normals, strict=True)
         ),
-        focus_points=_at(body, placement.foci),
+        focus_points=_at(center, radius, placement.foci),
         force_cones=four(found.cones),
         regions=four(
             trusted(
                 ContactRegion,
                 kind=region.kind,
-                polygon=_at(body, region.polygon),
-                inscribed_radius=body.radius * region.inscribed_radius,
+                polygon=_at(center, radius, region.polygon),
+                inscribed_radius=radius * region.inscribed_radius,
             )
             for region in found.regions
         ),
-        radius=body.radius * float(placement.radii.min()),
+        radius=radius * float(placement.radii.min()),
         span_angle=found.span_angle,
         closure_margin=found.margin,
         witness=trusted(Witness, points=positions, forces=frozen_copy(placement.forces)),
@@ -255,8 +257,8 @@ def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:
     )
 
 
-def _at(body: Polyhedron, unit_points: Array) -> Array:
+def _at(center: Array, radius: float, unit_points: Array) -> Array:
     """Convert points from unit object size to the object's frame, read-only, (k, 3) [m]."""
-    points = body.center_of_mass + body.radius * unit_points
+    points = center + radius * unit_points
     points.setflags(write=False)
     return points

@@ -1,11 +1,12 @@
 """Searches one object's face quadruples with one construction, keeping its best grasps."""
 
 import math
-from bisect import insort
+from bisect import bisect
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, islice, takewhile
+from typing import TypeAlias
 
 import numpy as np
 
@@ -34,6 +35,10 @@ SAME_CONTACTS = 1e-6
 """Distance between contacts below which two grasps count as one, in object radii."""
 
 
+SortKey: TypeAlias = tuple[float, FaceQuadruple, FaceQuadruple]
+"""Minus the graded merit of a grasp, its faces in rising order, and its faces by finger."""
+
+
 @dataclass(slots=True, eq=False)
 class MethodSearch:
     """The grasps, proofs and counts that one method has gathered so far."""
@@ -44,6 +49,8 @@ class MethodSearch:
     """Function that returns how fingers reach the contacts of a grasp, or why they cannot."""
     best: list[Certified] = field(default_factory=list[Certified])
     """At most `limit` grasps, best first."""
+    _keys: list[SortKey] = field(default_factory=list[SortKey])
+    """What the grasps of `best` are sorted by."""
     held: set[FaceQuadruple] = field(default_factory=set[FaceQuadruple])
     """Ascending faces on which a grasp was found, whether it was kept or not."""
     tally: Tally = field(default_factory=Tally)
@@ -87,13 +94,16 @@ class MethodSearch:
         found = replace(found, method=self.method, ways_out=way.directions)
         self.tally.count("found")
         self.held.add(faces)
-        insort(self.best, found, key=best_first)
+        key = best_first(found)
+        place = bisect(self._keys, key)
+        self._keys.insert(place, key)
+        self.best.insert(place, found)
         if self.limit is not None:
-            del self.best[self.limit :]
+            del self.best[self.limit :], self._keys[self.limit :]
         return [found]
 
 
-def best_first(found: Certified) -> tuple[float, FaceQuadruple, FaceQuadruple]:
+def best_first(found: Certified) -> SortKey:
     """Return a sort key: largest merit first, equal merits by faces, then by finger order."""
     return -graded(found.placement.merit), four(sorted(found.faces)), found.faces
 
