@@ -95,7 +95,7 @@ def certify_each(candidates: Sequence[Candidate], friction: float) -> list[Certi
     points = np.array([each.placement.positions for each in candidates])
     normals = np.array([[piece.normal for piece in each.pieces] for each in candidates])
     forces = np.array([each.placement.forces for each in candidates])
-    families = [each.family for each in candidates]
+    families: list[Family] = [each.family for each in candidates]
     certified: list[Certified | None] = []
     for each, fits, known, angle in zip(
         candidates,
@@ -225,40 +225,50 @@ class LateFigures:
 
 def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:
     """Convert a certified placement to a grasp in the object's frame, which has late figures."""
-    placement, normals = found.placement, frozen_copy(found.normals)
+    return to_grasps(body, friction, [found])[0]
+
+
+def to_grasps(body: Polyhedron, friction: float, found: Sequence[Certified]) -> list[Grasp]:
+    """Convert certified placements to grasps in the object's frame, which have late figures."""
+    if not found:
+        return []
+    normals = frozen_copy(np.array([each.normals for each in found]))
+    forces = frozen_copy(np.array([each.placement.forces for each in found]))
     center, radius = body.center_of_mass, body.radius
-    positions = _at(center, radius, placement.positions)
-    return trusted(
-        Grasp,
-        id=found.id,
-        family=found.family,
-        faces=found.faces,
-        contacts=four(
-            trusted(Contact, position=position, normal=normal)
-            for position, normal in zip(positions, normals, strict=True)
-        ),
-        focus_points=_at(center, radius, placement.foci),
-        force_cones=four(found.cones),
-        regions=four(
-            trusted(
-                ContactRegion,
-                kind=region.kind,
-                polygon=_at(center, radius, region.polygon),
-                inscribed_radius=radius * region.inscribed_radius,
-            )
-            for region in found.regions
-        ),
-        radius=radius * float(placement.radii.min()),
-        span_angle=found.span_angle,
-        closure_margin=found.margin,
-        witness=trusted(Witness, points=positions, forces=frozen_copy(placement.forces)),
-        approach_directions=None if found.ways_out is None else frozen_copy(-found.ways_out),
-        _figures=LateFigures(placement.positions, normals, friction),
-    )
-
-
-def _at(center: Array, radius: float, unit_points: Array) -> Array:
-    """Convert points from unit object size to the object's frame, read-only, (k, 3) [m]."""
-    points = center + radius * unit_points
-    points.setflags(write=False)
-    return points
+    positions = center + radius * np.array([each.placement.positions for each in found])
+    polygons = [region.polygon for each in found for region in each.regions]
+    corners = center + radius * np.concatenate(polygons)
+    for array in (positions, corners):
+        array.setflags(write=False)
+    ends = np.cumsum([len(polygon) for polygon in polygons]).tolist()
+    rings = iter(corners[start:end] for start, end in zip([0, *ends], ends, strict=False))
+    return [
+        trusted(
+            Grasp,
+            id=each.id,
+            family=each.family,
+            faces=each.faces,
+            contacts=four(
+                trusted(Contact, position=position, normal=normal)
+                for position, normal in zip(positions[i], normals[i], strict=True)
+            ),
+            focus_points=frozen_copy(center + radius * each.placement.foci),
+            force_cones=four(each.cones),
+            regions=four(
+                trusted(
+                    ContactRegion,
+                    kind=region.kind,
+                    polygon=next(rings),
+                    inscribed_radius=radius * region.inscribed_radius,
+                )
+                for region in each.regions
+            ),
+            radius=radius * float(each.placement.radii.min()),
+            span_angle=each.span_angle,
+            closure_margin=each.margin,
+            witness=trusted(Witness, points=positions[i], forces=forces[i]),
+            approach_directions=None if each.ways_out is None else frozen_copy(-each.ways_out),
+            _figures=LateFigures(each.placement.positions, normals[i], friction),
+        )
+        for i, each in enumerate(found)
+    ]

@@ -91,7 +91,8 @@ class MethodSearch:
             self.tally.count("unreachable")
             self.unreached[faces] = way.reason
             return []
-        found = replace(found, method=self.method, ways_out=way.directions)
+        if found.method != self.method or way.directions is not None:
+            found = replace(found, method=self.method, ways_out=way.directions)
         self.tally.count("found")
         self.held.add(faces)
         key = best_first(found)
@@ -232,6 +233,8 @@ class Tries:
 
 def _without_duplicates(found: list[Certified]) -> list[Certified]:
     """Drop each grasp whose contacts are those of a better one; all are on the same faces."""
+    if len(found) < 2:  # noqa: PLR2004 - nothing to compare
+        return found
     kept: list[Certified] = []
     for one in sorted(found, key=best_first):
         here = one.placement.positions[np.argsort(one.faces)]

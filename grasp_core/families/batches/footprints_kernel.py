@@ -69,7 +69,7 @@ def _cut(
     (a, finger), (flat, heights) = place, room
     face, axis = attempts.faces[a, finger], attempts.axes[a, finger]
     T, o = faces.frames[face], faces.origins[face]
-    count, way, corner = faces.edges[face], np.empty(3), np.empty(3)
+    count, way, corner = int(faces.edges[face]), np.empty(3), np.empty(3)
     for k in range(count):
         for j in range(3):
             corner[j] = faces.corners[face, k, j] - o[j]
@@ -87,7 +87,7 @@ def _cut(
             lean = turns[m, 0] * first[j] + turns[m, 1] * second[j]
             g[j] = side * (sine * axis[j] - cosine * lean)
         # (1) and (3) of `concurrent` with r = 0 and x0 fixed bound the point y alone
-        limit = dotted(g, way) - faces.depths[face] * abs(dotted(g, faces.normals[face]))
+        limit = dotted(g, way) - float(faces.depths[face]) * abs(dotted(g, faces.normals[face]))
         count = _clip(flat, heights, count, (dotted(T[:, 0], g), dotted(T[:, 1], g), limit))
     return count
 

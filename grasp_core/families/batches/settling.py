@@ -113,6 +113,9 @@ class Settling:
         chosen, cones, placement, known = end.planned
         regions = known or regions_of(self.construction.region, chosen, cones, placement)
         shapes = chosen_shapes(self.shapes, attempt.faces)
+        if all(shape.facets is None for shape in shapes):
+            end.settled = chosen, cones, placement, regions
+            return
         place = partial(_placed_on, self.construction, cones)
         try:
             found = on_true_surface(shapes, chosen, cones, placement, regions, place)
