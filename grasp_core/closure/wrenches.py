@@ -21,7 +21,7 @@ def grasp_map(positions: Array, center: Array | None = None) -> Array:
         center: Point about which torques are taken, (3,) [m]; the origin when None.
     """
     arms = positions if center is None else positions - center
-    x, y, z = np.moveaxis(arms, -1, 0)
+    x, y, z = arms[..., 0], arms[..., 1], arms[..., 2]
     G = np.zeros((*arms.shape[:-2], WRENCH, arms.shape[-2], 3))
     G[..., 0, :, 0] = G[..., 1, :, 1] = G[..., 2, :, 2] = 1.0
     G[..., 3, :, 1], G[..., 3, :, 2] = -z, y
