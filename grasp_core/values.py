@@ -253,9 +253,9 @@ def trusted(kind: type[Item], /, **fields: Any) -> Item:
         kind: Class of the value.
         fields: All fields by name; arrays have to be read-only floats of the right shape.
     """
-    made = object.__new__(kind)
-    for name, value in fields.items():
-        object.__setattr__(made, name, value)
+    made, put = object.__new__(kind), object.__setattr__
+    for name in fields:
+        put(made, name, fields[name])
     return made
 
 

@@ -6,6 +6,7 @@ upper bound on the radius of their discs, and rows that are not worth a linear p
 """
 
 from dataclasses import dataclass, fields
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,22 +87,22 @@ class ConedQuadruples:
                 with a bound of minus infinity are left out.
         """
         found: list[Attempt] = []
+        made = cache(partial(self._cones, row))
         for column, order in enumerate(construction.orders):
             kinds = np.argsort(-graded(bounds[:, column]), kind="stable").tolist()
             kinds = [kind for kind in kinds if bounds[kind, column] > -np.inf]
             if kinds:
                 faces = four(int(self.faces[row, finger]) for finger in order)
-                cones = tuple(self._cones(row, kind, order) for kind in kinds)
+                cones = tuple(four(made(kind)[finger] for finger in order) for kind in kinds)
                 attempt = Attempt(faces, cones, tuple(float(bounds[k, column]) for k in kinds))
                 found.append(attempt)
         return tuple(found)
 
-    def _cones(self, row: int, kind: int, order: tuple[int, ...]) -> Cones:
+    def _cones(self, row: int, kind: int) -> Cones:
+        """Return one choice of force cones, in the order of the faces."""
         half_angle = float(self.half_angles[row, kind])
         axes = frozen_copy(self.axes[row, kind])
-        return four(
-            trusted(ForceCone, axis=axes[finger], half_angle=half_angle) for finger in order
-        )
+        return four(trusted(ForceCone, axis=axis, half_angle=half_angle) for axis in axes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
