@@ -37,6 +37,8 @@ ON_CLASS = 1e-7
 spread over a unit length: ten times what a linear program's answer may be off."""
 ONE_POINT = 1e-12
 """Points closer than this, relative to their coordinates, are one point."""
+DEPENDENT = 3
+"""Largest rank of four dependent lines."""
 REGULUS = 3
 """Rank of the reciprocal form on the span of four lines that lie on a regulus."""
 
@@ -113,11 +115,11 @@ def classify_each(points: Array, directions: Array) -> list[LineClass]:
     vectors = np.concatenate([units, cross(arms, units)], axis=-1)
     _, sizes, basis = np.linalg.svd(vectors, full_matrices=False)
     ranks = (sizes > ON_CLASS).sum(axis=-1)
-    # (1): sets of another rank are rare
-    for row in np.flatnonzero(ranks == units.shape[-2]).tolist():
+    # (1); sets of a smaller rank are rare, and left to `classify_lines`
+    for row in np.flatnonzero(ranks > DEPENDENT).tolist():
         found[rows[row]] = "independent"
-    three = np.flatnonzero(ranks == REGULUS)
-    span = basis[three, :REGULUS]
+    three = np.flatnonzero(ranks == DEPENDENT)
+    span = basis[three, :DEPENDENT]
     # (2), on an orthonormal basis of the span
     form = span[..., :3] @ span[..., 3:].swapaxes(-1, -2)
     values = np.linalg.eigvalsh(form + form.swapaxes(-1, -2))

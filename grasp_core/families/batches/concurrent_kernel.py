@@ -41,12 +41,11 @@ def place(
     x = np.empty(VARIABLES)
     for a in range(len(least)):
         count = FINGERS * (len(turns) + 1) + edges_of(faces, attempts, a)
-        program = Program(
-            np.zeros((count + 2, VARIABLES)), np.zeros(count + 2), FIRST_RADIUS, LEAST
-        )
         worth, placed.ends[a] = least[a], NONE
         for p in range(len(patterns)):
-            program.A[:], program.b[:] = 0.0, 0.0
+            program = Program(
+                np.zeros((count + 2, VARIABLES)), np.zeros(count + 2), FIRST_RADIUS, LEAST
+            )
             row = 0
             for finger in range(FINGERS):
                 place = (a, finger, row)

@@ -27,7 +27,7 @@ class Program(NamedTuple):
     """A disc program: rows A x <= b, with room for the two rows that later steps add."""
 
     A: Array
-    """Rows, (rows + 2, n); the last two are filled in by `largest_discs`."""
+    """Rows, (rows + 2, n); the last two are zeros, filled in by `largest_discs`."""
     b: Array
     """Limits of the rows, (rows + 2,)."""
     radii: int
@@ -56,14 +56,14 @@ def largest_discs(program: Program, least: float, x: Array) -> tuple[int, float]
     if status != PLACED or first < least:
         return (NONE if status == PLACED else status), first
     # the sum of the radii, where the smallest one stays nearly as large
-    A[count], b[count] = -c, -first * (1.0 - KEPT)
-    c[:] = 0.0
+    A[count, smallest], b[count] = -1.0, -first * (1.0 - KEPT)
+    c[smallest] = 0.0
     for finger in range(4):
         c[radii + finger] = 1.0
+        A[count + 1, radii + finger] = -1.0
     status, second = optimum(c, A[: count + 1], b[: count + 1], -np.inf, x)
     if status != PLACED:
         return LEFT, first
-    A[count + 1] = -c
     b[count + 1] = -(second - SAME_VALUE * (1.0 + abs(second)))
     if not _nearest(A, b, x):
         return LEFT, first
@@ -87,9 +87,11 @@ def optimum(c: Array, A: Array, b: Array, cutoff: float, x: Array) -> tuple[int,
         `PLACED` and the optimum; `NONE` where a bound below the cutoff is proved; or `LEFT`.
     """
     count, n = A.shape
-    rows = Rows(np.ascontiguousarray(A.T), b.copy(), np.empty(count), 0)
+    rows = Rows(np.empty((n, count)), np.empty(count), np.empty(count), 0)
     for k in range(count):
-        rows.norms[k] = max(np.sqrt(_dot(A[k], A[k])), RESIDUAL)
+        rows.b[k], rows.norms[k] = b[k], max(np.sqrt(_dot(A[k], A[k])), RESIDUAL)
+        for j in range(n):
+            rows.At[j, k] = A[k, j]
     vertex = Vertex(np.empty(n, np.int64), np.empty(n), np.empty(n))
     status, _ = solve(c, rows, cutoff, vertex)
     if status == BELOW:
@@ -97,17 +99,23 @@ def optimum(c: Array, A: Array, b: Array, cutoff: float, x: Array) -> tuple[int,
         return (NONE if bound <= cutoff else LEFT), bound
     if status != OPTIMAL:
         return LEFT, 0.0
-    basis, limits, y = np.sort(vertex.basis), np.empty(n), c.copy()
-    if basis[-1] >= count:  # the box, in which the search begins
+    if not _at_vertex(c, A, b, vertex, x):
         return LEFT, 0.0
-    corner = np.empty((n, n))
+    return _checked(c, A, b, vertex.basis, x, vertex.y)
+
+
+@loop("numpy")
+def _at_vertex(c: Array, A: Array, b: Array, vertex: Vertex, x: Array) -> bool:
+    """Solve for the point and the multipliers of a basis; return False if it leans on the box."""
+    n, basis, y = len(x), vertex.basis, vertex.y
+    corner, turned = np.empty((n, n)), np.empty((n, n))
     for j in range(n):
-        corner[j], limits[j] = A[basis[j]], b[basis[j]]
-    turned = corner.T.copy()
-    x[:] = limits
-    if not (_solved(corner, x) and _solved(turned, y)):
-        return LEFT, 0.0
-    return _checked(c, A, b, basis, x, y)
+        if basis[j] >= len(b):  # a side of the box in which the search begins
+            return False
+        x[j], y[j] = b[basis[j]], c[j]
+        for i in range(n):
+            corner[j, i] = turned[i, j] = A[basis[j], i]
+    return _solved(corner, x) and _solved(turned, y)
 
 
 @loop("numpy")
@@ -174,17 +182,23 @@ def _nearest(A: Array, b: Array, x: Array) -> bool:
     The last row of A x <= b keeps the value.
     """
     count, n = A.shape
-    size = -b.min()
-    if size <= 0.0:  # the origin itself
-        x[:] = 0.0
-        return True
-    d, near, u = (b / size).reshape(1, count), np.zeros((1, n)), np.zeros((1, count))
+    size, d, largest = 0.0, np.empty((1, count)), 1.0
+    for k in range(count):
+        size = max(size, -b[k])
+    if size <= 0.0:  # the origin is nearest to itself, which no disc program asks for
+        return False
+    for k in range(count):
+        d[0, k] = b[k] / size
+    near, u = np.zeros((1, n)), np.zeros((1, count))
     solve_nearest(A, d, near, u)
     unmet, excess = _unmet(A, d[0], near[0], u[0])
-    if not unmet <= FOUND * max(1.0, np.abs(near).max()):
+    for j in range(n):
+        largest = max(largest, abs(near[0, j]))
+    if not unmet <= FOUND * largest:
         return False
     if excess * size <= FEASIBLE:
-        x[:] = size * near[0]
+        for j in range(n):
+            x[j] = size * near[0, j]
     return True
 
 

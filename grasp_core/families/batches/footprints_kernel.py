@@ -96,8 +96,8 @@ def _cut(
 def _clip(flat: Array, heights: Array, count: int, row: tuple[float, float, float]) -> int:
     """Cut a convex polygon by one row, as `clip` of `geometry.polygons`; return its corners."""
     largest, kept, fresh = 0.0, 0, flat[1]
-    for value in flat[0, :count].ravel():
-        largest = max(largest, abs(value))
+    for k in range(count):
+        largest = max(largest, abs(flat[0, k, 0]), abs(flat[0, k, 1]))
     for k in range(count):
         heights[k] = flat[0, k, 0] * row[0] + flat[0, k, 1] * row[1] - row[2]
         if abs(heights[k]) <= ON_LINE * largest:
